@@ -1,0 +1,91 @@
+#include "runtime/error.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <numeric>
+
+namespace rapid {
+
+Error& Error::at(const Location& location)
+{
+    if (location_.file.empty()) location_ = location;
+    compose();
+    return *this;
+}
+
+Error& Error::in_node(std::string_view name)
+{
+    if (node_.empty()) node_ = name;
+    compose();
+    return *this;
+}
+
+Error& Error::with_trace(std::string trace)
+{
+    if (trace_.empty()) trace_ = std::move(trace);
+    return *this;
+}
+
+void Error::compose()
+{
+    text_.clear();
+    if (!location_.file.empty()) {
+        text_ += location_.file;
+        if (location_.line > 0) text_ += fmt::format(":{}", location_.line);
+        text_ += ": ";
+    }
+    if (!node_.empty()) text_ += fmt::format("node \"{}\": ", node_);
+    text_ += message_;
+}
+
+namespace {
+
+// Optimal string alignment: insert, delete, replace, swap neighbours ("linaer" is one step from "linear").
+std::size_t edit_distance(std::string_view a, std::string_view b)
+{
+    std::vector<std::size_t> before, above(b.size() + 1), row(b.size() + 1);
+    std::iota(above.begin(), above.end(), std::size_t{0});
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        row[0] = i;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            row[j] = std::min({above[j] + 1, row[j - 1] + 1, above[j - 1] + (a[i - 1] != b[j - 1])});
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                row[j] = std::min(row[j], before[j - 2] + 1);
+        }
+        before = std::exchange(above, row);
+    }
+    return above[b.size()];
+}
+
+}  // namespace
+
+std::string nearest_name(std::string_view name, const std::vector<std::string>& names)
+{
+    std::string nearest;
+    std::size_t least = std::max<std::size_t>(1, name.size() / 3) + 1;
+    for (const std::string& candidate : names) {
+        const std::size_t distance = edit_distance(name, candidate);
+        if (distance < least) {
+            least = distance;
+            nearest = candidate;
+        }
+    }
+    return nearest;
+}
+
+std::string did_you_mean(std::string_view name, const std::vector<std::string>& names)
+{
+    const std::string nearest = nearest_name(name, names);
+    return nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest);
+}
+
+void assertion_failed(const char* condition, const char* file, int line)
+{
+    std::fprintf(stderr, "%s:%d: this is a bug in Rapid: %s does not hold\n", file, line, condition);
+    std::abort();
+}
+
+}  // namespace rapid

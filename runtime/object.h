@@ -1,0 +1,20 @@
+// What a graph's parameters can hold besides numbers and text: shapes, meshes, point sets, motions, functions. Made
+// once, never changed, shared between nodes, states and threads.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+namespace rapid {
+
+class Object {
+public:
+    virtual ~Object() = default;
+
+    // What it is called in messages: "mesh", "level set", "shape", "points", "motion", "function".
+    virtual std::string_view kind() const = 0;
+};
+
+using ObjectPtr = std::shared_ptr<const Object>;
+
+}  // namespace rapid

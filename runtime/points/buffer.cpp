@@ -1,0 +1,100 @@
+#include "runtime/points/buffer.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <utility>
+
+namespace rapid {
+namespace {
+
+constexpr std::size_t page = 4096;
+constexpr std::size_t line = 64;
+// Blocks from here on are pages of their own: below it mremap costs more than the copy that it saves.
+constexpr std::size_t mapped_from = std::size_t{1} << 18;
+
+// Five lines further for each block, within the first page.
+std::size_t stagger()
+{
+    static std::atomic<std::size_t> serial{0};
+    return line * (5 * serial.fetch_add(1, std::memory_order_relaxed) % (page / line));
+}
+
+std::size_t whole_pages(std::size_t bytes) { return (bytes + page - 1) / page * page; }
+
+}  // namespace
+
+Buffer::Buffer(Buffer&& other) noexcept
+    : block_(std::exchange(other.block_, nullptr)),
+      block_bytes_(std::exchange(other.block_bytes_, 0)),
+      mapped_(std::exchange(other.mapped_, false)),
+      data_(std::exchange(other.data_, nullptr)),
+      capacity_(std::exchange(other.capacity_, 0))
+{
+}
+
+Buffer& Buffer::operator=(Buffer&& other) noexcept
+{
+    if (this != &other) {
+        release();
+        new (this) Buffer(std::move(other));
+    }
+    return *this;
+}
+
+void Buffer::reserve(std::size_t bytes)
+{
+    if (bytes <= capacity_) return;
+    // Growth by half: untouched pages are free, and a column that is appended to every frame is remapped seldom.
+    const std::size_t wanted = capacity_ == 0 ? bytes : std::max(bytes, capacity_ + capacity_ / 2);
+
+    if (mapped_) {
+        const std::size_t offset = static_cast<char*>(data_) - static_cast<char*>(block_);
+        const std::size_t grown = whole_pages(wanted + offset);
+        void* moved = mremap(block_, block_bytes_, grown, MREMAP_MAYMOVE);
+        if (moved == MAP_FAILED) throw std::bad_alloc();
+        madvise(moved, grown, MADV_HUGEPAGE);
+        block_ = moved;
+        block_bytes_ = grown;
+        data_ = static_cast<char*>(moved) + offset;
+        capacity_ = grown - offset;
+        return;
+    }
+
+    Buffer grown;
+    if (wanted >= mapped_from) {
+        const std::size_t offset = stagger();
+        grown.block_bytes_ = whole_pages(wanted + offset);
+        grown.block_ = mmap(nullptr, grown.block_bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (grown.block_ == MAP_FAILED) {
+            grown.block_ = nullptr;
+            throw std::bad_alloc();
+        }
+        madvise(grown.block_, grown.block_bytes_, MADV_HUGEPAGE);
+        grown.mapped_ = true;
+        grown.data_ = static_cast<char*>(grown.block_) + offset;
+        grown.capacity_ = grown.block_bytes_ - offset;
+    } else {
+        grown.block_bytes_ = (wanted + line - 1) / line * line;
+        grown.block_ = std::aligned_alloc(line, grown.block_bytes_);
+        if (!grown.block_) throw std::bad_alloc();
+        grown.data_ = grown.block_;
+        grown.capacity_ = grown.block_bytes_;
+    }
+    if (capacity_ > 0) std::memcpy(grown.data_, data_, capacity_);
+    *this = std::move(grown);
+}
+
+void Buffer::release()
+{
+    if (mapped_)
+        munmap(block_, block_bytes_);
+    else
+        std::free(block_);
+}
+
+}  // namespace rapid

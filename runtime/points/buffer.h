@@ -1,0 +1,39 @@
+// The memory of one column: a block that grows in place.
+//
+// Large blocks are whole pages from the system, grown with mremap: growing moves page-table entries, never values, and
+// pages that nothing has touched take no memory. Small blocks come from the heap. The start is 64-byte aligned, and
+// staggered: columns that all begin at the same offset in their pages cost a loop over several of them 12 to 25 %
+// (4 KiB aliasing).
+#pragma once
+
+#include <cstddef>
+
+namespace rapid {
+
+class Buffer {
+public:
+    Buffer() = default;
+    explicit Buffer(std::size_t bytes) { reserve(bytes); }
+    Buffer(const Buffer&) = delete;
+    Buffer& operator=(const Buffer&) = delete;
+    Buffer(Buffer&& other) noexcept;
+    Buffer& operator=(Buffer&& other) noexcept;
+    ~Buffer() { release(); }
+
+    void* data() const { return data_; }
+    std::size_t capacity() const { return capacity_; }
+
+    // Makes room for at least `bytes`; what was written stays. Throws std::bad_alloc.
+    void reserve(std::size_t bytes);
+
+private:
+    void release();
+
+    void* block_ = nullptr;  // what the system gave
+    std::size_t block_bytes_ = 0;
+    bool mapped_ = false;  // pages of its own, else from the heap
+    void* data_ = nullptr;
+    std::size_t capacity_ = 0;
+};
+
+}  // namespace rapid

@@ -1,0 +1,173 @@
+// A typed attribute column: one value for every point of a set.
+//
+// Copying a column copies a pointer; the first write after a copy clones the values. A value that all points share is
+// held once: `pscale = 0.02` costs four bytes, not four bytes a point.
+//
+// Layout: shape [size], contiguous, 64-byte aligned; vec3 is packed x y z, as OpenVDB and Houdini hold it.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "runtime/error.h"
+#include "runtime/points/buffer.h"
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// The points that stay when others are removed: maximal runs of neighbours, in order.
+struct Compaction {
+    struct Run {
+        std::size_t begin, size;
+    };
+    std::vector<Run> runs;
+    std::size_t kept = 0;
+
+    // From a mask, shape [size]; points with 0 are removed.
+    static Compaction from_mask(std::span<const std::uint8_t> keep);
+};
+
+// Reading that does not ask, point by point, whether a column is uniform. Valid until the column is written or moved.
+template <class T>
+struct Strided {
+    const T* data;
+    std::size_t stride;  // 1, or 0 when all points share the one value
+
+    const T& operator[](std::size_t i) const { return data[i * stride]; }
+};
+
+template <class T>
+class Column {
+public:
+    // `fallback` is the value of points that are appended without one of their own.
+    explicit Column(std::size_t size = 0, T shared = zero()) : size_(size), shared_(shared), fallback_(shared) {}
+    Column(std::size_t size, T shared, T fallback) : size_(size), shared_(shared), fallback_(fallback) {}
+    explicit Column(std::span<const T> values, T fallback = zero()) : size_(0), shared_(fallback), fallback_(fallback)
+    {
+        append(values);
+    }
+
+    static T zero()
+    {
+        if constexpr (std::is_same_v<T, Vec3f>)
+            return Vec3f::Zero();
+        else if constexpr (std::is_same_v<T, Quatf>)
+            return Quatf::Identity();
+        else
+            return T{};
+    }
+
+    std::size_t size() const { return size_; }
+    bool is_uniform() const { return !values_; }
+    const T& operator[](std::size_t i) const { return values_ ? data()[i] : shared_; }
+    Strided<T> read() const { return values_ ? Strided<T>{data(), 1} : Strided<T>{&shared_, 0}; }
+
+    const T& fallback() const { return fallback_; }
+    void set_fallback(const T& value) { fallback_ = value; }
+
+    // Bytes that the values take; a column shared with another set counts in both.
+    std::size_t bytes() const { return values_ ? size_ * sizeof(T) : sizeof(T); }
+
+    // True when the two columns are one piece of memory (or both uniform).
+    bool shares_values_with(const Column& other) const { return values_ == other.values_; }
+
+    // The values for writing, shape [size]. Expands a uniform column and clones a shared one, so take it before a loop,
+    // not inside one, and from one thread: the executor gives a column to one writer at a time.
+    std::span<T> write()
+    {
+        own(size_);
+        return {mutable_data(), size_};
+    }
+
+    // The values for writing when all will be overwritten: as write(), without copying what is there.
+    std::span<T> overwrite()
+    {
+        if (!values_ || values_.use_count() > 1) values_ = std::make_shared<Buffer>(size_ * sizeof(T));
+        return {mutable_data(), size_};
+    }
+
+    void fill(const T& value)
+    {
+        values_.reset();
+        shared_ = value;
+    }
+
+    // Adds n points with the fallback value. A uniform column of that value stays one.
+    void append(std::size_t n) { append(n, fallback_); }
+
+    void append(std::size_t n, const T& value)
+    {
+        if (n == 0) return;
+        if (!values_ && (size_ == 0 || same(shared_, value))) {
+            shared_ = value;
+            size_ += n;
+            return;
+        }
+        const T copy = value;  // it may be a value of this column
+        std::span<T> added = append_for_writing(n);
+        std::uninitialized_fill(added.begin(), added.end(), copy);
+    }
+
+    void append(std::span<const T> values)
+    {
+        if (values.empty()) return;
+        std::memcpy(static_cast<void*>(append_for_writing(values.size()).data()), values.data(), values.size_bytes());
+    }
+
+    // Adds n points and returns the place of their values, which are not initialised.
+    std::span<T> append_for_writing(std::size_t n)
+    {
+        own(size_ + n);
+        size_ += n;
+        return {mutable_data() + (size_ - n), n};
+    }
+
+    // Removes all points that are in no run; the others keep their order.
+    void keep(const Compaction& compaction)
+    {
+        if (values_) {
+            const T* from = data();
+            const bool shared = values_.use_count() > 1;
+            std::shared_ptr<Buffer> into = shared ? std::make_shared<Buffer>(compaction.kept * sizeof(T)) : values_;
+            T* to = static_cast<T*>(into->data());
+            for (const auto& run : compaction.runs) {
+                if (to != from + run.begin)
+                    std::memmove(static_cast<void*>(to), from + run.begin, run.size * sizeof(T));
+                to += run.size;
+            }
+            values_ = std::move(into);
+        }
+        size_ = compaction.kept;
+    }
+
+private:
+    static_assert(std::is_trivially_destructible_v<T>, "values are moved as bytes");
+
+    static bool same(const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; }
+
+    const T* data() const { return static_cast<const T*>(values_->data()); }
+    T* mutable_data() { return values_ ? static_cast<T*>(values_->data()) : nullptr; }
+
+    // Makes the values this column's alone, expanded, with room for `size` of them.
+    void own(std::size_t size)
+    {
+        if (values_ && values_.use_count() == 1) return values_->reserve(size * sizeof(T));
+        auto owned = std::make_shared<Buffer>(size * sizeof(T));
+        if (values_)
+            std::memcpy(owned->data(), values_->data(), size_ * sizeof(T));
+        else
+            std::uninitialized_fill_n(static_cast<T*>(owned->data()), size_, shared_);
+        values_ = std::move(owned);
+    }
+
+    std::size_t size_;
+    T shared_;  // every point's value while values_ is null
+    T fallback_;
+    std::shared_ptr<Buffer> values_;
+};
+
+}  // namespace rapid

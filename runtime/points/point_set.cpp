@@ -1,0 +1,179 @@
+#include "runtime/points/point_set.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for_each.h>
+
+#include <functional>
+
+#include "runtime/parallel.h"
+
+namespace rapid {
+
+Compaction Compaction::from_mask(std::span<const std::uint8_t> keep)
+{
+    Compaction result;
+    for (std::size_t i = 0; i < keep.size();) {
+        const void* kept = std::memchr(keep.data() + i, 1, keep.size() - i);
+        if (!kept) break;
+        const std::size_t begin = static_cast<const std::uint8_t*>(kept) - keep.data();
+        const void* removed = std::memchr(keep.data() + begin, 0, keep.size() - begin);
+        const std::size_t end = removed ? static_cast<const std::uint8_t*>(removed) - keep.data() : keep.size();
+        result.runs.push_back({begin, end - begin});
+        result.kept += end - begin;
+        i = end;
+    }
+    return result;
+}
+
+std::string_view type_name(AttributeType type)
+{
+    constexpr std::string_view names[] = {"float", "vec3", "int32", "int64", "quat"};
+    return names[static_cast<std::size_t>(type)];
+}
+
+const std::vector<AttributeSpec>& known_attributes()
+{
+    static const std::vector<AttributeSpec> known = [] {
+        const Vec3f zero = Vec3f::Zero();
+        return std::vector<AttributeSpec>{
+            {"age", 0.0f},
+            {"airresist", 0.0f},
+            {"birthtime", 0.0f},
+            {"force", zero},
+            {"hitimpulse", 0.0f},
+            {"hitnml", zero},
+            {"hitnum", std::int32_t{0}},
+            {"hitpath", std::int32_t{-1}},
+            {"hitpos", zero},
+            {"hittime", -1.0f},
+            {"hittotal", std::int32_t{0}},
+            {"hitv", zero},
+            {"life", std::numeric_limits<float>::infinity()},
+            {"mass", 1.0f},
+            {"pscale", 0.0f},
+            {"targetv", zero},
+        };
+    }();
+    return known;
+}
+
+const AttributeSpec* known_attribute(std::string_view name)
+{
+    for (const AttributeSpec& spec : known_attributes())
+        if (spec.name == name) return &spec;
+    return nullptr;
+}
+
+PointSet::PointSet()
+{
+    columns_.emplace("P", Column<Vec3f>());
+    columns_.emplace("v", Column<Vec3f>());
+    columns_.emplace("id", Column<std::int64_t>(0, -1));
+}
+
+std::vector<std::string> PointSet::column_names() const
+{
+    std::vector<std::string> names;
+    for (const auto& [name, column] : columns_) names.push_back(name);
+    return names;
+}
+
+std::vector<std::string> PointSet::group_names() const
+{
+    std::vector<std::string> names;
+    for (const auto& [name, members] : groups_) names.push_back(name);
+    return names;
+}
+
+const AnyColumn* PointSet::find(std::string_view name) const
+{
+    const auto found = columns_.find(name);
+    return found == columns_.end() ? nullptr : &found->second;
+}
+
+AnyColumn* PointSet::find(std::string_view name) { return const_cast<AnyColumn*>(std::as_const(*this).find(name)); }
+
+void PointSet::no_column(std::string_view name, const AnyColumn& wanted) const
+{
+    if (const AnyColumn* other = find(name))
+        throw Error(fmt::format("attribute \"{}\" is {}; it must be {}", name, type_name(type_of(*other)),
+                                type_name(type_of(wanted))));
+    throw Error(fmt::format("no attribute \"{}\"{}", name, did_you_mean(name, column_names())));
+}
+
+AnyColumn& PointSet::add(const AttributeSpec& spec)
+{
+    if (AnyColumn* existing = find(spec.name)) {
+        if (existing->index() != spec.fallback.index())
+            throw Error(fmt::format("attribute \"{}\" is {} already; it can't be {} too", spec.name,
+                                    type_name(type_of(*existing)), type_name(type_of(spec.fallback))));
+        return *existing;
+    }
+    return std::visit(
+        [&](const auto& value) -> AnyColumn& {
+            using T = std::decay_t<decltype(value)>;
+            return columns_.emplace(spec.name, Column<T>(size_, value)).first->second;
+        },
+        spec.fallback);
+}
+
+void PointSet::set(std::string_view name, AnyColumn column)
+{
+    RAPID_ASSERT(std::visit([](const auto& c) { return c.size(); }, column) == size_);
+    columns_.insert_or_assign(std::string(name), std::move(column));
+}
+
+void PointSet::remove(std::string_view name)
+{
+    RAPID_ASSERT(name != "P" && name != "v" && name != "id");
+    if (const auto found = columns_.find(name); found != columns_.end()) columns_.erase(found);
+}
+
+Column<std::uint8_t>& PointSet::group(std::string_view name)
+{
+    const auto found = groups_.find(name);
+    if (found != groups_.end()) return found->second;
+    return groups_.emplace(std::string(name), Column<std::uint8_t>(size_, 0)).first->second;
+}
+
+const Column<std::uint8_t>* PointSet::find_group(std::string_view name) const
+{
+    const auto found = groups_.find(name);
+    return found == groups_.end() ? nullptr : &found->second;
+}
+
+void PointSet::remove_group(std::string_view name)
+{
+    if (const auto found = groups_.find(name); found != groups_.end()) groups_.erase(found);
+}
+
+void PointSet::append(std::size_t n)
+{
+    for (auto& [name, column] : columns_) std::visit([n](auto& c) { c.append(n); }, column);
+    for (auto& [name, members] : groups_) members.append(n, std::uint8_t{0});
+    size_ += n;
+}
+
+void PointSet::keep(std::span<const std::uint8_t> mask)
+{
+    RAPID_ASSERT(mask.size() == size_);
+    const Compaction compaction = Compaction::from_mask(mask);
+    if (compaction.kept == size_) return;
+
+    std::vector<std::function<void()>> tasks;
+    for (auto& [name, column] : columns_)
+        tasks.emplace_back([&] { std::visit([&](auto& c) { c.keep(compaction); }, column); });
+    for (auto& [name, members] : groups_) tasks.emplace_back([&] { members.keep(compaction); });
+    tbb::parallel_for_each(tasks, [](const std::function<void()>& task) { task(); });
+    size_ = compaction.kept;
+}
+
+std::size_t PointSet::bytes() const
+{
+    std::size_t total = 0;
+    for (const auto& [name, column] : columns_) total += std::visit([](const auto& c) { return c.bytes(); }, column);
+    for (const auto& [name, members] : groups_) total += members.bytes();
+    return total;
+}
+
+}  // namespace rapid

@@ -1,0 +1,122 @@
+// A set of points: columns of equal size by name, and groups.
+//
+// P, v and id exist always. Copying a set copies pointers (columns are copy-on-write); ids are never reused and keep a
+// point's identity through appending and removal, which keep the order of the points.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "runtime/points/column.h"
+
+namespace rapid {
+
+using AnyColumn = std::variant<Column<float>, Column<Vec3f>, Column<std::int32_t>, Column<std::int64_t>, Column<Quatf>>;
+
+// The index of a type in AnyColumn; a scalar attribute's value in any of them fits AttributeValue.
+enum class AttributeType { Float, Vec3, Int32, Int64, Quat };
+using AttributeValue = std::variant<float, Vec3f, std::int32_t, std::int64_t, Quatf>;
+
+// "float", "vec3", "int32", "int64", "quat".
+std::string_view type_name(AttributeType type);
+inline AttributeType type_of(const AnyColumn& column) { return static_cast<AttributeType>(column.index()); }
+inline AttributeType type_of(const AttributeValue& value) { return static_cast<AttributeType>(value.index()); }
+
+// A column's name, type and the value of points that have none of their own.
+struct AttributeSpec {
+    std::string name;
+    AttributeValue fallback;
+};
+
+// The attributes whose name, type and default Rapid knows (age, life, mass, pscale, ...): reading one brings it into
+// being. Null for any other name.
+const AttributeSpec* known_attribute(std::string_view name);
+const std::vector<AttributeSpec>& known_attributes();
+
+class PointSet {
+public:
+    PointSet();
+
+    std::size_t size() const { return size_; }
+    bool empty() const { return size_ == 0; }
+
+    const Column<Vec3f>& P() const { return column<Vec3f>("P"); }
+    const Column<Vec3f>& v() const { return column<Vec3f>("v"); }
+    const Column<std::int64_t>& id() const { return column<std::int64_t>("id"); }
+    Column<Vec3f>& P() { return column<Vec3f>("P"); }
+    Column<Vec3f>& v() { return column<Vec3f>("v"); }
+    Column<std::int64_t>& id() { return column<std::int64_t>("id"); }
+
+    // Columns and groups by name, in the order of their names.
+    using Columns = std::map<std::string, AnyColumn, std::less<>>;
+    using Groups = std::map<std::string, Column<std::uint8_t>, std::less<>>;
+    const Columns& columns() const { return columns_; }
+    const Groups& groups() const { return groups_; }
+    std::vector<std::string> column_names() const;
+    std::vector<std::string> group_names() const;
+
+    bool has(std::string_view name) const { return columns_.find(name) != columns_.end(); }
+    const AnyColumn* find(std::string_view name) const;
+    AnyColumn* find(std::string_view name);
+
+    // Null where there is no such column, or one of another type.
+    template <class T>
+    const Column<T>* find(std::string_view name) const
+    {
+        const AnyColumn* any = find(name);
+        return any ? std::get_if<Column<T>>(any) : nullptr;
+    }
+    template <class T>
+    Column<T>* find(std::string_view name)
+    {
+        AnyColumn* any = find(name);
+        return any ? std::get_if<Column<T>>(any) : nullptr;
+    }
+
+    // The column, which must exist. Error: no such attribute (with the nearest name), or the type that it has instead.
+    template <class T>
+    const Column<T>& column(std::string_view name) const
+    {
+        if (const Column<T>* found = find<T>(name)) return *found;
+        no_column(name, AnyColumn(Column<T>()));
+    }
+    template <class T>
+    Column<T>& column(std::string_view name)
+    {
+        return const_cast<Column<T>&>(std::as_const(*this).column<T>(name));
+    }
+
+    // Makes the column with its fallback value everywhere, unless there is one: then it is kept, and its type must
+    // agree.
+    AnyColumn& add(const AttributeSpec& spec);
+    // Replaces or adds a column; its size must be the set's.
+    void set(std::string_view name, AnyColumn column);
+    void remove(std::string_view name);
+
+    // The group's membership, 0 or 1 a point; made empty when there is none.
+    Column<std::uint8_t>& group(std::string_view name);
+    const Column<std::uint8_t>* find_group(std::string_view name) const;
+    void remove_group(std::string_view name);
+
+    // Adds n points: every column gets its fallback value (P and v zero), groups 0, ids -1 until the caller sets them.
+    void append(std::size_t n);
+
+    // Removes the points whose mask is 0, shape [size]; the others keep their order. Columns are compacted in parallel.
+    void keep(std::span<const std::uint8_t> mask);
+
+    // Bytes of all columns and groups.
+    std::size_t bytes() const;
+
+private:
+    [[noreturn]] void no_column(std::string_view name, const AnyColumn& wanted) const;
+
+    std::size_t size_ = 0;
+    Columns columns_;
+    Groups groups_;
+};
+
+}  // namespace rapid

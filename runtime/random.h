@@ -1,0 +1,41 @@
+// Counter-based random numbers (Philox4x32-10 of Salmon et al. 2011, Random123): a number depends on its key and
+// counter alone, never on what was drawn before it, by which thread, or on which machine.
+#pragma once
+
+#include <Random123/philox.h>
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace rapid {
+
+// The stream of one node of a simulation: (seed, the node's name). Inserting a node changes no other node's stream.
+struct RandomKey {
+    std::uint64_t value = 0;
+
+    RandomKey() = default;
+    RandomKey(std::uint64_t seed, std::string_view node)
+    {
+        std::uint64_t hash = 14695981039346656037ull;  // FNV-1a of the name, then mixed with the seed by Philox itself
+        for (const char c : node) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+        r123::Philox4x32 philox;
+        const auto mixed = philox({{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32), 0, 0}},
+                                  {{static_cast<std::uint32_t>(hash), static_cast<std::uint32_t>(hash >> 32)}});
+        value = mixed[0] | std::uint64_t{mixed[1]} << 32;
+    }
+};
+
+// Four independent numbers, uniform in [0, 1) with 32 bits each, for the item (a point's id, a birth's number) and the
+// use (which question is asked of it).
+inline std::array<double, 4> uniform4(RandomKey key, std::uint64_t item, std::uint64_t use)
+{
+    r123::Philox4x32 philox;
+    const auto bits = philox({{static_cast<std::uint32_t>(item), static_cast<std::uint32_t>(item >> 32),
+                               static_cast<std::uint32_t>(use), static_cast<std::uint32_t>(use >> 32)}},
+                             {{static_cast<std::uint32_t>(key.value), static_cast<std::uint32_t>(key.value >> 32)}});
+    constexpr double unit = 1.0 / 4294967296.0;
+    return {bits[0] * unit, bits[1] * unit, bits[2] * unit, bits[3] * unit};
+}
+
+}  // namespace rapid

@@ -1,0 +1,59 @@
+// A polygon mesh: positions and faces, and values at its vertices (Cd, any float) where its file has them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "runtime/object.h"
+#include "runtime/vec.h"
+
+namespace rapid {
+
+class Mesh : public Object {
+public:
+    using Triangle = Eigen::Matrix<std::int32_t, 3, 1>;
+    using VertexValues = std::variant<std::vector<float>, std::vector<Vec3f>>;
+
+    std::string_view kind() const override { return "mesh"; }
+
+    std::vector<Vec3f> positions;
+    std::vector<Triangle> triangles;  // counter-clockwise seen from outside; polygons are split when a mesh is made
+    std::map<std::string, VertexValues> values;
+    std::string name;  // for messages: the file, or "sphere", "torus", ...
+
+    Box3f bounds() const;
+    double area() const;           // m²
+    double signed_volume() const;  // m³; negative when the faces point inwards
+
+    // How far the mesh is from bounding a volume: counts of edges that do not have exactly two faces of opposite sense.
+    struct Openness {
+        std::size_t boundary_edges = 0;      // one face
+        std::size_t non_manifold_edges = 0;  // three or more, or two of the same sense
+        bool closed() const { return boundary_edges == 0 && non_manifold_edges == 0; }
+    };
+    Openness openness() const;
+};
+
+using MeshPtr = std::shared_ptr<const Mesh>;
+
+// OBJ, PLY, STL, glTF. Vertices at one place are joined (STL has no shared ones). Error: no such file, what the reader
+// could not understand, no triangles, a coordinate that is not finite.
+MeshPtr read_mesh(const std::filesystem::path& path);
+
+// Made meshes, about `center`. Each argument in metres and above 0; divisions at least 3 (sphere, torus) or 1 (grid).
+MeshPtr make_sphere(double radius, int divisions, const Vec3d& center);
+MeshPtr make_box(const Vec3d& size, const Vec3d& center);
+MeshPtr make_grid(double size_x, double size_z, int divisions, const Vec3d& center);  // in the plane y = center.y
+MeshPtr make_torus(double radius, double tube, int divisions, const Vec3d& center);   // about the y axis
+// Faces are lists of vertex indices from 0, split into fans. Error: an index out of range, a face of fewer than three.
+MeshPtr make_mesh(std::vector<Vec3f> points, const std::vector<std::vector<std::int32_t>>& faces);
+
+// The mesh moved by an affine map; faces are turned when the map mirrors.
+MeshPtr transformed(const MeshPtr& mesh, const Eigen::Affine3d& map);
+
+}  // namespace rapid

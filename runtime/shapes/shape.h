@@ -1,0 +1,56 @@
+// Everything a particle can hit or be born from: a signed distance, a gradient, a first contact along a path.
+//
+// Distances are in metres, negative inside; gradients point out of the shape. All queries are for many points at once:
+// the virtual call is one a chunk, never one a point. A shape is immutable, and asked from any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "runtime/object.h"
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// A piece of one point's way: the parabola x(s) = P + v s + a s²/2 for s in [0, duration], in seconds.
+struct Path {
+    Vec3d P, v, a;
+    double duration;
+    double radius;  // m; contact is where distance = radius
+};
+
+// Where a path first meets the shape from outside. A point that starts flush with the surface (within rounding) is
+// outside it: it touches at s = 0 only when it moves, or is pressed, inwards.
+struct Contact {
+    static constexpr double none = std::numeric_limits<double>::infinity();
+
+    double time = none;        // s along the path
+    Vec3d n = Vec3d::Zero();   // unit normal, out of the surface
+    Vec3d vc = Vec3d::Zero();  // velocity of the surface there, m/s
+    double curvature = 0;      // 1/m, of the surface along the path; for resting on curved ground; 0 where unknown
+};
+
+class Shape : public Object {
+public:
+    std::string_view kind() const override { return "shape"; }
+
+    // Where the distance can be below `radius`. May be infinite; outside it no contact is looked for.
+    virtual Box3d bounds() const = 0;
+
+    // Signed distances, and where `gradient` is not empty their gradients (not normalised; zero where there is none:
+    // deep inside, at a medial axis). All of shape [n]. Beyond a level set's band the distance is a bound of the right
+    // sign.
+    virtual void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const = 0;
+
+    // The first contact of each path; shapes [n], [n].
+    virtual void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const = 0;
+
+    // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow band.
+    virtual double band() const { return std::numeric_limits<double>::infinity(); }
+};
+
+using ShapePtr = std::shared_ptr<const Shape>;
+
+}  // namespace rapid

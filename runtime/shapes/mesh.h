@@ -19,6 +19,7 @@ public:
     using Triangle = Eigen::Matrix<std::int32_t, 3, 1>;
     using VertexValues = std::variant<std::vector<float>, std::vector<Vec3f>>;
 
+    static constexpr std::string_view param_type = "mesh";
     std::string_view kind() const override { return "mesh"; }
 
     std::vector<Vec3f> positions;

@@ -34,6 +34,7 @@ struct Contact {
 
 class Shape : public Object {
 public:
+    static constexpr std::string_view param_type = "shape";
     std::string_view kind() const override { return "shape"; }
 
     // Where the distance can be below `radius`. May be infinite; outside it no contact is looked for.

@@ -1,0 +1,287 @@
+// A node type: its one declaration, from which validation, `rapid nodes`, the Lua method, the annotations and the plan
+// come.
+//
+//   struct Gravity {
+//       Vec3d g;
+//       static NodeType declare()
+//       {
+//           return node<Gravity>("gravity", "Accelerates all points alike.")
+//               .param(&Gravity::g, "g", Vec3d(0, -9.81, 0), any_number(), "m/s²", "acceleration");
+//       }
+//       ...
+//   };
+//   RAPID_NODE(Gravity);
+//
+// What the node does is the member function that its struct has; one of
+//
+//   void edit(PointSet& points, const Evaluation& now)                a point node: changes points at once
+//   void contribute(const Chunk&, Forces&) const                      a force: Solve calls it (solver/dynamics.h)
+//   DynamicPtr dynamic(const Evaluation& now) const                   a collider, a constraint, a force with a state of
+//   its own Flow evaluate(std::span<Flow> inputs, const Evaluation& now)      anything else (Create, Merge, Solve)
+//
+// and, where it needs them,
+//
+//   Flow start(std::span<Flow> inputs, const Evaluation& now)         at the first frame, where nodes between Create
+//   and Solve do
+//                                                                     not run; by default the first input passes
+//   void uses(Uses& uses) const                                       names read, written or made, as the arguments say
+//   void check() const                                                arguments that are legal one by one, but not
+//   together
+//
+// Fields are set from the arguments before each evaluation; other members are the node's state over a run.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/graph/param.h"
+#include "runtime/random.h"
+#include "runtime/solver/dynamics.h"
+
+namespace rapid {
+
+// One simulation: what a Create starts and its Solve feeds back. Shared by all flows that come from it.
+struct Simulation {
+    double fps = 24;
+    std::int64_t start = 1;
+    std::uint64_t seed = 0;
+    std::int64_t next_id = 0;            // ids count all births from 0
+    std::vector<AttributeSpec> columns;  // what the plan knows: these exist from the first frame on
+    std::vector<std::string> groups;
+    PointSet state;  // as Solve left it at the frame before
+};
+
+// What travels along an edge of the graph.
+struct Flow {
+    PointSet points;
+    std::vector<DynamicPtr> dynamics;  // in the order of the chain
+    std::shared_ptr<Simulation> simulation;
+};
+
+// Counted while a frame runs (see `--stats`).
+struct FrameFigures {
+    std::uint64_t born = 0, died = 0, collisions = 0;
+    std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
+    int substeps = 0;
+    double penetration_max = 0;
+    double script_seconds = 0, solve_seconds = 0;
+};
+
+// What a node is told when it is evaluated.
+struct Evaluation {
+    Frame frame;
+    bool at_start = false;    // the first frame: the initial state, before any dynamics
+    const std::string& node;  // its name
+    const Location& location;
+    RandomKey random;       // (seed, name)
+    FrameFigures& figures;  // what this frame's statistics count
+    std::vector<std::string>& warnings;
+    // Hands a set to be written; empty where nothing may be written (check, explain, test).
+    const std::function<void(const std::string& pattern, const PointSet& points)>& write;
+};
+
+// Attributes and groups that a node reads, writes, or brings into being.
+struct Uses {
+    std::vector<std::string> reads, writes;
+    std::vector<AttributeSpec> makes;
+    std::vector<std::string> reads_groups, makes_groups;
+};
+
+// What a node does; one object a node and run.
+class Operator {
+public:
+    virtual ~Operator() = default;
+    virtual void* fields() = 0;
+    virtual Flow evaluate(std::span<Flow> inputs, const Evaluation& now) = 0;
+    virtual Flow start(std::span<Flow> inputs, const Evaluation& now) = 0;
+    virtual void uses(Uses& uses) const = 0;
+    virtual void check() const = 0;
+};
+
+enum class NodeKind {
+    Source,   // no input: create
+    Points,   // changes points; the same input and arguments give another result in another frame only if `varies`
+    Dynamic,  // adds a force, collider or constraint
+    Merge,    // several inputs
+    Solve,    // advances the points, and feeds them back to its Create
+};
+
+struct NodeType {
+    std::string name, doc;
+    NodeKind kind = NodeKind::Points;
+    std::vector<Param> params;
+    Uses uses;            // of every node of this type; a node's own come from Operator::uses
+    bool varies = false;  // its result changes from frame to frame although inputs and arguments do not
+    std::function<std::unique_ptr<Operator>()> make;
+
+    const Param* find(std::string_view param) const;
+    std::vector<std::string> param_names() const;
+};
+
+// A node as the graph file wrote it. Immutable; its inputs were made before it.
+struct Node {
+    const NodeType* type;
+    std::string name;
+    Location location;
+    std::uint64_t serial;  // order of making: every node comes after its inputs
+    std::vector<std::shared_ptr<const Node>> inputs;
+    std::map<std::string, Value> arguments;
+};
+
+using NodePtr = std::shared_ptr<const Node>;
+
+namespace detail {
+
+template <class T>
+class ForceOf : public Force {
+public:
+    explicit ForceOf(const T& fields) : fields_(fields) {}
+    void contribute(const Chunk& chunk, Forces& forces) const override { fields_.contribute(chunk, forces); }
+    std::optional<Vec3d> uniform_acceleration() const override
+    {
+        if constexpr (requires { fields_.uniform_acceleration(); })
+            return fields_.uniform_acceleration();
+        else
+            return std::nullopt;
+    }
+
+private:
+    T fields_;
+};
+
+template <class T>
+constexpr bool is_force = requires(const T& t, const Chunk& chunk, Forces& forces)
+{
+    t.contribute(chunk, forces);
+};
+template <class T>
+constexpr bool has_dynamic = requires(const T& t, const Evaluation& now)
+{
+    t.dynamic(now);
+};
+template <class T>
+constexpr bool has_edit = requires(T& t, PointSet& points, const Evaluation& now)
+{
+    t.edit(points, now);
+};
+
+template <class T>
+class OperatorOf : public Operator {
+public:
+    void* fields() override { return &fields_; }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
+    {
+        if constexpr (has_edit<T>) {
+            fields_.edit(inputs[0].points, now);
+            return std::move(inputs[0]);
+        } else if constexpr (is_force<T> || has_dynamic<T>) {
+            inputs[0].dynamics.push_back(dynamic(now));
+            return std::move(inputs[0]);
+        } else {
+            return fields_.evaluate(inputs, now);
+        }
+    }
+
+    Flow start(std::span<Flow> inputs, const Evaluation& now) override
+    {
+        if constexpr (requires { fields_.start(inputs, now); })
+            return fields_.start(inputs, now);
+        else
+            return std::move(inputs[0]);
+    }
+
+    void uses(Uses& uses) const override
+    {
+        if constexpr (requires { fields_.uses(uses); }) fields_.uses(uses);
+    }
+
+    void check() const override
+    {
+        if constexpr (requires { fields_.check(); }) fields_.check();
+    }
+
+private:
+    DynamicPtr dynamic(const Evaluation& now) const
+    {
+        if constexpr (has_dynamic<T>) {
+            return fields_.dynamic(now);
+        } else {
+            auto force = std::make_shared<ForceOf<T>>(fields_);
+            force->node = now.node;
+            force->location = now.location;
+            if constexpr (requires { fields_.group; }) force->group = fields_.group;
+            return force;
+        }
+    }
+
+    T fields_;
+};
+
+}  // namespace detail
+
+// Builds a declaration. Every node has `name`, and all but sources and merges have `group`.
+template <class T>
+class Declaration {
+public:
+    Declaration(std::string name, std::string doc)
+    {
+        type_.name = std::move(name);
+        type_.doc = std::move(doc);
+        if constexpr (detail::is_force<T> || detail::has_dynamic<T>) type_.kind = NodeKind::Dynamic;
+        type_.make = [] { return std::make_unique<detail::OperatorOf<T>>(); };
+        if constexpr (requires(T t) { t.group; })
+            param(&T::group, "group", Value(), any_number(), "", "acts on this group only");
+    }
+
+    // A parameter kept in `field`. fallback: its default, in the unit that users give.
+    template <class F>
+    Declaration& param(F T::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)
+    {
+        Param p;
+        p.name = std::move(name);
+        p.type = param_type<F>();
+        p.fallback = std::move(fallback);
+        p.range = range;
+        p.unit = std::move(unit);
+        p.doc = std::move(doc);
+        p.per_point = std::is_same_v<F, PerPoint<float>> || std::is_same_v<F, PerPoint<Vec3f>> ||
+                      std::is_same_v<F, std::optional<PerPoint<float>>>;
+        p.assign = [field](const Param& param, void* fields, const Value& value) {
+            read_value(param, value, static_cast<T*>(fields)->*field);
+        };
+        type_.params.push_back(std::move(p));
+        return *this;
+    }
+
+    // These speak of the parameter declared last.
+    Declaration& required() { return last().required = true, *this; }
+    Declaration& constant() { return last().of_the_frame = false, *this; }  // takes no function of the frame
+    Declaration& choices(std::vector<std::string> names) { return last().choices = std::move(names), *this; }
+    Declaration& of_type(std::string words) { return last().type = std::move(words), *this; }
+
+    Declaration& kind(NodeKind kind) { return type_.kind = kind, *this; }
+    Declaration& reads(std::string name) { return type_.uses.reads.push_back(std::move(name)), *this; }
+    Declaration& writes(std::string name) { return type_.uses.writes.push_back(std::move(name)), *this; }
+    Declaration& makes(AttributeSpec spec) { return type_.uses.makes.push_back(std::move(spec)), *this; }
+    Declaration& varies() { return type_.varies = true, *this; }
+
+    operator NodeType() const { return type_; }
+
+private:
+    Param& last() { return type_.params.back(); }
+
+    NodeType type_;
+};
+
+template <class T>
+Declaration<T> node(std::string name, std::string doc)
+{
+    return Declaration<T>(std::move(name), std::move(doc));
+}
+
+}  // namespace rapid

@@ -1,0 +1,113 @@
+// Parameters of nodes: each is written once, in the node's declaration, and its type, range, default, unit and
+// documentation are used by validation, by `rapid nodes` and by the editor's annotations.
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/error.h"
+#include "runtime/graph/value.h"
+#include "runtime/points/per_point.h"
+
+namespace rapid {
+
+struct Range {
+    double lo = -std::numeric_limits<double>::infinity();
+    double hi = std::numeric_limits<double>::infinity();
+    bool lo_excluded = false;  // above lo, not at it
+
+    bool contains(double x) const { return (lo_excluded ? x > lo : x >= lo) && x <= hi; }
+    bool bounded() const { return std::isfinite(lo) || std::isfinite(hi); }
+    std::string text() const;  // "from 0 to 1", "at least 0", "above 0"
+};
+
+inline Range any_number() { return {}; }
+inline Range at_least(double lo) { return {lo}; }
+inline Range above(double lo) { return {lo, std::numeric_limits<double>::infinity(), true}; }
+inline Range between(double lo, double hi) { return {lo, hi}; }
+
+struct Param {
+    std::string name, type;  // type as a user reads it: "number", "vec3", "shape", "one of begin, end"
+    std::string unit, doc;
+    Value fallback;  // nil: the node decides, or does without
+    Range range;
+    std::vector<std::string> choices;
+    bool required = false;
+    bool per_point = false;    // takes rapid.attr
+    bool of_the_frame = true;  // takes a function of the frame
+
+    // Puts a value, which is no function, into the node's field. Error: wrong type, out of range; says what was found.
+    std::function<void(const Param& self, void* fields, const Value& value)> assign;
+};
+
+// Reads a value into a field of type T, or throws an Error that names the parameter, what was found and what is right.
+// A node may add an overload for a type of its own, in namespace rapid, before its declaration.
+void read_value(const Param& param, const Value& value, double& field);
+void read_value(const Param& param, const Value& value, float& field);
+void read_value(const Param& param, const Value& value, int& field);
+void read_value(const Param& param, const Value& value, bool& field);
+void read_value(const Param& param, const Value& value, std::string& field);  // one of `choices` where there are any
+void read_value(const Param& param, const Value& value, Vec3d& field);
+void read_value(const Param& param, const Value& value, Vec3f& field);
+void read_value(const Param& param, const Value& value, PerPoint<float>& field);
+void read_value(const Param& param, const Value& value, PerPoint<Vec3f>& field);
+void read_value(const Param& param, const Value& value, ObjectPtr& field);
+// Attribute values by name: {heat = 1, Cd = {1, .5, 0}}.
+void read_value(const Param& param, const Value& value, std::map<std::string, AttributeValue>& field);
+// Numbers by frame: {[1] = 100, [24] = 50}. A list {100, 50} is frames 1 and 2.
+void read_value(const Param& param, const Value& value, std::map<std::int64_t, double>& field);
+
+template <class T>
+void read_value(const Param& param, const Value& value, std::optional<T>& field)
+{
+    if (value.is_nil()) return field.reset();
+    T given{};
+    read_value(param, value, given);
+    field = std::move(given);
+}
+
+[[noreturn]] void wrong_type(const Param& param, const Value& value);
+[[noreturn]] void out_of_range(const Param& param, double value);
+
+template <class T>
+void read_value(const Param& param, const Value& value, std::shared_ptr<const T>& field)
+{
+    if (value.is_nil()) return field.reset();
+    field = value.object<T>();
+    if (!field) wrong_type(param, value);
+}
+
+// What a field's type is called to a user.
+template <class T>
+constexpr std::string_view param_type()
+{
+    if constexpr (std::is_same_v<T, double> || std::is_same_v<T, float> || std::is_same_v<T, PerPoint<float>>)
+        return "number";
+    else if constexpr (std::is_same_v<T, int>)
+        return "integer";
+    else if constexpr (std::is_same_v<T, bool>)
+        return "boolean";
+    else if constexpr (std::is_same_v<T, std::string>)
+        return "string";
+    else if constexpr (std::is_same_v<T, Vec3d> || std::is_same_v<T, Vec3f> || std::is_same_v<T, PerPoint<Vec3f>>)
+        return "vec3";
+    else if constexpr (std::is_same_v<T, std::map<std::string, AttributeValue>>)
+        return "attributes";
+    else if constexpr (std::is_same_v<T, std::map<std::int64_t, double>>)
+        return "numbers by frame";
+    else if constexpr (requires { typename T::value_type; })  // std::optional
+        return param_type<typename T::value_type>();
+    else if constexpr (requires { T::param_type; })  // a node's own type
+        return T::param_type;
+    else
+        return T::element_type::param_type;  // a pointer to an object
+}
+
+}  // namespace rapid

@@ -1,0 +1,40 @@
+// The node types of a session: the native ones, and those that Lua files add.
+#pragma once
+
+#include <deque>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/graph/node.h"
+
+namespace rapid {
+
+class Registry {
+public:
+    // All native types.
+    Registry();
+
+    // Error: a name that is taken.
+    const NodeType& add(NodeType type);
+
+    // Null where there is none.
+    const NodeType* find(std::string_view name) const;
+    // Error: no such type, with the nearest name.
+    const NodeType& at(std::string_view name) const;
+
+    // In order of name, so that link order changes nothing a user can see.
+    std::vector<const NodeType*> types() const;
+
+private:
+    std::deque<NodeType> types_;  // a node keeps a pointer to its type
+};
+
+// Registers a native type while the program starts; used through RAPID_NODE, in the node's own file.
+struct NodeRegistration {
+    explicit NodeRegistration(NodeType (*declare)());
+};
+#define RAPID_NODE(Type) \
+    static const ::rapid::NodeRegistration registration_of_##Type([] { return NodeType(Type::declare()); })
+
+}  // namespace rapid

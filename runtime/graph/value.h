@@ -1,0 +1,79 @@
+// What a graph file can give a node's parameter: the host of the scripting language turns its values into these.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "runtime/object.h"
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// The instant that a parameter, kernel or node is asked for. time = (number - start) / fps, dt = 1 / fps, from
+// integers, never from a sum.
+struct Frame {
+    double number = 1;  // whole except where a motion is asked between frames
+    double time = 0;    // s
+    double dt = 0;      // s
+};
+
+struct Value;
+
+// `rapid.attr "bounce"`: each point's own.
+struct AttributeRef {
+    std::string name;
+};
+
+// A table: list part (1, 2, ...), other whole numbers, and names.
+struct Table {
+    std::vector<Value> list;
+    std::map<std::int64_t, Value> numbered;  // keys outside the list part
+    std::map<std::string, Value> named;
+};
+
+// A parameter given as a function of the frame. Asked on one thread, before the pass that needs it.
+class FrameFunction {
+public:
+    virtual ~FrameFunction() = default;
+    // Error: what the script raised, at its place.
+    virtual Value call(const Frame& frame) const = 0;
+};
+
+struct Value : std::variant<std::monostate, bool, double, std::string, Vec3d, AttributeRef,
+                            std::shared_ptr<const Table>, ObjectPtr, std::shared_ptr<const FrameFunction>> {
+    using variant::variant;
+
+    bool is_nil() const { return std::holds_alternative<std::monostate>(*this); }
+    template <class T>
+    const T* get() const
+    {
+        return std::get_if<T>(this);
+    }
+    const Table* table() const
+    {
+        const auto* pointer = get<std::shared_ptr<const Table>>();
+        return pointer ? pointer->get() : nullptr;
+    }
+    // The object, where it is a T.
+    template <class T>
+    std::shared_ptr<const T> object() const
+    {
+        const auto* pointer = get<ObjectPtr>();
+        return pointer ? std::dynamic_pointer_cast<const T>(*pointer) : nullptr;
+    }
+    const FrameFunction* function() const
+    {
+        const auto* pointer = get<std::shared_ptr<const FrameFunction>>();
+        return pointer ? pointer->get() : nullptr;
+    }
+};
+
+// As a message shows it: 1.4, "up", {0, 1, 0}, a mesh, a function, nil.
+std::string describe(const Value& value);
+
+}  // namespace rapid

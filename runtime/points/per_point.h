@@ -1,0 +1,32 @@
+// A parameter that is one number for all points, or an attribute that gives each point its own.
+#pragma once
+
+#include <string>
+
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+template <class T>
+struct PerPoint {
+    T constant = Column<T>::zero();
+    std::string attribute;  // where not empty, read from this column instead
+
+    PerPoint() = default;
+    PerPoint(T value) : constant(value) {}
+    static PerPoint of(std::string attribute)
+    {
+        PerPoint result;
+        result.attribute = std::move(attribute);
+        return result;
+    }
+
+    // Valid while this parameter and the set's column stay as they are. Error: no such attribute, or of another type.
+    Strided<T> read(const PointSet& points) const
+    {
+        if (attribute.empty()) return {&constant, 0};
+        return points.column<T>(attribute).read();
+    }
+};
+
+}  // namespace rapid

@@ -1,0 +1,99 @@
+// What forces, actions, colliders and constraints add to the points that travel down a chain, for Solve to apply (paper
+// §2.3). They change no point themselves; Solve takes all that are upstream of it, in the order of the chain, and
+// cannot tell a native force from a scripted one.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/error.h"
+#include "runtime/points/per_point.h"
+#include "runtime/points/point_set.h"
+#include "runtime/shapes/shape.h"
+
+namespace rapid {
+
+// The points of a chunk in the middle of a step. State is in double within the frame and rounded to float once, at its
+// end; all spans have shape [size].
+struct Chunk {
+    const PointSet& points;  // columns, at offset `first`
+    std::size_t first;
+    std::span<Vec3d> P, v;         // now: m, m/s
+    std::span<const double> dt;    // s, this sub-step of each point: a newborn's is shorter
+    std::span<const double> time;  // s since the start, at the middle of each point's sub-step
+    int substep;                   // from 0
+
+    std::size_t size() const { return P.size(); }
+
+    // A parameter's values for this chunk's points.
+    template <class T>
+    Strided<T> read(const PerPoint<T>& parameter) const
+    {
+        Strided<T> values = parameter.read(points);
+        return {values.data + first * values.stride, values.stride};
+    }
+};
+
+// What the forces of one chunk add up to in one sub-step. Accelerations in m/s²; shape [size] once a force needs one a
+// point.
+class Forces {
+public:
+    void reset(std::size_t size)
+    {
+        size_ = size;
+        uniform_.setZero();
+        per_point_.clear();
+    }
+
+    void add_uniform(const Vec3d& a) { uniform_ += a; }
+    void add(std::size_t i, const Vec3d& a)
+    {
+        if (per_point_.empty()) per_point_.resize(size_, Vec3d::Zero());
+        per_point_[i] += a;
+    }
+
+    bool is_uniform() const { return per_point_.empty(); }
+    const Vec3d& uniform() const { return uniform_; }
+    Vec3d acceleration(std::size_t i) const { return is_uniform() ? uniform_ : Vec3d(uniform_ + per_point_[i]); }
+
+private:
+    std::size_t size_ = 0;
+    Vec3d uniform_ = Vec3d::Zero();
+    std::vector<Vec3d> per_point_;
+};
+
+class Dynamic {
+public:
+    virtual ~Dynamic() = default;
+
+    std::string node;   // for messages
+    Location location;  // of the node, in the graph file
+    std::string group;  // acts on these points only; all when empty
+};
+
+using DynamicPtr = std::shared_ptr<const Dynamic>;
+
+// A force, or an action operator: called once a sub-step for each chunk, from any thread.
+class Force : public Dynamic {
+public:
+    virtual void contribute(const Chunk& chunk, Forces& forces) const = 0;
+
+    // The acceleration where it is the same for all points, at all times within the frame: then contribute() is not
+    // called.
+    virtual std::optional<Vec3d> uniform_acceleration() const { return std::nullopt; }
+};
+
+class Collider : public Dynamic {
+public:
+    ShapePtr shape;
+    PerPoint<float> bounce{0.5f};    // restitution ε in [0, 1]
+    PerPoint<float> friction{0.0f};  // Coulomb μ >= 0
+    // The attribute pscale where the points have it, unless the node says otherwise.
+    std::optional<PerPoint<float>> radius;
+};
+
+}  // namespace rapid

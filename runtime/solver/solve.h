@@ -1,0 +1,31 @@
+// Advances points by one frame: forces, integration, collision, at each sub-step (paper §2.1, §2.3, §4).
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "runtime/points/point_set.h"
+#include "runtime/solver/dynamics.h"
+
+namespace rapid {
+
+struct SolveOptions {
+    int substeps = 1;
+    double time = 0;  // s since the start, at the end of the frame
+    double h = 0;     // s, the frame's length
+};
+
+struct SolveResult {
+    std::uint64_t collisions = 0;     // contacts
+    std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
+    double penetration_max = 0;       // m, the deepest at the end of the frame
+};
+
+// Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age at
+// the end of the frame), else h. Ages, deaths and ids are the caller's.
+//
+// Same bits for any number of threads, any chunk, and whichever other points there are. Error: a velocity or position that
+// is not finite before or after, with the point's id; a collider or force whose attribute is missing.
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
+
+}  // namespace rapid

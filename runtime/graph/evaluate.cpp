@@ -1,0 +1,114 @@
+#include "runtime/graph/evaluate.h"
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <optional>
+
+namespace rapid {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point begin)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace
+
+Evaluator::Evaluator(const Plan& plan, WriteHook write)
+    : plan_(plan), write_(std::move(write)), next_(plan.first_frame()), kept_(plan.nodes.size())
+{
+    for (const PlannedSimulation& planned : plan.simulations) {
+        auto simulation = std::make_shared<Simulation>();
+        simulation->fps = planned.fps;
+        simulation->start = planned.start;
+        simulation->seed = planned.seed;
+        simulations_.push_back(std::move(simulation));
+    }
+}
+
+FrameResult Evaluator::advance()
+{
+    const auto begin = std::chrono::steady_clock::now();
+    FrameResult result;
+    result.frame = next_;
+
+    // Functions of the frame are asked first, on this thread; what a column's fallback is may depend on them.
+    for (const PlannedNode& planned : plan_.nodes) {
+        if (planned.once && next_ > plan_.first_frame()) continue;
+        const Simulation& simulation = *simulations_[planned.simulation];
+        const Frame frame = simulation.frame(next_);
+        try {
+            bind_arguments(*planned.node, *planned.op, frame, true);
+            planned.op->check();
+        } catch (Error& error) {
+            error.in_node(planned.node->name).at(planned.node->location);
+            throw;
+        }
+    }
+    for (std::size_t s = 0; s < simulations_.size(); ++s) {
+        simulations_[s]->columns = plan_.columns_of(s);
+        simulations_[s]->groups = plan_.groups_of(s);
+    }
+
+    std::vector<Flow> results(plan_.nodes.size());
+    std::vector<std::size_t> readers(plan_.nodes.size());
+    for (std::size_t i = 0; i < plan_.nodes.size(); ++i) readers[i] = plan_.nodes[i].consumers;
+    for (std::size_t i = 0; i < plan_.nodes.size(); ++i) results[i] = evaluate(i, results, readers, result);
+
+    for (const auto& [name, i] : plan_.outputs) {
+        const Simulation& simulation = *simulations_[plan_.nodes[i].simulation];
+        PointSet& points = results[i].points;
+        result.outputs[name] = --readers[i] == 0 ? std::move(points) : points;
+        result.outputs[name].remove("dt");
+        result.fps[name] = simulation.fps;
+        result.time[name] = simulation.frame(next_).time;
+    }
+    ++next_;
+    result.total_seconds = seconds_since(begin);
+    return result;
+}
+
+Flow Evaluator::evaluate(std::size_t i, std::vector<Flow>& results, std::vector<std::size_t>& readers,
+                         FrameResult& frame)
+{
+    const PlannedNode& planned = plan_.nodes[i];
+    const Node& node = *planned.node;
+    if (kept_[i]) return *kept_[i];
+
+    std::vector<Flow> inputs;
+    for (const std::size_t input : planned.inputs)
+        inputs.push_back(--readers[input] == 0 ? std::move(results[input]) : results[input]);
+    if (node.type->kind == NodeKind::Source) inputs.push_back({PointSet(), {}, simulations_[planned.simulation]});
+
+    const Simulation& simulation = *simulations_[planned.simulation];
+    const Frame now = simulation.frame(std::max(next_, simulation.start));
+    const std::function<void(const std::string&, const PointSet&)> write =
+        write_
+            ? [&](const std::string& pattern, const PointSet& points) { write_(pattern, points, now, simulation.fps); }
+            : std::function<void(const std::string&, const PointSet&)>();
+    const Evaluation evaluation{now,
+                                next_ <= simulation.start,
+                                node.name,
+                                node.location,
+                                RandomKey(simulation.seed, node.name),
+                                frame.figures,
+                                frame.warnings,
+                                write};
+    try {
+        const auto begin = std::chrono::steady_clock::now();
+        Flow result = planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source
+                          ? planned.op->start(inputs, evaluation)
+                          : planned.op->evaluate(inputs, evaluation);
+        if (node.type->kind == NodeKind::Solve) frame.figures.solve_seconds += seconds_since(begin);
+        if (planned.once) kept_[i] = result;
+        return result;
+    } catch (Error& error) {
+        error.in_node(node.name).at(node.location);
+        throw;
+    } catch (const std::bad_alloc&) {
+        throw Error("out of memory").in_node(node.name).at(node.location);
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,52 @@
+// Runs a plan, frame by frame.
+//
+// At each frame the nodes are evaluated in the order of the plan; a result goes to its last reader without a copy, and
+// what never changes is evaluated once. At the first frame the nodes between Create and Solve do not run.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "runtime/graph/plan.h"
+
+namespace rapid {
+
+struct FrameResult {
+    std::int64_t frame = 0;
+    std::map<std::string, PointSet> outputs;
+    std::map<std::string, double> fps;  // of each output's simulation
+    std::map<std::string, double> time;
+    FrameFigures figures;
+    double total_seconds = 0;  // wall time, without writing
+    std::vector<std::string> warnings;
+};
+
+class Evaluator {
+public:
+    // Hands on what `:write` nodes write; empty where nothing may be written. `frame` is the frame of that node's
+    // simulation.
+    using WriteHook =
+        std::function<void(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)>;
+
+    explicit Evaluator(const Plan& plan, WriteHook write = {});
+
+    // The frame that advance() will compute.
+    std::int64_t next_frame() const { return next_; }
+
+    // Computes the next frame. The result shares its columns with the state: let go of it before the next call, where a
+    // copy is to be avoided. Error: whatever a node throws, with its name and place; the evaluator is then at its end.
+    FrameResult advance();
+
+private:
+    Flow evaluate(std::size_t i, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);
+
+    const Plan& plan_;
+    WriteHook write_;
+    std::int64_t next_;
+    std::vector<std::shared_ptr<Simulation>> simulations_;
+    std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once
+};
+
+}  // namespace rapid

@@ -1,0 +1,57 @@
+// A graph file that has been run: its graph, its parameters, and the scripts that its nodes call.
+//
+// The file runs once in the session's main state, in the restricted environment; worker threads get states of their own
+// when they first run a kernel. A session is used from one thread; its kernels run in all.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/graph/plan.h"
+#include "runtime/graph/registry.h"
+
+namespace rapid {
+
+struct SessionOptions {
+    std::map<std::string, std::string> set;            // --set NAME=VALUE
+    double script_timeout = 600;                       // s, a frame (or a load) may spend in scripts
+    std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory, a state
+    // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
+    std::function<void(const std::string& message)> on_timeout;
+};
+
+class ScriptHost;
+
+class Session {
+public:
+    // Runs the file. Error: it can't be read; what Lua or Rapid found wrong with it, with file and line; an unknown or
+    // ill-typed name in options.set, with the nearest.
+    Session(const std::filesystem::path& file, SessionOptions options);
+    ~Session();
+
+    const Graph& graph() const;
+    const Registry& registry() const;
+
+    struct Parameter {
+        std::string name, doc;
+        Value value, fallback;
+    };
+    // In the order in which the file declares them.
+    const std::vector<Parameter>& parameters() const;
+
+    // What was doubtful while the file ran: a mesh with holes, ...
+    const std::vector<std::string>& warnings() const;
+
+    // The node types that are there without any graph: the native ones and those of the shipped Lua nodes.
+    static Registry all_node_types();
+
+private:
+    std::unique_ptr<ScriptHost> host_;
+};
+
+}  // namespace rapid

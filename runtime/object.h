@@ -9,6 +9,7 @@ namespace rapid {
 
 class Object {
 public:
+    static constexpr std::string_view param_type = "object";
     virtual ~Object() = default;
 
     // What it is called in messages: "mesh", "level set", "shape", "points", "motion", "function".

@@ -28,7 +28,8 @@
 //   void check() const                                                arguments that are legal one by one, but not
 //   together
 //
-// Fields are set from the arguments before each evaluation; other members are the node's state over a run.
+// Fields are set from the arguments before each evaluation; other members are the node's state over a run. uses() and
+// check() are asked with the fields as they are at the first frame.
 #pragma once
 
 #include <functional>
@@ -53,6 +54,11 @@ struct Simulation {
     std::vector<AttributeSpec> columns;  // what the plan knows: these exist from the first frame on
     std::vector<std::string> groups;
     PointSet state;  // as Solve left it at the frame before
+
+    Frame frame(std::int64_t number) const
+    {
+        return {static_cast<double>(number), static_cast<double>(number - start) / fps, 1 / fps};
+    }
 };
 
 // What travels along an edge of the graph.
@@ -114,10 +120,13 @@ struct NodeType {
     std::string name, doc;
     NodeKind kind = NodeKind::Points;
     std::vector<Param> params;
-    Uses uses;            // of every node of this type; a node's own come from Operator::uses
-    bool varies = false;  // its result changes from frame to frame although inputs and arguments do not
+    std::optional<Param> rest;  // takes arguments of any other name; its `name` is then that name
+    Uses uses;                  // of every node of this type; a node's own come from Operator::uses
+    bool varies = false;        // its result changes from frame to frame although inputs and arguments do not
     std::function<std::unique_ptr<Operator>()> make;
 
+    // One of `params`; null where there is none of that name. `name` is a parameter where it is declared (`:group`);
+    // elsewhere it names the node.
     const Param* find(std::string_view param) const;
     std::vector<std::string> param_names() const;
 };
@@ -197,6 +206,8 @@ public:
 
     void uses(Uses& uses) const override
     {
+        if constexpr (requires { fields_.group; })
+            if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
         if constexpr (requires { fields_.uses(uses); }) fields_.uses(uses);
     }
 
@@ -255,6 +266,19 @@ public:
             read_value(param, value, static_cast<T*>(fields)->*field);
         };
         type_.params.push_back(std::move(p));
+        return *this;
+    }
+
+    // Takes arguments of any other name, as values of attributes of that name.
+    Declaration& rest(std::map<std::string, AttributeValue> T::*field, std::string doc)
+    {
+        Param p;
+        p.type = "attribute value";
+        p.doc = std::move(doc);
+        p.assign = [field](const Param& param, void* fields, const Value& value) {
+            read_value(param, value, (static_cast<T*>(fields)->*field)[param.name]);
+        };
+        type_.rest = std::move(p);
         return *this;
     }
 

@@ -22,6 +22,7 @@ struct Range {
     double lo = -std::numeric_limits<double>::infinity();
     double hi = std::numeric_limits<double>::infinity();
     bool lo_excluded = false;  // above lo, not at it
+    bool infinity = false;     // takes math.huge too; NaN is never in range
 
     bool contains(double x) const { return (lo_excluded ? x > lo : x >= lo) && x <= hi; }
     bool bounded() const { return std::isfinite(lo) || std::isfinite(hi); }
@@ -32,6 +33,7 @@ inline Range any_number() { return {}; }
 inline Range at_least(double lo) { return {lo}; }
 inline Range above(double lo) { return {lo, std::numeric_limits<double>::infinity(), true}; }
 inline Range between(double lo, double hi) { return {lo, hi}; }
+inline Range or_infinity(Range range) { return range.infinity = true, range; }
 
 struct Param {
     std::string name, type;  // type as a user reads it: "number", "vec3", "shape", "one of begin, end"
@@ -59,10 +61,15 @@ void read_value(const Param& param, const Value& value, Vec3f& field);
 void read_value(const Param& param, const Value& value, PerPoint<float>& field);
 void read_value(const Param& param, const Value& value, PerPoint<Vec3f>& field);
 void read_value(const Param& param, const Value& value, ObjectPtr& field);
+// An attribute's value; the parameter's name is the attribute's. A known name has its own type, any other the value's:
+// a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion. Error: a name that is Rapid's own (P, v, id, dt).
+void read_value(const Param& param, const Value& value, AttributeValue& field);
 // Attribute values by name: {heat = 1, Cd = {1, .5, 0}}.
 void read_value(const Param& param, const Value& value, std::map<std::string, AttributeValue>& field);
 // Numbers by frame: {[1] = 100, [24] = 50}. A list {100, 50} is frames 1 and 2.
 void read_value(const Param& param, const Value& value, std::map<std::int64_t, double>& field);
+// Names: {"heat", "Cd"}, or one name.
+void read_value(const Param& param, const Value& value, std::vector<std::string>& field);
 
 template <class T>
 void read_value(const Param& param, const Value& value, std::optional<T>& field)
@@ -102,6 +109,10 @@ constexpr std::string_view param_type()
         return "attributes";
     else if constexpr (std::is_same_v<T, std::map<std::int64_t, double>>)
         return "numbers by frame";
+    else if constexpr (std::is_same_v<T, std::vector<std::string>>)
+        return "names";
+    else if constexpr (std::is_same_v<T, AttributeValue>)
+        return "attribute value";
     else if constexpr (requires { typename T::value_type; })  // std::optional
         return param_type<typename T::value_type>();
     else if constexpr (requires { T::param_type; })  // a node's own type

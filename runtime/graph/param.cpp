@@ -1,0 +1,300 @@
+#include "runtime/graph/param.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+namespace rapid {
+namespace {
+
+// "a number", "an integer"; names of several things ("points") and sentences go without.
+std::string with_article(std::string_view type)
+{
+    for (const std::string_view plain : {"points", "attributes", "numbers by frame", "names"})
+        if (type == plain) return std::string(type);
+    const bool vowel = std::string_view("aeiou").find(type.front()) != std::string_view::npos;
+    return fmt::format("{} {}", vowel ? "an" : "a", type);
+}
+
+std::string right_type(const Param& param)
+{
+    std::string words = with_article(param.type);
+    if (param.type == "vec3") words += " or {x, y, z}";
+    if (param.per_point) words += ", or rapid.attr \"name\"";
+    return words;
+}
+
+double checked(const Param& param, double value)
+{
+    const bool finite = std::isfinite(value) || (param.range.infinity && !std::isnan(value));
+    if (!finite || !param.range.contains(value)) out_of_range(param, value);
+    return value;
+}
+
+float to_float(const Param& param, double value)
+{
+    const float narrow = static_cast<float>(value);
+    if (std::isfinite(value) && !std::isfinite(narrow)) out_of_range(param, value);
+    return narrow;
+}
+
+double whole(const Param& param, double value, double lo, double hi)
+{
+    checked(param, value);
+    if (value != std::floor(value))
+        throw Error(fmt::format("{} = {} is not whole; it must be an integer", param.name, value));
+    if (value < lo || value > hi)
+        throw Error(fmt::format("{} = {} is out of range; it must be from {} to {}", param.name, value, lo, hi));
+    return value;
+}
+
+template <class Int>
+Int to_int(const Param& param, double value)
+{
+    return static_cast<Int>(whole(param, value, static_cast<double>(std::numeric_limits<Int>::min()),
+                                  static_cast<double>(std::numeric_limits<Int>::max())));
+}
+
+// The N numbers of a plain list; nothing for anything else.
+template <std::size_t N>
+std::optional<std::array<double, N>> numbers(const Value& value)
+{
+    const Table* table = value.table();
+    if (!table || table->list.size() != N || !table->numbered.empty() || !table->named.empty()) return std::nullopt;
+    std::array<double, N> result;
+    for (std::size_t i = 0; i < N; ++i) {
+        const double* number = table->list[i].get<double>();
+        if (!number) return std::nullopt;
+        result[i] = *number;
+    }
+    return result;
+}
+
+std::optional<Vec3d> to_vec3(const Value& value)
+{
+    if (const Vec3d* vector = value.get<Vec3d>()) return *vector;
+    if (const auto list = numbers<3>(value)) return Vec3d((*list)[0], (*list)[1], (*list)[2]);
+    return std::nullopt;
+}
+
+Vec3f to_vec3f(const Param& param, const Vec3d& value)
+{
+    return {to_float(param, value[0]), to_float(param, value[1]), to_float(param, value[2])};
+}
+
+template <class Map>
+const Table& names_only(const Param& param, const Value& value, Map& field)
+{
+    field.clear();
+    static const Table none;
+    if (value.is_nil()) return none;
+    const Table* table = value.table();
+    if (!table || !table->list.empty() || !table->numbered.empty()) wrong_type(param, value);
+    return *table;
+}
+
+void check_attribute_name(std::string_view name)
+{
+    for (const std::string_view own : {"P", "v", "id", "dt"})
+        if (name == own) throw Error(fmt::format("attribute \"{}\" is set by Rapid itself; choose another name", name));
+    const auto letter = [](unsigned char c) { return std::isalpha(c) || c == '_'; };
+    const auto part = [&](unsigned char c) { return letter(c) || std::isdigit(c); };
+    if (name.empty() || !letter(name.front()) || !std::all_of(name.begin(), name.end(), part))
+        throw Error(
+            fmt::format("attribute name \"{}\" can't be used; take letters, digits and _, no digit first", name));
+}
+
+}  // namespace
+
+std::string Range::text() const
+{
+    const bool low = std::isfinite(lo), high = std::isfinite(hi);
+    if (low && high && !lo_excluded) return fmt::format("from {} to {}", lo, hi);
+    if (low && high) return fmt::format("above {} and at most {}", lo, hi);
+    if (low) return fmt::format("{} {}", lo_excluded ? "above" : "at least", lo);
+    if (high) return fmt::format("at most {}", hi);
+    return "any number";
+}
+
+void wrong_type(const Param& param, const Value& value)
+{
+    if (value.is_nil()) throw Error(fmt::format("{} is nil; it must be {}", param.name, right_type(param)));
+    throw Error(
+        fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right_type(param)));
+}
+
+void out_of_range(const Param& param, double value)
+{
+    std::string right = param.range.bounded() ? param.range.text() : "finite";
+    if (std::isfinite(value) && param.range.contains(value))  // too large for what holds it
+        right = fmt::format("within ±{:.3g}", std::numeric_limits<float>::max());
+    throw Error(fmt::format("{} = {} is out of range; it must be {}", param.name, value, right));
+}
+
+void read_value(const Param& param, const Value& value, double& field)
+{
+    const double* number = value.get<double>();
+    if (!number) wrong_type(param, value);
+    field = checked(param, *number);
+}
+
+void read_value(const Param& param, const Value& value, float& field)
+{
+    double wide = 0;
+    read_value(param, value, wide);
+    field = to_float(param, wide);
+}
+
+void read_value(const Param& param, const Value& value, int& field)
+{
+    const double* number = value.get<double>();
+    if (!number) wrong_type(param, value);
+    field = to_int<int>(param, *number);
+}
+
+void read_value(const Param& param, const Value& value, bool& field)
+{
+    const bool* truth = value.get<bool>();
+    if (!truth) wrong_type(param, value);
+    field = *truth;
+}
+
+void read_value(const Param& param, const Value& value, std::string& field)
+{
+    if (value.is_nil()) return field.clear();
+    const std::string* text = value.get<std::string>();
+    if (!text) wrong_type(param, value);
+    if (!param.choices.empty() && std::find(param.choices.begin(), param.choices.end(), *text) == param.choices.end()) {
+        const std::string nearest = did_you_mean(*text, param.choices);
+        throw Error(fmt::format(
+            "{} = \"{}\" is unknown{}", param.name, *text,
+            nearest.empty() ? fmt::format("; it must be one of {}", fmt::join(param.choices, ", ")) : nearest));
+    }
+    field = *text;
+}
+
+void read_value(const Param& param, const Value& value, Vec3d& field)
+{
+    const std::optional<Vec3d> vector = to_vec3(value);
+    if (!vector) wrong_type(param, value);
+    for (int axis = 0; axis < 3; ++axis) checked(param, (*vector)[axis]);
+    field = *vector;
+}
+
+void read_value(const Param& param, const Value& value, Vec3f& field)
+{
+    Vec3d wide;
+    read_value(param, value, wide);
+    field = to_vec3f(param, wide);
+}
+
+void read_value(const Param& param, const Value& value, PerPoint<float>& field)
+{
+    if (const AttributeRef* attribute = value.get<AttributeRef>()) {
+        field = PerPoint<float>::of(attribute->name);
+        return;
+    }
+    float constant = 0;
+    read_value(param, value, constant);
+    field = PerPoint<float>(constant);
+}
+
+void read_value(const Param& param, const Value& value, PerPoint<Vec3f>& field)
+{
+    if (const AttributeRef* attribute = value.get<AttributeRef>()) {
+        field = PerPoint<Vec3f>::of(attribute->name);
+        return;
+    }
+    Vec3f constant;
+    read_value(param, value, constant);
+    field = PerPoint<Vec3f>(constant);
+}
+
+void read_value(const Param& param, const Value& value, ObjectPtr& field)
+{
+    if (value.is_nil()) return field.reset();
+    const ObjectPtr* object = value.get<ObjectPtr>();
+    if (!object) wrong_type(param, value);
+    field = *object;
+}
+
+void read_value(const Param& param, const Value& value, AttributeValue& field)
+{
+    check_attribute_name(param.name);
+    const AttributeSpec* known = known_attribute(param.name);
+
+    // Lua has one kind of number: an unknown name's is a float, so that 1 and 1.5 make the same column.
+    if (const double* number = value.get<double>(); number && (!known || known->fallback.index() != 1)) {
+        if (known && std::holds_alternative<std::int32_t>(known->fallback)) {
+            field = to_int<std::int32_t>(param, *number);
+            return;
+        }
+        Param finite = param;
+        const float* ordinary = known ? std::get_if<float>(&known->fallback) : nullptr;
+        finite.range.infinity = ordinary && std::isinf(*ordinary);  // life: for ever
+        field = to_float(finite, checked(finite, *number));
+        return;
+    }
+    if (!known || std::holds_alternative<Vec3f>(known->fallback)) {
+        if (const std::optional<Vec3d> vector = to_vec3(value)) {
+            for (int axis = 0; axis < 3; ++axis) checked(param, (*vector)[axis]);
+            field = to_vec3f(param, *vector);
+            return;
+        }
+    }
+    if (const auto xyzw = numbers<4>(value); xyzw && !known) {
+        for (const double component : *xyzw) checked(param, component);
+        const auto at = [&](int i) { return to_float(param, (*xyzw)[i]); };
+        field = Quatf(at(3), at(0), at(1), at(2));  // Eigen's arguments begin with w
+        return;
+    }
+
+    const std::string right = !known ? "a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}"
+                              : std::holds_alternative<Vec3f>(known->fallback) ? "a vec3 or {x, y, z}"
+                                                                               : "a number";
+    throw Error(fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right));
+}
+
+void read_value(const Param& param, const Value& value, std::map<std::string, AttributeValue>& field)
+{
+    for (const auto& [name, given] : names_only(param, value, field).named) {
+        Param one = param;
+        one.name = name;
+        read_value(one, given, field[name]);
+    }
+}
+
+void read_value(const Param& param, const Value& value, std::map<std::int64_t, double>& field)
+{
+    field.clear();
+    if (value.is_nil()) return;
+    const Table* table = value.table();
+    if (!table || !table->named.empty()) wrong_type(param, value);
+
+    const auto put = [&](std::int64_t frame, const Value& given) {
+        Param one = param;
+        one.name = fmt::format("{}[{}]", param.name, frame);
+        one.type = "number";
+        read_value(one, given, field[frame]);
+    };
+    for (std::size_t i = 0; i < table->list.size(); ++i) put(static_cast<std::int64_t>(i) + 1, table->list[i]);
+    for (const auto& [frame, given] : table->numbered) put(frame, given);
+}
+
+void read_value(const Param& param, const Value& value, std::vector<std::string>& field)
+{
+    field.clear();
+    if (value.is_nil()) return;
+    if (const std::string* one = value.get<std::string>()) return field.push_back(*one);
+    const Table* table = value.table();
+    if (!table || !table->numbered.empty() || !table->named.empty()) wrong_type(param, value);
+    for (const Value& entry : table->list) {
+        const std::string* name = entry.get<std::string>();
+        if (!name) wrong_type(param, value);
+        field.push_back(*name);
+    }
+}
+
+}  // namespace rapid

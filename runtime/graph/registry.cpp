@@ -1,0 +1,71 @@
+#include "runtime/graph/registry.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace rapid {
+namespace {
+
+// Filled while the program starts, in link order; a function's static, so that it is there before the first node's
+// registration, whichever file that is in.
+std::vector<NodeType (*)()>& declarations()
+{
+    static std::vector<NodeType (*)()> all;
+    return all;
+}
+
+}  // namespace
+
+const Param* NodeType::find(std::string_view param) const
+{
+    const auto found = std::find_if(params.begin(), params.end(), [&](const Param& p) { return p.name == param; });
+    return found == params.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> NodeType::param_names() const
+{
+    std::vector<std::string> names;
+    for (const Param& param : params) names.push_back(param.name);
+    return names;
+}
+
+NodeRegistration::NodeRegistration(NodeType (*declare)()) { declarations().push_back(declare); }
+
+Registry::Registry()
+{
+    for (NodeType (*declare)() : declarations()) add(declare());
+}
+
+const NodeType& Registry::add(NodeType type)
+{
+    if (find(type.name))
+        throw Error(fmt::format("a node \"{}\" exists already; give the new one another name", type.name));
+    return types_.emplace_back(std::move(type));
+}
+
+const NodeType* Registry::find(std::string_view name) const
+{
+    const auto found = std::find_if(types_.begin(), types_.end(), [&](const NodeType& t) { return t.name == name; });
+    return found == types_.end() ? nullptr : &*found;
+}
+
+const NodeType& Registry::at(std::string_view name) const
+{
+    if (const NodeType* found = find(name)) return *found;
+    std::vector<std::string> names;
+    for (const NodeType* type : types()) names.push_back(type->name);
+    const std::string nearest = did_you_mean(name, names);
+    throw Error(fmt::format("unknown node \"{}\"{}", name,
+                            nearest.empty() ? "; `rapid nodes` lists those that there are" : nearest));
+}
+
+std::vector<const NodeType*> Registry::types() const
+{
+    std::vector<const NodeType*> sorted;
+    for (const NodeType& type : types_) sorted.push_back(&type);
+    std::sort(sorted.begin(), sorted.end(), [](const NodeType* a, const NodeType* b) { return a->name < b->name; });
+    return sorted;
+}
+
+}  // namespace rapid

@@ -1,0 +1,43 @@
+# How our own code is compiled. rapid_public holds what a user of the library must share, rapid_private the rest.
+
+# The build types: Release for use, Debug and RelWithDebInfo with assertions.
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Release, RelWithDebInfo or Debug" FORCE)
+endif()
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
+set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
+
+add_library(rapid_public INTERFACE)
+target_compile_features(rapid_public INTERFACE cxx_std_20)
+# Eigen aligns to the widest vector that the compiler may use, so a library built for this machine and a program built
+# for any would disagree about the layout of an Affine3d, and about who frees a heap block. 16 bytes is the same for
+# both, and costs nothing on processors that load across lines.
+target_compile_definitions(rapid_public INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+# Inline functions of our headers may be compiled there and run here: the same bits need the same rule.
+target_compile_options(rapid_public INTERFACE -ffp-contract=off)
+target_link_libraries(rapid_public INTERFACE Eigen3::Eigen TBB::tbb fmt::fmt Random123::Random123 Threads::Threads)
+
+add_library(rapid_private INTERFACE)
+target_include_directories(rapid_private INTERFACE ${PROJECT_SOURCE_DIR})
+target_link_libraries(rapid_private INTERFACE rapid_public)
+target_compile_definitions(rapid_private INTERFACE $<$<NOT:$<CONFIG:Release>>:RAPID_ASSERTIONS>)
+target_compile_options(rapid_private INTERFACE
+  -march=${RAPID_ARCH} -Wall -Wextra -Wshadow $<$<BOOL:${RAPID_WERROR}>:-Werror>
+  # The same for executables as for the library, so that they share precompiled headers. Calls inside the library may
+  # be inlined although it is shared: nobody replaces a function of it.
+  -fPIC -fno-semantic-interposition)
+if(RAPID_SANITIZE)
+  target_compile_options(rapid_private INTERFACE
+    -fsanitize=${RAPID_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(rapid_private INTERFACE -fsanitize=${RAPID_SANITIZE})
+endif()
+
+# ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so.
+find_program(CCACHE ccache)
+if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(rapid_private INTERFACE -fpch-preprocess)
+  endif()
+endif()

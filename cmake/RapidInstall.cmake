@@ -1,0 +1,19 @@
+# bin/rapid, the library, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the package
+# config for find_package(rapid).
+include(CMakePackageConfigHelpers)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/rapid)
+
+install(TARGETS rapid rapid_public EXPORT rapidTargets)
+if(TARGET rapid_command)
+  install(TARGETS rapid_command)
+endif()
+install(DIRECTORY runtime DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY lua graphs DESTINATION ${CMAKE_INSTALL_DATADIR}/rapid)
+
+install(EXPORT rapidTargets NAMESPACE rapid:: DESTINATION ${package_dir})
+configure_package_config_file(cmake/rapidConfig.cmake.in rapidConfig.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(rapidConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES
+  ${PROJECT_BINARY_DIR}/rapidConfig.cmake ${PROJECT_BINARY_DIR}/rapidConfigVersion.cmake cmake/FindRandom123.cmake
+  DESTINATION ${package_dir})

@@ -1,0 +1,68 @@
+# rapid_layer(NAME SOURCE...)
+#
+# A layer of the runtime as an OBJECT library rapid_NAME: so it builds alone, and links whole, with the nodes and formats
+# that register themselves and that nothing refers to by name. Sources that include OpenVDB, directly or by a header of
+# ours, are compiled apart (rapid_NAME_openvdb) with its headers precompiled: they take seconds, each time.
+#
+# rapid_link_layers(TARGET NAME...) links layers into a target.
+
+# The headers of ours that bring OpenVDB with them.
+function(rapid_openvdb_headers result)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/runtime/*.h)
+  set(found "")
+  foreach(header ${headers})
+    file(STRINGS ${header} line REGEX "#include <openvdb/" LIMIT_COUNT 1)
+    if(line)
+      file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR} ${header})
+      list(APPEND found ${name})
+    endif()
+  endforeach()
+  set(${result} ${found} PARENT_SCOPE)
+endfunction()
+
+function(rapid_split_openvdb with without)
+  rapid_openvdb_headers(headers)
+  list(TRANSFORM headers PREPEND "|\"")
+  list(TRANSFORM headers APPEND "\"")
+  list(JOIN headers "" headers)
+  set(result_with "")
+  set(result_without "")
+  foreach(source ${ARGN})
+    file(STRINGS ${source} line REGEX "#include (<openvdb/${headers})" LIMIT_COUNT 1)
+    if(line)
+      list(APPEND result_with ${source})
+    else()
+      list(APPEND result_without ${source})
+    endif()
+  endforeach()
+  set(${with} ${result_with} PARENT_SCOPE)
+  set(${without} ${result_without} PARENT_SCOPE)
+endfunction()
+
+function(rapid_layer name)
+  rapid_split_openvdb(with without ${ARGN})
+  set(parts "")
+  if(without)
+    add_library(rapid_${name} OBJECT ${without})
+    target_link_libraries(rapid_${name} PRIVATE rapid_private)
+    target_precompile_headers(rapid_${name} REUSE_FROM rapid_precompiled)
+    list(APPEND parts rapid_${name})
+  endif()
+  if(with)
+    add_library(rapid_${name}_openvdb OBJECT ${with})
+    target_link_libraries(rapid_${name}_openvdb PRIVATE rapid_private OpenVDB::openvdb)
+    target_precompile_headers(rapid_${name}_openvdb REUSE_FROM rapid_precompiled_openvdb)
+    list(APPEND parts rapid_${name}_openvdb)
+  endif()
+  set_property(GLOBAL PROPERTY rapid_parts_of_${name} ${parts})
+endfunction()
+
+function(rapid_link_layers target)
+  foreach(name ${ARGN})
+    get_property(parts GLOBAL PROPERTY rapid_parts_of_${name})
+    target_link_libraries(${target} PRIVATE ${parts})
+  endforeach()
+  # The linker takes of these what the layers refer to.
+  target_link_libraries(${target} PRIVATE OpenVDB::openvdb assimp::assimp PNG::PNG)
+  target_link_options(${target} PRIVATE -Wl,--as-needed)
+endfunction()

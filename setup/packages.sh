@@ -1,0 +1,13 @@
+# Debian 12 packages, the one list of them. To be sourced.
+
+# What the command needs, to be built and to run (lua-busted for `rapid test`). libopenvdb-dev's headers include
+# Boost's, though it does not depend on them.
+build_packages=(
+    ccache cmake g++ ninja-build
+    libassimp-dev libboost-dev libcli11-dev libeigen3-dev libfmt-dev libluajit-5.1-dev libopenvdb-dev libpng-dev
+    librandom123-dev libtbb-dev nlohmann-json3-dev
+    lua-busted
+)
+
+# What its tests need besides.
+test_packages=(catch2 clang-format-14 libbenchmark-dev librapidcheck-dev lua-check)

@@ -39,6 +39,7 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/graph/adopted_ids.h"
 #include "runtime/graph/param.h"
 #include "runtime/random.h"
 #include "runtime/solver/dynamics.h"
@@ -54,6 +55,7 @@ struct Simulation {
     std::vector<AttributeSpec> columns;  // what the plan knows: these exist from the first frame on
     std::vector<std::string> groups;
     PointSet state;  // as Solve left it at the frame before
+    std::map<const Simulation*, AdoptedIds> adopted;  // the ids here of points that came from other simulations
 
     Frame frame(std::int64_t number) const
     {
@@ -94,6 +96,7 @@ struct Evaluation {
 struct Uses {
     std::vector<std::string> reads, writes;
     std::vector<AttributeSpec> makes;
+    std::vector<AttributeSpec> defaults;  // what points without a value of their own get, whoever makes the attribute
     std::vector<std::string> reads_groups, makes_groups;
 };
 
@@ -307,5 +310,12 @@ Declaration<T> node(std::string name, std::string doc)
 {
     return Declaration<T>(std::move(name), std::move(doc));
 }
+
+// Registers a native type while the program starts; used through RAPID_NODE, in the node's own file.
+struct NodeRegistration {
+    explicit NodeRegistration(NodeType (*declare)());
+};
+#define RAPID_NODE(Type) \
+    static const ::rapid::NodeRegistration registration_of_##Type([] { return NodeType(Type::declare()); })
 
 }  // namespace rapid

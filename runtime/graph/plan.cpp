@@ -275,14 +275,19 @@ bool Plan::brings_other_points(const PlannedNode& planned) const
 std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
 {
     std::vector<AttributeSpec> columns;
+    std::map<std::string, AttributeValue> defaults;  // the first node that gives one decides
     std::set<std::string> taken;
     for (const PlannedNode& planned : nodes) {
         if (planned.simulation != simulation) continue;
         const bool makes_columns = planned.in_loop || planned.node->type->kind == NodeKind::Source;
         if (!makes_columns) continue;
-        for (const AttributeSpec& spec : uses_of(planned).makes)
+        const Uses uses = uses_of(planned);
+        for (const AttributeSpec& spec : uses.defaults) defaults.emplace(spec.name, spec.fallback);
+        for (const AttributeSpec& spec : uses.makes)
             if (taken.insert(spec.name).second) columns.push_back(spec);
     }
+    for (AttributeSpec& spec : columns)
+        if (const auto given = defaults.find(spec.name); given != defaults.end()) spec.fallback = given->second;
     for (const std::string& name : known_names_[simulation])
         if (taken.insert(name).second) columns.push_back(*known_attribute(name));
     return columns;

@@ -30,11 +30,4 @@ private:
     std::deque<NodeType> types_;  // a node keeps a pointer to its type
 };
 
-// Registers a native type while the program starts; used through RAPID_NODE, in the node's own file.
-struct NodeRegistration {
-    explicit NodeRegistration(NodeType (*declare)());
-};
-#define RAPID_NODE(Type) \
-    static const ::rapid::NodeRegistration registration_of_##Type([] { return NodeType(Type::declare()); })
-
 }  // namespace rapid

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for_each.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "runtime/parallel.h"
@@ -117,6 +118,13 @@ AnyColumn& PointSet::add(const AttributeSpec& spec)
         spec.fallback);
 }
 
+AnyColumn& PointSet::set_fallback(const AttributeSpec& spec)
+{
+    AnyColumn& column = add(spec);
+    std::visit([&](auto& c) { c.set_fallback(std::get<std::decay_t<decltype(c.fallback())>>(spec.fallback)); }, column);
+    return column;
+}
+
 void PointSet::set(std::string_view name, AnyColumn column)
 {
     RAPID_ASSERT(std::visit([](const auto& c) { return c.size(); }, column) == size_);
@@ -151,6 +159,24 @@ void PointSet::append(std::size_t n)
 {
     for (auto& [name, column] : columns_) std::visit([n](auto& c) { c.append(n); }, column);
     for (auto& [name, members] : groups_) members.append(n, std::uint8_t{0});
+    size_ += n;
+}
+
+void PointSet::append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups)
+{
+    for (auto& [name, column] : columns_)
+        std::visit(
+            [&, &key = name](auto& c) {
+                const auto given =
+                    std::find_if(values.begin(), values.end(), [&](const auto& s) { return s.name == key; });
+                if (given == values.end())
+                    c.append(n);
+                else
+                    c.append(n, std::get<std::decay_t<decltype(c.fallback())>>(given->fallback));
+            },
+            column);
+    for (auto& [name, members] : groups_)
+        members.append(n, std::uint8_t{std::find(groups.begin(), groups.end(), name) != groups.end()});
     size_ += n;
 }
 

@@ -94,6 +94,8 @@ public:
     // Makes the column with its fallback value everywhere, unless there is one: then it is kept, and its type must
     // agree.
     AnyColumn& add(const AttributeSpec& spec);
+    // As add(), and points that are appended from now on get this value.
+    AnyColumn& set_fallback(const AttributeSpec& spec);
     // Replaces or adds a column; its size must be the set's.
     void set(std::string_view name, AnyColumn column);
     void remove(std::string_view name);
@@ -105,6 +107,9 @@ public:
 
     // Adds n points: every column gets its fallback value (P and v zero), groups 0, ids -1 until the caller sets them.
     void append(std::size_t n);
+    // The same, with one value for all of them in the columns named, and as members of the groups named; these exist.
+    // What is uniform of that value stays so.
+    void append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups);
 
     // Removes the points whose mask is 0, shape [size]; the others keep their order. Columns are compacted in parallel.
     void keep(std::span<const std::uint8_t> mask);

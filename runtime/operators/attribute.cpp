@@ -1,0 +1,36 @@
+// attribute: brings attributes into being.
+//
+// Points that have no value yet get the one given here: the initial ones, those born later without one of their own,
+// and those that a merge brings without one. Values that are there are never overwritten. A value that is a function of
+// the frame is the one that points get at that frame.
+#include "runtime/graph/node.h"
+
+namespace rapid {
+namespace {
+
+struct Attribute {
+    std::map<std::string, AttributeValue> values;
+
+    static NodeType declare()
+    {
+        return node<Attribute>("attribute", "Gives attributes to points that do not have them; never overwrites.")
+            .rest(&Attribute::values, "value of points that have none: a number is a float, {x, y, z} a vec3");
+    }
+
+    void uses(Uses& uses) const
+    {
+        for (const auto& [name, value] : values) {
+            uses.makes.push_back({name, value});
+            uses.defaults.push_back({name, value});
+        }
+    }
+
+    void edit(PointSet& points, const Evaluation&) const
+    {
+        for (const auto& [name, value] : values) points.set_fallback({name, value});
+    }
+};
+RAPID_NODE(Attribute);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,88 @@
+// create: starts a simulation, and yields its points at the beginning of each frame.
+//
+// At the first frame these are the initial points, with ids from 0 in their order (whatever ids they brought: an id is
+// a birth's number in this simulation). At every later frame they are the points as Solve left them, handed on without
+// a copy. Every column and group that the plan knows is there from the first frame on, so that all frames have the
+// same.
+#include "runtime/graph/node.h"
+#include "runtime/graph/points_object.h"
+
+#include <fmt/format.h>
+
+#include <numeric>
+
+namespace rapid {
+namespace {
+
+struct Create {
+    double fps = 24;
+    int start_frame = 1;
+    int seed = 0;
+    std::shared_ptr<const PointsObject> points;
+
+    static NodeType declare()
+    {
+        return node<Create>("create", "Starts a simulation; yields its points as Solve left them at the frame before.")
+            .kind(NodeKind::Source)
+            .param(&Create::fps, "fps", 24.0, above(0), "1/s", "frames a second")
+            .constant()
+            .param(&Create::start_frame, "start", 1.0, any_number(), "", "first frame: the initial state, at time 0")
+            .constant()
+            .param(&Create::seed, "seed", 0.0, at_least(0), "", "of all random numbers of this simulation")
+            .constant()
+            .param(&Create::points, "points", Value(), any_number(), "", "initial points; their ids count from 0")
+            .constant();
+    }
+
+    void uses(Uses& uses) const
+    {
+        if (!points) return;
+        for (const auto& [name, column] : points->points.columns())
+            if (name != "P" && name != "v" && name != "id" && name != "dt")
+                uses.makes.push_back({name, fallback_of(column)});
+        for (const auto& [name, members] : points->points.groups()) uses.makes_groups.push_back(name);
+    }
+
+    void check() const
+    {
+        if (!points) return;
+        for (const auto& [name, column] : points->points.columns())
+            if (const AttributeSpec* known = known_attribute(name);
+                known && type_of(known->fallback) != type_of(column))
+                throw Error(fmt::format("the initial points have \"{}\" as {}; it must be {}", name,
+                                        type_name(type_of(column)), type_name(type_of(known->fallback))));
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        Simulation& simulation = *flow.simulation;
+        flow.points = now.at_start ? initial(simulation) : std::move(simulation.state);
+        for (const AttributeSpec& spec : simulation.columns) flow.points.set_fallback(spec);
+        for (const std::string& name : simulation.groups) flow.points.group(name);
+        return flow;
+    }
+
+private:
+    static AttributeValue fallback_of(const AnyColumn& column)
+    {
+        return std::visit([](const auto& c) -> AttributeValue { return c.fallback(); }, column);
+    }
+
+    PointSet initial(Simulation& simulation) const
+    {
+        PointSet set = points ? points->points : PointSet();
+        set.remove("dt");
+        if (!set.empty()) {
+            const std::span<std::int64_t> ids = set.id().overwrite();
+            std::iota(ids.begin(), ids.end(), std::int64_t{0});
+        }
+        simulation.next_id = static_cast<std::int64_t>(set.size());
+        simulation.adopted.clear();
+        return set;
+    }
+};
+RAPID_NODE(Create);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,61 @@
+// write: hands the points, as they are here, to be written to a file of each frame; they go on unchanged.
+//
+// At the first frame it writes too, wherever it stands in the chain: a sequence of files begins where the frames do.
+#include "runtime/graph/selection.h"
+
+#include <algorithm>
+
+namespace rapid {
+namespace {
+
+struct Write {
+    std::string file, group;
+    std::vector<std::string> attributes;
+
+    static NodeType declare()
+    {
+        return node<Write>("write", "Writes the points as they are here, and passes them on.")
+            .varies()
+            .param(&Write::file, "file", Value(), any_number(), "", "pattern of the file: #### is the frame")
+            .required()
+            .param(&Write::attributes, "attributes", Value(), any_number(), "",
+                   "those that are written besides P, v and id; without it all are")
+            .constant();
+    }
+
+    void uses(Uses& uses) const { uses.reads.insert(uses.reads.end(), attributes.begin(), attributes.end()); }
+
+    void check() const
+    {
+        if (file.empty()) throw Error("file = \"\" names no file; give a pattern such as \"points.####.vdb\"");
+    }
+
+    void edit(PointSet& points, const Evaluation& now) const
+    {
+        if (!now.write) return;
+        PointSet written = points;
+        written.remove("dt");
+        if (!attributes.empty()) keep_columns(written);
+        if (!group.empty()) written.keep(select(written, group, nullptr, now));
+        now.write(file, written);
+    }
+
+    Flow start(std::span<Flow> inputs, const Evaluation& now) const
+    {
+        edit(inputs[0].points, now);
+        return std::move(inputs[0]);
+    }
+
+private:
+    void keep_columns(PointSet& set) const
+    {
+        for (const std::string& name : set.column_names())
+            if (name != "P" && name != "v" && name != "id" &&
+                std::find(attributes.begin(), attributes.end(), name) == attributes.end())
+                set.remove(name);
+    }
+};
+RAPID_NODE(Write);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,78 @@
+// Dependencies point downward: the includes of the runtime, read from its sources, against a table of allowed edges.
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What a folder's files may include besides their own folder's. The files in runtime itself (errors, vectors, random
+// numbers) are the bottom.
+const std::map<std::string, std::set<std::string>> below = {
+    {"runtime", {}},
+    {"runtime/points", {"runtime"}},
+    {"runtime/shapes", {"runtime", "runtime/points"}},
+    {"runtime/solver", {"runtime", "runtime/points", "runtime/shapes"}},
+    {"runtime/graph", {"runtime", "runtime/points", "runtime/shapes", "runtime/solver"}},
+    {"runtime/operators", {"runtime", "runtime/points", "runtime/shapes", "runtime/solver", "runtime/graph"}},
+    {"runtime/io", {"runtime", "runtime/points", "runtime/shapes", "runtime/solver", "runtime/graph"}},
+    {"runtime/report", {"runtime", "runtime/points", "runtime/shapes", "runtime/solver", "runtime/graph"}},
+};
+
+struct Include {
+    std::string file, folder;  // relative to the checkout
+    std::string included;      // as it is written, without quotes or angles
+    bool ours;                 // in quotes
+};
+
+std::vector<Include> includes_of_runtime()
+{
+    const fs::path root = RAPID_SOURCE_DIR;
+    const std::regex directive(R"re(^\s*#\s*include\s*(["<])([^">]+)[">].*)re");
+    std::vector<Include> result;
+    for (const auto& entry : fs::recursive_directory_iterator(root / "runtime")) {
+        if (entry.path().extension() != ".h" && entry.path().extension() != ".cpp") continue;
+        const fs::path file = fs::relative(entry.path(), root);
+        std::ifstream text(entry.path());
+        std::smatch match;
+        for (std::string line; std::getline(text, line);)
+            if (std::regex_match(line, match, directive))
+                result.push_back({file.string(), file.parent_path().string(), match[2], match[1] == "\""});
+    }
+    return result;
+}
+
+}  // namespace
+
+TEST_CASE("a file of the runtime includes only its own folder and those below", "[layers]")
+{
+    const auto includes = includes_of_runtime();
+    REQUIRE(includes.size() > 100);  // the sources were found and read
+
+    for (const Include& include : includes) {
+        if (!include.ours) continue;
+        CAPTURE(include.file, include.included);
+        REQUIRE(below.count(include.folder) == 1);
+        const std::string into = fs::path(include.included).parent_path().string();
+        CHECK((into == include.folder || below.at(include.folder).count(into) == 1));
+    }
+}
+
+TEST_CASE("only shapes and formats know OpenVDB", "[layers]")
+{
+    for (const Include& include : includes_of_runtime()) {
+        if (include.included.rfind("openvdb/", 0) != 0) continue;
+        CAPTURE(include.file, include.included);
+        CHECK((include.folder == "runtime/shapes" || include.folder == "runtime/io"));
+    }
+}
+
+}  // namespace rapid

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <numeric>
+#include <utility>
 
 namespace rapid {
 
@@ -43,6 +44,14 @@ void Error::compose()
 
 namespace {
 
+std::string lower_case(std::string_view text)
+{
+    std::string lower(text);
+    for (char& c : lower)
+        if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
+    return lower;
+}
+
 // Optimal string alignment: insert, delete, replace, swap neighbours ("linaer" is one step from "linear").
 std::size_t edit_distance(std::string_view a, std::string_view b)
 {
@@ -65,10 +74,12 @@ std::size_t edit_distance(std::string_view a, std::string_view b)
 std::string nearest_name(std::string_view name, const std::vector<std::string>& names)
 {
     std::string nearest;
+    const std::string wanted = lower_case(name);
     std::size_t least = std::max<std::size_t>(1, name.size() / 3) + 1;
     for (const std::string& candidate : names) {
-        const std::size_t distance = edit_distance(name, candidate);
-        if (distance < least) {
+        const std::size_t distance = edit_distance(wanted, lower_case(candidate));
+        const bool alike = distance < std::max(name.size(), candidate.size());
+        if (alike && distance < least) {
             least = distance;
             nearest = candidate;
         }

@@ -42,8 +42,8 @@ private:
     Location location_;
 };
 
-// The name among `names` that `name` was most likely meant to be: the smallest edit distance, if that is at most a
-// third of its length (at least 1). Empty when none is near.
+// The name among `names` that `name` was most likely meant to be: the smallest edit distance, upper and lower case
+// alike, if that is at most a third of its length (at least 1) and leaves something of both. Empty when none is near.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& names);
 
 // `; did you mean "NEAREST"?`, or nothing.

@@ -1,11 +1,17 @@
-// What every test includes: Catch2, and nothing that a single layer could not link.
+// What every test includes: Catch2, RapidCheck's rc::prop, vectors compared within a tolerance, and point sets in a
+// line.
 #pragma once
 
+#include <rapidcheck/catch.h>
+
 #include <catch2/catch.hpp>
+#include <initializer_list>
 #include <limits>
 #include <sstream>
 #include <string>
+#include <vector>
 
+#include "runtime/points/point_set.h"
 #include "runtime/vec.h"
 
 // How a failed check shows a vector: all digits, on one line.
@@ -26,7 +32,8 @@ struct StringMaker<Eigen::Matrix<Scalar, 3, 1>> {
 
 namespace rapid::test {
 
-// Compares vectors by the largest difference of a component; `tolerance` is absolute, in the vector's unit.
+// Compares vectors by the largest difference of a component; `tolerance` is absolute, in the vector's unit. NaN is
+// close to nothing.
 template <class Vec>
 class CloseTo : public Catch::MatcherBase<Vec> {
 public:
@@ -34,7 +41,7 @@ public:
 
     bool match(const Vec& actual) const override
     {
-        return (actual - expected_).template cast<double>().cwiseAbs().maxCoeff() <= tolerance_;
+        return ((actual - expected_).template cast<double>().array().abs() <= tolerance_).all();
     }
 
     std::string describe() const override
@@ -49,5 +56,40 @@ private:
 
 inline CloseTo<Vec3f> close_to(const Vec3f& expected, double tolerance) { return {expected, tolerance}; }
 inline CloseTo<Vec3d> close_to(const Vec3d& expected, double tolerance) { return {expected, tolerance}; }
+
+// points({{0, 1, 0}, {0, 2, 0}}).v({{0, -3, 0}, {}}).set<float>("heat", {1, 2}).group("hot", {1}): a set with ids from
+// 0.
+class Points : public PointSet {
+public:
+    explicit Points(const std::vector<Vec3f>& positions)
+    {
+        append(positions.size());
+        P() = Column<Vec3f>(std::span(positions));
+        auto ids = id().overwrite();
+        for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int64_t>(i);
+    }
+
+    using PointSet::v;
+    Points& v(const std::vector<Vec3f>& velocities) { return set<Vec3f>("v", velocities); }
+
+    using PointSet::set;
+    template <class T>
+    Points& set(std::string_view name, const std::vector<T>& values)
+    {
+        PointSet::set(name, Column<T>(std::span(values)));
+        return *this;
+    }
+
+    // The members are places in the set, from 0.
+    using PointSet::group;
+    Points& group(std::string_view name, std::initializer_list<std::size_t> members)
+    {
+        auto membership = PointSet::group(name).write();
+        for (const std::size_t member : members) membership[member] = 1;
+        return *this;
+    }
+};
+
+inline Points points(const std::vector<Vec3f>& positions) { return Points(positions); }
 
 }  // namespace rapid::test

@@ -49,6 +49,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept
 void Buffer::reserve(std::size_t bytes)
 {
     if (bytes <= capacity_) return;
+    if (bytes > max_bytes) throw std::bad_alloc();
     // Growth by half: untouched pages are free, and a column that is appended to every frame is remapped seldom.
     const std::size_t wanted = capacity_ == 0 ? bytes : std::max(bytes, capacity_ + capacity_ / 2);
 

@@ -12,6 +12,9 @@ namespace rapid {
 
 class Buffer {
 public:
+    // More than any machine's address space has for a block, less than would overflow when a block grows.
+    static constexpr std::size_t max_bytes = std::size_t{1} << 62;
+
     Buffer() = default;
     explicit Buffer(std::size_t bytes) { reserve(bytes); }
     Buffer(const Buffer&) = delete;

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -86,7 +87,7 @@ public:
     // The values for writing when all will be overwritten: as write(), without copying what is there.
     std::span<T> overwrite()
     {
-        if (!values_ || values_.use_count() > 1) values_ = std::make_shared<Buffer>(size_ * sizeof(T));
+        if (!values_ || is_shared()) values_ = std::make_shared<Buffer>(bytes_of(size_));
         return {mutable_data(), size_};
     }
 
@@ -102,8 +103,8 @@ public:
     void append(std::size_t n, const T& value)
     {
         if (n == 0) return;
-        if (!values_ && (size_ == 0 || same(shared_, value))) {
-            shared_ = value;
+        if (size_ == 0 || (!values_ && same(shared_, value))) {
+            fill(value);
             size_ += n;
             return;
         }
@@ -112,9 +113,11 @@ public:
         std::uninitialized_fill(added.begin(), added.end(), copy);
     }
 
+    // The values of another column, or of none: growing moves this column's own.
     void append(std::span<const T> values)
     {
         if (values.empty()) return;
+        RAPID_ASSERT(!values_ || values.data() + values.size() <= data() || data() + size_ <= values.data());
         std::memcpy(static_cast<void*>(append_for_writing(values.size()).data()), values.data(), values.size_bytes());
     }
 
@@ -131,8 +134,7 @@ public:
     {
         if (values_) {
             const T* from = data();
-            const bool shared = values_.use_count() > 1;
-            std::shared_ptr<Buffer> into = shared ? std::make_shared<Buffer>(compaction.kept * sizeof(T)) : values_;
+            std::shared_ptr<Buffer> into = is_shared() ? std::make_shared<Buffer>(bytes_of(compaction.kept)) : values_;
             T* to = static_cast<T*>(into->data());
             for (const auto& run : compaction.runs) {
                 if (to != from + run.begin)
@@ -149,14 +151,31 @@ private:
 
     static bool same(const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; }
 
+    // Too many to count in bytes is too many to hold.
+    static std::size_t bytes_of(std::size_t size)
+    {
+        if (size > Buffer::max_bytes / sizeof(T)) throw std::bad_alloc();
+        return size * sizeof(T);
+    }
+
+    // Whether another column holds the values too. A last other one may have been let go by another thread (a writer of
+    // files), and its reads must be over before these values are written: use_count() orders nothing, but the decrement
+    // of a copy that is made and dropped does.
+    bool is_shared() const
+    {
+        if (values_.use_count() > 1) return true;
+        std::shared_ptr<Buffer>(values_).reset();
+        return false;
+    }
+
     const T* data() const { return static_cast<const T*>(values_->data()); }
     T* mutable_data() { return values_ ? static_cast<T*>(values_->data()) : nullptr; }
 
     // Makes the values this column's alone, expanded, with room for `size` of them.
     void own(std::size_t size)
     {
-        if (values_ && values_.use_count() == 1) return values_->reserve(size * sizeof(T));
-        auto owned = std::make_shared<Buffer>(size * sizeof(T));
+        if (values_ && !is_shared()) return values_->reserve(bytes_of(size));
+        auto owned = std::make_shared<Buffer>(bytes_of(size));
         if (values_)
             std::memcpy(owned->data(), values_->data(), size_ * sizeof(T));
         else

@@ -1,0 +1,102 @@
+#include "runtime/points/buffer.h"
+
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <numeric>
+#include <set>
+#include <span>
+
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+std::span<std::uint64_t> words(const Buffer& buffer, std::size_t bytes)
+{
+    return {static_cast<std::uint64_t*>(buffer.data()), bytes / sizeof(std::uint64_t)};
+}
+
+std::uintptr_t address(const Buffer& buffer) { return reinterpret_cast<std::uintptr_t>(buffer.data()); }
+
+}  // namespace
+
+TEST_CASE("values survive growth, from the heap to pages and from pages to more pages", "[buffer]")
+{
+    Buffer buffer;
+    std::size_t written = 0;
+    // 64 B to 64 MiB: blocks are from the heap below 256 KiB, and pages of their own from there on.
+    for (std::size_t bytes = 64; bytes <= std::size_t{1} << 26; bytes *= 4) {
+        buffer.reserve(bytes);
+        REQUIRE(buffer.capacity() >= bytes);
+
+        const auto values = words(buffer, bytes);
+        for (std::size_t i = 0; i < written; ++i)
+            if (values[i] != i) FAIL("value " << i << " is " << values[i] << " at " << bytes << " bytes");
+        std::iota(values.begin(), values.end(), std::uint64_t{0});
+        written = values.size();
+    }
+}
+
+TEST_CASE("room that is there already is kept where it is", "[buffer]")
+{
+    Buffer buffer(1000);
+    void* before = buffer.data();
+    buffer.reserve(10);
+    buffer.reserve(buffer.capacity());
+    CHECK(buffer.data() == before);
+}
+
+TEST_CASE("growing bit by bit moves the values a few times, not every time", "[buffer]")
+{
+    Buffer buffer;
+    std::set<std::size_t> capacities;
+    for (std::size_t bytes = 1; bytes < 1000000; bytes += 100) {
+        buffer.reserve(bytes);
+        capacities.insert(buffer.capacity());
+    }
+    CHECK(capacities.size() < 40);  // log(1e6) / log(1.5) = 34 and the change from heap to pages
+}
+
+TEST_CASE("every block starts on a cache line", "[buffer]")
+{
+    const std::size_t bytes = GENERATE(1, 100, 5000, 1 << 18, (1 << 20) + 1);
+    for (int i = 0; i < 100; ++i) CHECK(address(Buffer(bytes)) % 64 == 0);
+}
+
+TEST_CASE("large blocks start at different places of their pages", "[buffer]")
+{
+    std::set<std::uintptr_t> offsets;
+    for (int i = 0; i < 10; ++i) offsets.insert(address(Buffer(1 << 20)) % 4096);
+    CHECK(offsets.size() == 10);
+}
+
+TEST_CASE("moving a buffer moves the block, and the values of neither are lost", "[buffer]")
+{
+    const std::size_t bytes = GENERATE(64, 1 << 20);
+    Buffer from(bytes), to(128);
+    words(from, bytes)[7] = 42;
+    void* block = from.data();
+
+    to = std::move(from);
+    CHECK(to.data() == block);
+    CHECK(words(to, bytes)[7] == 42);
+
+    from.reserve(bytes);  // the moved-from buffer is an empty one
+    CHECK(from.data() != block);
+}
+
+TEST_CASE("more memory than there is address space is refused, before anything changes", "[buffer]")
+{
+    Buffer buffer(64);
+    words(buffer, 64)[0] = 42;
+    const std::size_t bytes =
+        GENERATE(as<std::size_t>{}, std::size_t{1} << 60, ~std::size_t{0}, ~std::size_t{0} - 4096);
+
+    CHECK_THROWS_AS(buffer.reserve(bytes), std::bad_alloc);
+
+    CHECK(buffer.capacity() == 64);
+    CHECK(words(buffer, 64)[0] == 42);
+}
+
+}  // namespace rapid

@@ -21,6 +21,7 @@ struct SessionOptions {
     std::map<std::string, std::string> set;            // --set NAME=VALUE
     double script_timeout = 600;                       // s, a frame (or a load) may spend in scripts
     std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory, a state
+    bool may_write = false;                            // levelset:write acts in a run alone
     // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
     std::function<void(const std::string& message)> on_timeout;
 };

@@ -54,7 +54,7 @@ struct Simulation {
     std::int64_t next_id = 0;            // ids count all births from 0
     std::vector<AttributeSpec> columns;  // what the plan knows: these exist from the first frame on
     std::vector<std::string> groups;
-    PointSet state;  // as Solve left it at the frame before
+    PointSet state;                                   // as Solve left it at the frame before
     std::map<const Simulation*, AdoptedIds> adopted;  // the ids here of points that came from other simulations
 
     Frame frame(std::int64_t number) const
@@ -95,6 +95,7 @@ struct Evaluation {
 // Attributes and groups that a node reads, writes, or brings into being.
 struct Uses {
     std::vector<std::string> reads, writes;
+    std::vector<std::string> may;  // names that may be attributes: known ones among them are brought into being
     std::vector<AttributeSpec> makes;
     std::vector<AttributeSpec> defaults;  // what points without a value of their own get, whoever makes the attribute
     std::vector<std::string> reads_groups, makes_groups;
@@ -121,6 +122,7 @@ enum class NodeKind {
 
 struct NodeType {
     std::string name, doc;
+    std::string defined_in;  // the file of a type written in Lua; empty for native ones
     NodeKind kind = NodeKind::Points;
     std::vector<Param> params;
     std::optional<Param> rest;  // takes arguments of any other name; its `name` is then that name
@@ -252,23 +254,13 @@ public:
             param(&T::group, "group", Value(), any_number(), "", "acts on this group only");
     }
 
-    // A parameter kept in `field`. fallback: its default, in the unit that users give.
+    // A parameter kept in `field`. fallback: its default, in the unit that users give; degrees ("deg") are kept as
+    // radians.
     template <class F>
     Declaration& param(F T::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)
     {
-        Param p;
-        p.name = std::move(name);
-        p.type = param_type<F>();
-        p.fallback = std::move(fallback);
-        p.range = range;
-        p.unit = std::move(unit);
-        p.doc = std::move(doc);
-        p.per_point = std::is_same_v<F, PerPoint<float>> || std::is_same_v<F, PerPoint<Vec3f>> ||
-                      std::is_same_v<F, std::optional<PerPoint<float>>>;
-        p.assign = [field](const Param& param, void* fields, const Value& value) {
-            read_value(param, value, static_cast<T*>(fields)->*field);
-        };
-        type_.params.push_back(std::move(p));
+        type_.params.push_back(
+            param_of(field, std::move(name), std::move(fallback), range, std::move(unit), std::move(doc)));
         return *this;
     }
 

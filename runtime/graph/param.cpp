@@ -297,4 +297,29 @@ void read_value(const Param& param, const Value& value, std::vector<std::string>
     }
 }
 
+void read_value(const Param& param, const Value& value, std::map<std::string, Value>& field)
+{
+    const Table* table = value.table();
+    if (!table || !table->list.empty() || !table->numbered.empty()) wrong_type(param, value);
+    field = table->named;
+}
+
+void assign_arguments(const std::vector<Param>& params, const std::map<std::string, Value>& arguments, void* fields)
+{
+    std::vector<std::string> names;
+    for (const Param& param : params) names.push_back(param.name);
+    for (const auto& [name, value] : arguments)
+        if (std::find(names.begin(), names.end(), name) == names.end())
+            throw Error(fmt::format("unknown option \"{}\"{}", name, did_you_mean(name, names)));
+    for (const Param& param : params) {
+        const auto given = arguments.find(param.name);
+        if (given != arguments.end())
+            param.assign(param, fields, given->second);
+        else if (param.required)
+            throw Error(fmt::format("{} is missing: {}", param.name, param.doc));
+        else if (!param.fallback.is_nil())
+            param.assign(param, fields, param.fallback);
+    }
+}
+
 }  // namespace rapid

@@ -44,6 +44,7 @@ struct Param {
     bool required = false;
     bool per_point = false;    // takes rapid.attr
     bool of_the_frame = true;  // takes a function of the frame
+    bool internal = false;     // given by the host of the scripting language, not by users; not shown
 
     // Puts a value, which is no function, into the node's field. Error: wrong type, out of range; says what was found.
     std::function<void(const Param& self, void* fields, const Value& value)> assign;
@@ -70,6 +71,9 @@ void read_value(const Param& param, const Value& value, std::map<std::string, At
 void read_value(const Param& param, const Value& value, std::map<std::int64_t, double>& field);
 // Names: {"heat", "Cd"}, or one name.
 void read_value(const Param& param, const Value& value, std::vector<std::string>& field);
+
+// A table with names only, its values as they are.
+void read_value(const Param& param, const Value& value, std::map<std::string, Value>& field);
 
 template <class T>
 void read_value(const Param& param, const Value& value, std::optional<T>& field)
@@ -111,6 +115,10 @@ constexpr std::string_view param_type()
         return "numbers by frame";
     else if constexpr (std::is_same_v<T, std::vector<std::string>>)
         return "names";
+    else if constexpr (std::is_same_v<T, std::map<std::string, Value>>)
+        return "table";
+    else if constexpr (requires { typename T::allocator_type; })
+        return "list";
     else if constexpr (std::is_same_v<T, AttributeValue>)
         return "attribute value";
     else if constexpr (requires { typename T::value_type; })  // std::optional
@@ -119,6 +127,45 @@ constexpr std::string_view param_type()
         return T::param_type;
     else
         return T::element_type::param_type;  // a pointer to an object
+}
+
+// A list, each of its values read as its own.
+template <class T>
+void read_value(const Param& param, const Value& value, std::vector<T>& field)
+{
+    field.clear();
+    if (value.is_nil()) return;
+    const Table* table = value.table();
+    if (!table || !table->numbered.empty() || !table->named.empty()) wrong_type(param, value);
+    field.resize(table->list.size());
+    for (std::size_t i = 0; i < field.size(); ++i) read_value(param, table->list[i], field[i]);
+}
+
+// Sets all fields from arguments by name, and those that are not given from their defaults. Error: an unknown or
+// missing name, and what read_value throws.
+void assign_arguments(const std::vector<Param>& params, const std::map<std::string, Value>& arguments, void* fields);
+
+// A parameter kept in a field of T. fallback: its default, in the unit that users give; degrees ("deg") are kept as
+// radians.
+template <class T, class F>
+Param param_of(F T::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)
+{
+    Param p;
+    p.name = std::move(name);
+    p.type = param_type<F>();
+    p.fallback = std::move(fallback);
+    p.range = range;
+    p.unit = std::move(unit);
+    p.doc = std::move(doc);
+    p.per_point = std::is_same_v<F, PerPoint<float>> || std::is_same_v<F, PerPoint<Vec3f>> ||
+                  std::is_same_v<F, std::optional<PerPoint<float>>>;
+    p.assign = [field](const Param& param, void* fields, const Value& value) {
+        F& read = static_cast<T*>(fields)->*field;
+        read_value(param, value, read);
+        if constexpr (std::is_same_v<F, double>)
+            if (param.unit == "deg") read *= EIGEN_PI / 180;
+    };
+    return p;
 }
 
 }  // namespace rapid

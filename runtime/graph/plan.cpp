@@ -252,6 +252,8 @@ void Plan::check_names(const PlanOptions& options)
                                               name, near));
                     }
                 }
+                for (const std::string& name : uses.may)
+                    if (known_attribute(name)) asked.insert(name);
                 for (const std::string& name : uses.reads_groups)
                     if (!groups.count(name) && !brings_other_points(planned))
                         throw Error(

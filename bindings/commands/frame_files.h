@@ -1,0 +1,66 @@
+// What a run writes: the files of -o and those of `:write` nodes, each pattern by a writer of its own.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings/commands/command.h"
+#include "bindings/commands/picture_scene.h"
+#include "runtime/graph/evaluate.h"
+#include "runtime/io/frame_writer.h"
+
+namespace rapid {
+
+class FrameFiles {
+public:
+    // -o, --camera, --size.
+    void declare(CLI::App& app);
+
+    // Attributes that some -o asks for by name: they must be kept alive.
+    std::vector<std::string> attributes() const;
+
+    // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames, or
+    // for no output of the graph; two that write the same files.
+    void resolve(const Plan& plan, bool several_frames);
+
+    // Queues the files of a frame. Error: one of an earlier frame that could not be written.
+    void write(const FrameResult& result);
+    // Queues the file of a `:write` node.
+    void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
+
+    // Waits until all is written. Error: what could not be.
+    void finish();
+
+    // The first name of each pattern and output, once it is known; then no more.
+    std::vector<std::string> take_first_names() { return std::exchange(first_names_, {}); }
+
+    // The files that are complete. From any thread.
+    std::vector<FrameWriter::Written> written() const;
+
+private:
+    struct Target {
+        OutputTarget to;
+        std::string text;                  // as the user gave it
+        std::vector<std::string> outputs;  // whose points it takes
+        std::set<std::string> unasked;     // columns that are there only because another -o asked for them
+    };
+    void resolve(Target& target, const Plan& plan) const;
+    FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
+    void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output);
+
+    std::vector<Target> targets_;
+    std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
+    std::unique_ptr<SceneOfPlan> scene_;
+
+    std::set<std::string> named_;
+    std::vector<std::string> first_names_;
+
+    mutable std::mutex mutex_;  // for written(), while a frame adds a writer
+    std::map<std::string, std::unique_ptr<FrameWriter>> writers_;
+};
+
+}  // namespace rapid

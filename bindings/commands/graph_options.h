@@ -1,0 +1,30 @@
+// The options of all commands that load a graph, and the loading.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "bindings/commands/command.h"
+#include "bindings/session.h"
+
+namespace rapid {
+
+class GraphOptions {
+public:
+    void declare(CLI::App& app);
+
+    const std::string& file() const { return file_; }
+    const std::optional<std::uint64_t>& seed() const { return seed_; }
+
+    // Error: what is wrong with the file or with --set. on_timeout: see SessionOptions.
+    std::unique_ptr<Session> load(std::function<void(const std::string& message)> on_timeout) const;
+
+private:
+    std::string file_;
+    SessionOptions session_;
+    std::optional<std::uint64_t> seed_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,27 @@
+// What a picture shows besides the points: the shapes that a plan's points collide with or are born from.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "runtime/graph/plan.h"
+#include "runtime/io/picture.h"
+
+namespace rapid {
+
+class SceneOfPlan {
+public:
+    explicit SceneOfPlan(const Plan& plan) : plan_(plan) {}
+
+    // Arguments that are functions are asked at the frame's time. Level sets are turned into meshes, each once.
+    std::shared_ptr<const PictureScene> at(std::int64_t frame);
+
+private:
+    void add(PictureScene& scene, const ObjectPtr& object, PictureScene::Body::Role role);
+
+    const Plan& plan_;
+    std::map<ObjectPtr, MeshPtr> surfaces_;
+    std::shared_ptr<const PictureScene> still_;  // where no argument is a function
+};
+
+}  // namespace rapid

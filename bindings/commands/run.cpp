@@ -1,0 +1,162 @@
+// rapid run: computes the frames in order and writes them.
+#include <fmt/format.h>
+
+#include <charconv>
+#include <csignal>
+
+#include "bindings/commands/command.h"
+#include "bindings/commands/frame_files.h"
+#include "bindings/commands/graph_options.h"
+#include "bindings/commands/run_report.h"
+#include "bindings/commands/signals.h"
+#include "bindings/commands/threads.h"
+#include "runtime/graph/evaluate.h"
+
+namespace rapid {
+namespace {
+
+// Without -f: two seconds at 24 frames a second.
+constexpr std::int64_t default_frames = 48;
+
+// -f 1-48, 1-48x2, 12. All frames from the scene's first one are computed; these are written.
+struct FrameRange {
+    std::int64_t first, last, step = 1;
+
+    bool contains(std::int64_t frame) const { return frame >= first && frame <= last && (frame - first) % step == 0; }
+    bool single() const { return first + step > last; }
+};
+
+FrameRange read_frames(const std::string& text)
+{
+    const auto wrong = [&](const char* what) {
+        return Error(fmt::format("-f {}: {}; it must be a frame (12), a range (1-48), or a range and a step (1-48x2)",
+                                 text, what));
+    };
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    const auto number = [&] {
+        std::int32_t value = 0;  // as far as file formats and names go
+        const auto parsed = std::from_chars(at, end, value);
+        if (parsed.ec == std::errc::result_out_of_range) throw wrong("a frame's number must fit 32 bits");
+        if (parsed.ec != std::errc()) throw wrong("a number is missing");
+        at = parsed.ptr;
+        return std::int64_t{value};
+    };
+
+    FrameRange range{number(), 0};
+    range.last = range.first;
+    if (at == end) return range;
+    if (*at++ != '-') throw wrong("a - is missing");
+    range.last = number();
+    if (range.last < range.first) throw wrong("it ends before it begins");
+    if (at == end) return range;
+    if (*at++ != 'x') throw wrong("an x is missing");
+    range.step = number();
+    if (range.step < 1) throw wrong("the step must be at least 1");
+    if (at != end) throw wrong("there is more behind it");
+    return range;
+}
+
+class Run : public Command {
+public:
+    std::string name() const override { return "run"; }
+    std::string doc() const override { return "computes the frames of a graph and writes them"; }
+
+    void declare(CLI::App& app) override
+    {
+        graph_.declare(app);
+        app.add_option_function<std::string>(
+               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+               "the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too [default: "
+               "48 from the first]")
+            ->type_name("FRAMES");
+        files_.declare(app);
+        app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
+        app.add_flag("--quiet", quiet_, "no progress and no summary");
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
+        Threads threads(common.threads);
+        RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose},
+                         [this] { return files_.written(); });
+        const SignalThread signals([&](int signal) { report.abandon(128 + signal, "interrupted"); });
+
+        return threads.run([&] {
+            const std::unique_ptr<Session> session =
+                graph_.load([&](const std::string& message) { report.abandon(status_failed, message); });
+            for (const std::string& warning : session->warnings()) report.warning(warning);
+            const Plan plan(session->graph(), {graph_.seed(), files_.attributes()});
+            for (const std::string& warning : plan.warnings) report.warning(warning);
+
+            const FrameRange frames = range_of(plan);
+            files_.resolve(plan, !frames.single());
+            report.begin(plan.first_frame(), frames.last);
+            return compute(plan, frames, report);
+        });
+    }
+
+private:
+    FrameRange range_of(const Plan& plan) const
+    {
+        const std::int64_t start = plan.first_frame();
+        const FrameRange range = frames_.value_or(FrameRange{start, start + default_frames - 1});
+        if (range.first < start)
+            throw Error(fmt::format("-f: frame {} is before the scene's first, {}", range.first, start));
+        return range;
+    }
+
+    int compute(const Plan& plan, const FrameRange& frames, RunReport& report)
+    {
+        try {
+            Evaluator evaluator(plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame,
+                                          double fps) {
+                if (frames.contains(std::llround(frame.number))) files_.write_node(pattern, points, frame, fps);
+            });
+            while (evaluator.next_frame() <= frames.last) {
+                const FrameResult result = evaluator.advance();
+                for (const std::string& warning : result.warnings) report.warning(warning);
+                if (result.figures.contact_limit > 0) report.warning(contact_limit_warning(result));
+                if (frames.contains(result.frame)) files_.write(result);
+                for (const std::string& name : files_.take_first_names()) report.line("writing " + name);
+                report.frame(result);
+            }
+            files_.finish();
+            report.finish();
+            return status_done;
+        } catch (const Error& error) {
+            finish_files(error, report);
+            return report.fail(error);
+        } catch (const std::bad_alloc&) {
+            return report.fail(Error("out of memory"));
+        }
+    }
+
+    static std::string contact_limit_warning(const FrameResult& result)
+    {
+        return fmt::format("frame {}: {} points reached the limit of contacts in a step and the rest of it was dropped; "
+                           "take more substeps",
+                           result.frame, result.figures.contact_limit);
+    }
+
+    // The frames before the one that failed are complete: they are written, or it is said why not.
+    void finish_files(const Error& reason, RunReport& report)
+    {
+        try {
+            files_.finish();
+        } catch (const Error& error) {
+            if (std::string_view(error.what()) != reason.what()) report.warning(error.what());
+        }
+    }
+
+    GraphOptions graph_;
+    FrameFiles files_;
+    std::optional<FrameRange> frames_;
+    std::string stats_;
+    bool quiet_ = false;
+};
+RAPID_COMMAND(Run);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,35 @@
+// How many threads a run uses: TBB's workers and the calling thread together.
+#pragma once
+
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
+
+namespace rapid {
+
+class Threads {
+public:
+    // 0: all that the machine has. More than it has are really made, so that what depends on their number shows.
+    explicit Threads(int count)
+        : count_(count > 0 ? count : tbb::info::default_concurrency()),
+          limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count_)),
+          arena_(count_)
+    {
+    }
+
+    int count() const { return count_; }
+
+    // Runs f with these threads. The limit alone would not do: TBB's own arena never has more than the machine.
+    template <class F>
+    auto run(const F& f)
+    {
+        return arena_.execute(f);
+    }
+
+private:
+    int count_;
+    tbb::global_control limit_;
+    tbb::task_arena arena_;
+};
+
+}  // namespace rapid

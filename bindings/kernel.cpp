@@ -1,0 +1,361 @@
+#include "bindings/kernel.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <lua.hpp>
+#include <optional>
+
+#include "bindings/script_host.h"
+#include "bindings/state.h"
+#include "runtime/parallel.h"
+
+extern "C" {
+#include "lua/chunk.h"
+}
+
+namespace rapid {
+namespace {
+
+// Names on a point that are no attributes.
+bool is_method(const std::string& name)
+{
+    constexpr std::string_view methods[] = {"join", "leave", "within", "kill", "rand", "index"};
+    return std::find(std::begin(methods), std::end(methods), name) != std::end(methods);
+}
+
+// The keys of the table at the top of the stack, by a field of it.
+std::set<std::string> keys_of(lua_State* L, const char* field)
+{
+    std::set<std::string> keys;
+    lua_getfield(L, -1, field);
+    lua_pushnil(L);
+    while (lua_next(L, -2)) {
+        lua_pop(L, 1);
+        keys.insert(lua_tostring(L, -1));
+    }
+    lua_pop(L, 1);
+    return keys;
+}
+
+bool flag_of(lua_State* L, const char* field)
+{
+    lua_getfield(L, -1, field);
+    const bool set = lua_toboolean(L, -1) != 0;
+    lua_pop(L, 1);
+    return set;
+}
+
+struct ColumnMemory {
+    const char* data;           // of the set's first point
+    std::int64_t stride;        // in scalars, as rapid_column's
+    std::size_t element_bytes;  // of a point; 0 where all share one value
+};
+
+template <class T>
+ColumnMemory memory_of(const Column<T>& column)
+{
+    constexpr std::int64_t scalars = std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1;
+    const Strided<T> values = column.read();
+    return {reinterpret_cast<const char*>(values.data), scalars * static_cast<std::int64_t>(values.stride),
+            values.stride * sizeof(T)};
+}
+
+rapid_column at_point(const ColumnMemory& memory, std::size_t first)
+{
+    return {const_cast<char*>(memory.data) + first * memory.element_bytes, memory.stride};
+}
+
+}  // namespace
+
+// The columns and groups that a runner is made for, by name and type, and where they lie.
+struct Kernel::Layout {
+    struct Entry {
+        std::string name, type;
+        bool writable;
+    };
+    std::vector<Entry> columns, groups;
+    bool predicate = false, masked = false;
+    std::string key;  // equal for layouts that one runner serves
+
+    void finish()
+    {
+        key = fmt::format("{}{}", predicate ? 'p' : '-', masked ? 'm' : '-');
+        for (const Entry& e : columns) key += fmt::format(" {}:{}{}", e.name, e.type, e.writable ? "!" : "");
+        for (const Entry& e : groups) key += fmt::format(" ({}{})", e.name, e.writable ? "!" : "");
+    }
+};
+
+void Kernel::analyse()
+{
+    State& state = host_.main();
+    lua_State* L = state.lua();
+    state.push_entry("analyse");
+    state.push_kernel(number);
+    state.call(1, 1);
+    reads_ = keys_of(L, "reads");
+    writes_ = keys_of(L, "writes");
+    may_ = keys_of(L, "may");
+    may_write_ = keys_of(L, "may_write");
+    joins_ = keys_of(L, "joins");
+    asks_ = keys_of(L, "asks");
+    asks_any_ = flag_of(L, "asks_any");
+    kills_ = flag_of(L, "kills");
+
+    lua_getfield(L, -1, "stores");
+    lua_rawgeti(L, -1, 1);
+    if (lua_istable(L, -1)) {
+        lua_getfield(L, -1, "what");
+        lua_getfield(L, -2, "line");
+        lua_getfield(L, -3, "source");
+        const std::string what = lua_tostring(L, -3), source = lua_tostring(L, -1);
+        const int line = static_cast<int>(lua_tonumber(L, -2));
+        lua_pop(L, 6);
+        throw Error(
+            fmt::format("the kernel {}; kernels run in parallel, in states of their own: keep it in an attribute of "
+                        "the point, or do it once for the whole set in :detail",
+                        what))
+            .at({source.substr(source.rfind('@', 0) == 0 ? 1 : 0), line});
+    }
+    lua_pop(L, 2);
+
+    lua_getfield(L, -1, "computed_group");
+    if (lua_isnumber(L, -1)) {
+        const int line = static_cast<int>(lua_tonumber(L, -1));
+        lua_pop(L, 2);
+        throw Error("the kernel joins or leaves a group under a computed name; name it as a constant: p:join \"old\"")
+            .at({location.file, line});
+    }
+    lua_pop(L, 2);
+
+    state.push_entry("fingerprint");
+    state.push_kernel(number);
+    state.call(1, 1);
+    fingerprint = lua_tostring(L, -1);
+    lua_pop(L, 1);
+
+    for (const char* name : {"id", "dt", "index"})
+        if (writes_.count(name))
+            throw Error(fmt::format("the kernel assigns p.{}, which is read only", name)).at(location);
+}
+
+void Kernel::uses(Uses& uses) const
+{
+    const auto attributes = [](const std::set<std::string>& names, std::vector<std::string>& into) {
+        for (const std::string& name : names)
+            if (!is_method(name)) into.push_back(name);
+    };
+    attributes(reads_, uses.reads);
+    attributes(writes_, uses.writes);
+    attributes(may_, uses.may);
+    uses.makes_groups.insert(uses.makes_groups.end(), joins_.begin(), joins_.end());
+}
+
+Kernel::Layout Kernel::layout_for(const PointSet& points, bool predicate, bool masked) const
+{
+    Layout layout;
+    layout.predicate = predicate;
+    layout.masked = masked;
+    for (const auto& [name, column] : points.columns()) {
+        const bool written =
+            !predicate && (writes_.count(name) || may_write_.count(name)) && name != "id" && name != "dt";
+        // p:rand needs the id.
+        if (!written && !reads_.count(name) && !may_.count(name) && name != "id") continue;
+        layout.columns.push_back({name, std::string(type_name(type_of(column))), written});
+    }
+    for (const auto& [name, members] : points.groups()) {
+        const bool written = !predicate && joins_.count(name);
+        if (written || asks_any_ || asks_.count(name)) layout.groups.push_back({name, "", written});
+    }
+    layout.finish();
+    return layout;
+}
+
+void Kernel::push_runner(State& state, const Layout& layout) const
+{
+    lua_State* L = state.lua();
+    const std::string slot = fmt::format("rapid.runner {} {}", number, layout.key);
+    lua_getfield(L, LUA_REGISTRYINDEX, slot.c_str());
+    if (lua_istable(L, -1)) return;
+    lua_pop(L, 1);
+
+    state.push_entry("runner");
+    state.push_kernel(number);
+    lua_newtable(L);
+    const auto push_entries = [&](const std::vector<Layout::Entry>& entries, const char* field) {
+        lua_createtable(L, static_cast<int>(entries.size()), 0);
+        for (std::size_t i = 0; i < entries.size(); ++i) {
+            lua_createtable(L, 0, 4);
+            lua_pushlstring(L, entries[i].name.data(), entries[i].name.size());
+            lua_setfield(L, -2, "name");
+            lua_pushlstring(L, entries[i].type.data(), entries[i].type.size());
+            lua_setfield(L, -2, "type");
+            lua_pushnumber(L, static_cast<double>(i));
+            lua_setfield(L, -2, "slot");
+            lua_pushboolean(L, entries[i].writable);
+            lua_setfield(L, -2, "writable");
+            lua_rawseti(L, -2, static_cast<int>(i) + 1);
+        }
+        lua_setfield(L, -2, field);
+    };
+    push_entries(layout.columns, "columns");
+    push_entries(layout.groups, "groups");
+    lua_pushboolean(L, layout.predicate);
+    lua_setfield(L, -2, "predicate");
+    lua_pushboolean(L, layout.masked);
+    lua_setfield(L, -2, "masked");
+    state.call(2, 3);
+    lua_createtable(L, 3, 0);
+    lua_insert(L, -4);
+    for (int i = 3; i >= 1; --i) lua_rawseti(L, -1 - i, i);
+    lua_pushvalue(L, -1);
+    lua_setfield(L, LUA_REGISTRYINDEX, slot.c_str());
+}
+
+struct Kernel::Pass {
+    const PointSet& points;
+    const Evaluation& now;
+    const Layout& layout;
+    std::uint64_t serial;                        // of this pass: parameters are handed to each state once a pass
+    const std::map<std::string, Value>& values;  // the third argument
+    std::vector<ColumnMemory> columns, groups;
+    const std::uint8_t* members = nullptr;
+    std::uint8_t* kill = nullptr;
+    std::uint8_t* result = nullptr;
+};
+
+void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const
+{
+    std::vector<rapid_column> columns, groups;
+    for (const ColumnMemory& memory : pass.columns) columns.push_back(at_point(memory, begin));
+    for (const ColumnMemory& memory : pass.groups) groups.push_back(at_point(memory, begin));
+    rapid_chunk chunk{};
+    chunk.size = static_cast<std::int64_t>(end - begin);
+    chunk.first = static_cast<std::int64_t>(begin);
+    chunk.columns = columns.data();
+    chunk.groups = groups.data();
+    chunk.kill = pass.kill ? pass.kill + begin : nullptr;
+    chunk.result = pass.result ? pass.result + begin : nullptr;
+    chunk.members = pass.members ? const_cast<std::uint8_t*>(pass.members) + begin : nullptr;
+    chunk.random = pass.now.random.value;
+    chunk.number = pass.now.frame.number;
+    chunk.time = pass.now.frame.time;
+    chunk.dt = pass.now.frame.dt;
+
+    State& state = host_.local();
+    lua_State* L = state.lua();
+    push_runner(state, pass.layout);
+    const int runner = lua_gettop(L);
+
+    lua_rawgeti(L, runner, 4);
+    const bool has_values = lua_tonumber(L, -1) == static_cast<double>(pass.serial);
+    lua_pop(L, 1);
+    if (!has_values && !pass.values.empty()) {
+        lua_rawgeti(L, runner, 3);
+        Table table;
+        table.named = pass.values;
+        state.push(Value(std::make_shared<const Table>(std::move(table))));
+        state.call(1, 0);
+        lua_pushnumber(L, static_cast<double>(pass.serial));
+        lua_rawseti(L, runner, 4);
+    }
+
+    lua_rawgeti(L, runner, 1);
+    lua_pushlightuserdata(L, &chunk);
+    try {
+        state.call(1, 0);
+    } catch (Error& error) {
+        lua_rawgeti(L, runner, 2);
+        state.call(0, 1);
+        const double place = lua_tonumber(L, -1);
+        lua_settop(L, runner - 1);
+        const std::string at =
+            place < 0 ? fmt::format("frame {}", pass.now.frame.number)
+                      : fmt::format("point id {}, frame {}", pass.points.id()[static_cast<std::size_t>(place)],
+                                    pass.now.frame.number);
+        const Location where = error.location().file.empty() ? location : error.location();
+        Error placed(fmt::format("{} ({})", error.message(), at));
+        placed.at(where).in_node(pass.now.node).with_trace(error.trace());
+        throw placed;
+    }
+    lua_settop(L, runner - 1);
+}
+
+void Kernel::run_pass(Pass& pass) const
+{
+    const auto begin_time = std::chrono::steady_clock::now();
+    static std::atomic<std::uint64_t> serial{0};
+    pass.serial = ++serial;
+    for (const Layout::Entry& entry : pass.layout.columns)
+        pass.columns.push_back(std::visit([](const auto& c) { return memory_of(c); }, *pass.points.find(entry.name)));
+    for (const Layout::Entry& entry : pass.layout.groups)
+        pass.groups.push_back(memory_of(*pass.points.find_group(entry.name)));
+
+    const ScriptHost::Section section(
+        host_, fmt::format("{}:{}: node \"{}\"", pass.now.location.file, pass.now.location.line, pass.now.node));
+    // The first error in the order of the points is reported, whichever thread comes upon one first.
+    std::mutex mutex;
+    std::optional<Error> first;
+    std::atomic<std::size_t> failed_at{pass.points.size()};
+    for_each_chunk(pass.points.size(), [&](std::size_t begin, std::size_t end) {
+        if (begin > failed_at.load(std::memory_order_relaxed)) return;
+        try {
+            run_chunk(pass, begin, end);
+        } catch (const Error& error) {
+            const std::lock_guard lock(mutex);
+            if (begin < failed_at) {
+                failed_at = begin;
+                first = error;
+            }
+        }
+    });
+    if (first) throw *first;
+    pass.now.figures.script_seconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_time).count();
+}
+
+void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const
+{
+    const Layout layout = layout_for(points, true, false);
+    const std::map<std::string, Value> no_values;
+    Pass pass{points, now, layout, 0, no_values, {}, {}};
+    pass.result = result.data();
+    run_pass(pass);
+}
+
+void Kernel::run(PointSet& points, const std::string& group, const Evaluation& now,
+                 const std::map<std::string, Value>& values) const
+{
+    for (const std::string& name : joins_) points.group(name);
+    const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
+    if (!group.empty() && !members) return;  // nobody is in it yet
+    if (members && members->is_uniform()) {
+        if (points.empty() || !(*members)[0]) return;
+        members = nullptr;
+    }
+
+    const Layout layout = layout_for(points, false, members != nullptr);
+    for (const Layout::Entry& entry : layout.columns)
+        if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
+    // A kernel may leave the very group that chooses its points: the choice is the one before.
+    const Column<std::uint8_t> chosen = members ? *members : Column<std::uint8_t>();
+    for (const Layout::Entry& entry : layout.groups)
+        if (entry.writable) points.group(entry.name).write();
+
+    std::vector<std::uint8_t> kill(kills_ ? points.size() : 0);
+    Pass pass{points, now, layout, 0, values, {}, {}};
+    pass.kill = kills_ ? kill.data() : nullptr;
+    pass.members = members ? chosen.read().data : nullptr;
+    run_pass(pass);
+
+    if (std::find(kill.begin(), kill.end(), 1) != kill.end()) {
+        for (std::uint8_t& mark : kill) mark = mark == 0;
+        const std::size_t before = points.size();
+        points.keep(kill);
+        now.figures.died += before - points.size();
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,56 @@
+// A function of a point, written in Lua: what it reads and writes, and how it runs over a set.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "runtime/graph/point_function.h"
+
+namespace rapid {
+
+class ScriptHost;
+class State;
+
+class Kernel : public PointFunction {
+public:
+    Kernel(ScriptHost& script_host, std::size_t number_, Location location_)
+        : number(number_), location(std::move(location_)), host_(script_host)
+    {
+    }
+
+    void uses(Uses& uses) const override;
+    void test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const override;
+
+    // Runs it over the points of `group` (all when empty), in parallel. Points that it killed are removed afterwards.
+    // values: the third argument of a Lua node's kernel.
+    void run(PointSet& points, const std::string& group, const Evaluation& now,
+             const std::map<std::string, Value>& values) const;
+
+    const std::size_t number;  // in each state
+    const Location location;   // of the function
+    std::string fingerprint;   // of its bytecode, the same in each state
+
+    // Reads its bytecode, in the main state, once the file has run. Error: it writes what other points share.
+    void analyse();
+
+private:
+    struct Layout;
+    struct Pass;
+
+    Layout layout_for(const PointSet& points, bool predicate, bool masked) const;
+    void run_pass(Pass& pass) const;
+    void run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const;
+    // Leaves the runner for this layout on the state's stack: a list of run, at, set_params and the pass whose
+    // parameters it has.
+    void push_runner(State& state, const Layout& layout) const;
+
+    ScriptHost& host_;
+
+    std::set<std::string> reads_, writes_, may_, may_write_, joins_, asks_;
+    bool kills_ = false, asks_any_ = false;
+};
+
+}  // namespace rapid

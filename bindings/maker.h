@@ -1,0 +1,83 @@
+// What graph code makes besides nodes (meshes, level sets, shapes, points, motions): each maker is declared once, with
+// parameters that are checked and documented as those of nodes are.
+//
+//   struct MeshSphere {
+//       double radius; int divisions; Vec3d center;
+//       static Maker declare() { return maker<MeshSphere>("mesh.sphere", "A sphere.").param(...); }
+//       ObjectPtr make(MakeContext& context) const;
+//   };
+//   RAPID_MAKER(MeshSphere);
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/graph/param.h"
+
+namespace rapid {
+
+struct MakeContext {
+    std::filesystem::path folder;  // of the graph file: relative paths start there
+    std::vector<std::string>& warnings;
+    bool may_write = false;  // false in check, explain and test: nothing is written
+
+    std::filesystem::path resolve(const std::string& path) const
+    {
+        return std::filesystem::path(path).is_absolute() ? std::filesystem::path(path) : folder / path;
+    }
+};
+
+struct Maker {
+    std::string name, doc;
+    std::vector<Param> params;
+    std::function<ObjectPtr(const Maker& self, const Table& arguments, MakeContext& context)> make;
+};
+
+template <class T>
+class MakerDeclaration {
+public:
+    MakerDeclaration(std::string name, std::string doc)
+    {
+        maker_.name = std::move(name);
+        maker_.doc = std::move(doc);
+        maker_.make = [](const Maker& self, const Table& arguments, MakeContext& context) -> ObjectPtr {
+            T fields{};
+            assign_arguments(self.params, arguments.named, &fields);
+            return fields.make(context);
+        };
+    }
+
+    template <class F>
+    MakerDeclaration& param(F T::*field, std::string name, Value fallback, Range range, std::string unit,
+                            std::string doc)
+    {
+        maker_.params.push_back(
+            param_of(field, std::move(name), std::move(fallback), range, std::move(unit), std::move(doc)));
+        return *this;
+    }
+    MakerDeclaration& required() { return maker_.params.back().required = true, *this; }
+
+    operator Maker() const { return maker_; }
+
+private:
+    Maker maker_;
+};
+
+template <class T>
+MakerDeclaration<T> maker(std::string name, std::string doc)
+{
+    return MakerDeclaration<T>(std::move(name), std::move(doc));
+}
+
+// Error: no such maker (a bug of Rapid's own Lua files).
+const Maker& find_maker(std::string_view name);
+
+struct MakerRegistration {
+    explicit MakerRegistration(Maker (*declare)());
+};
+#define RAPID_MAKER(Type) static const ::rapid::MakerRegistration maker_##Type([] { return Maker(Type::declare()); })
+
+}  // namespace rapid

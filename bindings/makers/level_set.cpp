@@ -1,0 +1,131 @@
+// rapid.levelset: narrow-band level sets.
+#include "runtime/shapes/level_set.h"
+
+#include <fmt/format.h>
+
+#include "bindings/maker.h"
+
+namespace rapid {
+namespace {
+
+// What every level set is made with.
+struct Grid {
+    double voxel, half_width;
+
+    LevelSetOptions options() const { return {voxel, half_width}; }
+
+    template <class T>
+    static void declare(MakerDeclaration<T>& declaration)
+    {
+        declaration.param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, above(0), "m", "edge of a voxel")
+            .param(static_cast<double T::*>(&T::half_width), "half_width", 3.0, at_least(1.5), "voxels",
+                   "of the band, on each side of the surface");
+    }
+};
+
+struct FromMesh : Grid {
+    MeshPtr mesh;
+
+    static Maker declare()
+    {
+        auto declaration = maker<FromMesh>("levelset.from_mesh", "The distance to a closed mesh.");
+        declaration.param(&FromMesh::mesh, "mesh", Value(), any_number(), "", "closed").required();
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext& context) const { return level_set_from_mesh(mesh, options(), context.warnings); }
+};
+RAPID_MAKER(FromMesh);
+
+struct SphereLevelSet : Grid {
+    double radius;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        auto declaration = maker<SphereLevelSet>("levelset.sphere", "A sphere.");
+        declaration.param(&SphereLevelSet::radius, "radius", 1.0, above(0), "m", "of the sphere")
+            .param(&SphereLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const { return level_set_sphere(radius, center, options()); }
+};
+RAPID_MAKER(SphereLevelSet);
+
+struct BoxLevelSet : Grid {
+    Vec3d size, center;
+
+    static Maker declare()
+    {
+        auto declaration = maker<BoxLevelSet>("levelset.box", "A box.");
+        declaration.param(&BoxLevelSet::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
+            .param(&BoxLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        if (!(size.minCoeff() > 0))
+            throw Error(fmt::format("size = {}: each edge must be above 0", describe(Value(size))));
+        return level_set_box(size, center, options());
+    }
+};
+RAPID_MAKER(BoxLevelSet);
+
+struct TorusLevelSet : Grid {
+    double radius, tube;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        auto declaration = maker<TorusLevelSet>("levelset.torus", "A torus about the y axis.");
+        declaration
+            .param(&TorusLevelSet::radius, "radius", 1.0, above(0), "m", "from the axis to the middle of the tube")
+            .param(&TorusLevelSet::tube, "tube", 0.25, above(0), "m", "radius of the tube")
+            .param(&TorusLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const { return level_set_torus(radius, tube, center, options()); }
+};
+RAPID_MAKER(TorusLevelSet);
+
+struct ReadLevelSet {
+    std::string path, grid;
+
+    static Maker declare()
+    {
+        return maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file.")
+            .param(&ReadLevelSet::path, "path", Value(), any_number(), "", "relative to the graph file")
+            .required()
+            .param(&ReadLevelSet::grid, "grid", Value(), any_number(), "",
+                   "its name; the only level set, when not given");
+    }
+    ObjectPtr make(MakeContext& context) const { return read_level_set(context.resolve(path), grid); }
+};
+RAPID_MAKER(ReadLevelSet);
+
+struct WriteLevelSet {
+    LevelSetPtr levelset;
+    std::string path, grid;
+
+    static Maker declare()
+    {
+        return maker<WriteLevelSet>("levelset.write", "Writes a level set to a .vdb file, in a run.")
+            .param(&WriteLevelSet::levelset, "levelset", Value(), any_number(), "", "what to write")
+            .required()
+            .param(&WriteLevelSet::path, "path", Value(), any_number(), "", "relative to the current folder")
+            .required()
+            .param(&WriteLevelSet::grid, "grid", std::string("surface"), any_number(), "", "its name in the file");
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        if (context.may_write) levelset->write(path, grid);
+        return levelset;
+    }
+};
+RAPID_MAKER(WriteLevelSet);
+
+}  // namespace
+}  // namespace rapid

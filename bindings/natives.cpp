@@ -1,0 +1,344 @@
+#include "bindings/natives.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <lua.hpp>
+
+#include "bindings/maker.h"
+#include "bindings/script_host.h"
+#include "bindings/script_node.h"
+#include "runtime/graph/registry.h"
+
+namespace rapid {
+namespace {
+
+// Called from compiled kernels. `anew`: 0, or the frame, for numbers that differ from frame to frame.
+double draw(std::uint64_t random, std::int64_t id, double use, double anew)
+{
+    RandomKey key;
+    key.value = random;
+    if (anew != 0) {
+        const auto mixed = uniform4(key, std::bit_cast<std::uint64_t>(anew), ~std::uint64_t{0});
+        key.value ^=
+            static_cast<std::uint64_t>(mixed[0] * 0x1p32) << 32 | static_cast<std::uint64_t>(mixed[1] * 0x1p32);
+    }
+    const auto numbers = uniform4(key, static_cast<std::uint64_t>(id), std::bit_cast<std::uint64_t>(use + 0.0));
+    return numbers[0] + numbers[1] * 0x1p-32 < 1 ? numbers[0] + numbers[1] * 0x1p-32 : numbers[0];
+}
+
+std::string text_at(State& state, int index)
+{
+    std::size_t size = 0;
+    const char* text = lua_tolstring(state.lua(), index, &size);
+    return text ? std::string(text, size) : std::string();
+}
+
+// The table at `index`, which our Lua files have made or checked.
+std::shared_ptr<const Table> table_at(State& state, int index)
+{
+    const Value value = state.to_value(index);
+    const auto* table = value.get<std::shared_ptr<const Table>>();
+    if (!table) throw Error(fmt::format("a table is expected, not {}", describe(value)));
+    return *table;
+}
+
+// What the main state's call of this constructor made; for the main state itself, what `make` makes.
+template <class F>
+int construct(State& state, const F& make)
+{
+    ScriptHost& host = state.host();
+    const std::size_t call = state.next_made++;
+    if (state.is_main()) {
+        host.made.emplace_back(ObjectPtr());
+        try {
+            ObjectPtr object = make();
+            host.made[call] = object;
+            state.push_object(object);
+        } catch (const Error& error) {
+            host.made[call] = std::string(error.what());
+            throw;
+        }
+        return 1;
+    }
+    if (call >= host.made.size())
+        throw Error("the graph file made more in a worker than at first; it must do the same each time it is run");
+    if (const auto* failed = std::get_if<std::string>(&host.made[call])) throw Error(*failed);
+    state.push_object(std::get<ObjectPtr>(host.made[call]));
+    return 1;
+}
+
+int make_object(State& state)
+{
+    return construct(state, [&] {
+        const Maker& maker = find_maker(text_at(state, 1));
+        ScriptHost& host = state.host();
+        MakeContext context{host.folder(), host.warnings, host.options().may_write};
+        return maker.make(maker, *table_at(state, 2), context);
+    });
+}
+
+int make_attribute(State& state)
+{
+    if (lua_type(state.lua(), 1) != LUA_TSTRING)
+        throw Error("rapid.attr takes the name of an attribute: rapid.attr \"bounce\"");
+    state.push_object(std::make_shared<AttributeName>(text_at(state, 1)));
+    return 1;
+}
+
+// "5000" as a value of the same type as the default. Error: it is none.
+Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
+{
+    const auto refuse = [&](const char* wanted) -> Value {
+        throw Error(fmt::format("--set {}={}: the parameter is {}, as its default {} is", name, text, wanted,
+                                describe(fallback)));
+    };
+    if (fallback.get<std::string>()) return Value(text);
+    if (fallback.get<bool>()) {
+        if (text == "true" || text == "1") return Value(true);
+        if (text == "false" || text == "0") return Value(false);
+        return refuse("true or false");
+    }
+    std::vector<double> numbers;
+    std::string rest = text;
+    std::erase_if(rest, [](char c) { return c == '{' || c == '}' || c == ' '; });
+    for (std::size_t begin = 0; begin <= rest.size();) {
+        const std::size_t end = std::min(rest.find(',', begin), rest.size());
+        const std::string word = rest.substr(begin, end - begin);
+        char* stop = nullptr;
+        numbers.push_back(std::strtod(word.c_str(), &stop));
+        if (word.empty() || *stop != '\0') return refuse(fallback.get<double>() ? "a number" : "a vec3 x,y,z");
+        begin = end + 1;
+    }
+    if (fallback.get<double>()) return numbers.size() == 1 ? Value(numbers[0]) : refuse("a number");
+    return numbers.size() == 3 ? Value(Vec3d(numbers[0], numbers[1], numbers[2])) : refuse("a vec3 x,y,z");
+}
+
+int declare_parameter(State& state)
+{
+    lua_State* L = state.lua();
+    ScriptHost& host = state.host();
+    if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param takes a name, a default and a line of documentation");
+    const std::string name = text_at(state, 1);
+    const auto known = std::find_if(host.parameters.begin(), host.parameters.end(),
+                                    [&](const Session::Parameter& p) { return p.name == name; });
+    if (known != host.parameters.end()) {
+        state.push(known->value);
+        return 1;
+    }
+    Value fallback = state.to_value(2);
+    if (const Table* table = fallback.table(); table && table->list.size() == 3) {
+        Param param;
+        param.name = name;
+        param.type = "vec3";
+        Vec3d vector;
+        read_value(param, fallback, vector);
+        fallback = Value(vector);
+    }
+    if (!fallback.get<double>() && !fallback.get<bool>() && !fallback.get<std::string>() && !fallback.get<Vec3d>())
+        throw Error(
+            fmt::format("rapid.param(\"{}\"): the default is {}; it must be a number, a boolean, a string or a vec3",
+                        name, describe(fallback)));
+    const auto setting = host.options().set.find(name);
+    const Value value = setting == host.options().set.end() ? fallback : parse_setting(name, setting->second, fallback);
+    host.parameters.push_back({name, text_at(state, 3), value, fallback});
+    state.push(value);
+    return 1;
+}
+
+// Kernels among the arguments are numbered in the order of the type's parameters, in every state alike. Takes the table
+// at `index`; gives, in the main state, the kernels by parameter.
+std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type, int index)
+{
+    std::map<std::string, ObjectPtr> kernels;
+    lua_State* L = state.lua();
+    ScriptHost& host = state.host();
+    for (const Param& param : type.params) {
+        if (param.type != PointFunction::param_type) continue;
+        if (param.internal)
+            push_script_of(state, type.name);
+        else
+            lua_getfield(L, index, param.name.c_str());
+        if (!lua_isfunction(L, -1)) {
+            lua_pop(L, 1);
+            continue;
+        }
+        lua_Debug info;
+        lua_pushvalue(L, -1);
+        lua_getinfo(L, ">S", &info);
+        const Location location{info.source[0] == '@' ? info.source + 1 : "", info.linedefined};
+        const std::size_t number = state.add_kernel();
+        if (state.is_main()) {
+            host.kernels.push_back(std::make_shared<Kernel>(host, number, location));
+            kernels[param.name] = host.kernels.back();
+        } else if (number >= host.kernels.size()) {
+            throw Error("the graph file made more kernels in a worker than at first; it must do the same each time");
+        }
+        if (!param.internal) {
+            lua_pushnil(L);
+            lua_setfield(L, index, param.name.c_str());
+        }
+    }
+    return kernels;
+}
+
+int make_node(State& state)
+{
+    lua_State* L = state.lua();
+    ScriptHost& host = state.host();
+    const NodeType& type = host.registry.at(text_at(state, 1));
+
+    // The caller's table is not changed.
+    lua_newtable(L);
+    lua_pushnil(L);
+    while (lua_next(L, 2)) {
+        lua_pushvalue(L, -2);
+        lua_insert(L, -2);
+        lua_rawset(L, -4);
+    }
+    lua_replace(L, 2);
+    std::map<std::string, ObjectPtr> kernels = take_kernels(state, type, 2);
+
+    return construct(state, [&]() -> ObjectPtr {
+        auto node = std::make_shared<Node>();
+        node->type = &type;
+        node->location = state.where();
+        node->serial = host.graph.nodes.size();
+        const std::string what = type.name;
+        try {
+            node->arguments = table_at(state, 2)->named;
+            const auto named = node->arguments.find("name");
+            if (named != node->arguments.end() && !type.find("name")) {
+                const std::string* name = named->second.get<std::string>();
+                if (!name || name->empty())
+                    throw Error(fmt::format("name = {}; it must be a string", describe(named->second)));
+                node->name = *name;
+                node->arguments.erase(named);
+            } else {
+                const auto same = std::count_if(host.graph.nodes.begin(), host.graph.nodes.end(),
+                                                [&](const NodePtr& other) { return other->type == &type; });
+                node->name = fmt::format("{}{}", what, same + 1);
+            }
+            for (auto& [param, kernel] : kernels) node->arguments[param] = Value(kernel);
+            for (int i = 3; i <= lua_gettop(L); ++i) {
+                const auto input = std::dynamic_pointer_cast<const NodeHandle>(state.to_object(i));
+                if (!input)
+                    throw Error(fmt::format("input {} is {}; it must be a node: call it as node:{}{{ ... }}", i - 2,
+                                            luaL_typename(L, i), what));
+                node->inputs.push_back(input->node);
+            }
+        } catch (Error& error) {
+            error.in_node(node->name.empty() ? what : node->name).at(node->location);
+            throw;
+        }
+        host.graph.nodes.push_back(node);
+        return std::make_shared<NodeHandle>(node);
+    });
+}
+
+// A type that Lua defines must have been defined in this state too: its kernel lives here.
+int has_type(State& state)
+{
+    lua_State* L = state.lua();
+    const NodeType* type = state.host().registry.find(text_at(state, 1));
+    bool known = type != nullptr;
+    if (known && !type->defined_in.empty()) {
+        push_script_of(state, type->name);
+        known = !lua_isnil(L, -1);
+        lua_pop(L, 1);
+    }
+    lua_pushboolean(L, known);
+    return 1;
+}
+
+int unknown_type(State& state)
+{
+    state.host().registry.at(text_at(state, 1));  // says what is near
+    return 0;
+}
+
+int kind_of(State& state)
+{
+    const ObjectPtr object = state.to_object(1);
+    const std::string_view kind = object ? object->kind() : "value";
+    lua_pushlstring(state.lua(), kind.data(), kind.size());
+    return 1;
+}
+
+// native.set_index(index, product): what reading a field of an object, and multiplying two, call.
+int set_index(State& state)
+{
+    lua_State* L = state.lua();
+    luaL_getmetatable(L, "rapid.object");
+    lua_pushvalue(L, 1);
+    lua_setfield(L, -2, "__index");
+    lua_pushvalue(L, 2);
+    lua_setfield(L, -2, "__mul");
+    lua_pushcfunction(L, [](lua_State* state_of) {
+        return guarded(state_of, [](State& s) {
+            const ObjectPtr object = s.to_object(1);
+            const std::string text = object ? fmt::format("a {}", object->kind()) : "a value";
+            lua_pushlstring(s.lua(), text.data(), text.size());
+            return 1;
+        });
+    });
+    lua_setfield(L, -2, "__tostring");
+    return 0;
+}
+
+// native.read_module(name), native.read_node(name): text and chunk name, or nil and where it was looked for.
+template <bool node>
+int read_source(State& state)
+{
+    std::string looked_in;
+    const auto source = state.host().find_module(text_at(state, 1), node, looked_in);
+    lua_State* L = state.lua();
+    if (!source) {
+        lua_pushnil(L);
+        lua_pushlstring(L, looked_in.data(), looked_in.size());
+        return 2;
+    }
+    lua_pushlstring(L, source->text.data(), source->text.size());
+    const std::string name = "@" + source->name;
+    lua_pushlstring(L, name.data(), name.size());
+    return 2;
+}
+
+template <int (*f)(State&)>
+int native(lua_State* L)
+{
+    return guarded(L, f);
+}
+
+}  // namespace
+
+void push_natives(State& state, const std::string& chunk_header)
+{
+    lua_State* L = state.lua();
+    constexpr luaL_Reg functions[] = {{"make", native<make_object>},
+                                      {"attribute", native<make_attribute>},
+                                      {"param", native<declare_parameter>},
+                                      {"node", native<make_node>},
+                                      {"define", native<define_node_type>},
+                                      {"complete", native<complete_arguments>},
+                                      {"has_type", native<has_type>},
+                                      {"unknown_type", native<unknown_type>},
+                                      {"kind", native<kind_of>},
+                                      {"set_index", native<set_index>},
+                                      {"read_module", native<read_source<false>>},
+                                      {"read_node", native<read_source<true>>}};
+    lua_newtable(L);
+    for (const luaL_Reg& function : functions) {
+        lua_pushcfunction(L, function.func);
+        lua_setfield(L, -2, function.name);
+    }
+    lua_pushboolean(L, !state.is_main());
+    lua_setfield(L, -2, "is_worker");
+    lua_pushlstring(L, chunk_header.data(), chunk_header.size());
+    lua_setfield(L, -2, "chunk_header");
+    lua_pushlightuserdata(L, reinterpret_cast<void*>(&draw));
+    lua_setfield(L, -2, "rand");
+}
+
+}  // namespace rapid

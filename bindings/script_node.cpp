@@ -1,0 +1,241 @@
+#include "bindings/script_node.h"
+
+#include <fmt/format.h>
+
+#include <lua.hpp>
+
+#include "bindings/script_host.h"
+#include "runtime/graph/registry.h"
+
+namespace rapid {
+namespace {
+
+constexpr char definitions[] = "rapid.definitions";  // in each state's registry: kernels by type name
+
+// points: an edit of the points, one by one, written in Lua.
+struct Points {
+    std::string group;
+    std::shared_ptr<const Kernel> kernel;
+
+    static NodeType declare()
+    {
+        return node<Points>("points", "Edits the points with a Lua function, one by one, in parallel.")
+            .param(&Points::kernel, "kernel", Value(), any_number(), "", "function(p, frame)")
+            .of_type(std::string(PointFunction::param_type))
+            .required()
+            .constant()
+            .varies();
+    }
+    void uses(Uses& uses) const { kernel->uses(uses); }
+    void edit(PointSet& points, const Evaluation& now) { kernel->run(points, group, now, {}); }
+};
+RAPID_NODE(Points);
+
+// A node type that rapid.node defines: its parameters' values by name, and its kernel.
+class ScriptOperator : public Operator {
+public:
+    struct Fields {
+        std::string group;
+        std::shared_ptr<const Kernel> kernel;
+        std::map<std::string, Value> values;
+    };
+
+    void* fields() override { return &fields_; }
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
+    {
+        fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.values);
+        return std::move(inputs[0]);
+    }
+    Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
+    void uses(Uses& uses) const override
+    {
+        if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
+        fields_.kernel->uses(uses);
+    }
+    void check() const override {}
+
+private:
+    Fields fields_;
+};
+
+// Reads a value as a T, for its checks, and keeps it as a plain value.
+template <class T>
+void keep_as(const Param& param, void* fields, const Value& value)
+{
+    T field{};
+    read_value(param, value, field);
+    Value kept = value;
+    if constexpr (std::is_same_v<T, Vec3d>) kept = Value(field);
+    static_cast<ScriptOperator::Fields*>(fields)->values[param.name] = std::move(kept);
+}
+
+const Value* find(const Table& table, const char* name)
+{
+    const auto found = table.named.find(name);
+    return found == table.named.end() || found->second.is_nil() ? nullptr : &found->second;
+}
+
+std::string text_of(const Table& table, const char* name, const std::string& what)
+{
+    const Value* value = find(table, name);
+    if (!value) return {};
+    const std::string* text = value->get<std::string>();
+    if (!text) throw Error(fmt::format("{}: {} = {}; it must be a string", what, name, describe(*value)));
+    return *text;
+}
+
+// params = { strength = { "float", default = 1, min = 0, unit = "1/s", doc = "..." } }
+Param read_param(const std::string& name, const Value& declared, const std::string& node_name)
+{
+    const std::string what = fmt::format("rapid.node \"{}\", parameter {}", node_name, name);
+    const Table* table = declared.table();
+    const std::string* type = table && !table->list.empty() ? table->list.front().get<std::string>() : nullptr;
+    if (!type) throw Error(what + ": declare it as { \"float\", default = 1, doc = \"...\" }");
+    for (const auto& [field, value] : table->named)
+        if (field != "default" && field != "min" && field != "max" && field != "unit" && field != "doc" &&
+            field != "choices" && field != "required")
+            throw Error(
+                fmt::format("{}: unknown field \"{}\"{}", what, field,
+                            did_you_mean(field, {"default", "min", "max", "unit", "doc", "choices", "required"})));
+
+    Param param;
+    param.name = name;
+    param.unit = text_of(*table, "unit", what);
+    param.doc = text_of(*table, "doc", what);
+    if (param.doc.empty()) throw Error(what + ": say what it is, doc = \"...\"");
+    if (const Value* lo = find(*table, "min")) {
+        if (!lo->get<double>()) throw Error(fmt::format("{}: min = {}; it must be a number", what, describe(*lo)));
+        param.range.lo = *lo->get<double>();
+    }
+    if (const Value* hi = find(*table, "max")) {
+        if (!hi->get<double>()) throw Error(fmt::format("{}: max = {}; it must be a number", what, describe(*hi)));
+        param.range.hi = *hi->get<double>();
+    }
+    if (const Value* required = find(*table, "required")) {
+        const bool* flag = required->get<bool>();
+        if (!flag) throw Error(fmt::format("{}: required = {}; it must be true or false", what, describe(*required)));
+        param.required = *flag;
+    }
+    if (const Value* choices = find(*table, "choices")) read_value(param, *choices, param.choices);
+    if (const Value* fallback = find(*table, "default")) param.fallback = *fallback;
+    if (param.fallback.is_nil() && !param.required) throw Error(what + ": give it a default, or required = true");
+
+    const std::map<std::string, std::pair<std::string_view, decltype(Param::assign)>> types = {
+        {"float", {"number", keep_as<double>}}, {"int", {"integer", keep_as<int>}},
+        {"bool", {"boolean", keep_as<bool>}},   {"string", {"string", keep_as<std::string>}},
+        {"vec3", {"vec3", keep_as<Vec3d>}},
+    };
+    const auto known = types.find(*type);
+    if (known == types.end())
+        throw Error(fmt::format("{}: unknown type \"{}\"{}; there are bool, float, int, string and vec3", what, *type,
+                                did_you_mean(*type, {"bool", "float", "int", "string", "vec3"})));
+    param.type = known->second.first;
+    param.assign = known->second.second;
+    ScriptOperator::Fields scratch;  // a default is checked where it is declared
+    try {
+        if (!param.fallback.is_nil()) param.assign(param, &scratch, param.fallback);
+    } catch (const Error& error) {
+        throw Error(fmt::format("{}: the default {}", what, error.message()));
+    }
+    return param;
+}
+
+NodeType read_type(const Table& definition, bool has_points, bool has_expand)
+{
+    NodeType type;
+    type.name = text_of(definition, "name", "rapid.node");
+    if (type.name.empty()) throw Error("rapid.node: the name is missing");
+    const std::string what = fmt::format("rapid.node \"{}\"", type.name);
+    type.doc = text_of(definition, "doc", what);
+    if (type.doc.empty()) throw Error(what + ": say what it does, doc = \"...\"");
+    for (const auto& [field, value] : definition.named)
+        if (field != "name" && field != "doc" && field != "params" && field != "points" && field != "expand")
+            throw Error(fmt::format("{}: unknown field \"{}\"{}", what, field,
+                                    did_you_mean(field, {"name", "doc", "params", "points", "expand"})));
+    if (has_points == has_expand)
+        throw Error(what + ": give it points = function(p, frame, params), or expand = function(input, params)");
+    type.varies = true;
+    if (const Value* params = find(definition, "params")) {
+        const Table* table = params->table();
+        if (!table || !table->list.empty()) throw Error(what + ": params is a table of declarations by name");
+        for (const auto& [name, declared] : table->named) type.params.push_back(read_param(name, declared, type.name));
+    }
+    if (has_points) {
+        Param group;
+        group.name = "group";
+        group.type = "string";
+        group.doc = "acts on this group only";
+        group.of_the_frame = false;
+        group.assign = [](const Param& self, void* fields, const Value& value) {
+            read_value(self, value, static_cast<ScriptOperator::Fields*>(fields)->group);
+        };
+        type.params.push_back(group);
+        Param kernel;
+        kernel.name = "kernel";
+        kernel.type = PointFunction::param_type;
+        kernel.doc = "the node's function";
+        kernel.internal = true;
+        kernel.of_the_frame = false;
+        kernel.assign = [](const Param& self, void* fields, const Value& value) {
+            read_value(self, value, static_cast<ScriptOperator::Fields*>(fields)->kernel);
+        };
+        type.params.push_back(kernel);
+    }
+    type.make = [] { return std::make_unique<ScriptOperator>(); };
+    return type;
+}
+
+}  // namespace
+
+int define_node_type(State& state)
+{
+    lua_State* L = state.lua();
+    ScriptHost& host = state.host();
+
+    lua_getfield(L, 1, "points");
+    lua_getfield(L, 1, "expand");
+    const bool has_points = lua_isfunction(L, -2), has_expand = lua_isfunction(L, -1);
+    lua_pop(L, 1);
+
+    lua_getfield(L, 1, "name");
+    const std::string name = lua_type(L, -1) == LUA_TSTRING ? lua_tostring(L, -1) : "";
+    lua_pop(L, 1);
+    if (state.is_main()) {
+        const Value definition = state.to_value(1);
+        NodeType type = read_type(*definition.table(), has_points, has_expand);
+        type.defined_in = state.where().file;
+        host.registry.add(std::move(type));
+    }
+    // The kernel; a type without one (expand) is known by a mark.
+    luaL_newmetatable(L, definitions);
+    if (has_points)
+        lua_pushvalue(L, -2);
+    else
+        lua_pushboolean(L, 1);
+    lua_setfield(L, -2, name.c_str());
+    return 0;
+}
+
+void push_script_of(State& state, const std::string& type)
+{
+    lua_State* L = state.lua();
+    luaL_newmetatable(L, definitions);
+    lua_getfield(L, -1, type.c_str());
+    lua_remove(L, -2);
+}
+
+int complete_arguments(State& state)
+{
+    const NodeType& type = state.host().registry.at(lua_tostring(state.lua(), 1));
+    const Value given = state.to_value(2);
+    const Table* table = given.table();
+    if (!table) throw Error(fmt::format(":{} takes a table of parameters", type.name));
+    ScriptOperator::Fields fields;
+    assign_arguments(type.params, table->named, &fields);
+    Table complete;
+    complete.named = std::move(fields.values);
+    state.push(Value(std::make_shared<const Table>(std::move(complete))));
+    return 1;
+}
+
+}  // namespace rapid

@@ -1,0 +1,17 @@
+// Nodes whose work is a kernel: `:points`, and the nodes that artists write in Lua (rapid.node).
+#pragma once
+
+#include <string>
+
+namespace rapid {
+
+class State;
+
+// Native functions of lua/rapid.lua.
+int define_node_type(State& state);    // rapid.node{...}: adds the type (main state) and keeps its kernel
+int complete_arguments(State& state);  // (type, arguments): the arguments, checked, with the defaults filled in
+
+// Pushes the kernel of a type that rapid.node has defined in this state; nil where it has none.
+void push_script_of(State& state, const std::string& type);
+
+}  // namespace rapid

@@ -1,0 +1,21 @@
+// What a kernel's runner sees of the points: compiled into the host, and given as text to ffi.cdef (lua/kernel.lua).
+// Graph code never gets hold of any of it.
+
+typedef struct rapid_column {
+    void* data;      // of the chunk's first point
+    int64_t stride;  // scalars from one point to the next: 1, 3 (vec3), 4 (quat), or 0 where all points share one value
+} rapid_column;
+
+typedef struct rapid_chunk {
+    int64_t size;           // points
+    int64_t first;          // place in the set of the chunk's first point
+    rapid_column* columns;  // as the runner's layout numbers them
+    rapid_column* groups;   // uint8, 0 or 1
+    uint8_t* kill;          // shape [size], set to 1 by p:kill(); null where the kernel never kills
+    uint8_t* result;        // shape [size], what a predicate returned; null for other kernels
+    uint8_t* members;       // shape [size], the points to visit; null for all
+    uint64_t random;        // key of the node's random numbers
+    double number, time, dt;  // the frame, seconds
+} rapid_chunk;
+
+typedef double (*rapid_rand)(uint64_t random, int64_t id, double use, double frame);

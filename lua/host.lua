@@ -1,0 +1,79 @@
+-- What the host runs first in each of its states: it makes the environment of graph code, and gives the host the few
+-- functions that it calls.
+--
+-- The chunk is called with the host's native functions and returns a table of entry points.
+local native = ...
+
+local bytecode = require "bytecode"
+local kernel = require "kernel"
+local sandbox = require "sandbox"
+local language = require "rapid"
+local vector = require "vec3"
+local ffi = require "ffi"
+
+-- Nothing of ours is on the search path of graph code; what it may load stands beside the graph, or on RAPID_PATH.
+local env, loaded, load_text = sandbox.make(native.read_module, native.is_worker)
+string.dump = nil -- it is reached through no copy, and through no method of strings
+
+local function load_node(name)
+  local text, where = native.read_node(name)
+  if not text then return nil end
+  local chunk, message = load_text(text, where)
+  if not chunk then error(message, 0) end
+  local definition = chunk(name)
+  if type(definition) ~= "table" or definition.name ~= name then
+    error(("%s does not return rapid.node{ name = %q, ... }"):format(where:gsub("^@", ""), name), 0)
+  end
+  return definition
+end
+
+local rapid = language.make(native, load_node)
+loaded.rapid = rapid
+env.vec3 = vector.make
+
+local engine = kernel.prepare(native.chunk_header, native.rand)
+
+local entry = {}
+
+-- Runs the graph and returns what it returned: a node, or a table of nodes by name.
+function entry.run(text, name)
+  local chunk, message = load_text(text, name)
+  if not chunk then error(message, 0) end
+  -- Interpreted: a graph's body runs once, and bytecode that is compiled is no longer what bytecode.lua reads.
+  jit.off()
+  return chunk()
+end
+
+function entry.loaded()
+  jit.on()
+end
+
+function entry.load_node(name)
+  return load_node(name) ~= nil
+end
+
+function entry.analyse(f)
+  return bytecode.analyse(f, env)
+end
+
+entry.fingerprint = bytecode.fingerprint
+
+function entry.runner(f, layout)
+  return engine.runner(f, layout)
+end
+
+-- A parameter given as a function.
+function entry.call(f, number, time, dt)
+  return f(engine.frame(number, time, dt))
+end
+
+-- x, y, z of a vec3; nothing for any other cdata.
+function entry.unpack_vec3(value)
+  if ffi.istype(vector.type, value) then return value.x, value.y, value.z end
+end
+
+function entry.make_vec3(x, y, z)
+  return vector.type(x, y, z)
+end
+
+return entry

@@ -1,0 +1,272 @@
+-- Runners: what carries a kernel over the points of a chunk.
+--
+-- A kernel sees the point through a view `p` whose reads and writes are closures over the chunk's columns; it never gets
+-- a pointer, and an index outside its own point cannot be said. The trace compiler inlines all of it. Each kernel gets a
+-- runner from generated text, with function prototypes of its own: kernels that share one runner share its traces, and
+-- fall to a fifth of their speed.
+local ffi = require "ffi"
+local vector = require "vec3"
+
+local vec3, quat = vector.type, vector.quat
+
+-- One attribute's getter and setter by type. $N is its column's number, $S its name.
+local getter_text = {
+  float = "return tonumber(c$N[i * s$N])",
+  int32 = "return tonumber(c$N[i * s$N])",
+  int64 = "return tonumber(c$N[i * s$N])",
+  vec3 = "local k = i * s$N return vec3(c$N[k], c$N[k + 1], c$N[k + 2])",
+  quat = "local k = i * s$N return quat(c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3])",
+}
+
+local setter_text = {
+  float = [[
+    if type(x) ~= "number" then wrong_type($S, "a number", x) end
+    if not (x >= -MAX and x <= MAX) then not_finite($S, x) end
+    c$N[i] = x]],
+  int32 = [[
+    if type(x) ~= "number" then wrong_type($S, "a whole number", x) end
+    if not (x >= -2147483648 and x <= 2147483647 and floor(x) == x) then not_whole($S, x) end
+    c$N[i] = x]],
+  int64 = [[
+    if type(x) ~= "number" then wrong_type($S, "a whole number", x) end
+    if not (x >= -9007199254740992 and x <= 9007199254740992 and floor(x) == x) then not_whole($S, x) end
+    c$N[i] = x]],
+  vec3 = [[
+    if not istype(vec3, x) then wrong_type($S, "a vec3", x) end
+    local x1, x2, x3 = x.x, x.y, x.z
+    if not (x1 >= -MAX and x1 <= MAX and x2 >= -MAX and x2 <= MAX and x3 >= -MAX and x3 <= MAX) then
+      not_finite($S, x)
+    end
+    local k = i * 3
+    c$N[k], c$N[k + 1], c$N[k + 2] = x1, x2, x3]],
+  quat = [[
+    if not istype(quat, x) then wrong_type($S, "a quat", x) end
+    local x1, x2, x3, x4 = x.x, x.y, x.z, x.w
+    if not (x1 >= -MAX and x1 <= MAX and x2 >= -MAX and x2 <= MAX and x3 >= -MAX and x3 <= MAX and x4 >= -MAX
+        and x4 <= MAX) then
+      not_finite($S, x)
+    end
+    local k = i * 4
+    c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3] = x1, x2, x3, x4]],
+}
+
+local pointer_type = {
+  float = "float*", vec3 = "float*", quat = "float*", int32 = "int32_t*", int64 = "int64_t*",
+}
+
+local function describe(value)
+  if type(value) == "string" then return ("%q"):format(value) end
+  if type(value) == "number" or type(value) == "cdata" or type(value) == "boolean" then return tostring(value) end
+  return value == nil and "nil" or "a " .. type(value)
+end
+
+-- Level 3 is the kernel's line: error <- these <- setter <- __newindex would be 4, but setters are tail-called.
+local function wrong_type(name, wanted, value)
+  error(("attribute %q takes %s, not %s"):format(name, wanted, describe(value)), 0)
+end
+local function not_finite(name, value)
+  error(("%s became %s, which is not a finite number"):format(name, describe(value)), 0)
+end
+local function not_whole(name, value)
+  error(("attribute %q takes a whole number, not %s"):format(name, describe(value)), 0)
+end
+
+local function sorted_names(map)
+  local list = {}
+  for name in pairs(map) do list[#list + 1] = name end
+  table.sort(list)
+  return list
+end
+
+-- A view's refusals.
+local function missing(name, getters)
+  error(("no attribute %q here; a name that is computed must be an attribute that the kernel also names as a constant "
+    .. "(it names: %s)"):format(tostring(name), table.concat(sorted_names(getters), ", ")), 0)
+end
+
+local text_head = [[
+local ffi, vec3, quat, kernel, frame_type, rand, refuse, layout = ...
+local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.floor, type, tonumber, error
+local wrong_type, not_finite, not_whole, missing = refuse.wrong_type, refuse.not_finite, refuse.not_whole, refuse.missing
+local MAX = 3.4028234663852886e38
+local i, first, frame, random, params = -1, 0, nil, 0, nil
+local kill, result, members
+local getters, setters, methods, attach = {}, {}, {}, {}
+local id_column, id_stride
+]]
+
+local text_methods = [[
+function methods.rand(_, use, frame_or_number)
+  if type(use) ~= "number" then wrong_use(use) end
+  local anew = 0
+  if frame_or_number ~= nil then
+    anew = type(frame_or_number) == "number" and frame_or_number or frame_or_number.number
+  end
+  return rand(random, id_column[i * id_stride], use, anew)
+end
+
+function methods.kill()
+  if kill == nil then error("kill is out of reach here", 0) end
+  kill[i] = 1
+end
+
+local function alive()
+  if i < 0 then error("a point can't be used outside its kernel", 0) end
+end
+
+local function read(_, name)
+  alive()
+  local get = getters[name]
+  if get then return get() end
+  local method = methods[name]
+  if method then return method end
+  return missing(name, getters)
+end
+
+local function write(_, name, x)
+  alive()
+  local set = setters[name]
+  if set then return set(x) end
+  refuse.write(name, getters)
+end
+
+local p = newproxy(true)
+local view = getmetatable(p)
+view.__index, view.__newindex, view.__metatable = read, write, false
+view.__tostring = function() return "a point" end
+]]
+
+-- layout.columns: { name, type, slot (from 0), writable }; layout.groups: { name, slot, writable };
+-- layout.predicate: the kernel's result is kept, and nothing may be written. Returns run(chunk); at(), the place in the
+-- set of the point that is being worked on; and set_params(values), for the third argument of a Lua node's kernel.
+local function make_runner(kernel, layout, pointers)
+  local text = { text_head }
+  local function add(line, name, slot)
+    text[#text + 1] = (line:gsub("%$N", slot or ""):gsub("%$S", name and ("%q"):format(name) or ""))
+  end
+
+  local locals, setup = {}, {}
+  for _, column in ipairs(layout.columns) do
+    local n = tostring(column.slot)
+    locals[#locals + 1] = ("local c%s, s%s"):format(n, n)
+    setup[#setup + 1] = ([[attach[#attach + 1] = function(chunk)
+      c%s, s%s = cast(%q, chunk.columns[%s].data), tonumber(chunk.columns[%s].stride) %s
+    end]]):format(n, n, pointer_type[column.type], n, n,
+      column.name == "id" and ("id_column, id_stride = c%s, s%s"):format(n, n) or "")
+  end
+  for _, group in ipairs(layout.groups) do
+    local n = tostring(group.slot)
+    locals[#locals + 1] = ("local g%s, t%s"):format(n, n)
+    setup[#setup + 1] = ([[attach[#attach + 1] = function(chunk)
+      g%s, t%s = cast("uint8_t*", chunk.groups[%s].data), tonumber(chunk.groups[%s].stride)
+    end]]):format(n, n, n, n)
+  end
+  text[#text + 1] = table.concat(locals, "\n") .. "\n"
+  for _, column in ipairs(layout.columns) do
+    add("getters[$S] = function() " .. getter_text[column.type] .. " end", column.name, tostring(column.slot))
+    if column.writable then
+      add("setters[$S] = function(x)\n" .. setter_text[column.type] .. "\nend", column.name, tostring(column.slot))
+    end
+  end
+  text[#text + 1] = [[
+if not getters.dt then getters.dt = function() return frame.dt end end
+getters.index = function() return first + i + 1 end
+]]
+
+  -- Groups by name: a chain of closures, chosen when the name is looked up.
+  text[#text + 1] = "local within, join, leave = {}, {}, {}"
+  for _, group in ipairs(layout.groups) do
+    local n = tostring(group.slot)
+    add("within[$S] = function() return g$N[i * t$N] ~= 0 end", group.name, n)
+    if group.writable then
+      add("join[$S] = function() g$N[i] = 1 end leave[$S] = function() g$N[i] = 0 end", group.name, n)
+    end
+  end
+  text[#text + 1] = [[
+function methods.within(_, name)
+  local ask = within[name]
+  return ask ~= nil and ask()
+end
+function methods.join(_, name)
+  local act = join[name]
+  if not act then refuse.group(name, "join") end
+  act()
+end
+function methods.leave(_, name)
+  local act = leave[name]
+  if not act then refuse.group(name, "leave") end
+  act()
+end
+local function wrong_use(use) refuse.use(use) end
+]]
+  text[#text + 1] = text_methods
+  text[#text + 1] = table.concat(setup, "\n")
+  text[#text + 1] = [[
+local function begin(chunk)
+  first, random = tonumber(chunk.first), chunk.random
+  frame = frame_type(chunk.number, chunk.time, chunk.dt)
+  kill, result, members = chunk.kill, chunk.result, chunk.members
+  for k = 1, #attach do attach[k](chunk) end
+end
+]]
+
+  local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0" or "kernel(p, frame, params)"
+  local test = layout.masked and "if members[k] ~= 0 then i = k " .. body .. " end" or "i = k " .. body
+  text[#text + 1] = [[
+local function run(pointer)
+  local chunk = cast("rapid_chunk*", pointer)
+  begin(chunk)
+  for k = 0, tonumber(chunk.size) - 1 do ]] .. test .. [[ end
+  i = -1
+end
+local function at()
+  local place = i
+  i = -1
+  return place < 0 and -1 or first + place
+end
+local function set_params(values)
+  params = setmetatable({}, {
+    __index = values,
+    __newindex = function(_, name) error(("params.%s can't be assigned: parameters are the graph's"):format(name), 2) end,
+    __metatable = false,
+  })
+end
+return run, at, set_params
+]]
+  local refuse = { wrong_type = wrong_type, not_finite = not_finite, not_whole = not_whole, missing = missing }
+  function refuse.write(name, getters)
+    if layout.predicate then error(("assigns %q; a test must not change its point"):format(tostring(name)), 0) end
+    if name == "id" or name == "dt" or name == "index" then error(("%s is read only"):format(name), 0) end
+    if getters[name] then
+      error(("assigns %q under a computed name; name it as a constant somewhere in the kernel"):format(name), 0)
+    end
+    error(("no attribute %q; add :attribute{ %s = 0 } before it"):format(tostring(name), tostring(name)), 0)
+  end
+  function refuse.group(name, what)
+    error(("can't %s the group %s: a kernel names the groups that it joins and leaves as constants"):format(what, describe(name)), 0)
+  end
+  function refuse.use(use)
+    error(("p:rand takes a number, the use, not %s"):format(describe(use)), 0)
+  end
+  local chunk = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
+  return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, refuse, layout)
+end
+
+-- chunk_header: the text of lua/chunk.h; rand: a light userdata, the function that draws.
+local function prepare(chunk_header, rand)
+  ffi.cdef(chunk_header)
+  local frame_type = ffi.typeof "struct { const double number, time, dt; }"
+  ffi.metatype(frame_type, {
+    __tostring = function(frame) return ("frame %g"):format(frame.number) end,
+    __index = function(_, name)
+      error(("the frame has no %q; it has number, time and dt"):format(tostring(name)), 2)
+    end,
+  })
+  local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand) }
+  return {
+    frame = function(number, time, dt) return frame_type(number, time, dt) end,
+    runner = function(kernel, layout) return make_runner(kernel, layout, pointers) end,
+  }
+end
+
+return { prepare = prepare }

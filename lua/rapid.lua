@@ -1,0 +1,185 @@
+-- The graph language: the table that `require "rapid"` gives to graph code.
+--
+-- Everything here only gathers arguments; the host makes the values, checks them and remembers where they were asked for.
+-- A call with a place of its own among the arguments (a path, a mesh, a motion) is turned into named arguments.
+local vector = require "vec3"
+
+local function options_of(what, options)
+  if options == nil then return {} end
+  if type(options) ~= "table" then
+    error(("%s takes a table of options, not a %s"):format(what, type(options)), 3)
+  end
+  local copy = {}
+  for name, value in pairs(options) do copy[name] = value end
+  return copy
+end
+
+-- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil.
+local function make(native, load_node)
+  local rapid = {}
+
+  -- A maker with the named positional arguments first.
+  local function maker(what, ...)
+    local positional = { ... }
+    return function(...)
+      local options = options_of("rapid." .. what, (select(#positional + 1, ...)))
+      for place, name in ipairs(positional) do
+        local value = select(place, ...)
+        if value == nil then error(("rapid.%s: the %s is missing"):format(what, name), 2) end
+        options[name] = value
+      end
+      return native.make(what, options)
+    end
+  end
+
+  rapid.mesh = {
+    read = maker("mesh.read", "path"),
+    sphere = maker "mesh.sphere",
+    box = maker "mesh.box",
+    grid = maker "mesh.grid",
+    torus = maker "mesh.torus",
+    from = maker "mesh.from",
+  }
+  rapid.levelset = {
+    from_mesh = maker("levelset.from_mesh", "mesh"),
+    read = maker("levelset.read", "path"),
+    sphere = maker "levelset.sphere",
+    box = maker "levelset.box",
+    torus = maker "levelset.torus",
+  }
+  rapid.shape = {
+    plane = maker "shape.plane",
+    sphere = maker "shape.sphere",
+    box = maker "shape.box",
+  }
+  rapid.points = {
+    read = maker("points.read", "path"),
+    grid = maker "points.grid",
+    from = function(columns)
+      return native.make("points.from", { columns = columns })
+    end,
+  }
+
+  function rapid.translate(x, y, z)
+    return native.make("motion.translate", { by = vector.make(x, y, z) })
+  end
+  rapid.rotate = maker("motion.rotate", "axis", "degrees")
+  rapid.scale = maker("motion.scale", "by")
+
+  function rapid.attr(name)
+    return native.attribute(name)
+  end
+
+  -- A number, a boolean, a string or a vec3 that --set can replace.
+  function rapid.param(name, default, doc)
+    return native.param(name, default, doc)
+  end
+
+  -- Positional forms: a name and a kernel.
+  local function named_kernel(type_name)
+    return function(input, name, kernel)
+      if type(name) == "table" and kernel == nil then return native.node(type_name, name, input) end
+      if type(name) ~= "string" or type(kernel) ~= "function" then
+        error((":%s takes a name and a function, or a table { name = ..., kernel = ... }"):format(type_name), 2)
+      end
+      return native.node(type_name, { name = name, kernel = kernel }, input)
+    end
+  end
+
+  local sugar = { points = named_kernel "points" }
+
+  function sugar.merge(input, ...)
+    local inputs, options = { input }, {}
+    for place = 1, select("#", ...) do
+      local other = select(place, ...)
+      if type(other) == "table" then options = other else inputs[#inputs + 1] = other end
+    end
+    if #inputs < 2 then error(":merge takes another node: a:merge(b)", 2) end
+    return native.node("merge", options, unpack(inputs))
+  end
+
+  local function call(type_name, options, ...)
+    if options ~= nil and type(options) ~= "table" then
+      error((":%s takes a table of parameters: :%s{ ... }"):format(type_name, type_name), 3)
+    end
+    return native.node(type_name, options or {}, ...)
+  end
+
+  local methods = {} -- by node type, made when first used
+  local definitions = {} -- of Lua nodes
+
+  local function method_of(type_name)
+    if methods[type_name] then return methods[type_name] end
+    local method = sugar[type_name]
+    if not method then
+      local definition = definitions[type_name]
+      if not native.has_type(type_name) then
+        definition = load_node(type_name)
+        if definition == nil then native.unknown_type(type_name) end
+        definitions[type_name] = definition
+      end
+      if definition and definition.expand then
+        local expand = definition.expand
+        method = function(input, options)
+          return expand(input, native.complete(type_name, options or {}))
+        end
+      else
+        method = function(input, options, ...)
+          if select("#", ...) > 0 then
+            error((":%s takes one table of parameters"):format(type_name), 2)
+          end
+          return call(type_name, options, input)
+        end
+      end
+    end
+    methods[type_name] = method
+    return method
+  end
+
+  function rapid.create(options)
+    return call("create", options)
+  end
+
+  -- A node written in Lua; returned by its file.
+  function rapid.node(definition)
+    if type(definition) ~= "table" then error("rapid.node takes a table", 2) end
+    native.define(definition)
+    if type(definition.name) == "string" then definitions[definition.name] = definition end
+    return definition
+  end
+
+  -- Methods of values, by what they are.
+  local function transformed(object, motion)
+    return native.make("transform", { object = object, motion = motion })
+  end
+  local value_methods = {
+    mesh = { transform = transformed },
+    ["level set"] = {
+      write = function(object, path, options)
+        local named = options_of("levelset:write", options)
+        named.levelset, named.path = object, path
+        native.make("levelset.write", named)
+        return object
+      end,
+    },
+    motion = {},
+  }
+
+  native.set_index(function(object, name)
+    local kind = native.kind(object)
+    if kind == "node" then
+      if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
+      return method_of(name)
+    end
+    local known = value_methods[kind]
+    local method = known and known[name]
+    if method then return method end
+    error(("a %s has no %q"):format(kind, tostring(name)), 2)
+  end, function(a, b)
+    return native.make("motion.product", { first = a, second = b })
+  end)
+
+  return rapid
+end
+
+return { make = make }

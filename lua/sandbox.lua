@@ -1,0 +1,145 @@
+-- The environment of graph code: ordinary Lua without a way out.
+--
+-- Out of reach: files, processes, ffi, debug, bytecode, other environments, addresses, and whatever depends on chance (the
+-- order of a string hash, math.random). Libraries are copies, so nothing that graph code does to them reaches ours.
+local ffi = require "ffi"
+
+local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
+
+local function copy(library, without)
+  local result = {}
+  for name, value in raw_pairs(library) do result[name] = value end
+  for _, name in ipairs(without or {}) do result[name] = nil end
+  return result
+end
+
+-- tostring without addresses.
+local function safe_tostring(value)
+  local text = raw_tostring(value)
+  if type(text) == "string" and text:find "0x%x%x%x" then
+    return (text:gsub(": 0x%x+", ""):gsub("0x%x+", "?"))
+  end
+  return text
+end
+
+-- Keys in an order that does not depend on the hash: numbers, then strings, then false, true, then the rest as found.
+local function sorted_keys(map)
+  local numbers, strings, others = {}, {}, {}
+  for key in raw_pairs(map) do
+    local kind = type(key)
+    local list = kind == "number" and numbers or kind == "string" and strings or others
+    list[#list + 1] = key
+  end
+  table.sort(numbers)
+  table.sort(strings)
+  for _, key in ipairs(strings) do numbers[#numbers + 1] = key end
+  for _, key in ipairs(others) do numbers[#numbers + 1] = key end
+  return numbers
+end
+
+local function sorted_pairs(map)
+  if type(map) ~= "table" then error(("pairs takes a table, not a %s"):format(type(map)), 2) end
+  local keys, place = sorted_keys(map), 0
+  return function()
+    repeat
+      place = place + 1
+      if keys[place] == nil then return nil end
+    until map[keys[place]] ~= nil
+    return keys[place], map[keys[place]]
+  end, map, nil
+end
+
+local function sorted_next(map, key)
+  if type(map) ~= "table" then error(("next takes a table, not a %s"):format(type(map)), 2) end
+  local keys = sorted_keys(map)
+  if key == nil then return keys[1], map[keys[1]] end
+  for place, known in ipairs(keys) do
+    if known == key then
+      local following = keys[place + 1]
+      if following == nil then return nil end
+      return following, map[following]
+    end
+  end
+  error("next was given a key that is not in the table", 2)
+end
+
+local function safe_format(format, ...)
+  if type(format) == "string" and format:gsub("%%%%", ""):find "%%[%d%.%-%+ #]*p" then
+    error("%p is not there: addresses differ from run to run", 2)
+  end
+  local count, values = select("#", ...), { ... }
+  for place = 1, count do
+    local kind = type(values[place])
+    if kind ~= "string" and kind ~= "number" then values[place] = safe_tostring(values[place]) end
+  end
+  return raw_format(format, unpack(values, 1, count))
+end
+
+-- read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and where it was
+-- looked for. In a quiet environment (a worker's) print says nothing: the first state has said it.
+local function make(read_module, quiet)
+  local env = {}
+  local strings = copy(string, { "dump" })
+  strings.format = safe_format
+
+  -- Methods of strings come from here too.
+  local of_strings = debug.getmetatable("")
+  of_strings.__index = strings
+  of_strings.__metatable = false
+
+  env._G = env
+  env._VERSION = _VERSION
+  env.assert, env.error, env.ipairs, env.pcall, env.xpcall = assert, error, ipairs, pcall, xpcall
+  env.select, env.tonumber, env.type, env.unpack = select, tonumber, type, unpack
+  env.pairs, env.next, env.tostring = sorted_pairs, sorted_next, safe_tostring
+  env.rawequal = rawequal
+  env.string, env.bit = strings, copy(require "bit")
+  env.math = copy(math, { "random", "randomseed" })
+  env.table = copy(table, { "foreach", "foreachi", "getn" })
+  env.coroutine = copy(coroutine)
+
+  function env.setmetatable(object, meta)
+    if type(object) ~= "table" then error("setmetatable takes a table", 2) end
+    return setmetatable(object, meta)
+  end
+  function env.getmetatable(object)
+    if type(object) ~= "table" then return nil end
+    return getmetatable(object)
+  end
+  function env.print(...)
+    if quiet then return end
+    local words = {}
+    for place = 1, select("#", ...) do words[place] = safe_tostring((select(place, ...))) end
+    print(table.concat(words, "\t"))
+  end
+
+  -- Text only: bytecode could say what Lua cannot.
+  local function load_text(text, name)
+    if type(text) ~= "string" then return nil, "load takes a string" end
+    if text:byte(1) == 27 then return nil, "bytecode is not loaded" end
+    local chunk, message = loadstring(text, name)
+    if not chunk then return nil, message end
+    return setfenv(chunk, env)
+  end
+  env.load = load_text
+  env.loadstring = load_text
+
+  local loaded = {}
+  function env.require(name)
+    if type(name) ~= "string" then error("require takes the name of a module", 2) end
+    if loaded[name] ~= nil then return loaded[name] end
+    local text, where = read_module(name)
+    if not text then error(("no module %q; looked for %s"):format(name, where), 2) end
+    local chunk, message = load_text(text, where)
+    if not chunk then error(message, 0) end
+    local result = chunk(name)
+    loaded[name] = result == nil and true or result
+    return loaded[name]
+  end
+
+  return env, loaded, load_text
+end
+
+assert(ffi.abi "gc64", "the host counts on frames of two slots")
+
+return { make = make }

@@ -1,0 +1,126 @@
+#include "runtime/operators/birth_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runtime/graph/points_object.h"
+#include "runtime/graph/value.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::uint64_t pick_use = 17;
+
+// A mesh's vertices with their values, as points.
+PointSet vertices_of(const Mesh& mesh)
+{
+    PointSet vertices;
+    vertices.append(mesh.positions.size());
+    vertices.P() = Column<Vec3f>(std::span<const Vec3f>(mesh.positions));
+    for (const auto& [name, values] : mesh.values)
+        std::visit(
+            [&, &key = name](const auto& list) {
+                using T = typename std::decay_t<decltype(list)>::value_type;
+                if (key != "P" && key != "v" && key != "id") vertices.set(key, Column<T>(std::span<const T>(list)));
+            },
+            values);
+    return vertices;
+}
+
+// The mean of the normals of the faces around each vertex, by area; not of length 1.
+Column<Vec3f> vertex_normals(const Mesh& mesh)
+{
+    std::vector<Vec3f> sum(mesh.positions.size(), Vec3f::Zero());
+    for (const Mesh::Triangle& triangle : mesh.triangles) {
+        const auto corner = [&](int i) { return static_cast<std::size_t>(triangle[i]); };
+        const Vec3f& a = mesh.positions[corner(0)];
+        const Vec3f twice_area = (mesh.positions[corner(1)] - a).cross(mesh.positions[corner(2)] - a);
+        for (int i = 0; i < 3; ++i) sum[corner(i)] += twice_area;
+    }
+    return Column<Vec3f>(std::span<const Vec3f>(sum));
+}
+
+Vec3f direction(const Vec3f& normal)
+{
+    const double length = normal.cast<double>().norm();
+    return length > 0 ? Vec3f((normal.cast<double>() / length).cast<float>()) : Vec3f(Vec3f::Zero());
+}
+
+}  // namespace
+
+BirthSource::BirthSource(ObjectPtr object, std::string from) : object_(std::move(object)), from_(std::move(from))
+{
+    if (const auto points = std::dynamic_pointer_cast<const PointsObject>(object_)) {
+        if (!from_.empty() && from_ != "points")
+            throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of points take \"points\"", from_));
+        take_points(points->points);
+    } else if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object_)) {
+        take_mesh(mesh);
+    } else if (const auto shape = std::dynamic_pointer_cast<const Shape>(object_)) {
+        if (from_ == "points")
+            throw Error(
+                fmt::format("from = \"points\" needs points or a mesh, and source is {}; take \"surface\" or "
+                            "\"volume\"",
+                            describe(object_)));
+        has_normals_ = from_ != "volume";
+        scatter_ = from_ == "volume" ? scatter_in_volume(shape) : scatter_on_surface(shape);
+    } else {
+        throw Error(fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape or points",
+                                describe(object_)));
+    }
+}
+
+void BirthSource::take_mesh(const MeshPtr& mesh)
+{
+    has_normals_ = from_ != "volume";
+    if (from_ == "volume") {
+        scatter_ = scatter_in_volume(mesh);
+        return;
+    }
+    values_ = vertices_of(*mesh);
+    if (from_ == "points") {
+        normals_ = vertex_normals(*mesh);
+        return;
+    }
+    mesh_ = mesh;
+    scatter_ = scatter_on_surface(mesh);
+}
+
+void BirthSource::take_points(PointSet points)
+{
+    values_ = std::move(points);
+    if (const Column<Vec3f>* normals = std::as_const(values_).find<Vec3f>("N")) {
+        normals_ = *normals;
+        has_normals_ = true;
+    }
+}
+
+std::vector<std::string> BirthSource::carried() const
+{
+    std::vector<std::string> names;
+    for (const std::string& name : values_.column_names()) {
+        const auto own = {"P", "v", "id", "dt", "age", "life", "birthtime", "force"};
+        if (std::find(own.begin(), own.end(), name) == own.end() && name.rfind("hit", 0) != 0) names.push_back(name);
+    }
+    return names;
+}
+
+void BirthSource::place(RandomKey key, std::uint64_t first, bool in_order, std::span<Birthplace> out) const
+{
+    if (scatter_) return scatter_->place(key, first, out);
+
+    const std::uint64_t n = values_.size();
+    const Strided<Vec3f> P = values_.P().read(), N = normals_.read();
+    for (std::size_t i = 0; i < out.size(); ++i) {
+        std::uint64_t point = (first + i) % n;
+        if (!in_order) {
+            const auto u = uniform4(key, first + i, pick_use);
+            point = std::min(n - 1, static_cast<std::uint64_t>((u[0] + u[1] * 0x1p-32) * static_cast<double>(n)));
+        }
+        out[i] = {P[point], has_normals_ ? direction(N[point]) : Vec3f(Vec3f::Zero()),
+                  static_cast<std::int32_t>(point)};
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,423 @@
+// emit: bears points from a surface, in a volume or at points (paper §3.1).
+//
+// A point born in the frame's interval has the age L at the frame's end, 0 <= L <= h: h for birth = "begin", 0 for
+// "end", uniform between for "random", h less its exact time for "even". It is appended where and as it is born; its
+// column `dt` has γ = min(L, h), the time for which Solve advances it in this frame, so that its age grows to L by the
+// end.
+//
+//   velocity = C(velocity + speed N) + inherit v_source      C turns a vector uniformly in a cone of half angle
+//   `spread`
+//
+// A birth's random numbers depend on the seed, this node's name and the birth's number within this emitter; each
+// question has a number of its own, so that a parameter more changes no answer to another.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "runtime/graph/node.h"
+#include "runtime/operators/birth_source.h"
+#include "runtime/operators/births.h"
+#include "runtime/parallel.h"
+
+namespace rapid {
+namespace {
+
+// The numbers of a birth: its age, its life, and two for its direction. What comes from the source has others
+// (birth_source.h).
+constexpr std::uint64_t draw_use = 16;
+enum Draw { age_draw, life_draw, cone_draw, turn_draw };
+
+// Births are placed in blocks that stay in the first-level cache.
+constexpr std::size_t block_size = 256;
+
+constexpr double most_births = 2147483647;  // in a frame
+
+struct EmitSource {
+    static constexpr std::string_view param_type = "mesh, level set, shape or points";
+    ObjectPtr object;
+};
+
+void read_value(const Param& param, const Value& value, EmitSource& field)
+{
+    read_value(param, value, field.object);
+    if (!field.object) wrong_type(param, value);
+}
+
+// One number for all points, or each point's own, uniform between two.
+struct Interval {
+    static constexpr std::string_view param_type = "number or {min, max}";
+    double min = 0, max = 0;
+
+    bool is_single() const { return min == max; }
+    double at(double u) const { return is_single() ? min : min + (max - min) * u; }
+};
+
+void read_value(const Param& param, const Value& value, Interval& field)
+{
+    const Table* table = value.table();
+    if (!table) {
+        if (!value.get<double>()) wrong_type(param, value);
+        read_value(param, value, field.min);
+        field.max = field.min;
+        return;
+    }
+    if (table->list.size() != 2 || !table->list[0].get<double>() || !table->list[1].get<double>())
+        wrong_type(param, value);
+    read_value(param, table->list[0], field.min);
+    read_value(param, table->list[1], field.max);
+    if (field.min > field.max)
+        throw Error(
+            fmt::format("{} = {} is the wrong way round; it must be {{min, max}}", param.name, describe(value)));
+    if (std::isinf(field.max) && !field.is_single())
+        throw Error(fmt::format("{} = {} has no mean; both must be finite", param.name, describe(value)));
+}
+
+// The vectors that `turn` needs of a cone of the half angle θ: 1 - cos α is uniform in [0, 1 - cos θ] where directions
+// are uniform over the cone's solid angle.
+class Cone {
+public:
+    explicit Cone(double half_angle) : depth_(2 * std::pow(std::sin(half_angle / 2), 2)) {}
+
+    // `mean` turned, its length kept. u, w: uniform in [0, 1).
+    Vec3d turn(const Vec3d& mean, double u, double w) const
+    {
+        const double length = mean.norm();
+        if (length == 0) return mean;
+        const Vec3d d = mean / length;
+        const double fall = depth_ * u;  // 1 - cos α; of the cosine alone a narrow cone would keep few digits
+        const double side = std::sqrt(fall * (2 - fall));
+        const double turn = 2 * EIGEN_PI * w;
+
+        // A frame about d without a branch on its direction (Duff et al. 2017).
+        const double sign = std::copysign(1.0, d.z());
+        const double a = -1 / (sign + d.z());
+        const double b = d.x() * d.y() * a;
+        const Vec3d e1(1 + sign * d.x() * d.x() * a, sign * b, -sign * d.x());
+        const Vec3d e2(b, sign + d.y() * d.y() * a, -d.y());
+        return length * ((1 - fall) * d + side * (std::cos(turn) * e1 + std::sin(turn) * e2));
+    }
+
+private:
+    double depth_;  // 1 - cos θ
+};
+
+// The value of points that have none, of an attribute that holds values like this one.
+AttributeSpec neutral(const std::string& name, const AttributeValue& like)
+{
+    if (const AttributeSpec* known = known_attribute(name)) return *known;
+    return {name, std::visit([](const auto& v) -> AttributeValue { return Column<std::decay_t<decltype(v)>>::zero(); },
+                             like)};
+}
+
+// The newborn's part of the columns in which each has a value of its own, shape [n]; empty for the others.
+struct Newborn {
+    std::span<Vec3f> P, v;
+    std::span<std::int64_t> id;
+    std::span<float> dt, age, birthtime, life;
+    // Attributes of the source, for the newborn from `begin` on.
+    std::vector<std::function<void(std::size_t begin, std::span<const Birthplace> places)>> carry;
+};
+
+struct Emit {
+    EmitSource source;
+    std::string from, birth, joins;
+    std::optional<double> rate;
+    std::optional<int> count;
+    std::optional<std::map<std::int64_t, double>> impulse;
+    std::optional<Interval> age, life;
+    double inherit = 1, speed = 0, spread = 0;
+    Vec3d velocity = Vec3d::Zero();
+    std::map<std::string, AttributeValue> attributes;
+
+    static NodeType declare()
+    {
+        return node<Emit>("emit", "Bears points from a surface, in a volume or at points.")
+            .varies()
+            .writes("P")
+            .writes("v")
+            .writes("id")
+            .writes("dt")
+            .param(&Emit::source, "source", Value(), any_number(), "", "what points are born from")
+            .required()
+            .param(&Emit::from, "from", Value(), any_number(), "",
+                   "where on the source; without it \"points\" of points, else \"surface\". A mesh's points are its "
+                   "vertices. With count or impulse points are taken in order, so that as many births as points take "
+                   "each once; with rate at random")
+            .choices({"surface", "volume", "points"})
+            .param(&Emit::rate, "rate", Value(), at_least(0), "1/s", "points born a second")
+            .param(&Emit::count, "count", Value(), at_least(0), "", "points born a frame")
+            .param(&Emit::impulse, "impulse", Value(), between(0, most_births), "",
+                   "points born in single frames, {[frame] = count}; at the first frame they have not moved yet")
+            .param(&Emit::birth, "birth", "random", any_number(), "",
+                   "when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time")
+            .choices({"random", "begin", "end", "even"})
+            .param(&Emit::age, "age", Value(), at_least(0), "s",
+                   "age at the end of the frame of birth, instead of `birth`; a number or {min, max}")
+            .param(&Emit::inherit, "inherit", 1.0, any_number(), "", "fraction of the source's velocity that is added")
+            .param(&Emit::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean direction and size")
+            .param(&Emit::speed, "speed", 0.0, any_number(), "m/s", "along the source's normal N, added to velocity")
+            .param(&Emit::spread, "spread", 0.0, between(0, 180), "deg",
+                   "turns velocity and speed together, uniformly in a cone of this half angle")
+            .param(&Emit::life, "life", Value(), or_infinity(at_least(0)), "s",
+                   "age at which points die: a number or {min, max}; without it they live for ever")
+            .param(&Emit::joins, "group", Value(), any_number(), "", "the newborn join this group")
+            .constant()
+            .param(&Emit::attributes, "attributes", Value(), any_number(), "",
+                   "values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; they go before the source's own");
+    }
+
+    void uses(Uses& uses) const
+    {
+        for (const AttributeSpec& spec : made()) uses.makes.push_back(spec);
+        if (life) uses.writes.insert(uses.writes.end(), {"age", "life"});
+        if (!joins.empty()) uses.makes_groups.push_back(joins);
+    }
+
+    void check() const
+    {
+        const int given = rate.has_value() + count.has_value() + impulse.has_value();
+        if (given == 0) throw Error("nothing says how many points are born; give rate, count or impulse");
+        if (given > 1)
+            throw Error(fmt::format("{} are given together; keep one of them", !impulse ? "rate and count"
+                                                                               : !count ? "rate and impulse"
+                                                                               : !rate  ? "count and impulse"
+                                                                                        : "rate, count and impulse"));
+        if (impulse)
+            for (const auto& [frame, n] : *impulse)
+                if (n != std::floor(n))
+                    throw Error(fmt::format("impulse[{}] = {} is not whole; it must be a number of points", frame, n));
+
+        for (const auto& [name, value] : attributes)
+            for (const auto& [own, remedy] : {std::pair{"age", "use age"},
+                                              {"life", "use life"},
+                                              {"birthtime", "it is the time of birth, where something reads it"}})
+                if (name == own) throw Error(fmt::format("attributes: \"{}\" has its own way; {}", name, remedy));
+
+        if (!source_.is(source.object, from)) source_ = BirthSource(source.object, from);
+        if (speed != 0 && !source_.has_normals())
+            throw Error(fmt::format("speed = {} goes along N, which {} does not have; give velocity instead", speed,
+                                    from == "volume" ? "a volume" : "this set of points"));
+        for (const std::string& name : carried()) {
+            const AttributeType type = type_of(*source_.values().find(name));
+            if (const AttributeSpec* known = known_attribute(name); known && type_of(known->fallback) != type)
+                throw Error(fmt::format("the source has \"{}\" as {}; it must be {}", name, type_name(type),
+                                        type_name(type_of(known->fallback))));
+        }
+    }
+
+    Flow start(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        const Simulation& simulation = *flow.simulation;
+        if (impulse && !impulse->empty() && impulse->begin()->first < simulation.start)
+            throw Error(fmt::format("impulse[{}] is before the first frame; frames begin at {}",
+                                    impulse->begin()->first, simulation.start));
+        clock_ = BirthClock(simulation.start);
+        bear(flow, clock_.at_once(impulse ? impulse_at(simulation.start) : 0, simulation.fps), now);
+        return flow;
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        if (now.at_start) return start(inputs, now);
+        Flow flow = std::move(inputs[0]);
+        bear(flow, births(static_cast<std::int64_t>(now.frame.number), flow.simulation->fps), now);
+        return flow;
+    }
+
+private:
+    std::size_t impulse_at(std::int64_t frame) const
+    {
+        const auto found = impulse->find(frame);
+        return found == impulse->end() ? 0 : static_cast<std::size_t>(found->second);
+    }
+
+    Births births(std::int64_t frame, double fps)
+    {
+        if (!rate) return clock_.at_once(count ? static_cast<std::size_t>(*count) : impulse_at(frame), fps);
+        if (*rate / fps > most_births)
+            throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", *rate, *rate / fps,
+                                    most_births));
+        return clock_.at_rate(*rate, frame, fps);
+    }
+
+    // The source's attributes that `attributes` does not replace.
+    std::vector<std::string> carried() const
+    {
+        std::vector<std::string> names = source_.carried();
+        std::erase_if(names, [&](const std::string& name) { return attributes.count(name) > 0; });
+        return names;
+    }
+
+    std::vector<AttributeSpec> made() const
+    {
+        std::vector<AttributeSpec> specs;
+        for (const auto& [name, value] : attributes) specs.push_back(neutral(name, value));
+        for (const std::string& name : carried())
+            std::visit([&](const auto& c) { specs.push_back(neutral(name, c.fallback())); },
+                       *source_.values().find(name));
+        return specs;
+    }
+
+    // The age at the frame's end where it is the same for all births.
+    std::optional<double> same_age(const Evaluation& now) const
+    {
+        if (age) return age->is_single() ? std::optional(age->min) : std::nullopt;
+        if (now.at_start || birth == "end") return 0.0;
+        if (birth == "begin") return now.frame.dt;
+        return std::nullopt;
+    }
+
+    // Whether newborn differ in the velocity that they take from the source; where not, all take the same.
+    bool inherits_each() const { return inherit != 0 && !source_.values().v().is_uniform(); }
+    Vec3d inherited_by_all() const
+    {
+        if (inherit == 0 || inherits_each()) return Vec3d::Zero();
+        return inherit * source_.values().v()[0].cast<double>();
+    }
+    bool turns() const { return spread > 0 && (speed != 0 || velocity != Vec3d::Zero()); }
+    bool own_velocity() const { return turns() || speed != 0 || inherits_each(); }
+
+    void bear(Flow& flow, const Births& births, const Evaluation& now);
+    void make_columns(PointSet& points, const Evaluation& now) const;
+    void append(PointSet& points, std::size_t n, const Evaluation& now) const;
+    Newborn newborn_of(PointSet& points, std::size_t n, const Evaluation& now) const;
+    void fill(const Newborn& newborn, const Births& births, std::size_t begin, std::span<Birthplace> places,
+              const Evaluation& now) const;
+
+    BirthClock clock_;
+    mutable BirthSource source_;  // made from `source` and `from` when they change
+};
+RAPID_NODE(Emit);
+
+// The time for which a newborn is advanced in its first frame; the initial state is not.
+double frame_length(const Evaluation& now) { return now.at_start ? 0 : now.frame.dt; }
+
+void Emit::bear(Flow& flow, const Births& births, const Evaluation& now)
+{
+    PointSet& points = flow.points;
+    make_columns(points, now);
+    const std::size_t n = source_.empty() ? 0 : births.count;
+    if (n == 0) return;
+
+    append(points, n, now);
+    const Newborn newborn = newborn_of(points, n, now);
+    for_each_chunk(n, [&](std::size_t chunk_begin, std::size_t chunk_end) {
+        std::array<Birthplace, block_size> places;
+        for (std::size_t begin = chunk_begin; begin < chunk_end; begin += block_size)
+            fill(newborn, births, begin, std::span(places).first(std::min(block_size, chunk_end - begin)), now);
+    });
+    std::iota(newborn.id.begin(), newborn.id.end(), flow.simulation->next_id);
+    flow.simulation->next_id += static_cast<std::int64_t>(n);
+    now.figures.born += n;
+}
+
+// Whether anything is born or not: all frames have the same columns.
+void Emit::make_columns(PointSet& points, const Evaluation& now) const
+{
+    for (const AttributeSpec& spec : made()) points.add(spec);
+    if (life)
+        for (const char* name : {"age", "life"}) points.add(*known_attribute(name));
+    if (!joins.empty()) points.group(joins);
+
+    const std::optional<double> L = same_age(now);
+    const bool all_whole_frames = L && *L >= frame_length(now);
+    if (!now.at_start && !all_whole_frames) points.add({"dt", static_cast<float>(now.frame.dt)});
+}
+
+// What all newborn have in common goes into its column as one value, and a uniform column stays uniform.
+void Emit::append(PointSet& points, std::size_t n, const Evaluation& now) const
+{
+    std::vector<AttributeSpec> common;
+    for (const auto& [name, value] : attributes) common.push_back({name, value});
+    for (const std::string& name : carried())
+        std::visit(
+            [&](const auto& column) {
+                if (column.is_uniform()) common.push_back({name, column[0]});
+            },
+            *source_.values().find(name));
+    if (!own_velocity()) {
+        common.push_back({"v", Vec3f((velocity + inherited_by_all()).cast<float>())});
+    }
+    if (life && life->is_single()) common.push_back({"life", static_cast<float>(life->min)});
+    if (const std::optional<double> L = same_age(now)) {
+        const double gamma = std::min(*L, frame_length(now));
+        common.push_back({"dt", static_cast<float>(gamma)});
+        common.push_back({"age", static_cast<float>(*L - gamma)});
+        common.push_back({"birthtime", static_cast<float>(now.frame.time - *L)});
+    } else if (!age) {
+        common.push_back({"age", 0.0f});
+    }
+    points.append(n, common, joins.empty() ? std::vector<std::string>() : std::vector{joins});
+}
+
+Newborn Emit::newborn_of(PointSet& points, std::size_t n, const Evaluation& now) const
+{
+    const auto floats = [&](const char* name, bool own) {
+        Column<float>* column = own ? points.find<float>(name) : nullptr;
+        return column ? column->write().last(n) : std::span<float>();
+    };
+    const bool own_age = !same_age(now);
+    Newborn newborn;
+    newborn.P = points.P().write().last(n);
+    newborn.id = points.id().write().last(n);
+    if (own_velocity()) newborn.v = points.v().write().last(n);
+    newborn.dt = floats("dt", own_age);
+    newborn.age = floats("age", own_age && age);
+    newborn.birthtime = floats("birthtime", own_age);
+    newborn.life = floats("life", life && !life->is_single());
+    for (const std::string& name : carried())
+        std::visit(
+            [&](const auto& column) {
+                using T = std::decay_t<decltype(column[0])>;
+                if (column.is_uniform()) return;
+                newborn.carry.push_back([this, values = column.read(), to = points.column<T>(name).write().last(n)](
+                                            std::size_t begin, std::span<const Birthplace> places) {
+                    for (std::size_t i = 0; i < places.size(); ++i) to[begin + i] = source_.value(values, places[i]);
+                });
+            },
+            *source_.values().find(name));
+    return newborn;
+}
+
+void Emit::fill(const Newborn& newborn, const Births& births, std::size_t begin, std::span<Birthplace> places,
+                const Evaluation& now) const
+{
+    source_.place(now.random, births.first + begin, /*in_order=*/!rate, places);
+    for (const auto& carry : newborn.carry) carry(begin, places);
+
+    const double h = frame_length(now);
+    const bool own_age = !same_age(now);
+    const bool even = !age && birth == "even";
+    const bool own_velocities = !newborn.v.empty(), inherits = inherits_each(), turned = turns();
+    const Cone cone(spread);
+    const Strided<Vec3f> source_v = source_.values().v().read();
+    const Vec3d inherited = inherited_by_all();
+    const bool draws = own_age || turned || !newborn.life.empty();
+
+    for (std::size_t j = 0; j < places.size(); ++j) {
+        const std::size_t i = begin + j;
+        const Birthplace& place = places[j];
+        const auto u = draws ? uniform4(now.random, births.first + i, draw_use) : std::array<double, 4>();
+        newborn.P[i] = place.P;
+        if (own_age) {
+            const double L = age ? age->at(u[age_draw]) : even ? births.even_age(i) : h * u[age_draw];
+            const double gamma = std::min(L, h);
+            if (!newborn.dt.empty()) newborn.dt[i] = static_cast<float>(gamma);
+            if (!newborn.age.empty()) newborn.age[i] = static_cast<float>(L - gamma);
+            if (!newborn.birthtime.empty()) newborn.birthtime[i] = static_cast<float>(now.frame.time - L);
+        }
+        if (!newborn.life.empty()) newborn.life[i] = static_cast<float>(life->at(u[life_draw]));
+        if (own_velocities) {
+            const Vec3d mean = velocity + speed * place.N.cast<double>();
+            const Vec3d own = turned ? cone.turn(mean, u[cone_draw], u[turn_draw]) : mean;
+            const Vec3d taken = inherits ? Vec3d(inherit * source_.value(source_v, place).cast<double>()) : inherited;
+            newborn.v[i] = (own + taken).cast<float>();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace rapid

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,11 +12,20 @@
 
 namespace rapid {
 
+struct PictureOptions;
+struct PictureScene;
+struct PictureView;
+
 // What a writer may want to know of the frame besides its points.
 struct FrameInfo {
     int number = 1;
     double time = 0;  // s since the start
     double fps = 24;
+
+    // For pictures (runtime/io/picture.h). Null: the usual ones; the points alone; fitted to this one frame.
+    std::shared_ptr<const PictureOptions> picture = nullptr;
+    std::shared_ptr<const PictureScene> scene = nullptr;
+    std::shared_ptr<const PictureView> view = nullptr;  // FrameWriter keeps one over a sequence
 };
 
 struct Format {
@@ -24,7 +34,9 @@ struct Format {
     // Writes all columns and groups of `points` to `path`, a new file: the caller gives an unfinished name and renames
     // it. Error: what could not be written (a full disk, int64 ids in a format that can't hold them), naming what can.
     void (*write)(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame);
-    // Null where a format can't be read back (.png).
+    // Null where a format can't be read back (.png). Text and matrices, which points do not hold, are left out; an
+    // attribute of n other numbers becomes the floats or integers NAME0 ... NAMEn-1. Without an id in the file, points
+    // are numbered from 0.
     PointSet (*read)(const std::filesystem::path& path);
 };
 
@@ -39,7 +51,10 @@ struct FormatRegistration {
 };
 #define RAPID_FORMAT(...) static const ::rapid::FormatRegistration format_registration(__VA_ARGS__)
 
-// Reads any file whose format can be read.
+// Reads any file whose format can be read. Errors name the file.
 PointSet read_points(const std::filesystem::path& path);
+
+// Writes one file, which has its name only when it is complete; missing folders are made. Errors name the file.
+void write_points(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame = {});
 
 }  // namespace rapid

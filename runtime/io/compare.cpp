@@ -1,0 +1,298 @@
+#include "runtime/io/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <tuple>
+
+#include "runtime/io/id_order.h"
+#include "runtime/parallel.h"
+
+namespace rapid {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+// Places of the points that are in both sets.
+struct Match {
+    std::vector<std::size_t> a, b;
+};
+
+// The sets in order of id walk side by side; equal ids are matched in turn.
+Match match_ids(const PointSet& a, const PointSet& b, Comparison& result)
+{
+    const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
+    const auto place = [](const std::vector<std::size_t>& order, std::size_t i) { return order.empty() ? i : order[i]; };
+    Match match;
+    std::size_t i = 0, j = 0;
+    while (i < a.size() || j < b.size()) {
+        const std::size_t at_a = place(order_a, i), at_b = place(order_b, j);
+        if (j == b.size() || (i < a.size() && a.id()[at_a] < b.id()[at_b])) {
+            result.only_a.push_back(a.id()[at_a]);
+            ++i;
+        } else if (i == a.size() || b.id()[at_b] < a.id()[at_a]) {
+            result.only_b.push_back(b.id()[at_b]);
+            ++j;
+        } else {
+            match.a.push_back(at_a);
+            match.b.push_back(at_b);
+            ++i;
+            ++j;
+        }
+    }
+    return match;
+}
+
+double difference(double a, double b)
+{
+    if (a == b) return 0;  // infinities too
+    if (std::isnan(a) && std::isnan(b)) return 0;
+    const double d = std::abs(a - b);
+    return std::isfinite(d) ? d : infinite;
+}
+
+// Numbers of a value, so that vectors and scalars of any type are compared alike.
+using Numbers = Eigen::Array<double, 4, 1>;
+
+template <class T>
+Numbers numbers(const T& value)
+{
+    Numbers result = Numbers::Zero();
+    if constexpr (std::is_same_v<T, Vec3f>)
+        result.head<3>() = value.array().template cast<double>();
+    else if constexpr (std::is_same_v<T, Quatf>)
+        result = value.coeffs().array().template cast<double>();
+    else
+        result[0] = static_cast<double>(value);
+    return result;
+}
+
+struct ValueDifference {
+    double amount;
+    double scale;  // what a relative tolerance is relative to
+};
+
+template <class A, class B>
+ValueDifference difference(const A& a, const B& b)
+{
+    if constexpr (std::is_integral_v<A> && std::is_integral_v<B>) {
+        if (a == b) return {0, 0};
+        const double amount = std::abs(static_cast<double>(a) - static_cast<double>(b));
+        return {std::max(1.0, amount), 0};  // int64 that differ may be one double
+    } else {
+        const Numbers x = numbers(a), y = numbers(b);
+        Numbers d;
+        for (int c = 0; c < 4; ++c) d[c] = difference(x[c], y[c]);
+        const double scale = std::max(x.matrix().norm(), y.matrix().norm());
+        return {d.isInf().any() ? infinite : d.matrix().norm(), std::isfinite(scale) ? scale : 0};
+    }
+}
+
+// Fills in all but the names and types, from the difference of each matched pair.
+void summarise(AttributeDifference& result, std::vector<double>& amounts, const Match& match, const PointSet& a)
+{
+    if (amounts.empty()) return;
+    double squares = 0;
+    std::size_t worst = 0;
+    for (std::size_t i = 0; i < amounts.size(); ++i) {
+        squares += amounts[i] * amounts[i];
+        if (amounts[i] > amounts[worst]) worst = i;
+    }
+    result.max = amounts[worst];
+    result.worst_id = result.max > 0 ? a.id()[match.a[worst]] : -1;
+    result.rms = std::sqrt(squares / static_cast<double>(amounts.size()));
+    // The least value that at least 95 % do not exceed.
+    const std::size_t rank = (95 * amounts.size() + 99) / 100 - 1;
+    std::nth_element(amounts.begin(), amounts.begin() + static_cast<std::ptrdiff_t>(rank), amounts.end());
+    result.p95 = amounts[rank];
+    result.same = result.different == 0;
+}
+
+template <class A, class B>
+void compare_columns(AttributeDifference& result, const Column<A>& in_a, const Column<B>& in_b, const Match& match,
+                     const PointSet& a, double absolute, double relative)
+{
+    const Strided<A> values_a = in_a.read();
+    const Strided<B> values_b = in_b.read();
+    std::vector<double> amounts(match.a.size());
+    std::vector<std::uint8_t> beyond(match.a.size());
+    for_each_chunk(amounts.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto [amount, scale] = difference(values_a[match.a[i]], values_b[match.b[i]]);
+            amounts[i] = amount;
+            beyond[i] = amount > std::max(absolute, relative * scale);
+        }
+    });
+    result.different = static_cast<std::size_t>(std::count(beyond.begin(), beyond.end(), 1));
+    summarise(result, amounts, match, a);
+}
+
+bool is_scalar(const AnyColumn& column)
+{
+    return type_of(column) != AttributeType::Vec3 && type_of(column) != AttributeType::Quat;
+}
+
+double bounds_diagonal(const PointSet& a, const PointSet& b)
+{
+    Box3d bounds;
+    for (const PointSet* set : {&a, &b})
+        for (std::size_t i = 0; i < set->size(); ++i)
+            if (set->P()[i].allFinite()) bounds.extend(set->P()[i].cast<double>().eval());
+    return bounds.isEmpty() ? 0 : bounds.diagonal().norm();
+}
+
+AttributeDifference compare_attribute(const std::string& name, const PointSet& a, const PointSet& b,
+                                      const Match& match, const Comparison& comparison)
+{
+    AttributeDifference result;
+    result.name = name;
+    const AnyColumn* in_a = a.find(name);
+    const AnyColumn* in_b = b.find(name);
+    if (in_a) result.type_a = type_name(type_of(*in_a));
+    if (in_b) result.type_b = type_name(type_of(*in_b));
+    const bool comparable = in_a && in_b && (in_a->index() == in_b->index() || (is_scalar(*in_a) && is_scalar(*in_b)));
+    if (!comparable) {
+        result.same = a.empty() && b.empty();
+        result.different = match.a.size();
+        return result;
+    }
+    const double absolute = name == "P" ? comparison.tolerance_P : 0;
+    const double relative = name == "P" ? 0 : comparison.tolerance;
+    std::visit([&](const auto& x, const auto& y) { compare_columns(result, x, y, match, a, absolute, relative); }, *in_a,
+               *in_b);
+    return result;
+}
+
+AttributeDifference compare_group(const std::string& name, const PointSet& a, const PointSet& b, const Match& match)
+{
+    AttributeDifference result;
+    result.name = name;
+    const Column<std::uint8_t> none_a(a.size(), 0), none_b(b.size(), 0);
+    const Column<std::uint8_t>* in_a = a.find_group(name);
+    const Column<std::uint8_t>* in_b = b.find_group(name);
+    result.type_a = in_a ? "group" : "";
+    result.type_b = in_b ? "group" : "";
+    compare_columns(result, in_a ? *in_a : none_a, in_b ? *in_b : none_b, match, a, 0, 0);
+    return result;
+}
+
+}  // namespace
+
+Comparison compare(const PointSet& a, const PointSet& b, double tolerance)
+{
+    Comparison result;
+    result.points_a = a.size();
+    result.points_b = b.size();
+    result.tolerance = tolerance;
+    result.tolerance_P = tolerance * bounds_diagonal(a, b);
+    const Match match = match_ids(a, b, result);
+    result.compared = match.a.size();
+
+    std::set<std::string> names, groups;
+    for (const PointSet* set : {&a, &b}) {
+        for (const std::string& name : set->column_names()) names.insert(name);
+        for (const std::string& name : set->group_names()) groups.insert(name);
+    }
+    std::vector<std::string> ordered = {"P", "v"};
+    for (const std::string& name : names)
+        if (name != "P" && name != "v" && name != "id") ordered.push_back(name);
+    for (const std::string& name : ordered) result.attributes.push_back(compare_attribute(name, a, b, match, result));
+    for (const std::string& name : groups) result.groups.push_back(compare_group(name, a, b, match));
+
+    const auto same = [](const AttributeDifference& d) { return d.same; };
+    result.same = result.only_a.empty() && result.only_b.empty() &&
+                  std::all_of(result.attributes.begin(), result.attributes.end(), same) &&
+                  std::all_of(result.groups.begin(), result.groups.end(), same);
+    return result;
+}
+
+namespace {
+
+// `3 points are only in A: ids 1, 2, 7`
+std::string missing_text(const std::vector<std::int64_t>& ids, const char* set)
+{
+    if (ids.empty()) return "";
+    constexpr std::size_t shown = 8;
+    std::string text = fmt::format("{} {} only in {}: {}", ids.size(), ids.size() == 1 ? "point is" : "points are", set,
+                                   ids.size() == 1 ? "id" : "ids");
+    for (std::size_t i = 0; i < std::min(shown, ids.size()); ++i) text += fmt::format("{} {}", i > 0 ? "," : "", ids[i]);
+    return text + (ids.size() > shown ? ", ...\n" : "\n");
+}
+
+std::string attribute_text(const AttributeDifference& d, std::size_t width)
+{
+    const std::string head = fmt::format("  {:<{}}  ", d.name, width);
+    if (d.type_a.empty() || d.type_b.empty())
+        return head + fmt::format("only in {} ({})\n", d.type_a.empty() ? "B" : "A",
+                                  d.type_a.empty() ? d.type_b : d.type_a);
+    const std::string type = d.type_a == d.type_b ? d.type_a : d.type_a + " / " + d.type_b;
+    if (d.max == 0 && d.same) return head + fmt::format("{:<5}  equal\n", type);
+    if (!d.same && d.max == 0) return head + fmt::format("{:<5}  can't be compared\n", type);
+    return head + fmt::format("{:<5}  max {:.3g} (id {})  rms {:.3g}  p95 {:.3g}  {}\n", type, d.max, d.worst_id, d.rms,
+                              d.p95,
+                              d.same ? std::string("within the tolerance") : fmt::format("{} differ", d.different));
+}
+
+std::string group_text(const AttributeDifference& d, std::size_t width)
+{
+    const std::string head = fmt::format("  {:<{}}  group  ", d.name, width);
+    return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
+}
+
+// JSON has no infinity: null stands for a difference from or to what is not finite.
+nlohmann::ordered_json json_number(double value)
+{
+    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+}
+
+nlohmann::ordered_json json_type(const std::string& type)
+{
+    return type.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(type);
+}
+
+}  // namespace
+
+std::string to_text(const Comparison& comparison)
+{
+    std::string text = fmt::format("{}: {} and {} points, {} compared, tolerance {:g} ({:.3g} m for P)\n",
+                                   comparison.same ? "the same" : "different", comparison.points_a, comparison.points_b,
+                                   comparison.compared, comparison.tolerance, comparison.tolerance_P);
+    text += missing_text(comparison.only_a, "A") + missing_text(comparison.only_b, "B");
+    std::size_t width = 4;
+    for (const AttributeDifference& d : comparison.attributes) width = std::max(width, d.name.size());
+    for (const AttributeDifference& d : comparison.groups) width = std::max(width, d.name.size());
+    for (const AttributeDifference& d : comparison.attributes) text += attribute_text(d, width);
+    for (const AttributeDifference& d : comparison.groups) text += group_text(d, width);
+    return text;
+}
+
+nlohmann::ordered_json to_json(const Comparison& comparison)
+{
+    nlohmann::ordered_json json = {{"same", comparison.same},
+                                   {"points", {comparison.points_a, comparison.points_b}},
+                                   {"compared", comparison.compared},
+                                   {"only_a", comparison.only_a},
+                                   {"only_b", comparison.only_b},
+                                   {"tolerance", comparison.tolerance},
+                                   {"tolerance_P", comparison.tolerance_P}};
+    json["attributes"] = nlohmann::ordered_json::array();
+    for (const AttributeDifference& d : comparison.attributes)
+        json["attributes"].push_back({{"name", d.name},
+                                      {"types", {json_type(d.type_a), json_type(d.type_b)}},
+                                      {"max", json_number(d.max)},
+                                      {"rms", json_number(d.rms)},
+                                      {"p95", json_number(d.p95)},
+                                      {"worst_id", d.worst_id},
+                                      {"different", d.different},
+                                      {"same", d.same}});
+    json["groups"] = nlohmann::ordered_json::array();
+    for (const AttributeDifference& d : comparison.groups)
+        json["groups"].push_back({{"name", d.name}, {"different", d.different}, {"same", d.same}});
+    return json;
+}
+
+}  // namespace rapid

@@ -1,0 +1,283 @@
+// .csv: a header line, then a point a line in order of id.
+//
+//   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then groups as group:NAME, 0 or 1
+//
+// Floats have 9 significant digits, which give back the same float. Read back, every column but id is float, since the
+// file does not say more: but a column of whole numbers, of which float would round one, is int32, or int64 where
+// that is too small.
+#include <fmt/format.h>
+#include <tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <utility>
+
+#include "runtime/io/attribute_names.h"
+#include "runtime/io/file.h"
+#include "runtime/io/format.h"
+#include "runtime/io/id_order.h"
+#include "runtime/parallel.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::string_view group_prefix = "group:";
+constexpr std::size_t number_chars = 24;  // the longest: an int64 has 20, a float of 9 digits 15
+
+char* put(char* to, float value) { return std::to_chars(to, to + number_chars, value, std::chars_format::general, 9).ptr; }
+
+template <class Integer>
+char* put(char* to, Integer value)
+{
+    return std::to_chars(to, to + number_chars, value).ptr;
+}
+
+char* put_value(char* to, float value) { return put(to, value); }
+char* put_value(char* to, std::int32_t value) { return put(to, value); }
+char* put_value(char* to, std::int64_t value) { return put(to, value); }
+
+template <class Vector>
+char* put_numbers(char* to, const Vector& numbers, int count)
+{
+    for (int c = 0; c < count; ++c) {
+        if (c > 0) *to++ = ',';
+        to = put(to, numbers[c]);
+    }
+    return to;
+}
+
+char* put_value(char* to, const Vec3f& value) { return put_numbers(to, value, 3); }
+char* put_value(char* to, const Quatf& value) { return put_numbers(to, value.coeffs(), 4); }
+
+struct CsvTable {
+    std::vector<const AnyColumn*> columns;
+    std::vector<const Column<std::uint8_t>*> groups;
+    std::string header;
+    std::size_t numbers = 0;  // in a line
+};
+
+CsvTable csv_table(const PointSet& points)
+{
+    CsvTable table;
+    std::vector<std::string> attributes = further_attributes(points), names;
+    attributes.insert(attributes.begin(), {"id", "P", "v"});
+    for (const std::string& name : attributes) {
+        table.columns.push_back(points.find(name));
+        for (std::string& number : component_names(name, component_count(type_of(*table.columns.back()))))
+            names.push_back(std::move(number));
+    }
+    for (const auto& [name, members] : points.groups()) {
+        table.groups.push_back(&members);
+        names.push_back(std::string(group_prefix) + name);
+    }
+    check_column_names(names, ",\"\r\n");
+    for (const std::string& name : names) table.header += (table.header.empty() ? "" : ",") + name;
+    table.header += '\n';
+    table.numbers = names.size();
+    return table;
+}
+
+// The lines of the points at [begin, end) of the order.
+std::string csv_lines(const CsvTable& table, const std::vector<std::size_t>& order, std::size_t begin, std::size_t end)
+{
+    std::string text(table.numbers * (number_chars + 1) * (end - begin), '\0');
+    char* to = text.data();
+    for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t point = order.empty() ? i : order[i];
+        for (const AnyColumn* column : table.columns) {
+            to = std::visit([&](const auto& c) { return put_value(to, c[point]); }, *column);
+            *to++ = ',';
+        }
+        for (const Column<std::uint8_t>* members : table.groups) {
+            *to++ = (*members)[point] ? '1' : '0';
+            *to++ = ',';
+        }
+        to[-1] = '\n';
+    }
+    text.resize(static_cast<std::size_t>(to - text.data()));
+    return text;
+}
+
+void write_csv(const std::filesystem::path& path, const PointSet& points, const FrameInfo&)
+{
+    const CsvTable table = csv_table(points);
+    const std::vector<std::size_t> order = id_order(points.id());
+    OutputFile file(path);
+    file.append(table.header.data(), table.header.size());
+
+    // Lines are made in parallel and written in order; the tokens bound the memory.
+    constexpr std::size_t tokens = 16;
+    std::size_t next = 0;
+    tbb::parallel_pipeline(
+        tokens, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order,
+                                                    [&](tbb::flow_control& control) {
+                                                        if (next >= points.size()) control.stop();
+                                                        return std::exchange(next, next + chunk_size);
+                                                    }) &
+                    tbb::make_filter<std::size_t, std::string>(
+                        tbb::filter_mode::parallel,
+                        [&](std::size_t begin) {
+                            return csv_lines(table, order, begin, std::min(begin + chunk_size, points.size()));
+                        }) &
+                    tbb::make_filter<std::string, void>(tbb::filter_mode::serial_in_order, [&](const std::string& text) {
+                        file.append(text.data(), text.size());
+                    }));
+    file.close();
+}
+
+// Where each line begins, without the header and empty lines at the end.
+std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
+{
+    std::vector<std::size_t> starts;
+    while (begin < text.size()) {
+        starts.push_back(begin);
+        const std::size_t end = text.find('\n', begin);
+        if (end == std::string_view::npos) break;
+        begin = end + 1;
+    }
+    while (!starts.empty() && text.substr(starts.back()).find_first_not_of("\r\n") == std::string_view::npos)
+        starts.pop_back();
+    return starts;
+}
+
+// A column of numbers as the file has them: as double, which holds every float and every int32; and as int64 as long as
+// all of them are whole.
+struct CsvColumn {
+    std::vector<double> numbers;
+    std::vector<std::int64_t> whole;
+    bool is_whole = true;
+
+    bool float_would_round() const
+    {
+        return std::any_of(whole.begin(), whole.end(), [](std::int64_t value) {
+            // 2^53: above it double is not exact either, and the cast back could overflow.
+            return std::abs(value) > (std::int64_t{1} << 53) ||
+                   static_cast<std::int64_t>(static_cast<float>(value)) != value;
+        });
+    }
+    bool fits_int32() const
+    {
+        return std::all_of(whole.begin(), whole.end(),
+                           [](std::int64_t value) { return value == static_cast<std::int32_t>(value); });
+    }
+};
+
+Error csv_error(std::size_t line, const std::string& what)
+{
+    return Error(fmt::format("line {}: {}", line, what));
+}
+
+std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
+                                     const std::vector<std::string>& names)
+{
+    std::vector<CsvColumn> columns(names.size());
+    for (CsvColumn& column : columns) {
+        column.numbers.resize(starts.size());
+        column.whole.resize(starts.size());
+    }
+    std::vector<std::atomic<bool>> broken(names.size());  // a column that holds a number that is not whole
+    for_each_chunk(starts.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const char* at = text.data() + starts[i];
+            const char* const stop = text.data() + text.size();
+            for (std::size_t c = 0; c < names.size(); ++c) {
+                if (c > 0) {
+                    if (at == stop || *at != ',')
+                        throw csv_error(i + 2, fmt::format("there are {} numbers; there must be {}", c, names.size()));
+                    ++at;
+                }
+                double& number = columns[c].numbers[i];
+                std::int64_t& whole = columns[c].whole[i];
+                const auto parsed = std::from_chars(at, stop, number);
+                if (parsed.ec != std::errc())
+                    throw csv_error(i + 2, fmt::format("{} is not a number", names[c]));
+                const auto parsed_whole = std::from_chars(at, stop, whole);
+                if (parsed_whole.ec != std::errc() || parsed_whole.ptr != parsed.ptr)
+                    broken[c].store(true, std::memory_order_relaxed);
+                at = parsed.ptr;
+            }
+            if (at != stop && *at == '\r') ++at;
+            if (at != stop && *at != '\n')
+                throw csv_error(i + 2, fmt::format("what follows {} numbers can't be understood", names.size()));
+        }
+    });
+    for (std::size_t c = 0; c < names.size(); ++c) columns[c].is_whole = !broken[c];
+    return columns;
+}
+
+template <class T, class Number>
+Column<T> joined(const std::vector<CsvColumn>& columns, const std::vector<std::size_t>& which)
+{
+    Column<T> column;
+    if (columns[which[0]].numbers.empty()) return column;
+    const std::size_t n = columns[which[0]].numbers.size();
+    Number* to = reinterpret_cast<Number*>(column.append_for_writing(n).data());
+    for (std::size_t i = 0; i < n; ++i)
+        for (const std::size_t c : which) {
+            if constexpr (std::is_integral_v<Number>)
+                *to++ = static_cast<Number>(columns[c].whole[i]);
+            else
+                *to++ = static_cast<Number>(columns[c].numbers[i]);
+        }
+    return column;
+}
+
+PointSet read_csv(const std::filesystem::path& path)
+{
+    const InputFile file(path);
+    const std::string_view text = file.text();
+    const std::size_t header_end = std::min(text.find('\n'), text.size());
+    std::string_view header = text.substr(0, header_end);
+    if (header.ends_with('\r')) header.remove_suffix(1);
+    std::vector<std::string> names;
+    for (std::size_t begin = 0; begin <= header.size();) {
+        const std::size_t end = std::min(header.find(',', begin), header.size());
+        names.emplace_back(header.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    const std::vector<JoinedColumns> attributes = join_components(names);
+    const bool placed = std::any_of(attributes.begin(), attributes.end(), [](const JoinedColumns& a) {
+        return a.name == "P" && a.columns.size() == 3;
+    });
+    if (!placed) throw csv_error(1, "there are no columns Px,Py,Pz; the first line must name the columns");
+    check_column_names(names, "");
+
+    const std::vector<std::size_t> starts = line_starts(text, header_end + 1);
+    const std::vector<CsvColumn> columns = parse_columns(text, starts, names);
+    PointSet points;
+    points.append(starts.size());
+    for (const JoinedColumns& attribute : attributes) {
+        const std::vector<std::size_t>& which = attribute.columns;
+        const CsvColumn& first = columns[which[0]];
+        if (which.size() == 3) {
+            points.set(attribute.name, joined<Vec3f, float>(columns, which));
+        } else if (which.size() == 4) {
+            points.set(attribute.name, joined<Quatf, float>(columns, which));
+        } else if (attribute.name.starts_with(group_prefix)) {
+            std::span<std::uint8_t> members =
+                points.group(std::string_view(attribute.name).substr(group_prefix.size())).overwrite();
+            for (std::size_t i = 0; i < members.size(); ++i) members[i] = first.numbers[i] != 0;
+        } else if (attribute.name == "id") {
+            if (!first.is_whole) throw Error("the column id holds numbers that are not whole");
+            points.set("id", joined<std::int64_t, std::int64_t>(columns, which));
+        } else if (first.is_whole && first.float_would_round()) {
+            if (first.fits_int32())
+                points.set(attribute.name, joined<std::int32_t, std::int32_t>(columns, which));
+            else
+                points.set(attribute.name, joined<std::int64_t, std::int64_t>(columns, which));
+        } else {
+            points.set(attribute.name, joined<float, float>(columns, which));
+        }
+    }
+    if (std::find(names.begin(), names.end(), "id") == names.end() && !points.empty()) {
+        std::span<std::int64_t> ids = points.id().overwrite();
+        for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int64_t>(i);
+    }
+    return points;
+}
+
+RAPID_FORMAT(Format{".csv", "a table of text, a point a line in order of id", write_csv, read_csv});
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,38 @@
+// What a point set holds, in numbers: what `rapid info` prints.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+struct AttributeSummary {
+    std::string name;
+    AttributeType type;
+    bool uniform;                   // all points have the same bits
+    std::vector<double> min, max;   // for each number of a value; empty where no value is finite
+    std::size_t not_finite = 0;     // points with a NaN or an infinity
+};
+
+struct GroupSummary {
+    std::string name;
+    std::size_t members;
+};
+
+struct PointSummary {
+    std::size_t points;
+    std::size_t bytes;  // in memory
+    Box3f bounds;       // of the finite positions
+    std::vector<AttributeSummary> attributes;
+    std::vector<GroupSummary> groups;
+};
+
+PointSummary describe(const PointSet& points);
+std::string to_text(const PointSummary& summary);
+nlohmann::ordered_json to_json(const PointSummary& summary);
+
+}  // namespace rapid

@@ -1,0 +1,76 @@
+#include "runtime/io/format.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runtime/io/file.h"
+
+namespace rapid {
+namespace {
+
+std::vector<Format>& registry()
+{
+    static std::vector<Format> formats;
+    return formats;
+}
+
+std::string lower_extension(const std::filesystem::path& path)
+{
+    std::string extension = path.extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    return extension;
+}
+
+}  // namespace
+
+FormatRegistration::FormatRegistration(Format format)
+{
+    std::vector<Format>& all = registry();
+    const auto after = std::find_if(all.begin(), all.end(),
+                                    [&](const Format& other) { return other.extension > format.extension; });
+    all.insert(after, std::move(format));
+}
+
+const std::vector<Format>& formats() { return registry(); }
+
+const Format& format_of(const std::filesystem::path& path)
+{
+    const std::string extension = lower_extension(path);
+    std::string known;
+    for (const Format& format : registry()) {
+        if (format.extension == extension) return format;
+        known += (known.empty() ? "" : ", ") + format.extension;
+    }
+    const std::string found =
+        extension.empty() ? std::string("it has no extension") : fmt::format("unknown extension \"{}\"", extension);
+    throw Error(fmt::format("{}; it must be one of {}", found, known)).at({path.string(), 0});
+}
+
+PointSet read_points(const std::filesystem::path& path)
+{
+    const Format& format = format_of(path);
+    if (!format.read)
+        throw Error(fmt::format("a {} file holds no points that could be read", format.extension))
+            .at({path.string(), 0});
+    try {
+        return format.read(path);
+    } catch (Error& error) {
+        throw error.at({path.string(), 0});
+    }
+}
+
+void write_points(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame)
+{
+    const Format& format = format_of(path);
+    try {
+        UnfinishedFile file(path);
+        format.write(file.path(), points, frame);
+        file.finish();
+    } catch (Error& error) {
+        throw error.at({path.string(), 0});
+    }
+}
+
+}  // namespace rapid

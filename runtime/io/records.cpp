@@ -1,0 +1,257 @@
+#include "runtime/io/records.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <numeric>
+
+#include "runtime/parallel.h"
+
+namespace rapid {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "records are swapped from little-endian memory");
+
+// Points woven at a time: with 32 to 128 bytes each they and their columns stay in the second-level cache.
+constexpr std::size_t woven_points = chunk_size;
+
+std::uint32_t load_word(const unsigned char* from)
+{
+    std::uint32_t word;
+    std::memcpy(&word, from, sizeof word);
+    return word;
+}
+
+template <bool swapped>
+void store_word(unsigned char* to, std::uint32_t word)
+{
+    if constexpr (swapped) word = __builtin_bswap32(word);
+    std::memcpy(to, &word, sizeof word);
+}
+
+// `words` is a constant where it matters: the loop over it unrolls.
+template <bool swapped, std::size_t words>
+void weave_words(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record, std::size_t n)
+{
+    for (std::size_t i = 0; i < n; ++i, from += stride, to += record)
+        for (std::size_t w = 0; w < words; ++w) store_word<swapped>(to + 4 * w, load_word(from + 4 * w));
+}
+
+template <bool swapped>
+void weave_narrowed(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record, std::size_t n)
+{
+    // The low word of a little-endian int64; the range was checked when the column was added.
+    for (std::size_t i = 0; i < n; ++i, from += stride, to += record) store_word<swapped>(to, load_word(from));
+}
+
+template <bool swapped>
+void weave_byte_as_word(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record,
+                        std::size_t n)
+{
+    for (std::size_t i = 0; i < n; ++i, from += stride, to += record) store_word<swapped>(to, *from);
+}
+
+void check_fits_int32(const std::string& name, const Column<std::int64_t>& column)
+{
+    const Strided<std::int64_t> values = column.read();
+    const std::size_t distinct = column.is_uniform() ? std::min<std::size_t>(1, column.size()) : column.size();
+    for_each_chunk(distinct, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (values[i] != static_cast<std::int32_t>(values[i]))
+                throw Error(fmt::format("{} = {} does not fit the int32 of this format (at most {}); write .vdb or "
+                                        ".csv, which hold int64",
+                                        name, values[i], std::numeric_limits<std::int32_t>::max()));
+    });
+}
+
+template <class Scalar>
+Scalar load(const unsigned char* from, ByteOrder order)
+{
+    unsigned char bytes[sizeof(Scalar)];
+    for (std::size_t b = 0; b < sizeof(Scalar); ++b)
+        bytes[b] = order == ByteOrder::Little ? from[b] : from[sizeof(Scalar) - 1 - b];
+    return std::bit_cast<Scalar>(bytes);
+}
+
+// Calls f with a reader of one number of that type.
+template <class F>
+auto with_loader(ScalarType type, ByteOrder order, const F& f)
+{
+    switch (type) {
+        case ScalarType::Int8: return f([=](const unsigned char* p) { return load<std::int8_t>(p, order); });
+        case ScalarType::UInt8: return f([=](const unsigned char* p) { return load<std::uint8_t>(p, order); });
+        case ScalarType::Int16: return f([=](const unsigned char* p) { return load<std::int16_t>(p, order); });
+        case ScalarType::UInt16: return f([=](const unsigned char* p) { return load<std::uint16_t>(p, order); });
+        case ScalarType::Int32: return f([=](const unsigned char* p) { return load<std::int32_t>(p, order); });
+        case ScalarType::UInt32: return f([=](const unsigned char* p) { return load<std::uint32_t>(p, order); });
+        case ScalarType::Float: return f([=](const unsigned char* p) { return load<float>(p, order); });
+        case ScalarType::Double: break;
+    }
+    return f([=](const unsigned char* p) { return load<double>(p, order); });
+}
+
+bool is_floating(ScalarType type) { return type == ScalarType::Float || type == ScalarType::Double; }
+
+struct Records {
+    std::span<const unsigned char> bytes;
+    std::size_t points, stride;
+    ByteOrder order;
+
+    // out[i * step] = the number at `offset` of record i.
+    template <class Number>
+    void read(ScalarType type, std::size_t offset, double scale, Number* out, std::size_t step) const
+    {
+        with_loader(type, order, [&](const auto& loader) {
+            for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
+                const unsigned char* from = bytes.data() + begin * stride + offset;
+                if (scale == 1)
+                    for (std::size_t i = begin; i < end; ++i, from += stride)
+                        out[i * step] = static_cast<Number>(loader(from));
+                else
+                    for (std::size_t i = begin; i < end; ++i, from += stride)
+                        out[i * step] = static_cast<Number>(scale * static_cast<double>(loader(from)));
+            });
+        });
+    }
+
+    template <class T, class Number>
+    Column<T> column(const RecordAttribute& attribute, std::span<const std::size_t> offsets) const
+    {
+        Column<T> column;
+        std::span<T> values = column.append_for_writing(points);
+        Number* numbers = reinterpret_cast<Number*>(values.data());
+        for (std::size_t c = 0; c < offsets.size(); ++c)
+            read(attribute.type, offsets[c], attribute.scale, numbers + c, offsets.size());
+        return column;
+    }
+};
+
+}  // namespace
+
+std::size_t scalar_bytes(ScalarType type)
+{
+    constexpr std::size_t bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+    return bytes[static_cast<std::size_t>(type)];
+}
+
+void RecordWriter::push(Part::Kind kind, const void* from, std::size_t stride, std::size_t words, std::size_t bytes)
+{
+    parts_.push_back({kind, static_cast<const unsigned char*>(from), stride, words, record_bytes_});
+    record_bytes_ += bytes;
+}
+
+void RecordWriter::add(const std::string& name, const AnyColumn& column)
+{
+    std::visit(
+        [&](const auto& c) {
+            using T = std::decay_t<decltype(c[0])>;
+            const Strided<T> values = c.read();
+            if constexpr (std::is_same_v<T, std::int64_t>) {
+                check_fits_int32(name, c);
+                push(Part::Narrowed, values.data, values.stride * sizeof(T), 1, 4);
+            } else {
+                push(Part::Words, values.data, values.stride * sizeof(T), sizeof(T) / 4, sizeof(T));
+            }
+        },
+        column);
+}
+
+void RecordWriter::add_group(const Column<std::uint8_t>& members, ScalarType type)
+{
+    RAPID_ASSERT(type == ScalarType::UInt8 || type == ScalarType::Int32);
+    const Strided<std::uint8_t> values = members.read();
+    push(type == ScalarType::UInt8 ? Part::Byte : Part::ByteAsWord, values.data, values.stride, 1, scalar_bytes(type));
+}
+
+void RecordWriter::add_constant(float value)
+{
+    constants_.push_back(std::make_unique<std::uint32_t>(std::bit_cast<std::uint32_t>(value)));
+    push(Part::Words, constants_.back().get(), 0, 1, 4);
+}
+
+void RecordWriter::weave(const Part& part, std::size_t begin, std::size_t end, unsigned char* records) const
+{
+    const unsigned char* from = part.from + begin * part.stride;
+    unsigned char* to = records + part.offset;
+    const std::size_t n = end - begin;
+    const auto woven = [&]<bool swapped>() {
+        switch (part.kind) {
+            case Part::Words:
+                if (part.words == 1) return weave_words<swapped, 1>(from, part.stride, to, record_bytes_, n);
+                if (part.words == 3) return weave_words<swapped, 3>(from, part.stride, to, record_bytes_, n);
+                return weave_words<swapped, 4>(from, part.stride, to, record_bytes_, n);
+            case Part::Narrowed: return weave_narrowed<swapped>(from, part.stride, to, record_bytes_, n);
+            case Part::ByteAsWord: return weave_byte_as_word<swapped>(from, part.stride, to, record_bytes_, n);
+            case Part::Byte: break;
+        }
+        for (std::size_t i = 0; i < n; ++i) to[i * record_bytes_] = from[i * part.stride];
+    };
+    if (order_ == ByteOrder::Big)
+        woven.template operator()<true>();
+    else
+        woven.template operator()<false>();
+}
+
+void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t points) const
+{
+    static_assert(woven_points == chunk_size, "a chunk is woven as a whole");
+    for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
+        // One buffer a thread, kept: its pages are touched once.
+        thread_local std::vector<unsigned char> records;
+        records.resize((end - begin) * record_bytes_);
+        for (const Part& part : parts_) weave(part, begin, end, records.data());
+        file.write_at(offset + begin * record_bytes_, records.data(), records.size());
+    });
+}
+
+PointSet read_records(std::span<const unsigned char> bytes, std::size_t n, std::size_t stride, ByteOrder order,
+                      const std::vector<RecordAttribute>& attributes)
+{
+    RAPID_ASSERT(bytes.size() >= n * stride);
+    const Records records{bytes, n, stride, order};
+    PointSet points;
+    points.append(n);
+
+    for (const RecordAttribute& attribute : attributes) {
+        const std::span<const std::size_t> offsets = attribute.offsets;
+        if (attribute.group) {
+            std::span<std::uint8_t> members = points.group(attribute.name).overwrite();
+            records.read(attribute.type, offsets[0], 1, members.data(), 1);
+            for (std::uint8_t& member : members) member = member != 0;
+            continue;
+        }
+        const bool floating = is_floating(attribute.type) || attribute.scale != 1;
+        if (attribute.name == "id" && offsets.size() == 1) {
+            points.set("id", records.column<std::int64_t, std::int64_t>(attribute, offsets));
+        } else if (floating && offsets.size() == 3) {
+            points.set(attribute.name, records.column<Vec3f, float>(attribute, offsets));
+        } else if (floating && offsets.size() == 4) {
+            points.set(attribute.name, records.column<Quatf, float>(attribute, offsets));
+        } else {
+            for (std::size_t c = 0; c < offsets.size(); ++c) {
+                const std::string name =
+                    offsets.size() == 1 ? attribute.name : fmt::format("{}{}", attribute.name, c);
+                const std::span<const std::size_t> one = offsets.subspan(c, 1);
+                if (floating)
+                    points.set(name, records.column<float, float>(attribute, one));
+                else if (attribute.type == ScalarType::UInt32)
+                    points.set(name, records.column<std::int64_t, std::int64_t>(attribute, one));
+                else
+                    points.set(name, records.column<std::int32_t, std::int32_t>(attribute, one));
+            }
+        }
+    }
+    const bool has_id = std::any_of(attributes.begin(), attributes.end(), [](const RecordAttribute& a) {
+        return a.name == "id" && !a.group && a.offsets.size() == 1;
+    });
+    if (!has_id && n > 0) {
+        std::span<std::int64_t> ids = points.id().overwrite();
+        std::iota(ids.begin(), ids.end(), std::int64_t{0});
+    }
+    return points;
+}
+
+}  // namespace rapid

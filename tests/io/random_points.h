@@ -1,0 +1,146 @@
+// Point sets of every kind for the tests of formats: all types, uniform and varying columns, groups, ids with gaps.
+#pragma once
+
+#include <unistd.h>
+
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <string>
+
+#include "runtime/points/point_set.h"
+
+namespace rapid::test {
+
+struct RandomPoints {
+    std::size_t size = 0;
+    unsigned seed = 1;
+    float extent = 2;             // m
+    std::int64_t first_id = 0;
+    bool wide = true;             // an int64 attribute beside id
+};
+
+inline PointSet random_points(const RandomPoints& wanted)
+{
+    std::mt19937 random(wanted.seed);
+    std::uniform_real_distribution<float> place(-wanted.extent, wanted.extent), unit(-1, 1);
+    const auto vec = [&](auto& distribution) {
+        const float x = distribution(random), y = distribution(random), z = distribution(random);
+        return Vec3f(x, y, z);
+    };
+    PointSet points;
+    points.append(wanted.size);
+    points.add({"pscale", 0.02f});  // uniform
+    points.add({"Cd", Vec3f(1, 0.5f, 0.25f)});
+    points.add({"age", 0.0f});
+    points.add({"N", Vec3f(0, 1, 0)});
+    points.add({"hitnum", std::int32_t{0}});
+    points.add({"orient", Quatf::Identity()});
+    if (wanted.wide) points.add({"serial", std::int64_t{0}});
+    std::int64_t id = wanted.first_id;
+    for (std::size_t i = 0; i < wanted.size; ++i) {
+        points.P().write()[i] = vec(place);
+        points.v().write()[i] = vec(unit);
+        points.id().write()[i] = id;
+        id += 1 + static_cast<std::int64_t>(random() % 3);
+        points.column<float>("age").write()[i] = unit(random) * 1e-3f;
+        points.column<Vec3f>("N").write()[i] = vec(unit).normalized();
+        points.column<std::int32_t>("hitnum").write()[i] = static_cast<std::int32_t>(random());
+        points.column<Quatf>("orient").write()[i] = Quatf(unit(random), unit(random), unit(random), unit(random));
+        if (wanted.wide)
+            points.column<std::int64_t>("serial").write()[i] = static_cast<std::int64_t>(random()) << 24 | 1;
+    }
+    points.group("all").fill(1);
+    std::span<std::uint8_t> hot = points.group("hot").write();
+    for (std::uint8_t& member : hot) member = random() % 5 == 0;
+    points.group("nobody");
+    return points;
+}
+
+// A folder of the test's own, gone with it.
+class TemporaryFolder {
+public:
+    TemporaryFolder()
+    {
+        std::string name = (std::filesystem::temp_directory_path() / "rapid-test-XXXXXX").string();
+        path_ = mkdtemp(name.data());
+    }
+    ~TemporaryFolder()
+    {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+    const std::filesystem::path& path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
+inline std::string file_text(const std::filesystem::path& path)
+{
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// The names in a folder, hidden ones too, in order.
+inline std::vector<std::string> file_names(const std::filesystem::path& folder)
+{
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+        names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+// Whether two columns hold the same bits (NaN and -0 included).
+template <class T>
+bool same_bits(const Column<T>& a, const Column<T>& b)
+{
+    if (a.size() != b.size()) return false;
+    for (std::size_t i = 0; i < a.size(); ++i)
+        if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0) return false;
+    return true;
+}
+
+// The names of what two sets do not have in common to the bit; empty when they are the same.
+inline std::string differing_columns(const PointSet& a, const PointSet& b)
+{
+    std::string different;
+    if (a.size() != b.size()) different += "size ";
+    for (const PointSet* set : {&a, &b})
+        for (const std::string& name : set->column_names()) {
+            const AnyColumn *x = a.find(name), *y = b.find(name);
+            const bool same = x && y && x->index() == y->index() &&
+                              std::visit(
+                                  [&](const auto& c) {
+                                      using C = std::decay_t<decltype(c)>;
+                                      return same_bits(c, std::get<C>(*y));
+                                  },
+                                  *x);
+            if (!same) different += name + " ";
+        }
+    for (const PointSet* set : {&a, &b})
+        for (const std::string& name : set->group_names()) {
+            const Column<std::uint8_t>*x = a.find_group(name), *y = b.find_group(name);
+            if (!x || !y || !same_bits(*x, *y)) different += "group:" + name + " ";
+        }
+    return different;
+}
+
+// What f throws, as text; empty when it does not.
+template <class F>
+std::string error_of(const F& f)
+{
+    try {
+        f();
+    } catch (const Error& error) {
+        return error.what();
+    }
+    return "";
+}
+
+}  // namespace rapid::test

@@ -1,13 +1,11 @@
 // rapid check: everything that can be wrong before the first frame, without running one.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "bindings/commands/command.h"
 #include "bindings/commands/frame_files.h"
 #include "bindings/commands/graph_options.h"
-#include "bindings/commands/threads.h"
-#include "runtime/io/file.h"
-
-#include <unistd.h>
+#include "bindings/threads.h"
 
 namespace rapid {
 namespace {
@@ -27,9 +25,8 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            const std::unique_ptr<Session> session = graph_.load([&](const std::string& message) {
+            const std::unique_ptr<Session> session = graph_.load(false, [&](const std::string& message) {
                 print_error(Error(message), common.verbose);
-                remove_unfinished_files();  // a level set that the graph writes
                 _exit(status_failed);
             });
             for (const std::string& warning : session->warnings()) print_warning(warning);

@@ -8,7 +8,7 @@
 
 #include "bindings/commands/cache_files.h"
 #include "bindings/commands/command.h"
-#include "bindings/commands/threads.h"
+#include "bindings/threads.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/format.h"
 

@@ -35,9 +35,11 @@ void GraphOptions::declare(CLI::App& app)
         ->type_name("BYTES");
 }
 
-std::unique_ptr<Session> GraphOptions::load(std::function<void(const std::string& message)> on_timeout) const
+std::unique_ptr<Session> GraphOptions::load(bool may_write,
+                                            std::function<void(const std::string& message)> on_timeout) const
 {
     SessionOptions options = session_;
+    options.may_write = may_write;
     options.on_timeout = std::move(on_timeout);
     return std::make_unique<Session>(file_, std::move(options));
 }

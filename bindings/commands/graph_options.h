@@ -18,8 +18,8 @@ public:
     const std::string& file() const { return file_; }
     const std::optional<std::uint64_t>& seed() const { return seed_; }
 
-    // Error: what is wrong with the file or with --set. on_timeout: see SessionOptions.
-    std::unique_ptr<Session> load(std::function<void(const std::string& message)> on_timeout) const;
+    // Error: what is wrong with the file or with --set. may_write, on_timeout: see SessionOptions.
+    std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout) const;
 
 private:
     std::string file_;

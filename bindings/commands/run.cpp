@@ -9,7 +9,7 @@
 #include "bindings/commands/graph_options.h"
 #include "bindings/commands/run_report.h"
 #include "bindings/commands/signals.h"
-#include "bindings/commands/threads.h"
+#include "bindings/threads.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
@@ -85,7 +85,7 @@ public:
 
         return threads.run([&] {
             const std::unique_ptr<Session> session =
-                graph_.load([&](const std::string& message) { report.abandon(status_failed, message); });
+                graph_.load(true, [&](const std::string& message) { report.abandon(status_failed, message); });
             for (const std::string& warning : session->warnings()) report.warning(warning);
             const Plan plan(session->graph(), {graph_.seed(), files_.attributes()});
             for (const std::string& warning : plan.warnings) report.warning(warning);

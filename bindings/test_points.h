@@ -1,0 +1,17 @@
+// Results of scenes as script-level tests see them: point sets as userdata.
+#pragma once
+
+#include "runtime/points/point_set.h"
+
+struct lua_State;
+
+namespace rapid {
+
+// Where the points come from, for messages: "frame 48", "frame 48, output sparks".
+void push_points(lua_State* L, PointSet points, std::string source);
+
+// Adds the functions on points to the table at the top of the stack, and `points_metatable`, whose __index is left to
+// Lua.
+void register_points(lua_State* L);
+
+}  // namespace rapid

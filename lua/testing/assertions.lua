@@ -1,0 +1,88 @@
+-- What scripts say about points, besides busted's own assertions:
+--
+--   assert.near(expected, actual, tolerance)          numbers and vec3 (the length of the difference); NaN is near nothing
+--   assert.points(p).finite()                         no NaN, no infinity
+--   assert.points(p).outside(distance, tolerance)     distance(P) >= -tolerance for every point
+--   assert.points(p).inside(distance, tolerance)      distance(P) <= tolerance
+--   assert.same_points(a, b)                          the same points, attributes and groups, bit by bit
+local assert = require "luassert"
+local say = require "say"
+local vector = require "vec3"
+local ffi = require "ffi"
+
+-- An assertion whose callback returns what is wrong, or nil.
+local function register(name, find_fault)
+  local key = "assertion." .. name
+  say:set(key .. ".positive", "%s")
+  say:set(key .. ".negative", "%s")
+  assert:register("assertion", name, function(state, arguments)
+    local fault = find_fault(state, arguments)
+    arguments[1] = fault or ("did not expect: " .. name)
+    arguments.n = 1
+    arguments.nofmt = { true }
+    return fault == nil
+  end, key .. ".positive", key .. ".negative")
+end
+
+local function show(value)
+  return type(value) == "number" and ("%.9g"):format(value) or tostring(value)
+end
+
+local function distance_between(a, b)
+  if type(a) == "table" then a = vector.make(a) end
+  if type(b) == "table" then b = vector.make(b) end
+  if type(a) == "number" and type(b) == "number" then return math.abs(a - b) end
+  if ffi.istype(vector.type, a) and ffi.istype(vector.type, b) then return (a - b):length() end
+end
+
+return function(native)
+  register("near", function(_, arguments)
+    local expected, actual, tolerance = arguments[1], arguments[2], arguments[3]
+    if type(tolerance) ~= "number" then return "assert.near takes what is expected, what is, and a tolerance" end
+    -- Equal infinities have no difference.
+    if expected == actual then return nil end
+    local distance = distance_between(expected, actual)
+    if not distance then return ("%s and %s can't be compared"):format(show(expected), show(actual)) end
+    if distance <= tolerance then return nil end
+    return ("%s is not within %s of %s; it is off by %s"):format(show(actual), show(tolerance), show(expected), show(distance))
+  end)
+
+  assert:register("modifier", "points", function(state, arguments)
+    -- Called again, without arguments, where the assertion is made.
+    if arguments then rawset(state, "points", arguments[1]) end
+  end)
+
+  local function points_of(state)
+    local points = rawget(state, "points")
+    if type(points) ~= "userdata" then error("assert.points takes the points of a frame: assert.points(result[48]).finite()", 0) end
+    return points
+  end
+
+  register("finite", function(state)
+    return native.not_finite(points_of(state))
+  end)
+
+  -- The point furthest on the wrong side; sign is 1 where outside is right.
+  local function wrong_side(points, distance, tolerance, sign, side)
+    local worst, fault = tolerance or 0, nil
+    for i = 1, #points do
+      local P = points[i].P
+      local depth = -sign * distance(P)
+      if not (depth <= worst) then
+        worst = depth
+        fault = ("%s, point %d (id %d): %s is %.3g m %s"):format(native.source(points), i, points[i].id, show(P), depth, side)
+      end
+    end
+    return fault
+  end
+  register("outside", function(state, arguments)
+    return wrong_side(points_of(state), arguments[1], arguments[2], 1, "inside")
+  end)
+  register("inside", function(state, arguments)
+    return wrong_side(points_of(state), arguments[1], arguments[2], -1, "outside")
+  end)
+
+  register("same_points", function(_, arguments)
+    return native.difference(arguments[1], arguments[2])
+  end)
+end

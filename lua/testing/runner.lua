@@ -1,0 +1,70 @@
+-- Runs one file of tests in busted's language, and tells the host of each test.
+--
+-- busted's own command line is left out: what it prints, which files it looks for and how it ends are ours.
+local native, path, filter = ...
+
+local ok, busted = pcall(function()
+  return require "busted.core" ()
+end)
+if not ok then
+  error("rapid test needs busted (on Debian: apt install lua-busted); " .. tostring(busted), 0)
+end
+require "busted" (busted)
+require "busted.luajit" ()
+
+local rapid = require "testing.rapid" (native)
+package.preload.rapid = function() return rapid end
+rawset(_G, "rapid", rapid)
+require "testing.assertions" (native)
+
+-- The names of the enclosing describe blocks and of the test itself.
+local function full_name(element)
+  local names = {}
+  while element and element.descriptor ~= "file" and (element.name or element.descriptor) do
+    table.insert(names, 1, tostring(element.name or element.descriptor))
+    element = busted.context.parent(element)
+  end
+  return #names > 0 and table.concat(names, " ") or path
+end
+
+local message -- of the running test, once something is wrong with it
+local tests = 0
+
+busted.subscribe({ "test", "start" }, function(element)
+  message = nil
+  tests = tests + 1
+  native.tell("started", full_name(element))
+  return nil, true
+end)
+
+busted.subscribe({ "test", "end" }, function(element, _, status)
+  local kind = status == "success" and "passed" or status == "pending" and "skipped" or "failed"
+  native.tell(kind, full_name(element), kind == "failed" and (message or "no message") or nil)
+  message = nil
+  return nil, true
+end)
+
+-- In a test the message waits for the test's end; a file or a describe block that does not run hides its tests; what
+-- fails before or after tests (before_each, setup, ...) is a failure of its own.
+local function failed(element, _, text)
+  if element.descriptor == "it" then
+    message = message or text
+  elseif element.descriptor == "file" or element.descriptor == "describe" then
+    native.tell("broken", full_name(element), text)
+  else
+    native.tell("failed", full_name(element), text)
+  end
+  return nil, true
+end
+busted.subscribe({ "failure" }, failed)
+busted.subscribe({ "error" }, failed)
+
+require "busted.modules.filter_loader" () (busted, { filter = filter ~= "" and { filter } or {}, nokeepgoing = false })
+
+local body, problem = loadfile(path)
+if not body then
+  native.tell("broken", path, problem)
+  return
+end
+busted.executors.file(path, setmetatable({}, { __call = function() return body() end }))
+require "busted.execute" (busted) (1, {})

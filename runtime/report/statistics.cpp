@@ -1,0 +1,135 @@
+#include "runtime/report/statistics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace rapid {
+
+using nlohmann::ordered_json;
+
+StageSeconds& StageSeconds::operator+=(const StageSeconds& other)
+{
+    graph += other.graph;
+    script += other.script;
+    solve += other.solve;
+    write += other.write;
+    return *this;
+}
+
+FrameStatistics statistics_of(const FrameResult& result)
+{
+    FrameStatistics frame;
+    frame.frame = result.frame;
+    for (const auto& [name, points] : result.outputs) frame.points += points.size();
+    frame.born = result.figures.born;
+    frame.died = result.figures.died;
+    frame.collisions = result.figures.collisions;
+    frame.substeps = result.figures.substeps;
+    frame.penetration_max = result.figures.penetration_max;
+    frame.seconds.script = result.figures.script_seconds;
+    frame.seconds.solve = result.figures.solve_seconds;
+    // The stages are timed apart from the whole: rounding of the clock must not make the rest negative.
+    frame.seconds.graph = std::max(0.0, result.total_seconds - frame.seconds.script - frame.seconds.solve);
+    return frame;
+}
+
+StageSeconds RunStatistics::by_stage() const
+{
+    StageSeconds sum;
+    for (const FrameStatistics& frame : frames) sum += frame.seconds;
+    return sum;
+}
+
+std::uint64_t RunStatistics::point_frames() const
+{
+    std::uint64_t sum = 0;
+    for (const FrameStatistics& frame : frames) sum += frame.points;
+    return sum;
+}
+
+namespace {
+
+ordered_json to_json(const FrameStatistics& frame)
+{
+    const StageSeconds& s = frame.seconds;
+    return {{"frame", frame.frame},
+            {"points", frame.points},
+            {"born", frame.born},
+            {"died", frame.died},
+            {"substeps", frame.substeps},
+            {"seconds",
+             {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}},
+            {"penetration_max", frame.penetration_max},
+            {"constraint_residual_max", frame.constraint_residual_max},
+            {"collisions", frame.collisions}};
+}
+
+}  // namespace
+
+std::string to_json(const RunStatistics& run)
+{
+    // A graph's name is what the file system allows, UTF-8 or not.
+    const std::string graph = ordered_json(run.graph).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+    std::string text = fmt::format("{{ \"graph\": {}, \"threads\": {}, \"peak_bytes\": {}, \"seconds\": {},\n", graph,
+                                   run.threads, run.peak_bytes, ordered_json(run.seconds).dump());
+    text += "  \"frames\": [";
+    for (const FrameStatistics& frame : run.frames)
+        text += fmt::format("{}\n    {}", &frame == run.frames.data() ? "" : ",", to_json(frame).dump());
+    return text + (run.frames.empty() ? "] }\n" : "\n  ] }\n");
+}
+
+std::string summary(const RunStatistics& run)
+{
+    const StageSeconds s = run.by_stage();
+    std::string text;
+    if (run.frames.empty()) {
+        text += "points   none: no frame was run\n";
+    } else {
+        const auto most =
+            std::max_element(run.frames.begin(), run.frames.end(),
+                             [](const FrameStatistics& a, const FrameStatistics& b) { return a.points < b.points; });
+        text += fmt::format("points   {}", with_separators(run.frames.back().points));
+        if (most->points > run.frames.back().points)
+            text += fmt::format(" (most: {} in frame {})", with_separators(most->points), most->frame);
+        text += '\n';
+    }
+    text += fmt::format("frames   {} in {}", run.frames.size(), duration_text(run.seconds));
+    if (run.point_frames() > 0 && run.seconds > 0)
+        text += fmt::format(", {} points a second", in_millions(static_cast<double>(run.point_frames()) / run.seconds));
+    text += fmt::format("\nseconds  graph {:.3f}, script {:.3f}, solve {:.3f}, write {:.3f}\n", s.graph, s.script,
+                        s.solve, s.write);
+    text += fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes));
+    return text;
+}
+
+std::string with_separators(std::uint64_t count)
+{
+    std::string text = std::to_string(count);
+    for (std::size_t i = text.size(); i > 3;) text.insert(i -= 3, 1, ',');
+    return text;
+}
+
+std::string in_millions(double count)
+{
+    if (count < 1e5) return with_separators(static_cast<std::uint64_t>(count));
+    return fmt::format("{:.{}f} million", count / 1e6, count < 1e7 ? 2 : 1);
+}
+
+std::string memory_text(std::uint64_t bytes)
+{
+    const double mebibytes = static_cast<double>(bytes) / (1 << 20);
+    return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes) : fmt::format("{:.2f} GiB", mebibytes / 1024);
+}
+
+std::string duration_text(double seconds)
+{
+    if (seconds < 1) return fmt::format("{:.3f} s", seconds);
+    if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+    const auto whole = static_cast<std::uint64_t>(seconds + 0.5);
+    if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace rapid

@@ -1,0 +1,60 @@
+// What a run did and what it cost, frame by frame and in all: the summary, and the file that --stats writes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "runtime/graph/evaluate.h"
+
+namespace rapid {
+
+// Wall time by stage, s. Their sum is the frame's total; writing runs beside the computation of later frames, so the
+// totals of all frames may exceed the run's own time.
+struct StageSeconds {
+    double graph = 0;   // nodes and parameters: all that is not below
+    double script = 0;  // kernels
+    double solve = 0;
+    double write = 0;
+
+    double total() const { return graph + script + solve + write; }
+    StageSeconds& operator+=(const StageSeconds& other);
+};
+
+struct FrameStatistics {
+    std::int64_t frame = 0;
+    std::uint64_t points = 0;  // of all outputs
+    std::uint64_t born = 0, died = 0, collisions = 0;
+    int substeps = 0;
+    double penetration_max = 0;          // m
+    double constraint_residual_max = 0;  // m; 0 where nothing is constrained
+    StageSeconds seconds;
+};
+
+// The writing is not known yet: it has not happened.
+FrameStatistics statistics_of(const FrameResult& result);
+
+struct RunStatistics {
+    std::string graph;  // as the user named it
+    int threads = 1;
+    std::uint64_t peak_bytes = 0;
+    double seconds = 0;  // wall time from loading the graph to the last file
+    std::vector<FrameStatistics> frames;
+
+    StageSeconds by_stage() const;
+    std::uint64_t point_frames() const;  // the sum of all frames' points
+};
+
+// One frame a line. A run that ended early has the frames that it did.
+std::string to_json(const RunStatistics& run);
+
+// Points, frames, seconds by stage, memory: a line each.
+std::string summary(const RunStatistics& run);
+
+// Numbers as people read them: "1,234,567", "3.21 million", "85.2 MiB", "0.042 s", "2 min 05 s".
+std::string with_separators(std::uint64_t count);
+std::string in_millions(double count);
+std::string memory_text(std::uint64_t bytes);
+std::string duration_text(double seconds);
+
+}  // namespace rapid

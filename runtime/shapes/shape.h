@@ -29,8 +29,18 @@ struct Contact {
     double time = none;        // s along the path
     Vec3d n = Vec3d::Zero();   // unit normal, out of the surface
     Vec3d vc = Vec3d::Zero();  // velocity of the surface there, m/s
-    double curvature = 0;      // 1/m, of the surface along the path; for resting on curved ground; 0 where unknown
+    bool flat = false;         // the surface is a plane, as far as any path goes
+
+    // Above 0 for a path that starts inside (time is then 0): as far away, in m, is the surface of the points that the
+    // radius keeps out, along n. Where the field has no gradient n is zero; `back` is then the time by which the point
+    // went in along a straight line, or farther than it went where that time is not known, and infinite for a point
+    // without a velocity.
+    double depth = 0;
+    double back = none;
 };
+
+class Mesh;
+class Scatter;
 
 class Shape : public Object {
 public:
@@ -50,6 +60,17 @@ public:
 
     // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow band.
     virtual double band() const { return std::numeric_limits<double>::infinity(); }
+
+    // A wall thinner than this may be missed, and a crease of a smaller radius is a kink, m: one voxel of a level set.
+    virtual double smallest_feature() const { return 0; }
+
+    // Where particles are born on or in it (scatter.h). A shape of finite area or volume overrides these; the others
+    // throw an error that says so.
+    virtual std::shared_ptr<const Scatter> surface_scatter() const;
+    virtual std::shared_ptr<const Scatter> volume_scatter() const;
+
+    // Its surface as a mesh, for pictures. Null where it is infinite.
+    virtual std::shared_ptr<const Mesh> surface() const { return nullptr; }
 };
 
 using ShapePtr = std::shared_ptr<const Shape>;

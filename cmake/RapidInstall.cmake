@@ -5,10 +5,14 @@ include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/rapid)
 
 install(TARGETS rapid rapid_public EXPORT rapidTargets)
-if(TARGET rapid_command)
-  install(TARGETS rapid_command)
-endif()
-install(DIRECTORY runtime DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid FILES_MATCHING PATTERN "*.h")
+install(TARGETS rapid_command)
+# Headers that bring OpenVDB are the library's own.
+rapid_openvdb_headers(own)
+set(excluded "")
+foreach(header ${own})
+  list(APPEND excluded PATTERN ${header} EXCLUDE)
+endforeach()
+install(DIRECTORY runtime DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid FILES_MATCHING PATTERN "*.h" ${excluded})
 install(DIRECTORY lua graphs DESTINATION ${CMAKE_INSTALL_DATADIR}/rapid)
 
 install(EXPORT rapidTargets NAMESPACE rapid:: DESTINATION ${package_dir})

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <numeric>
+#include <utility>
 
 namespace rapid {
 namespace {
@@ -57,7 +58,7 @@ struct Create {
     {
         Flow flow = std::move(inputs[0]);
         Simulation& simulation = *flow.simulation;
-        flow.points = now.at_start ? initial(simulation) : std::move(simulation.state);
+        flow.points = now.at_start ? initial(simulation) : std::exchange(simulation.state, PointSet());
         for (const AttributeSpec& spec : simulation.columns) flow.points.set_fallback(spec);
         for (const std::string& name : simulation.groups) flow.points.group(name);
         return flow;

@@ -1,0 +1,31 @@
+// A `where` of tests, and the points that it is asked about.
+#pragma once
+
+#include "runtime/graph/point_function.h"
+#include "tests/operators/node_test.h"
+
+namespace rapid::test {
+
+// True of points whose P.x is above a limit. Fails where it is asked about a point at x = 100.
+class RightOf : public PointFunction {
+public:
+    explicit RightOf(float limit) : limit_(limit) {}
+    void uses(Uses& uses) const override { uses.reads.push_back("P"); }
+    void test(const PointSet& points, const Evaluation&, std::span<std::uint8_t> result) const override
+    {
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (points.P()[i].x() == 100) throw Error("asked about a point outside the group");
+            result[i] = points.P()[i].x() > limit_;
+        }
+    }
+
+private:
+    float limit_;
+};
+
+inline Value right_of(float limit) { return ObjectPtr(std::make_shared<RightOf>(limit)); }
+
+// At x = 0, 1, 2.
+inline PointSet three_points() { return points_at({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}); }
+
+}  // namespace rapid::test

@@ -1,0 +1,72 @@
+#include "tests/operators/node_test.h"
+
+namespace rapid {
+
+using namespace test;
+
+TEST_CASE("attribute gives its value to points that have none", "[attribute]")
+{
+    NodeTest attribute("attribute",
+                       {{"heat", 2.0}, {"Cd", list({1.0, 0.5, 0.0})}, {"orient", list({0.0, 0.0, 0.0, 1.0})}});
+    const PointSet points = attribute(2, points_at({{0, 0, 0}, {1, 0, 0}}));
+    CHECK(values_of<float>(points, "heat") == std::vector<float>{2, 2});
+    CHECK(points.column<float>("heat").is_uniform());
+    CHECK(points.column<Vec3f>("Cd")[1] == Vec3f(1, 0.5f, 0));
+    CHECK(points.column<Quatf>("orient")[0].coeffs() == Quatf::Identity().coeffs());
+}
+
+TEST_CASE("attribute never overwrites, and later points get its value", "[attribute]")
+{
+    PointSet points = points_at({{0, 0, 0}});
+    points.add({"heat", 7.0f});
+    points = NodeTest("attribute", {{"heat", 2.0}})(2, points);
+    points.append(1);
+    CHECK(values_of<float>(points, "heat") == std::vector<float>{7, 2});
+}
+
+TEST_CASE("an attribute's value may be a function of the frame: points get that of the frame they come in",
+          "[attribute]")
+{
+    NodeTest attribute("attribute", {{"heat", of_frame([](const Frame& f) { return f.number; })}});
+    PointSet points;
+    for (std::int64_t frame = 1; frame <= 4; ++frame) {
+        points = attribute(frame, points);
+        points.append(1);
+    }
+    CHECK(values_of<float>(points, "heat") == std::vector<float>{1, 2, 3, 4});
+}
+
+TEST_CASE("a whole number makes a float; a known name has its own type", "[attribute]")
+{
+    const PointSet points = NodeTest("attribute", {{"count", 3.0}, {"hitnum", 2.0}, {"life", HUGE_VAL}})(2);
+    CHECK(points.find<float>("count"));
+    CHECK(points.find<std::int32_t>("hitnum"));
+    CHECK(points.find<float>("life"));
+}
+
+TEST_CASE("what attribute makes is the value of all points without one, whoever else makes it", "[attribute]")
+{
+    const Uses uses = NodeTest("attribute", {{"heat", 2.0}}).uses();
+    REQUIRE(uses.makes.size() == 1);
+    REQUIRE(uses.defaults.size() == 1);
+    CHECK(std::get<float>(uses.defaults[0].fallback) == 2);
+}
+
+TEST_CASE("attribute refuses names and values that can't be", "[attribute]")
+{
+    const auto refusal = [](const std::string& name, Value value) {
+        return error_of([&] { NodeTest("attribute", {{name, value}}); });
+    };
+    for (const char* own : {"P", "v", "id", "dt", "index", "kill"})
+        CHECK(refusal(own, 1.0) == "\"" + std::string(own) +
+                                       "\" can't be an attribute: Rapid itself uses it; choose "
+                                       "another name");
+    CHECK(refusal("2nd", 1.0) == "attribute name \"2nd\" can't be used; take letters, digits and _, no digit first");
+    CHECK(refusal("heat", "hot") ==
+          "heat = \"hot\" has the wrong type; it must be a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}");
+    CHECK(refusal("pscale", list({1.0, 1.0, 1.0})) == "pscale = {1, 1, 1} has the wrong type; it must be a number");
+    CHECK(refusal("heat", std::numeric_limits<double>::quiet_NaN()) == "heat = nan is out of range; it must be finite");
+    CHECK(refusal("hitnum", 0.5) == "hitnum = 0.5 is not whole; it must be an integer");
+}
+
+}  // namespace rapid

@@ -7,7 +7,7 @@ namespace rapid {
 
 // The points with normal · x <= offset are inside. Error: a normal of length 0.
 ShapePtr make_plane(const Vec3d& normal, double offset);
-// Metres, above 0; a box's size is its full edge lengths.
+// Metres, above 0; a box's size is its full edge lengths. Error: one that is not.
 ShapePtr make_sphere_shape(double radius, const Vec3d& center);
 ShapePtr make_box_shape(const Vec3d& size, const Vec3d& center);
 

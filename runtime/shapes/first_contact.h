@@ -31,6 +31,10 @@ inline double flush_within(const Vec3d& P, double radius, double rounding)
     return 0x1p-22 * (P.cwiseAbs().maxCoeff() + radius) + rounding;
 }
 
+// Whether a velocity has no more of a component along a unit normal than rounding gives one that is tangential. Without
+// this a point that slides could meet its own floor again and again, and get nowhere.
+inline bool is_along(double vn, const Vec3d& v) { return vn < 0 && vn * vn < 0x1p-96 * v.squaredNorm(); }
+
 // Whether a path can come near a box, by the box around the path.
 inline bool may_reach(const Path& path, const Box3d& bounds)
 {
@@ -135,14 +139,30 @@ double refine(const Sampler& sampler, const Path& path, double level, double bef
     return before;
 }
 
+// How the normal turns towards the velocity, a short way ahead along the surface.
+template <class Sampler>
+double curvature(const Sampler& sampler, const Vec3d& P, const Vec3d& n, const Vec3d& v)
+{
+    const Vec3d tangent = v - n.dot(v) * n;
+    const double speed = tangent.norm(), feature = sampler.smallest_feature();
+    if (!(speed > 0)) return 0;
+    const double way = feature > 0 ? feature / 2 : 0x1p-20 * sampler.bounds().sizes().maxCoeff();
+    Vec3d ahead;
+    sampler.distance(P + way / speed * tangent, ahead);
+    const double size = ahead.norm();
+    return size > 0 ? tangent.dot(ahead / size - n) / (speed * way) : 0;
+}
+
 template <class Sampler>
 Contact contact_at(const Sampler& sampler, const Path& path, double s)
 {
     Contact contact;
     contact.time = s;
     Vec3d gradient;
-    sampler.distance(place(path, s), gradient);
-    contact.n = unit_normal(gradient, path.v + s * path.a);
+    const Vec3d P = place(path, s), v = path.v + s * path.a;
+    sampler.distance(P, gradient);
+    contact.n = unit_normal(gradient, v);
+    contact.curvature = curvature(sampler, P, contact.n, v);
     return contact;
 }
 
@@ -182,7 +202,9 @@ Contact approach(const Sampler& sampler, const Path& path, double s, double leve
     for (int i = 0; i < most; ++i) {
         if (f <= close) {
             // The graze of a point that is leaving is no contact.
-            if (gradient.dot(path.v + s * path.a) < 0) return contact_at(sampler, path, s);
+            const Vec3d v = path.v + s * path.a;
+            const double vn = gradient.dot(v);
+            if (vn < 0 && !is_along(vn, v)) return contact_at(sampler, path, s);
             f = close;
         }
         const double approaching = -gradient.dot(path.v + s * path.a);
@@ -214,10 +236,8 @@ Contact first_contact_on(const Sampler& sampler, const Path& path)
     const double level = path.radius + std::min(f, 0.0);
     double s = 0, ahead = f + path.radius - level;
     if (f <= flush) {
-        Contact now;
-        now.time = 0;
-        now.n = detail::unit_normal(gradient, path.v);
-        if (gradient.dot(path.v) < 0) return now;
+        const double vn = gradient.dot(path.v);
+        if (vn < 0 && !is_along(vn, path.v)) return detail::contact_at(sampler, path, 0);
         // Pressed inwards, though it may still move outwards by less than will lift it by more than rounding: the test
         // is where it is after the time of such a hop.
         const double acceleration = path.a.norm();
@@ -227,7 +247,7 @@ Contact first_contact_on(const Sampler& sampler, const Path& path)
             if (feature > 0 && hop * speed > feature / 4) hop = feature / (4 * speed);
             hop = std::min(hop, path.duration);
             const double after = sampler.distance(detail::place(path, hop)) - level;
-            if (after < 0) return now;
+            if (after < 0) return detail::contact_at(sampler, path, 0);
             s = hop, ahead = after;
         }
     }

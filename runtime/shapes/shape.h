@@ -29,6 +29,7 @@ struct Contact {
     double time = none;        // s along the path
     Vec3d n = Vec3d::Zero();   // unit normal, out of the surface
     Vec3d vc = Vec3d::Zero();  // velocity of the surface there, m/s
+    double curvature = 0;      // 1/m, of the surface in the direction of the path; above 0 where it falls away
     bool flat = false;         // the surface is a plane, as far as any path goes
 
     // Above 0 for a path that starts inside (time is then 0): as far away, in m, is the surface of the points that the

@@ -20,21 +20,22 @@ CLI::App* find_subcommand(CLI::App& app, const std::string& name)
     return nullptr;
 }
 
-// The options of a command that take a value from the next argument.
-bool takes_value(const CLI::App& app, const std::string& argument)
+// Whether an argument is an option, of any command, that takes a value from the next one.
+bool takes_value(CLI::App& app, const std::string& argument)
 {
-    const CLI::Option* option = argument.starts_with('-') ? app.get_option_no_throw(argument) : nullptr;
-    return option && option->get_items_expected_max() > 0;
+    if (!argument.starts_with('-')) return false;
+    for (const CLI::App* command : app.get_subcommands({}))
+        if (const CLI::Option* option = command->get_option_no_throw(argument))
+            if (option->get_items_expected_max() > 0) return true;
+    return false;
 }
 
 // The place of the command's name: the first argument that is one, and that is not another option's value. The order of
 // options never matters, so they may stand before the name as well.
 std::size_t find_command(CLI::App& app, const Arguments& arguments)
 {
-    for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
-        const CLI::App* command = find_subcommand(app, arguments[i]);
-        if (command && (i == 0 || !takes_value(*command, arguments[i - 1]))) return i;
-    }
+    for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i)
+        if (find_subcommand(app, arguments[i]) && (i == 0 || !takes_value(app, arguments[i - 1]))) return i;
     return arguments.size();
 }
 
@@ -140,6 +141,9 @@ int run(Arguments arguments)
             return status_refused;
         } catch (const std::bad_alloc&) {
             print_error(Error("out of memory"), false);
+            return status_failed;
+        } catch (const std::exception& error) {  // of a library: what it says is all that is known
+            print_error(Error(error.what()), false);
             return status_failed;
         }
     }

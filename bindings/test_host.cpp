@@ -48,7 +48,7 @@ struct SceneRun {
     SessionOptions session;
 };
 
-// The arguments that lua/testing/rapid.lua gives, checked there: (path, {first, last, seed, threads, set}).
+// The arguments that lua/testing/rapid.lua gives, checked there: (path, {first, last, seed, threads, script_timeout, set}).
 SceneRun read_run(lua_State* L)
 {
     const Host& host = host_of(L);
@@ -58,6 +58,7 @@ SceneRun read_run(lua_State* L)
     run.last = static_cast<std::int64_t>(number_field(L, 2, "last").value_or(0));
     if (const auto seed = number_field(L, 2, "seed")) run.seed = static_cast<std::uint64_t>(*seed);
     run.threads = static_cast<int>(number_field(L, 2, "threads").value_or(host.options.threads));
+    if (const auto seconds = number_field(L, 2, "script_timeout")) run.session.script_timeout = *seconds;
     run.session.on_timeout = host.options.on_timeout;
     run.session.may_write = false;
     lua_getfield(L, 2, "set");

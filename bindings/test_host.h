@@ -1,5 +1,5 @@
-// Script-level tests: a file in busted's language, run by our own LuaJIT in a state without restrictions, with the module
-// `rapid` of lua/testing. Scenes run in sessions of their own, in this process.
+// Script-level tests: a file in busted's language, run by our own LuaJIT in a state without restrictions, with the
+// module `rapid` of lua/testing. Scenes run in sessions of their own, in this process.
 #pragma once
 
 #include <filesystem>

@@ -39,7 +39,7 @@ std::vector<std::unique_ptr<Command>> make_commands();
 struct CommandRegistration {
     explicit CommandRegistration(std::unique_ptr<Command> (*make)());
 };
-#define RAPID_COMMAND(Type)                                          \
+#define RAPID_COMMAND(Type)                                           \
     static const ::rapid::CommandRegistration registration_of_##Type( \
         []() -> std::unique_ptr<::rapid::Command> { return std::make_unique<Type>(); })
 

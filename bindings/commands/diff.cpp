@@ -87,7 +87,8 @@ private:
         }
         const bool same = different == 0 && only_a.empty() && only_b.empty();
         if (json_) {
-            print(ordered_json{{"same", same}, {"only_a", only_a}, {"only_b", only_b}, {"frames", frames}}.dump(2) + '\n');
+            print(ordered_json{{"same", same}, {"only_a", only_a}, {"only_b", only_b}, {"frames", frames}}.dump(2) +
+                  '\n');
         } else {
             if (!only_a.empty()) print(fmt::format("only in {}: frames {}\n", a_, fmt::join(only_a, ", ")));
             if (!only_b.empty()) print(fmt::format("only in {}: frames {}\n", b_, fmt::join(only_b, ", ")));

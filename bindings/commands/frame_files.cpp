@@ -32,9 +32,10 @@ void read_camera(const std::string& text, PictureOptions& picture)
     const std::vector<double> n = read_numbers(text);
     const bool right = (n.size() == 6 || n.size() == 7) && (n.size() == 6 || (n[6] > 0 && n[6] < 180));
     if (!right || Vec3d(n[0], n[1], n[2]) == Vec3d(n[3], n[4], n[5]))
-        throw Error(fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
-                                "another that it looks at, and its vertical angle of view, in degrees",
-                                text));
+        throw Error(
+            fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
+                        "another that it looks at, and its vertical angle of view, in degrees",
+                        text));
     picture.position = Vec3d(n[0], n[1], n[2]);
     picture.target = Vec3d(n[3], n[4], n[5]);
     if (n.size() == 7) picture.fov = n[6] * M_PI / 180;
@@ -67,7 +68,8 @@ std::set<std::string> names_of(const Plan& plan)
     std::set<std::string> names = {"P", "v", "id"};
     for (const PlannedNode& planned : plan.nodes) {
         const Uses uses = uses_of(planned);
-        for (const auto* list : {&uses.reads, &uses.writes, &uses.makes_groups}) names.insert(list->begin(), list->end());
+        for (const auto* list : {&uses.reads, &uses.writes, &uses.makes_groups})
+            names.insert(list->begin(), list->end());
         for (const AttributeSpec& spec : uses.makes) names.insert(spec.name);
     }
     names.erase("dt");
@@ -157,9 +159,10 @@ void FrameFiles::resolve(Target& target, const Plan& plan) const
     else if (plan.outputs.count("main"))
         target.outputs = {"main"};
     else
-        throw Error(fmt::format("the graph has several outputs and none is called main ({}); put {{output}} into the "
-                                "pattern",
-                                fmt::join(outputs, ", ")));
+        throw Error(
+            fmt::format("the graph has several outputs and none is called main ({}); put {{output}} into the "
+                        "pattern",
+                        fmt::join(outputs, ", ")));
 
     const std::set<std::string> in_scene = names_of(plan);
     const std::vector<std::string> known(in_scene.begin(), in_scene.end());

@@ -23,8 +23,8 @@ public:
     // Attributes that some -o asks for by name: they must be kept alive.
     std::vector<std::string> attributes() const;
 
-    // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames, or
-    // for no output of the graph; two that write the same files.
+    // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames,
+    // or for no output of the graph; two that write the same files.
     void resolve(const Plan& plan, bool several_frames);
 
     // Queues the files of a frame. Error: one of an earlier frame that could not be written.

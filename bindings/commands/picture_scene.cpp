@@ -49,8 +49,8 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
     bool moves = false;
     for (const PlannedNode& planned : plan_.nodes) {
         // What adds a dynamic is in the points' way; anything else is where they come from.
-        const auto role = planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider
-                                                                        : PictureScene::Body::Emitter;
+        const auto role =
+            planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
         const PlannedSimulation& simulation = plan_.simulations[planned.simulation];
         const Frame now{static_cast<double>(frame), static_cast<double>(frame - simulation.start) / simulation.fps,
                         1 / simulation.fps};

@@ -78,6 +78,7 @@ public:
     int run(const CommonOptions& common) override
     {
         std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
+        std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
         Threads threads(common.threads);
         RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose},
                          [this] { return files_.written(); });
@@ -110,10 +111,10 @@ private:
     int compute(const Plan& plan, const FrameRange& frames, RunReport& report)
     {
         try {
-            Evaluator evaluator(plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame,
-                                          double fps) {
-                if (frames.contains(std::llround(frame.number))) files_.write_node(pattern, points, frame, fps);
-            });
+            Evaluator evaluator(
+                plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame, double fps) {
+                    if (frames.contains(std::llround(frame.number))) files_.write_node(pattern, points, frame, fps);
+                });
             while (evaluator.next_frame() <= frames.last) {
                 const FrameResult result = evaluator.advance();
                 for (const std::string& warning : result.warnings) report.warning(warning);
@@ -128,16 +129,19 @@ private:
         } catch (const Error& error) {
             finish_files(error, report);
             return report.fail(error);
-        } catch (const std::bad_alloc&) {
-            return report.fail(Error("out of memory"));
+        } catch (const std::exception& error) {  // of a library
+            const Error known(dynamic_cast<const std::bad_alloc*>(&error) ? "out of memory" : error.what());
+            finish_files(known, report);
+            return report.fail(known);
         }
     }
 
     static std::string contact_limit_warning(const FrameResult& result)
     {
-        return fmt::format("frame {}: {} points reached the limit of contacts in a step and the rest of it was dropped; "
-                           "take more substeps",
-                           result.frame, result.figures.contact_limit);
+        return fmt::format(
+            "frame {}: {} points reached the limit of contacts in a step and the rest of it was dropped; "
+            "take more substeps",
+            result.frame, result.figures.contact_limit);
     }
 
     // The frames before the one that failed are complete: they are written, or it is said why not.
@@ -145,7 +149,7 @@ private:
     {
         try {
             files_.finish();
-        } catch (const Error& error) {
+        } catch (const std::exception& error) {
             if (std::string_view(error.what()) != reason.what()) report.warning(error.what());
         }
     }

@@ -37,7 +37,8 @@ public:
     void finish();
     // An error that ends the run: says it, and writes the statistics of the frames so far.
     int fail(const Error& error);
-    // From another thread, at any moment: says why, writes the statistics, removes what is unfinished, ends the process.
+    // From another thread, at any moment: says why, writes the statistics, removes what is unfinished, ends the
+    // process.
     [[noreturn]] void abandon(int status, const std::string& why);
 
 private:

@@ -1,5 +1,5 @@
-// Ends a run that the user (Ctrl-C) or the system (SIGTERM) wants ended, from an ordinary thread: locks may be taken and
-// files written there, which a signal handler can't do.
+// Ends a run that the user (Ctrl-C) or the system (SIGTERM) wants ended, from an ordinary thread: locks may be taken
+// and files written there, which a signal handler can't do.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
-// rapid test: script-level tests. Each file runs in a process of its own, so that one that crashes, hangs in a script or
-// ends the process is one failure, and the others run.
+// rapid test: script-level tests. Each file runs in a process of its own, so that one that crashes, hangs in a script
+// or ends the process is one failure, and the others run.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
@@ -60,7 +60,8 @@ int run_child(const std::string& file, const TestOptions& options)
 {
     const auto send = [](const json& event) {
         const std::string line = event.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
-        if (write(report_descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size())) _exit(status_failed);
+        if (write(report_descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
+            _exit(status_failed);
     };
     run_test_file(file, options, [&](const TestEvent& event) {
         std::fflush(stdout);
@@ -119,8 +120,9 @@ private:
         if (ended && WIFEXITED(status) && WEXITSTATUS(status) == status_done) return;
 
         // Its own words, if it had any, are on standard error already.
-        const std::string how = WIFSIGNALED(status) ? fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
-                                                    : fmt::format("status {}", WEXITSTATUS(status));
+        const std::string how = WIFSIGNALED(status)
+                                    ? fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
+                                    : fmt::format("status {}", WEXITSTATUS(status));
         if (running.empty()) {
             ++counts.broken;
             print(fmt::format("BROKEN {}\n{}", file.string(), indented("the tests ended with " + how)));
@@ -133,8 +135,9 @@ private:
 
     pid_t spawn(const std::string& program, const fs::path& file, const CommonOptions& common, int report) const
     {
-        std::vector<std::string> words = {"rapid", "test", "--child", "--filter=" + filter_,
-                                          fmt::format("--threads={}", common.threads), "--", file.string()};
+        std::vector<std::string> words = {"rapid", "test", "--child", fmt::format("--threads={}", common.threads)};
+        if (!filter_.empty()) words.push_back("--filter=" + filter_);
+        words.insert(words.end(), {"--", file.string()});
         std::vector<char*> arguments;
         for (std::string& word : words) arguments.push_back(word.data());
         arguments.push_back(nullptr);
@@ -176,7 +179,8 @@ private:
             print(fmt::format("{} {}\n{}", what, name, indented(event.at("message"))));
         };
         switch (kind) {
-            case TestEvent::Started: break;
+            case TestEvent::Started:
+                break;
             case TestEvent::Passed:
                 ++counts.passed;
                 if (verbose) print(fmt::format("passed {}\n", name));
@@ -185,8 +189,12 @@ private:
                 ++counts.skipped;
                 if (verbose) print(fmt::format("skipped {}\n", name));
                 break;
-            case TestEvent::Failed: ++counts.failed, tell("FAILED"); break;
-            case TestEvent::Broken: ++counts.broken, tell("BROKEN"); break;
+            case TestEvent::Failed:
+                ++counts.failed, tell("FAILED");
+                break;
+            case TestEvent::Broken:
+                ++counts.broken, tell("BROKEN");
+                break;
         }
     }
 

@@ -1,6 +1,6 @@
 -- What scripts say about points, besides busted's own assertions:
 --
---   assert.near(expected, actual, tolerance)          numbers and vec3 (the length of the difference); NaN is near nothing
+--   assert.near(expected, actual, tolerance)          numbers and vec3 (length of the difference); NaN is near nothing
 --   assert.points(p).finite()                         no NaN, no infinity
 --   assert.points(p).outside(distance, tolerance)     distance(P) >= -tolerance for every point
 --   assert.points(p).inside(distance, tolerance)      distance(P) <= tolerance
@@ -44,7 +44,8 @@ return function(native)
     local distance = distance_between(expected, actual)
     if not distance then return ("%s and %s can't be compared"):format(show(expected), show(actual)) end
     if distance <= tolerance then return nil end
-    return ("%s is not within %s of %s; it is off by %s"):format(show(actual), show(tolerance), show(expected), show(distance))
+    return ("%s is not within %s of %s; it is off by %s"):format(show(actual), show(tolerance), show(expected),
+      show(distance))
   end)
 
   assert:register("modifier", "points", function(state, arguments)
@@ -54,7 +55,9 @@ return function(native)
 
   local function points_of(state)
     local points = rawget(state, "points")
-    if type(points) ~= "userdata" then error("assert.points takes the points of a frame: assert.points(result[48]).finite()", 0) end
+    if type(points) ~= "userdata" then
+      error("assert.points takes the points of a frame: assert.points(result[48]).finite()", 0)
+    end
     return points
   end
 
@@ -68,9 +71,10 @@ return function(native)
     for i = 1, #points do
       local P = points[i].P
       local depth = -sign * distance(P)
-      if not (depth <= worst) then
+      if depth > worst or depth ~= depth then
         worst = depth
-        fault = ("%s, point %d (id %d): %s is %.3g m %s"):format(native.source(points), i, points[i].id, show(P), depth, side)
+        fault = ("%s, point %d (id %d): %s is %.3g m %s"):format(native.source(points), i, points[i].id, show(P), depth,
+          side)
       end
     end
     return fault

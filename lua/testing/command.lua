@@ -57,7 +57,7 @@ function command.folder()
   pipe:close()
   local folder = setmetatable({ path = path }, Folder)
   folder.remover = newproxy(true)
-  getmetatable(folder.remover).__gc = function() os.execute("chmod -R u+w " .. quoted(path) .. "; rm -rf " .. quoted(path)) end
+  getmetatable(folder.remover).__gc = function() os.execute("rm -rf " .. quoted(path)) end
   return folder
 end
 
@@ -66,7 +66,9 @@ function command.shell(line, options)
   options = options or {}
   local out = command.folder()
   local setup = "cd " .. quoted(options.cwd or ".") .. "\nRAPID=" .. quoted(command.binary()) .. "\n"
-  for name, value in pairs(options.environment or {}) do setup = setup .. ("export %s=%s\n"):format(name, quoted(value)) end
+  for name, value in pairs(options.environment or {}) do
+    setup = setup .. ("export %s=%s\n"):format(name, quoted(value))
+  end
   local script = out:write("script", setup .. line .. "\n")
   os.execute(("sh %s >%s 2>%s </dev/null; echo $? >%s"):format(quoted(script), quoted(out:file "stdout"),
     quoted(out:file "stderr"), quoted(out:file "status")))

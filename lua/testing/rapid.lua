@@ -6,6 +6,7 @@
 --   result:output "smoke"      the same of another output
 --   #points, points[1].P, points:by_id(7).heat, points:min "P", points:mean "v", points:group "hot"
 local vector = require "vec3"
+local ffi = require "ffi"
 
 return function(native)
   local rapid = {}
@@ -58,7 +59,8 @@ return function(native)
     if type(key) ~= "number" then return result_methods[key] end
     local run = rawget(self, "run")
     if not self.output_name then
-      error(("the scene has several outputs and none is called main; take one: result:output %q"):format(self.outputs[1]), 2)
+      error(("the scene has several outputs and none is called main; take one: result:output %q")
+        :format(self.outputs[1]), 2)
     end
     local points = run.frames[self.output_name][key]
     if not points then error(("frame %s was not run; frames %d to %d were"):format(key, run.first, run.last), 2) end
@@ -66,8 +68,9 @@ return function(native)
   end
 
   local function result_of(run, output_name)
-    return setmetatable({ run = run, output_name = output_name or false, outputs = run.outputs, warnings = run.warnings },
-      result_metatable)
+    return setmetatable({
+      run = run, output_name = output_name or false, outputs = run.outputs, warnings = run.warnings,
+    }, result_metatable)
   end
 
   function result_methods:frames()
@@ -89,12 +92,13 @@ return function(native)
   local function setting(name, value)
     if type(value) == "number" then return ("%.17g"):format(value) end
     if type(value) == "boolean" or type(value) == "string" then return tostring(value) end
-    local ok, v = pcall(function() return type(value) == "table" and vector.make(value) or value + vector.make(0, 0, 0) end)
+    local ok, v = pcall(vector.make, value)
+    if ffi.istype(vector.type, value) then ok, v = true, value end
     if ok then return ("%.17g,%.17g,%.17g"):format(v.x, v.y, v.z) end
     error(("set: %s is a %s; it must be a number, a boolean, a string or a vec3"):format(name, type(value)), 3)
   end
 
-  local known_options = { frames = true, set = true, seed = true, threads = true }
+  local known_options = { frames = true, set = true, seed = true, threads = true, script_timeout = true }
 
   local function whole(name, value, least)
     if type(value) ~= "number" or value % 1 ~= 0 or (least and value < least) then
@@ -104,14 +108,15 @@ return function(native)
     return value
   end
 
-  -- Runs the frames of a scene from its first to frames[2] and keeps those from frames[1]. Raises what `rapid run` would
-  -- print.
+  -- Runs the frames of a scene from its first to frames[2] and keeps those from frames[1]. Raises what `rapid run`
+  -- would print.
   function rapid.run(path, options)
     options = options or {}
     if type(path) ~= "string" then error("rapid.run takes the path of a graph", 2) end
     for name in pairs(options) do
       if not known_options[name] then
-        error(("rapid.run: unknown option %q; it must be frames, set, seed or threads"):format(tostring(name)), 2)
+        error(("rapid.run: unknown option %q; it must be frames, set, seed, threads or script_timeout")
+          :format(tostring(name)), 2)
       end
     end
     local frames = options.frames
@@ -119,7 +124,9 @@ return function(native)
       error("rapid.run: frames is missing; give the first and the last: { frames = {1, 48} }", 2)
     end
     local run = { first = whole("frames", frames[1]), last = whole("frames", frames[2]), outputs = {} }
-    if run.last < run.first then error(("rapid.run: frames = {%d, %d} ends before it begins"):format(run.first, run.last), 2) end
+    if run.last < run.first then
+      error(("rapid.run: frames = {%d, %d} ends before it begins"):format(run.first, run.last), 2)
+    end
 
     local set = {}
     for name, value in pairs(options.set or {}) do set[name] = setting(name, value) end
@@ -128,6 +135,7 @@ return function(native)
       last = run.last,
       seed = options.seed and whole("seed", options.seed, 0),
       threads = options.threads and whole("threads", options.threads, 0),
+      script_timeout = options.script_timeout,
       set = set,
     })
     if not ok then error(found, 0) end

@@ -46,7 +46,13 @@ end)
 
 -- In a test the message waits for the test's end; a file or a describe block that does not run hides its tests; what
 -- fails before or after tests (before_each, setup, ...) is a failure of its own.
-local function failed(element, _, text)
+local function failed(element, _, text, trace)
+  -- An error of a scene names the scene's file: the test's own line comes before it.
+  if not text:find(path .. ":", 1, true) then
+    local _, place = tostring(trace and trace.traceback):find(path .. ":", 1, true)
+    local line = place and trace.traceback:match("^%d+", place + 1)
+    if line then text = ("%s:%s: %s"):format(path, line, text) end
+  end
   if element.descriptor == "it" then
     message = message or text
   elseif element.descriptor == "file" or element.descriptor == "describe" then
@@ -61,10 +67,7 @@ busted.subscribe({ "error" }, failed)
 
 require "busted.modules.filter_loader" () (busted, { filter = filter ~= "" and { filter } or {}, nokeepgoing = false })
 
-local body, problem = loadfile(path)
-if not body then
-  native.tell("broken", path, problem)
-  return
-end
-busted.executors.file(path, setmetatable({}, { __call = function() return body() end }))
+local body, get_trace = require("busted.modules.files.lua").load(busted, path)
+if not body then return end -- told of by `failed`
+busted.executors.file(path, setmetatable({ getTrace = get_trace }, { __call = body }))
 require "busted.execute" (busted) (1, {})

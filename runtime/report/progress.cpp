@@ -112,7 +112,7 @@ std::string progress_bar(std::int64_t frame, std::int64_t first, std::int64_t la
         text = "[" + std::string(done, '=') + std::string(columns - done, ' ') + "]";
     }
     for (const std::string& word : words) text += word;
-    return text;
+    return text.substr(0, static_cast<std::size_t>(std::max(0, width)));
 }
 
 }  // namespace rapid

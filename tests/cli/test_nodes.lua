@@ -1,0 +1,68 @@
+-- rapid nodes: the nodes that there are, from their own declarations.
+local command = require "testing.command"
+local json = require "dkjson"
+
+describe("rapid nodes", function()
+  local all = json.decode(command.rapid("nodes --json").stdout)
+
+  it("lists every node with a line of documentation, in order of name", function()
+    local result = command.rapid "nodes"
+    assert.equal(0, result.status)
+    local names, docs = {}, {}
+    for name, doc in result.stdout:gmatch "([%w_]+) +([^\n]+)\n" do
+      names[#names + 1] = name
+      docs[#docs + 1] = doc
+    end
+    assert.equal(#all, #names)
+    for i, node in ipairs(all) do
+      assert.equal(node.name, names[i])
+      assert.equal(node.doc, docs[i])
+      assert.truthy(i == 1 or names[i - 1] < names[i])
+    end
+  end)
+
+  it("has the nodes of the simulation chain", function()
+    local known = {}
+    for _, node in ipairs(all) do known[node.name] = node end
+    for name in ("create emit gravity collide solve points attribute group delete merge write"):gmatch "%a+" do
+      assert.truthy(known[name], name)
+    end
+  end)
+
+  it("tells of every parameter: type, default, range, unit and documentation", function()
+    for _, node in ipairs(all) do
+      assert.truthy(#node.doc > 0, node.name)
+      local page = command.rapid("nodes " .. node.name)
+      assert.equal(0, page.status)
+      assert.truthy(page.stdout:find(node.doc, 1, true), node.name)
+      for _, param in ipairs(node.params) do
+        local line = page.stdout:match("\n  " .. param.name .. " [^\n]*")
+        assert.truthy(line, node.name .. " " .. param.name)
+        assert.truthy(#param.doc > 0 and line:find(param.doc, 1, true), line)
+        assert.truthy(line:find("[" .. param.type, 1, true), line)
+        if param.unit ~= "" then assert.truthy(line:find(", " .. param.unit, 1, true), line) end
+        if type(param.default) == "number" then
+          assert.truthy(line:find("default " .. ("%.14g"):format(param.default), 1, true), line)
+        end
+      end
+    end
+  end)
+
+  it("shows a page of one node, in words and as JSON", function()
+    local page = command.rapid "nodes gravity"
+    assert.equal(0, page.status)
+    assert.truthy(page.stdout:find(":gravity{...}\n", 1, true))
+    assert.truthy(page.stdout:find("default {0, -9.81, 0}", 1, true), page.stdout)
+    local gravity = json.decode(command.rapid("nodes gravity --json").stdout)
+    assert.equal("gravity", gravity.name)
+    for _, param in ipairs(gravity.params) do
+      if param.name == "g" then assert.same({ 0, -9.81, 0 }, param.default) end
+    end
+  end)
+
+  it("knows what an unknown node was meant to be", function()
+    local result = command.rapid "nodes gravty"
+    assert.equal(2, result.status)
+    assert.equal('unknown node "gravty"; did you mean "gravity"?\n', result.stderr)
+  end)
+end)

@@ -1,0 +1,350 @@
+-- rapid run: which frames are computed, what is written, and what is told.
+local command = require "testing.command"
+local json = require "dkjson"
+
+-- Three points that fall from 10 m. Frame f is (f - 1) / 24 s after the start.
+local falling = [[
+local rapid = require "rapid"
+local height = rapid.param("height", 10, "m")
+return rapid.create { seed = 1, points = rapid.points.from { P = {{0, height, 0}, {1, height, 0}, {2, height, 0}} } }
+  :gravity {} :solve {}
+]]
+
+local function new_folder(text)
+  local folder = command.folder()
+  folder:write("scene.lua", text or falling)
+  function folder:run(arguments)
+    return command.rapid("run scene.lua " .. arguments, { cwd = self.path })
+  end
+  return folder
+end
+
+-- The rows of a CSV file as tables by column.
+local function rows_of(text)
+  local rows, header = {}, nil
+  for line in text:gmatch "[^\n]+" do
+    local cells = {}
+    for cell in line:gmatch "[^,]+" do cells[#cells + 1] = cell end
+    if not header then
+      header = cells
+    else
+      local row = {}
+      for i, name in ipairs(header) do row[name] = tonumber(cells[i]) end
+      rows[#rows + 1] = row
+    end
+  end
+  return rows, header
+end
+
+local function height_at(frame, from)
+  local t = (frame - 1) / 24
+  return (from or 10) - 9.81 * t * t / 2
+end
+
+describe("rapid run", function()
+  it("without -o writes nothing, and prints the summary", function()
+    local folder = new_folder()
+    local result = folder:run "-f 1-4"
+    assert.equal(0, result.status)
+    assert.same({ "scene.lua" }, folder:list())
+    local _, _, points, frames, seconds, memory = result.stdout:find "\n(points[^\n]+)\n([^\n]+)\n([^\n]+)\n([^\n]+)\n$"
+    assert.equal("points   3", points)
+    assert.truthy(frames:find "^frames   4 in [%d.]+ s, [%d.,]+ %a*%s?points a second$", frames)
+    assert.truthy(seconds:find "^seconds  graph [%d.]+, script [%d.]+, solve [%d.]+, write 0.000$", seconds)
+    assert.truthy(memory:find "^memory   [%d.]+ MiB at the peak$", memory)
+    assert.equal("", result.stderr)
+  end)
+
+  it("computes 48 frames from the first where none are named", function()
+    local folder = new_folder()
+    assert.truthy(folder:run("").stdout:find("\nframes   48 in", 1, true))
+    assert.truthy(folder:run("").stdout:find("\nframe 48  3 points", 1, true))
+  end)
+
+  it("prints a line for each frame where the output is no terminal", function()
+    local lines = {}
+    for number in new_folder():run("-f 1-5").stdout:gmatch "frame (%d+)  3 points  [%d.]+ s\n" do
+      lines[#lines + 1] = number
+    end
+    assert.same({ "1", "2", "3", "4", "5" }, lines)
+  end)
+
+  it("draws a bar on a terminal, with frame, points, points per second and time left", function()
+    local folder = new_folder()
+    local result = command.shell([[TERM=xterm script -qec "stty cols 120; '$RAPID' run scene.lua -f 1-4" /dev/null]],
+      { cwd = folder.path })
+    assert.truthy(result.stdout:match "\r%[=+%] frame 4/4  3 points  [%d.,]+ ?%a* points/s  0.000 s left",
+      result.stdout)
+    assert.truthy(result.stdout:match "points   3\r?\n")
+  end)
+
+  it("is silent with --quiet", function()
+    local result = new_folder():run "-f 1-4 --quiet -o a.####.csv"
+    assert.equal(0, result.status)
+    assert.equal("", result.stdout)
+    assert.equal("", result.stderr)
+  end)
+
+  it("writes the frames of -f and computes all before them", function()
+    for frames, written in pairs {
+      ["1-3"] = { 1, 2, 3 },
+      ["3"] = { 3 },
+      ["2-7x2"] = { 2, 4, 6 },
+      ["1-7x3"] = { 1, 4, 7 },
+      ["5-5"] = { 5 },
+    } do
+      local folder = new_folder()
+      assert.equal(0, folder:run("-o a.####.csv -f " .. frames).status)
+      local names = {}
+      for i, frame in ipairs(written) do
+        names[i] = ("a.%04d.csv"):format(frame)
+        assert.near(height_at(frame), rows_of(folder:read(names[i]))[1].Py, 1e-5)
+      end
+      table.insert(names, "scene.lua")
+      assert.same(names, folder:list())
+    end
+  end)
+
+  it("refuses frames before the scene's first", function()
+    local result = new_folder [[return require("rapid").create { start = 10 }]]:run "-f 9-12"
+    assert.equal(2, result.status)
+    assert.equal("-f: frame 9 is before the scene's first, 10\n", result.stderr)
+  end)
+
+  it("begins at the create's start where no frames are named", function()
+    local folder = new_folder [[return require("rapid").create { start = 1001 }]]
+    assert.equal(0, folder:run("-o a.####.csv").status)
+    assert.truthy(folder:read "a.1001.csv")
+    assert.truthy(folder:read "a.1048.csv")
+    assert.is_nil(folder:read "a.1049.csv")
+  end)
+
+  it("knows frames before zero", function()
+    local folder = new_folder [[return require("rapid").create { start = -2 }]]
+    assert.equal(0, folder:run("-f -2-0 -o a.####.csv").status)
+    assert.same({ "a.-0001.csv", "a.-0002.csv", "a.0000.csv", "scene.lua" }, folder:list())
+  end)
+
+  it("takes ####, $F4 and %04d for the frame, and a lone # for four digits", function()
+    local folder = new_folder()
+    assert.equal(0, folder:run("-f 7 -o a.####.csv -o 'b.$F4.csv' -o c.%04d.csv -o d.#.csv -o e.##.csv").status)
+    assert.same({ "a.0007.csv", "b.0007.csv", "c.0007.csv", "d.0007.csv", "e.07.csv", "scene.lua" }, folder:list())
+  end)
+
+  it("prints the first name of each pattern in full", function()
+    local stdout = new_folder():run("-f 3-4 -o out/a.####.csv -o out/a.####.ply").stdout
+    assert.truthy(stdout:find("writing out/a.0003.csv\n", 1, true), stdout)
+    assert.truthy(stdout:find("writing out/a.0003.ply\n", 1, true), stdout)
+    assert.falsy(stdout:find("a.0004", 1, true))
+  end)
+
+  it("makes the folders of its outputs, and reads colons in their names", function()
+    local folder = new_folder()
+    assert.equal(0, folder:run("-f 1 -o 'new/of:me/a.csv'").status)
+    assert.same({ "new/of:me/a.csv", "scene.lua" }, folder:list())
+  end)
+
+  it("writes every format that it knows, and the same points to each", function()
+    local folder = new_folder()
+    assert.equal(0, folder:run("-f 9 -o a.csv -o a.vdb -o a.bgeo -o a.ply -o a.png").status)
+    for _, other in ipairs { "a.vdb", "a.bgeo", "a.ply" } do
+      local result = command.rapid("diff a.csv " .. other, { cwd = folder.path })
+      assert.equal(0, result.status, result.stdout .. result.stderr)
+    end
+    assert.equal("\137PNG\r\n\26\n", folder:read("a.png"):sub(1, 8))
+  end)
+
+  it("refuses a format that it does not know, before the first frame", function()
+    local folder = new_folder()
+    local result = folder:run "-f 1-4 -o a.####.xyz"
+    assert.equal(2, result.status)
+    assert.equal('-o a.####.xyz: unknown extension ".xyz"; it must be one of .bgeo, .csv, .ply, .png, .vdb\n',
+      result.stderr)
+    assert.equal("", result.stdout)
+  end)
+
+  it("refuses to write several frames to one file", function()
+    local result = new_folder():run "-f 1-4 -o a.csv"
+    assert.equal(2, result.status)
+    assert.equal("-o a.csv: several frames go to one file; put the frame's number into its name, as ####\n",
+      result.stderr)
+  end)
+
+  it("refuses to write the same files twice", function()
+    local result = new_folder():run "-f 1-4 -o a.####.csv -o a.####.csv"
+    assert.equal(2, result.status)
+    assert.equal("-o a.####.csv: the same files are written twice; give each its own pattern\n", result.stderr)
+  end)
+end)
+
+describe("-o PATTERN:ATTR,ATTR", function()
+  local coloured = [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
+  :attribute { heat = 2, Cd = {1, 0.5, 0} } :points("warm", function(p) p:join "warm" end) :solve {}
+]]
+
+  it("writes those attributes besides P, v and id", function()
+    local folder = new_folder(coloured)
+    assert.equal(0, folder:run("-f 2 -o a.csv -o b.csv:heat -o c.csv:warm,Cd").status)
+    assert.equal("id,Px,Py,Pz,vx,vy,vz,Cdx,Cdy,Cdz,heat,group:warm", folder:read("a.csv"):match "^[^\n]+")
+    assert.equal("id,Px,Py,Pz,vx,vy,vz,heat", folder:read("b.csv"):match "^[^\n]+")
+    assert.equal("id,Px,Py,Pz,vx,vy,vz,Cdx,Cdy,Cdz,group:warm", folder:read("c.csv"):match "^[^\n]+")
+  end)
+
+  it("brings a known attribute into being, in that file alone", function()
+    local folder = new_folder()
+    assert.equal(0, folder:run("-f 25 -o a.csv:age -o b.csv").status)
+    assert.near(1, rows_of(folder:read "a.csv")[1].age, 1e-6)
+    assert.equal("id,Px,Py,Pz,vx,vy,vz", folder:read("b.csv"):match "^[^\n]+")
+  end)
+
+  it("refuses a name that nothing makes, with the nearest", function()
+    local result = new_folder(coloured):run "-f 2 -o a.csv:haet"
+    assert.equal(2, result.status)
+    assert.equal('-o a.csv:haet: no attribute or group "haet" to write; did you mean "heat"?\n', result.stderr)
+  end)
+end)
+
+describe("a graph of several outputs", function()
+  local several = [[
+local rapid = require "rapid"
+local function at(x) return rapid.create { points = rapid.points.from { P = {{x, 0, 0}} } } :solve {} end
+return { %s = at(1), smoke = at(2) }
+]]
+
+  it("writes each by its name where the pattern has {output}", function()
+    local folder = new_folder(several:format "sparks")
+    assert.equal(0, folder:run("-f 1-2 -o '{output}/a.####.csv'").status)
+    assert.same({ "scene.lua", "smoke/a.0001.csv", "smoke/a.0002.csv", "sparks/a.0001.csv", "sparks/a.0002.csv" },
+      folder:list())
+    assert.equal(1, rows_of(folder:read "sparks/a.0002.csv")[1].Px)
+    assert.equal(2, rows_of(folder:read "smoke/a.0002.csv")[1].Px)
+  end)
+
+  it("writes the output main to a pattern without", function()
+    local folder = new_folder(several:format "main")
+    assert.equal(0, folder:run("-f 1 -o a.csv").status)
+    assert.equal(1, rows_of(folder:read "a.csv")[1].Px)
+  end)
+
+  it("needs {output} where none is called main", function()
+    local result = new_folder(several:format "sparks"):run "-f 1 -o a.csv"
+    assert.equal(2, result.status)
+    assert.equal("-o a.csv: the graph has several outputs and none is called main (smoke, sparks); " ..
+      "put {output} into the pattern\n", result.stderr)
+  end)
+end)
+
+describe("--set", function()
+  it("gives parameters of the graph their values, each of them", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+local x, up = rapid.param("x", 1), rapid.param("up", false)
+return rapid.create { points = rapid.points.from { P = {{x, up and 1 or 0, 0}} } }
+]]
+    assert.equal(0, folder:run("-f 1 -o a.csv --set x=2.5 --set up=true").status)
+    local row = rows_of(folder:read "a.csv")[1]
+    assert.equal(2.5, row.Px)
+    assert.equal(1, row.Py)
+  end)
+
+  it("refuses a name that the graph has not, with the nearest", function()
+    local result = new_folder():run "-f 1 --set hieght=3"
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find('no parameter "hieght"; did you mean "height"?', 1, true), result.stderr)
+  end)
+end)
+
+describe("--seed", function()
+  local random = [[
+local rapid = require "rapid"
+return rapid.create { seed = 3, points = rapid.points.from { P = {{0, 0, 0}} } }
+  :points("shake", function(p) p.v = vec3(p:rand(0), p:rand(1), p:rand(2)) end) :solve {}
+]]
+
+  it("replaces the seed of every create", function()
+    local folder = new_folder(random)
+    folder:run "-f 2 -o own.csv"
+    folder:run "-f 2 -o three.csv --seed 3"
+    folder:run "-f 2 -o four.csv --seed 4"
+    assert.equal(folder:read "own.csv", folder:read "three.csv")
+    assert.not_equal(folder:read "own.csv", folder:read "four.csv")
+  end)
+end)
+
+describe("--threads", function()
+  it("changes no bit of the result", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { seed = 5, points = rapid.points.grid { size = {4, 4, 4}, spacing = 0.1 } }
+  :points("shake", function(p) p.v = p.v + vec3(p:rand(0) - 0.5, p:rand(1), p:rand(2) - 0.5) end)
+  :gravity {} :collide { shape = rapid.shape.plane { normal = {0, 1, 0}, offset = -3 }, bounce = 0.5 }
+  :solve { substeps = 2 }
+]]
+    for _, threads in ipairs { 1, 2, 7 } do
+      assert.equal(0, folder:run(("-f 12-24x6 --threads %d -o %d.####.bgeo"):format(threads, threads)).status)
+    end
+    for _, frame in ipairs { 12, 18, 24 } do
+      local one = folder:read(("1.%04d.bgeo"):format(frame))
+      assert.truthy(#one > 64000 * 24)
+      assert.is_true(one == folder:read(("2.%04d.bgeo"):format(frame)))
+      assert.is_true(one == folder:read(("7.%04d.bgeo"):format(frame)))
+    end
+  end)
+end)
+
+describe("--stats", function()
+  it("writes what each frame had and cost", function()
+    local folder = new_folder()
+    assert.equal(0, folder:run("-f 2-6x2 -o a.####.csv --stats deep/stats.json --threads 1").status)
+    local stats = json.decode(folder:read "deep/stats.json")
+    assert.equal("scene.lua", stats.graph)
+    assert.equal(1, stats.threads)
+    assert.truthy(stats.peak_bytes > 1e6 and stats.seconds > 0)
+    assert.equal(6, #stats.frames)
+    for i, frame in ipairs(stats.frames) do
+      assert.equal(i, frame.frame)
+      assert.equal(3, frame.points)
+      assert.equal(0, frame.born)
+      assert.equal(0, frame.died)
+      local s = frame.seconds
+      assert.near(s.total, s.graph + s.script + s.solve + s.write, 1e-9)
+      assert.equal(i % 2 == 0, s.write > 0)
+      for _, name in ipairs { "substeps", "penetration_max", "constraint_residual_max", "collisions" } do
+        assert.equal("number", type(frame[name]), name)
+      end
+      assert.is_nil(frame.error)
+    end
+  end)
+
+  it("counts births, deaths and collisions", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create {}
+  :emit { source = rapid.points.from { P = {{0, 0.01, 0}} }, from = "points", impulse = { [2] = 5 }, life = 0.1 }
+  :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0 } :solve {}
+]]
+    assert.equal(0, folder:run("-f 1-6 --stats stats.json").status)
+    local frames = json.decode(folder:read "stats.json").frames
+    local born, died, collisions = 0, 0, 0
+    for _, frame in ipairs(frames) do
+      born, died, collisions = born + frame.born, died + frame.died, collisions + frame.collisions
+    end
+    assert.equal(5, frames[2].born)
+    assert.equal(5, born)
+    assert.equal(5, died)
+    assert.truthy(collisions >= 5)
+    assert.equal(0, frames[6].points)
+  end)
+end)
+
+describe("an empty scene", function()
+  it("just works", function()
+    local folder = new_folder [[return require("rapid").create {} :gravity {} :solve {}]]
+    local result = folder:run "-f 1-3 -o a.####.csv -o a.####.vdb -o a.####.png --stats stats.json"
+    assert.equal(0, result.status, result.stderr)
+    assert.equal("id,Px,Py,Pz,vx,vy,vz\n", folder:read "a.0003.csv")
+    assert.truthy(result.stdout:find("\npoints   0\n", 1, true))
+  end)
+end)

@@ -1,0 +1,226 @@
+-- rapid test: how script-level tests are found, run and counted, and what they can ask of a scene.
+local command = require "testing.command"
+
+local scene = [[
+local rapid = require "rapid"
+local up = rapid.param("up", 0, "m/s")
+local falling = rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 3, 0}}, heat = {2, 4} } }
+  :points("sort", function(p) if p.id == 1 then p:join "second" end; p.v = p.v + vec3(0, up, 0) end)
+  :solve {}
+return { main = falling, other = rapid.create { points = rapid.points.from { P = {{0, 7, 0}} } } }
+]]
+
+local function new_folder(files)
+  local folder = command.folder()
+  for name, text in pairs(files) do
+    os.execute("mkdir -p " .. command.quoted(folder:file(name):match "^(.*)/"))
+    folder:write(name, text)
+  end
+  function folder:test(arguments)
+    return command.rapid("test " .. arguments, { cwd = self.path })
+  end
+  return folder
+end
+
+local passing = 'describe("one", function() it("is true", function() assert.is_true(true) end) end)\n'
+local failing = [[
+describe("two", function()
+  it("is false", function() assert.is_true(false) end)
+  it("is true", function() end)
+end)
+]]
+
+describe("rapid test", function()
+  it("prints the counts alone where all pass", function()
+    local result = new_folder({ ["a.lua"] = passing }):test "a.lua"
+    assert.equal(0, result.status, result.stderr)
+    assert.equal("1 passed, 0 failed, 0 skipped\n", result.stdout)
+    assert.equal("", result.stderr)
+  end)
+
+  it("names what failed with file and line, and ends with 1", function()
+    local result = new_folder({ ["b.lua"] = failing }):test "b.lua"
+    assert.equal(1, result.status)
+    assert.truthy(result.stdout:find("^FAILED two is false\n  b.lua:2: "), result.stdout)
+    assert.truthy(result.stdout:find("\n1 passed, 1 failed, 0 skipped\n$"), result.stdout)
+  end)
+
+  it("counts pending tests as skipped", function()
+    local folder = new_folder { ["a.lua"] = 'describe("later", function() pending("is done") end)\n' .. passing }
+    local result = folder:test "a.lua"
+    assert.equal(0, result.status)
+    assert.equal("1 passed, 0 failed, 1 skipped\n", result.stdout)
+  end)
+
+  it("runs the files test_*.lua of a folder and of those in it", function()
+    local folder = new_folder { ["t/test_a.lua"] = passing, ["t/deep/test_b.lua"] = passing, ["t/other.lua"] = failing }
+    assert.equal("2 passed, 0 failed, 0 skipped\n", folder:test("t").stdout)
+    assert.equal("1 passed, 0 failed, 0 skipped\n", folder:test("t/deep").stdout)
+  end)
+
+  it("runs the tests whose name matches --filter alone", function()
+    local folder = new_folder { ["t/test_a.lua"] = passing, ["t/test_b.lua"] = failing }
+    assert.equal("1 passed, 0 failed, 0 skipped\n", folder:test("t --filter 'two is t'").stdout)
+    local none = folder:test "t --filter three"
+    assert.equal(2, none.status)
+    assert.equal('no test has a name that matches "three"\n', none.stderr)
+  end)
+
+  it("ends with 2 where a file is not there, does not load, or holds no tests", function()
+    local folder = new_folder {
+      ["bad.lua"] = "describe(", ["raises.lua"] = "error 'no'", ["empty.lua"] = "", ["good.lua"] = passing,
+      ["none/x.lua"] = "",
+    }
+    assert.equal(2, folder:test("missing.lua").status)
+    assert.equal(2, folder:test("empty.lua").status)
+    assert.equal(2, folder:test("none").status)
+    for _, name in ipairs { "bad", "raises" } do
+      local result = folder:test(name .. ".lua good.lua")
+      assert.equal(2, result.status)
+      assert.truthy(result.stdout:find("^BROKEN " .. name .. ".lua\n  " .. name .. ".lua:1: "), result.stdout)
+      assert.truthy(result.stdout:find("\n1 passed, 0 failed, 0 skipped\n$"), result.stdout)
+    end
+  end)
+
+  it("runs each file in a process of its own, so that one that ends its process is one failure", function()
+    local folder = new_folder {
+      ["test_a.lua"] = 'it("ends", function() os.exit(7) end)',
+      ["test_b.lua"] = 'it("kills", function() os.execute("kill -9 $PPID") end)',
+      ["test_c.lua"] = 'leaked = 1\n' .. passing,
+      ["test_d.lua"] = 'it("sees nothing of others", function() assert.is_nil(rawget(_G, "leaked")) end)',
+    }
+    local result = folder:test "."
+    assert.equal(1, result.status)
+    assert.equal("FAILED ends\n  ./test_a.lua: the test ended the process with status 7\n" ..
+      "FAILED kills\n  ./test_b.lua: the test ended the process with signal 9 (Killed)\n" ..
+      "2 passed, 2 failed, 0 skipped\n", result.stdout)
+  end)
+
+  it("counts what fails around tests", function()
+    local folder = new_folder { ["a.lua"] = [[
+describe("x", function()
+  before_each(function() error "early" end)
+  it("y", function() end)
+end)]] }
+    local result = folder:test "a.lua"
+    assert.equal(1, result.status)
+    assert.truthy(result.stdout:find("early", 1, true))
+    assert.truthy(result.stdout:find("\n0 passed, 1 failed, 0 skipped\n$"), result.stdout)
+  end)
+end)
+
+describe("a test", function()
+  -- Runs the body of a test beside the scene.
+  local function test(body)
+    local folder = new_folder { ["scene.lua"] = scene, ["t.lua"] = 'it("holds", function()\n' .. body .. "\nend)\n" }
+    return folder:test "t.lua"
+  end
+  local function holds(body)
+    local result = test(body)
+    assert.equal("1 passed, 0 failed, 0 skipped\n", result.stdout)
+    assert.equal(0, result.status)
+  end
+  local function fails(body, message)
+    local result = test(body)
+    assert.equal(1, result.status)
+    assert.truthy(result.stdout:find(message, 1, true), result.stdout)
+  end
+
+  it("sees the points of each frame", function()
+    holds [[
+      local result = rapid.run("scene.lua", { frames = {1, 25}, set = { up = 0.5 } })
+      local p = result[25]
+      assert.equal(2, #p)
+      assert.equal(1, p[1].P.y - 0.5 * 24 * 25 / 2 / 24)
+      assert.equal(4, p:by_id(1).heat)
+      assert.is_nil(p:by_id(2))
+      assert.is_nil(p[3])
+      local frames = 0
+      for frame, points in result:frames() do
+        frames = frames + 1
+        assert.equal(frames, frame)
+        assert.equal(2, #points)
+      end
+      assert.equal(25, frames)]]
+  end)
+
+  it("sees extremes, means, groups and names", function()
+    holds [[
+      local p = rapid.run("scene.lua", { frames = {2, 2} })[2]
+      assert.equal(1, p:min("P").y)
+      assert.equal(3, p:max("P").y)
+      assert.equal(0.5, p:mean("P").x)
+      assert.equal(3, p:mean "heat")
+      assert.same({ "P", "heat", "id", "v" }, p:names())
+      assert.same({ "second" }, p:groups())
+      assert.equal(1, #p:group "second")
+      assert.equal(1, p:group("second")[1].id)
+      assert.is_true(p[2]:within "second")
+      assert.is_false(p[1]:within "second")
+      assert.equal(math.huge, rapid.run("scene.lua", { frames = {1, 1} })[1]:group("second"):min("P").y)]]
+  end)
+
+  it("sees every output by name", function()
+    holds [[
+      local result = rapid.run("scene.lua", { frames = {1, 2} })
+      assert.same({ "main", "other" }, result.outputs)
+      assert.equal(7, result:output("other")[2][1].P.y)
+      assert.has_error(function() result:output "smoke" end, 'the scene has no output "smoke"; it has main, other')]]
+  end)
+
+  it("gets the text of a scene's error", function()
+    holds [[
+      assert.has_error(function() rapid.run("no.lua", { frames = {1, 2} }) end)
+      local ok, message = pcall(rapid.run, "scene.lua", { frames = {1, 2}, set = { upp = 1 } })
+      assert.is_false(ok)
+      assert.truthy(message:find('did you mean "up"?', 1, true))]]
+  end)
+
+  it("is told of wrong options", function()
+    fails('rapid.run("scene.lua", { frame = {1, 2} })', 'rapid.run: unknown option "frame"')
+    fails('rapid.run("scene.lua", {})', "rapid.run: frames is missing")
+    fails('rapid.run("scene.lua", { frames = {2, 1} })', "ends before it begins")
+    fails('rapid.run("scene.lua", { frames = {0, 1} })', "frames: 0 is before the scene's first frame, 1")
+    fails('local _ = rapid.run("scene.lua", { frames = {1, 2} })[3]', "frame 3 was not run; frames 1 to 2 were")
+    fails('local _ = rapid.run("scene.lua", { frames = {1, 2} })[2][1].haet',
+      'frame 2, output main has no attribute "haet"; did you mean "heat"?')
+  end)
+
+  it("asserts on points, and a failure names frame, point and value", function()
+    holds [[
+      local a = rapid.run("scene.lua", { frames = {1, 3} })
+      assert.points(a[3]).finite()
+      assert.points(a[3]).outside(function(P) return P.y end)
+      assert.points(a[3]).inside(function(P) return P.y - 4 end)
+      assert.same_points(a[3], rapid.run("scene.lua", { frames = {3, 3}, threads = 2 })[3])
+      assert.near(1, a[3]:min("P").y, 0)]]
+    fails('assert.points(rapid.run("scene.lua", { frames = {1, 3} })[3]).inside(function(P) return P.y - 2 end)',
+      "frame 3, output main, point 2 (id 1): vec3(1, 3, 0) is 1 m outside")
+    fails([[
+      local run = rapid.run
+      local faster = run("scene.lua", { frames = {1, 3}, set = { up = 24 } })
+      assert.same_points(run("scene.lua", { frames = {1, 3} })[3], faster[3])]],
+      "frame 3, output main, point 1 (id 0): P is {0, 1, 0} and {0, 4, 0}")
+  end)
+
+  it("finds NaN near nothing", function()
+    fails("assert.near(0, 0 / 0, 1e9)", "is not within 1e+09 of 0")
+    fails("assert.near(1, 1.5, 0.25)", "t.lua:2: 1.5 is not within 0.25 of 1; it is off by 0.5")
+    holds 'local vec3 = require("vec3").make; assert.near(vec3(0, 3, 4), vec3(0, 0, 0), 5)'
+  end)
+
+  it("of a script that does not end is one failure", function()
+    local folder = new_folder {
+      ["spin.lua"] = "while true do end",
+      ["t.lua"] = [[
+it("spins", function() rapid.run("spin.lua", { frames = {1, 2}, script_timeout = 0.3 }) end)
+it("is not reached", function() end)]],
+      ["u.lua"] = passing,
+    }
+    local result = folder:test "t.lua u.lua"
+    assert.equal(1, result.status)
+    assert.truthy(result.stderr:find("--script-timeout", 1, true), result.stderr)
+    assert.truthy(result.stdout:find("FAILED spins\n", 1, true), result.stdout)
+    assert.truthy(result.stdout:find("\n1 passed, 1 failed, 0 skipped\n$"), result.stdout)
+  end)
+end)

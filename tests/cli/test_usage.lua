@@ -1,0 +1,116 @@
+-- What the command says about itself, and how it reads its arguments.
+local command = require "testing.command"
+local rapid = command.rapid
+
+local scene = [[
+local rapid = require "rapid"
+local count = rapid.param("count", 3, "points along an edge")
+return rapid.create { points = rapid.points.grid { size = {count, 1, 1}, spacing = 1 } } :gravity {} :solve {}
+]]
+
+describe("rapid", function()
+  it("alone prints what it can do, and is done", function()
+    local result = rapid ""
+    assert.equal(0, result.status)
+    for _, name in ipairs { "run", "check", "nodes", "info", "diff", "test" } do
+      assert.truthy(result.stdout:find("\n  " .. name .. " ", 1, true), name)
+    end
+    assert.equal("", result.stderr)
+  end)
+
+  it("tells its version and its help, of each command too", function()
+    local version = rapid "--version"
+    assert.equal(0, version.status)
+    assert.truthy(version.stdout:match "^rapid %d+%.%d+%.%d+\n$")
+    assert.equal(0, rapid("--help").status)
+    local help = rapid "run --help"
+    assert.equal(0, help.status)
+    for _, option in ipairs { "--frames", "--output", "--set", "--seed", "--threads", "--stats", "--script-timeout",
+      "--script-memory", "--quiet", "--verbose", "--camera", "--size" } do
+      assert.truthy(help.stdout:find(option, 1, true), option)
+    end
+  end)
+
+  it("knows what an unknown command was meant to be", function()
+    local result = rapid "rnu scene.lua"
+    assert.equal(2, result.status)
+    assert.equal('rapid: unknown command "rnu"; did you mean "run"?\n', result.stderr)
+  end)
+
+  it("says how a graph that stands alone is run", function()
+    local result = rapid "scene.lua"
+    assert.equal(2, result.status)
+    assert.equal("rapid: no command; to run the graph, type: rapid run scene.lua\n", result.stderr)
+  end)
+
+  it("knows what an unknown option was meant to be", function()
+    local result = rapid "run scene.lua --thraeds 2"
+    assert.equal(2, result.status)
+    assert.equal('rapid run: unknown option "--thraeds"; did you mean "--threads"?\n', result.stderr)
+  end)
+
+  it("misses a graph that is not named", function()
+    local result = rapid "run -f 1-4"
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find("rapid run: GRAPH is required", 1, true), result.stderr)
+  end)
+
+  it("refuses values of options that are none, and says what would be right", function()
+    local frames = "; it must be a frame (12), a range (1-48), or a range and a step (1-48x2)"
+    for arguments, message in pairs {
+      ["-f 1..4"] = "-f 1..4: a - is missing" .. frames,
+      ["-f 5-3"] = "-f 5-3: it ends before it begins" .. frames,
+      ["-f 1-4x0"] = "-f 1-4x0: the step must be at least 1" .. frames,
+      ["--seed -1"] = '--seed = "-1"; it must be a whole number from 0 to 2^64 - 1',
+      ["--threads many"] = '--threads = "many"; it must be a whole number, at least 0',
+      ["--script-timeout 0"] = '--script-timeout = "0"; it must be a number above 0',
+      ["--script-memory 1T"] = '--script-memory = "1T"; it must be bytes above 0, such as 1073741824, 512M or 1G',
+      ["--set count"] = '--set "count"; it must be NAME=VALUE',
+      ["--size 1280"] = '--size = "1280"; it must be WIDTHxHEIGHT, each from 1 to 16384',
+    } do
+      local result = rapid("run scene.lua " .. arguments)
+      assert.equal(2, result.status)
+      assert.equal("rapid run: " .. message .. "\n", result.stderr)
+    end
+  end)
+end)
+
+describe("the order of options", function()
+  it("never matters", function()
+    local folder = command.folder()
+    folder:write("scene.lua", scene)
+    for i, arguments in ipairs {
+      "run scene.lua -f 3 -o a#.csv --set count=2 --threads 1 --quiet",
+      "--quiet --threads 1 -f 3 run --set count=2 -o b#.csv scene.lua",
+      "-o c#.csv --set count=2 -f 3 --threads=1 run --quiet scene.lua",
+      "run --set=count=2 -f3 scene.lua --threads 1 -od#.csv --quiet",
+    } do
+      local result = rapid(arguments, { cwd = folder.path })
+      assert.equal(0, result.status, result.stderr)
+      assert.equal(folder:read "a0003.csv", folder:read(("abcd"):sub(i, i) .. "0003.csv"))
+    end
+    assert.truthy(folder:read "a0003.csv")
+  end)
+
+  it("lets a value be called like a command", function()
+    local folder = command.folder()
+    folder:write("check", scene)
+    assert.equal(0, rapid("--stats test -f 1 -o a.csv run ./check", { cwd = folder.path }).status)
+    assert.same({ "a.csv", "check", "test" }, folder:list())
+  end)
+end)
+
+describe("standard output", function()
+  it("that nobody reads any more is no failure", function()
+    local result = command.shell '"$RAPID" nodes | true; "$RAPID" nodes --json | head -c 1'
+    assert.equal(0, result.status)
+    assert.equal("[", result.stdout)
+    assert.equal("", result.stderr)
+  end)
+
+  it("that can't be written is one", function()
+    local result = rapid "nodes >/dev/full"
+    assert.equal(1, result.status)
+    assert.equal("standard output can't be written: No space left on device\n", result.stderr)
+  end)
+end)

@@ -1,0 +1,147 @@
+#include <nlohmann/json.hpp>
+
+#include "runtime/report/statistics.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using nlohmann::ordered_json;
+
+namespace {
+
+FrameResult frame_result()
+{
+    FrameResult result;
+    result.frame = 7;
+    result.outputs["main"].append(3);
+    result.outputs["smoke"].append(2);
+    result.figures.born = 4;
+    result.figures.died = 1;
+    result.figures.collisions = 12;
+    result.figures.substeps = 2;
+    result.figures.penetration_max = 0.25;
+    result.figures.script_seconds = 0.125;
+    result.figures.solve_seconds = 0.5;
+    result.total_seconds = 1;
+    return result;
+}
+
+RunStatistics run_of(std::initializer_list<std::uint64_t> points)
+{
+    RunStatistics run;
+    run.graph = "sparks.lua";
+    run.threads = 2;
+    run.peak_bytes = 3 << 20;
+    run.seconds = 0.5;
+    for (const std::uint64_t count : points) {
+        FrameStatistics frame;
+        frame.frame = static_cast<std::int64_t>(run.frames.size()) + 1;
+        frame.points = count;
+        run.frames.push_back(frame);
+    }
+    return run;
+}
+
+std::vector<std::string> keys_of(const ordered_json& json)
+{
+    std::vector<std::string> keys;
+    for (const auto& [key, value] : json.items()) keys.push_back(key);
+    return keys;
+}
+
+}  // namespace
+
+TEST_CASE("a frame's stages before writing add up to its wall time", "[report]")
+{
+    const FrameStatistics frame = statistics_of(frame_result());
+    CHECK(frame.seconds.script == 0.125);
+    CHECK(frame.seconds.solve == 0.5);
+    CHECK(frame.seconds.graph == 0.375);
+    CHECK(frame.seconds.total() == 1);
+}
+
+TEST_CASE("stages that were timed longer than the whole leave nothing to the graph", "[report]")
+{
+    FrameResult result = frame_result();
+    result.total_seconds = 0.5;
+    CHECK(statistics_of(result).seconds.graph == 0);
+}
+
+TEST_CASE("a frame's points are those of all its outputs", "[report]")
+{
+    CHECK(statistics_of(frame_result()).points == 5);
+}
+
+TEST_CASE("the statistics file has the shape of the contract", "[report]")
+{
+    RunStatistics run = run_of({});
+    run.frames.push_back(statistics_of(frame_result()));
+    run.frames.front().seconds.write = 0.25;
+    const ordered_json json = ordered_json::parse(to_json(run));
+
+    CHECK(keys_of(json) == std::vector<std::string>{"graph", "threads", "peak_bytes", "seconds", "frames"});
+    CHECK(json["graph"] == "sparks.lua");
+    CHECK(json["threads"] == 2);
+    CHECK(json["peak_bytes"] == 3 << 20);
+    CHECK(json["seconds"] == 0.5);
+    REQUIRE(json["frames"].size() == 1);
+    // No "error": nothing is estimated, so nothing is said.
+    CHECK(json["frames"][0] == ordered_json::parse(R"({
+        "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
+        "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
+        "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12 })"));
+}
+
+TEST_CASE("a run that ended before its first frame has an empty list of frames", "[report]")
+{
+    const ordered_json json = ordered_json::parse(to_json(run_of({})));
+    CHECK(json["frames"].is_array());
+    CHECK(json["frames"].empty());
+}
+
+TEST_CASE("any name of a graph makes a file that can be parsed", "[report]")
+{
+    RunStatistics run = run_of({1, 2});
+    run.graph = "a\"b\\c\n\xff.lua";
+    CHECK_NOTHROW(ordered_json::parse(to_json(run)));
+}
+
+TEST_CASE("a statistics file has a line for each frame", "[report]")
+{
+    const std::string text = to_json(run_of({1, 2, 3}));
+    CHECK(std::count(text.begin(), text.end(), '\n') == 2 + 3);
+}
+
+TEST_CASE("the summary says points, frames, seconds by stage and memory", "[report]")
+{
+    RunStatistics run = run_of({100, 2000, 1500});
+    run.frames[0].seconds = {0.25, 0, 0.125, 0.5};
+    run.frames[2].seconds = {0.25, 0.5, 0.125, 0};
+    CHECK(summary(run) ==
+          "points   1,500 (most: 2,000 in frame 2)\n"
+          "frames   3 in 0.500 s, 7,200 points a second\n"
+          "seconds  graph 0.500, script 0.500, solve 0.250, write 0.500\n"
+          "memory   3.0 MiB at the peak\n");
+}
+
+TEST_CASE("the summary of an empty scene is one of no points, not of none run", "[report]")
+{
+    CHECK(summary(run_of({0, 0})).starts_with("points   0\nframes   2 in 0.500 s\n"));
+    CHECK(summary(run_of({})).starts_with("points   none: no frame was run\n"));
+}
+
+TEST_CASE("numbers read as people write them", "[report]")
+{
+    CHECK(with_separators(0) == "0");
+    CHECK(with_separators(999) == "999");
+    CHECK(with_separators(1000) == "1,000");
+    CHECK(with_separators(1234567) == "1,234,567");
+    CHECK(in_millions(99999) == "99,999");
+    CHECK(in_millions(3.214e6) == "3.21 million");
+    CHECK(in_millions(45.67e6) == "45.7 million");
+    CHECK(memory_text(std::uint64_t{5} << 29) == "2.50 GiB");
+    CHECK(duration_text(0.0421) == "0.042 s");
+    CHECK(duration_text(59.4) == "59.4 s");
+    CHECK(duration_text(59.97) == "60.0 s");
+    CHECK(duration_text(125) == "2 min 05 s");
+    CHECK(duration_text(3725) == "1 h 02 min");
+}

@@ -32,11 +32,12 @@ if(RAPID_SANITIZE)
   target_link_options(rapid_private INTERFACE -fsanitize=${RAPID_SANITIZE})
 endif()
 
-# ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so.
+# ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so; and
+# the header's path is taken relative to the build folder, so that two builds of the same sources share their objects.
 find_program(CCACHE ccache)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER
-    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
+    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR=${PROJECT_BINARY_DIR} ${CCACHE})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(rapid_private INTERFACE -fpch-preprocess)
   endif()

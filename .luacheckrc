@@ -1,0 +1,17 @@
+-- Lua as Rapid runs it: LuaJIT; in graphs and nodes the names that need no require; in tests busted and our assertions.
+std = "luajit"
+max_line_length = 120
+cache = false
+color = false
+
+local graph_code = { read_globals = { "vec3" } }
+files["graphs"] = graph_code
+files["lua/nodes"] = graph_code
+
+-- Takes functions away before any graph code runs.
+files["lua/host.lua"] = { globals = { string = { fields = { "dump" } } } }
+
+files["tests"] = {
+  std = "luajit+busted",
+  read_globals = { "vec3", assert = { fields = { "near", "points", "same_points" } } },
+}

@@ -11,21 +11,26 @@ namespace rapid {
 
 struct SolveOptions {
     int substeps = 1;
-    double time = 0;  // s since the start, at the end of the frame
-    double h = 0;     // s, the frame's length
+    double time = 0;         // s since the start, at the end of the frame
+    double h = 0;            // s, the frame's length
+    std::int64_t frame = 0;  // its number, for messages
+    std::string group;       // only these points are advanced; all when empty
 };
 
 struct SolveResult {
     std::uint64_t collisions = 0;     // contacts
     std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
+    std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     double penetration_max = 0;       // m, the deepest at the end of the frame
 };
 
-// Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age at
-// the end of the frame), else h. Ages, deaths and ids are the caller's.
+// Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age
+// at the end of the frame), else h; and where they have a `force` (N), by force / mass besides, which is then cleared.
+// Ages, deaths and ids are the caller's.
 //
-// Same bits for any number of threads, any chunk, and whichever other points there are. Error: a velocity or position that
-// is not finite before or after, with the point's id; a collider or force whose attribute is missing.
+// Same bits for any number of threads, any chunk, and whichever other points there are. Error: a velocity or position
+// that is not finite before or after, with the point's id, or a force that is not, with its node; a collider or force
+// whose attribute is missing. Of several points the one nearest to the beginning of the set is named.
 SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
 
 }  // namespace rapid

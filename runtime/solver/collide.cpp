@@ -1,0 +1,567 @@
+#include "runtime/solver/collide.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/shapes/first_contact.h"
+#include "runtime/solver/response.h"
+
+namespace rapid {
+namespace {
+
+// How often a point is taken out of shapes in one sub-step before it counts as trapped: out of one it may be in
+// another, and where a field is no exact distance it takes a few steps out of one.
+constexpr int most_rescues = 64;
+
+// How far a surface may turn within a piece of a slide, as the cosine of 0.2 radians. The length of the way along a
+// circle is then right to 1e-5 a piece.
+constexpr double least_cosine = 0.98;
+
+// A surface that curves inwards by a smaller radius than its field can show is a kink, at which a point bounces. A turn
+// of less than this, in radians, is the field's noise.
+constexpr double least_kink = 0.02;
+
+// The part of its size that a velocity after a bounce may have along the normal of a surface that the point rests on,
+// and leave the point on it: rounding.
+constexpr double tangential = 1e-9;
+
+// The shortest pieces of a slide, as parts of the sub-step: where friction turns, and where a surface without a
+// smallest feature does.
+constexpr double least_turning = 1.0 / 256, least_bending = 1.0 / 4096;
+
+const float no_radius = 0;
+const std::uint8_t everybody = 1, nobody = 0;
+
+Vec3d place(const Path& path, double s) { return path.P + s * (path.v + 0.5 * s * path.a); }
+
+}  // namespace
+
+Obstacle::Obstacle(const Collider& collider, const PointSet& points)
+    : shape(collider.shape.get()),
+      bounds(shape->bounds()),
+      feature(shape->smallest_feature()),
+      bounce(collider.bounce.read(points)),
+      friction(collider.friction.read(points)),
+      radius{&no_radius, 0},
+      members{&everybody, 0}
+{
+    if (collider.radius)
+        radius = collider.radius->read(points);
+    else if (points.has("pscale"))
+        radius = points.column<float>("pscale").read();
+    if (!collider.group.empty()) {
+        const Column<std::uint8_t>* group = points.find_group(collider.group);
+        members = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};
+    }
+}
+
+void Collisions::begin(std::size_t first, std::size_t size)
+{
+    first_ = first;
+    size_ = size;
+    met_.assign(size, 0);
+    surfaces_.resize(size);
+    widest_.clear();
+    for (const Obstacle& obstacle : obstacles_) {
+        float widest = 0;
+        for (std::size_t i = 0; i < (obstacle.radius.stride ? size : 1); ++i)
+            widest = std::max(widest, obstacle.radius[first + i]);
+        widest_.push_back(widest);
+    }
+}
+
+void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt)
+{
+    P_ = P;
+    v_ = v;
+    find_near(a, dt);
+    fly(a, dt);
+    while (!travellers_.empty()) round_of_travellers(a, dt);
+}
+
+// The box around all paths of the block, against those of the shapes.
+void Collisions::find_near(Strided<Vec3d> a, std::span<const double> dt)
+{
+    Box3d way;
+    for (std::size_t i = 0; i < size_; ++i) {
+        const Vec3d travel = dt[i] * v_[i], fall = 0.5 * dt[i] * dt[i] * a[i];
+        way.extend(P_[i] + travel.cwiseMin(0.0) + fall.cwiseMin(0.0));
+        way.extend(P_[i] + travel.cwiseMax(0.0) + fall.cwiseMax(0.0));
+    }
+    const double rounding = 0x1p-21 * way.min().cwiseAbs().cwiseMax(way.max().cwiseAbs()).maxCoeff();
+    near_.clear();
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+        const Vec3d margin = Vec3d::Constant(widest_[o] * (1 + 0x1p-21) + rounding);
+        if (obstacles_[o].bounds.intersects(Box3d(way.min() - margin, way.max() + margin)))
+            near_.push_back(static_cast<int>(o));
+    }
+}
+
+// All points on their free paths. Those that meet nothing are at the end of the sub-step.
+void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
+{
+    travellers_.clear();
+    if (!near_.empty()) {
+        paths_.resize(size_);
+        for (std::size_t i = 0; i < size_; ++i) paths_[i] = {P_[i], v_[i], a[i], dt[i], 0};
+        search(size_, true);
+    }
+    for (std::size_t i = 0; i < size_; ++i) {
+        if (near_.empty() || obstacle_[i] < 0) {
+            P_[i] += dt[i] * (v_[i] + 0.5 * dt[i] * a[i]);
+            v_[i] += dt[i] * a[i];
+            continue;
+        }
+        Traveller t;
+        t.i = static_cast<std::uint32_t>(i);
+        t.left = t.piece = dt[i];
+        meet_on_path(t, i, dt[i]);
+        travellers_.push_back(t);
+    }
+}
+
+void Collisions::meet_on_path(Traveller& t, std::size_t k, double dt)
+{
+    const Path& path = paths_[k];
+    const double s = contact_[k].time;
+    meet(t, place(path, s), path.v + s * path.a, path.a, contact_[k], obstacle_[k], dt);
+}
+
+void Collisions::round_of_travellers(Strided<Vec3d> a, std::span<const double> dt)
+{
+    going_on_.clear();
+    paths_.clear();
+    bool curved = false;
+    for (Traveller& t : travellers_) {
+        Path path;
+        if (plan(t, path, a[t.i], dt[t.i])) {
+            curved |= t.way == Traveller::Curved;
+            going_on_.push_back(t);
+            paths_.push_back(path);
+        } else {
+            finish(t);
+        }
+    }
+    travellers_.swap(going_on_);
+    if (travellers_.empty()) return;
+
+    bends_.resize(travellers_.size());
+    if (curved) bend(a, dt);
+    search(travellers_.size(), false);
+    for (std::size_t k = 0; k < travellers_.size(); ++k) {
+        Traveller& t = travellers_[k];
+        if (t.way == Traveller::Waits) continue;
+        if (obstacle_[k] < 0)
+            proceed(t, paths_[k], bends_[k]);
+        else if (t.way == Traveller::Curved)
+            meet_on_bend(t, paths_[k], bends_[k], contact_[k], obstacle_[k], dt[t.i]);
+        else
+            meet_on_path(t, k, dt[t.i]);
+    }
+}
+
+// The next path of a point; false when it has none, because its sub-step is over.
+bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
+{
+    Vec3d& v = v_[t.i];
+    while (true) {
+        if (!(t.left > 0)) return false;
+        path = {P_[t.i], v, a, t.left, 0};
+        t.way = Traveller::Free;
+        t.stops = false;
+        if (t.supports == 0) return true;
+
+        Slide slide;
+        bool flat = t.on[0].flat;
+        if (t.supports == 1) {
+            slide = slide_on(t.on[0], v, a, t.left, least_turning * dt);
+            if (slide.kind == Slide::Leaves) t.supports = 0;
+        } else {
+            flat = flat && t.on[1].flat;
+            int lifted = -1;
+            slide = slide_along(t.on[0], t.on[1], v, a, t.left, lifted);
+            if (slide.kind == Slide::Leaves) {
+                if (lifted == 0) t.on[0] = t.on[1];
+                t.supports = 1;
+            }
+        }
+        if (slide.kind == Slide::Leaves) continue;
+        if (slide.kind == Slide::Sticks) {
+            v = t.on[0].vc;
+            P_[t.i] += t.left * v;
+            return false;
+        }
+        path.a = slide.a;
+        path.duration = slide.duration;
+        t.stops = slide.stops;
+        if (flat) {
+            t.way = Traveller::Straight;
+        } else if (t.supports == 1) {
+            t.way = Traveller::Curved;
+            if (path.duration > t.piece) path.duration = t.piece, t.stops = false;
+            if (++t.events >= most_contacts) return ++limited, false;
+        } else {
+            // Along the edge of curved surfaces in short straight pieces; each ends in the air, or within rounding of
+            // the surfaces, where the next contact finds it.
+            t.way = Traveller::Straight;
+            if (path.duration > dt / 16) path.duration = dt / 16, t.stops = false;
+        }
+        return true;
+    }
+}
+
+void Collisions::bend(Strided<Vec3d> a, std::span<const double> dt)
+{
+    for (const int o : near_) bend_on(o, a, dt);
+}
+
+// Pieces along the curved surface of one shape, of second order in position and velocity: velocity Verlet in the plane
+// that turns with the surface.
+//
+// The piece d = v s + a s²/2 is tangential at its beginning. Where it ends the surface has turned by θ, so the chord of
+// the arc of this length is d (1 - θ²/24), halfway between the tangents of both ends. What is left is taken off along
+// the gradient.
+void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
+{
+    const Obstacle& obstacle = obstacles_[o];
+    const auto ask = [&] {
+        phi_.resize(asked_P_.size());
+        gradients_.resize(asked_P_.size());
+        obstacle.shape->distance(asked_P_, phi_, gradients_);
+    };
+    const auto radius = [&](std::size_t k) { return double(obstacle.radius[first_ + travellers_[k].i]); };
+
+    asked_.clear();
+    asked_P_.clear();
+    for (std::size_t k = 0; k < travellers_.size(); ++k) {
+        Traveller& t = travellers_[k];
+        if (t.way != Traveller::Curved || t.on[0].collider != o) continue;
+        Path& path = paths_[k];
+        path.v -= t.on[0].vc + t.on[0].n.dot(path.v - t.on[0].vc) * t.on[0].n;  // along the surface, in its frame
+        // Farther than its smallest feature the field may have anything: a wall across, or an edge.
+        if (obstacle.feature > 0) {
+            const double most = detail::time_to_travel(2 * obstacle.feature, path.v.norm(), path.a.norm());
+            if (path.duration > most) path.duration = most, t.stops = false;
+        }
+        asked_.push_back(k);
+        asked_P_.push_back(place(path, path.duration));
+    }
+    if (asked_.empty()) return;
+    ask();
+
+    // Whether the surface is one up to there.
+    std::size_t kept = 0;
+    for (std::size_t j = 0; j < asked_.size(); ++j) {
+        const std::size_t k = asked_[j];
+        Traveller& t = travellers_[k];
+        Path& path = paths_[k];
+        const Vec3d d = asked_P_[j] - path.P, n = t.on[0].n;
+        const double length = d.norm(), slope = gradients_[j].norm(), s = path.duration;
+        const Vec3d n1 = slope > 0 ? Vec3d(gradients_[j] / slope) : n;
+        const double cosine = n.dot(n1), turn = length > 0 ? (n1 - n).dot(d) / length : 0;
+        const double curvature = length > 0 ? turn / length : 0;
+        const double least = obstacle.feature > 0
+                                 ? detail::time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm())
+                                 : least_bending * dt[t.i];
+        const bool leaves = -a[t.i].dot(n) - curvature * path.v.squaredNorm() < 0;
+        const bool kink = turn < -least_kink && -curvature * 2 * obstacle.feature > 1;
+        if (s > least && (cosine < least_cosine || leaves || kink || !(slope > 0))) {
+            t.piece = std::max(s / 4, least);
+            t.way = Traveller::Waits;
+            continue;
+        }
+        if (leaves) {
+            t.supports = 0;
+            t.piece = dt[t.i];
+            t.way = Traveller::Free;
+            path = {P_[t.i], v_[t.i], a[t.i], t.left, path.radius};
+            continue;
+        }
+        if (turn < 0 && (kink || cosine < least_cosine)) {
+            Contact contact;
+            contact.time = 0;
+            contact.n = n1;
+            contact.vc = t.on[0].vc;
+            path.v += contact.vc;
+            meet(t, path.P, path.v, path.a, contact, o, dt[t.i]);
+            t.way = Traveller::Waits;
+            continue;
+        }
+        const Vec3d tangent = length > 0 ? Vec3d(d / length) : Vec3d(Vec3d::Zero());
+        const Vec3d tangent1 = carried(tangent, n, n1);
+        const Vec3d middle = tangent + tangent1;
+        const double angle2 = 2 * (1 - std::min(1.0, cosine));
+        bends_[k].curvature = curvature;
+        asked_[kept] = k;
+        asked_P_[kept++] = path.P + length * (1 - angle2 / 24) * (length > 0 ? middle.normalized() : middle);
+    }
+    asked_.resize(kept);
+    asked_P_.resize(kept);
+
+    for (int step = 0; step < 2; ++step) {
+        ask();
+        for (std::size_t j = 0; j < kept; ++j)
+            if (const double slope2 = gradients_[j].squaredNorm(); slope2 > 0)
+                asked_P_[j] -= (phi_[j] - radius(asked_[j])) / slope2 * gradients_[j];
+    }
+    ask();
+
+    for (std::size_t j = 0; j < kept; ++j) {
+        const std::size_t k = asked_[j];
+        Traveller& t = travellers_[k];
+        Path& path = paths_[k];
+        Bend& end = bends_[k];
+        const Support& on = t.on[0];
+        const double slope = gradients_[j].norm(), s = path.duration;
+        end.P = asked_P_[j];
+        end.a = path.a;
+        end.n = slope > 0 ? Vec3d(gradients_[j] / slope) : on.n;
+        const auto turned = [&](const Vec3d& x) { return carried(x, on.n, end.n); };
+        if (t.stops) {
+            end.v = Vec3d::Zero();
+        } else {
+            Support there = on;
+            there.n = end.n;
+            there.curvature = end.curvature;
+            const Vec3d v1 = turned(path.v + s * path.a);
+            const Slide next = slide_on(there, v1 + on.vc, a[t.i], s, 0);
+            const Vec3d a1 = next.kind == Slide::Moves ? next.a : turned(path.a);
+            end.v = turned(path.v + 0.5 * s * path.a) + 0.5 * s * a1;
+            end.v -= end.n.dot(end.v) * end.n;
+        }
+        end.v += on.vc;
+        end.P += s * on.vc;
+        t.piece = std::min(2 * s, dt[t.i]);
+        // What else may be in the way is looked for along the chord.
+        if (s > 0) path.v = (end.P - path.P) / s;
+        path.a.setZero();
+    }
+}
+
+// The first contact of the n paths, whichever shape it is with; of equally early ones, that with the first in the
+// chain. all: path i is that of the block's point i.
+void Collisions::search(std::size_t n, bool all)
+{
+    obstacle_.assign(n, -1);
+    contact_.resize(std::max(contact_.size(), n));
+    for (const int o : near_) search(o, n, all);
+}
+
+void Collisions::search(int o, std::size_t n, bool all)
+{
+    const Obstacle& obstacle = obstacles_[o];
+    asked_.clear();
+    asked_paths_.clear();
+    for (std::size_t k = 0; k < n; ++k) {
+        std::size_t i = first_ + k;
+        if (!all) {
+            const Traveller& t = travellers_[k];
+            if (t.way == Traveller::Waits) continue;
+            if ((t.supports > 0 && t.on[0].collider == o) || (t.supports > 1 && t.on[1].collider == o)) continue;
+            i = first_ + t.i;
+        }
+        if (!obstacle.members[i]) continue;
+        asked_.push_back(k);
+        asked_paths_.push_back(paths_[k]);
+        asked_paths_.back().radius = obstacle.radius[i];
+        // Of a further shape, only an earlier contact is of interest.
+        if (obstacle_[k] >= 0) asked_paths_.back().duration = contact_[k].time;
+    }
+    if (asked_.empty()) return;
+    answers_.resize(asked_.size());
+    obstacle.shape->first_contact(asked_paths_, answers_);
+    for (std::size_t j = 0; j < asked_.size(); ++j) {
+        const std::size_t k = asked_[j];
+        if (answers_[j].time == Contact::none) continue;
+        if (obstacle_[k] >= 0 && !(answers_[j].time < contact_[k].time)) continue;
+        obstacle_[k] = o;
+        contact_[k] = answers_[j];
+    }
+}
+
+// Takes a point to a contact on its path, and gives it the velocity that it leaves with.
+//
+// After a contact that leaves with the speed u, under the acceleration g into the surface, all further bounces together
+// take 2u/(g (1 - ε)). Where they would be over within this sub-step the point rests from now on. The momentum that
+// they would take from the tangent by friction is that of one contact with ε = 0 and the sliding after it, to the last
+// digit: μ (1 + ε) |vn| (1 + ε + ε² + ...) = μ |vn| + μ g 2u/(g (1 - ε)).
+void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d& a, const Contact& contact, int o,
+                      double dt)
+{
+    const Obstacle& obstacle = obstacles_[o];
+    met_[t.i] = 1;
+    P_[t.i] = P;
+    v_[t.i] = v;
+    t.left -= contact.time;
+    if (++t.events >= most_contacts) {
+        ++limited;
+        t.left = 0;
+    }
+    if (contact.depth > 0) return leave_shape(t, contact, o, a);
+
+    const double bounce = obstacle.bounce[first_ + t.i], friction = obstacle.friction[first_ + t.i];
+    const Vec3d& n = contact.n;
+    const Vec3d relative = v - contact.vc;
+    const double vn = relative.dot(n);
+    const double g = -a.dot(n) - contact.curvature * (relative - vn * n).squaredNorm();
+    const double u = vn < 0 ? -bounce * vn : vn;
+    const double flush = flush_within(P, obstacle.radius[first_ + t.i], obstacle.feature * 0x1p-21);
+    const double rising = g > 0 ? std::sqrt(2 * g * flush) : 0;  // by less than rounding
+    if (-vn > rising) ++contacts;
+
+    const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature};
+    if (vn >= 0 && g < 0) {
+        // Flush with the surface, and drawn off it: the next moments belong to the path.
+        const double s = std::min(t.left, least_bending * dt);
+        P_[t.i] += s * (v + 0.5 * s * a);
+        v_[t.i] += s * a;
+        t.left -= s;
+        t.supports = 0;
+    } else if (vn >= 0 || u <= rising || 2 * u <= g * (1 - bounce) * t.left) {
+        settle(t, support, contact_response(v, contact.vc, n, 0, friction));
+    } else {
+        v_[t.i] = contact_response(v, contact.vc, n, bounce, friction);
+        const double off = tangential * v_[t.i].norm();
+        const auto leaves = [&](const Support& on) { return std::abs((v_[t.i] - on.vc).dot(on.n)) > off; };
+        if (t.supports == 2 && leaves(t.on[1])) t.supports = 1;
+        if (t.supports >= 1 && leaves(t.on[0])) t.on[0] = t.on[1], --t.supports;
+        if (t.left == 0 && t.supports == 0) t.on[0] = support, t.supports = 1;
+    }
+}
+
+// The same within a piece along a curved surface, at whose chord the contact was found: the arc is off the chord by
+// κ d²/2 u (1 - u).
+void Collisions::meet_on_bend(Traveller& t, const Path& chord, const Bend& end, const Contact& contact, int o,
+                              double dt)
+{
+    const double u = chord.duration > 0 ? contact.time / chord.duration : 0;
+    Support& on = t.on[0];
+    const Vec3d d = end.P - chord.P, v0 = v_[t.i];
+    on.n = ((1 - u) * on.n + u * end.n).normalized();
+    on.curvature = end.curvature;
+    Vec3d v = (1 - u) * v0 + u * end.v - on.vc;
+    v += on.vc - v.dot(on.n) * on.n;
+    meet(t, chord.P + u * d + 0.5 * end.curvature * d.squaredNorm() * u * (1 - u) * on.n, v, end.a, contact, o, dt);
+}
+
+// Rests on one more surface: on one it slides, on two along their edge, on three nowhere.
+void Collisions::settle(Traveller& t, const Support& support, const Vec3d& v)
+{
+    Vec3d along = v - support.vc;
+    along -= along.dot(support.n) * support.n;
+    const bool again = t.supports > 0 && t.on[t.supports - 1].collider == support.collider;
+    if (t.supports == 0 || again) {
+        t.supports = std::max(t.supports, 1);
+        t.on[t.supports - 1] = support;
+    } else if (t.supports == 1 && !edge_of(t.on[0], support).isZero()) {
+        t.on[1] = support;
+        t.supports = 2;
+    } else if (t.supports == 1) {
+        t.on[0] = support;
+    } else {
+        along.setZero();
+        t.left = 0;
+    }
+    if (t.supports == 2) {
+        const Vec3d edge = edge_of(t.on[0], t.on[1]);
+        along = along.dot(edge) * edge;
+    }
+    v_[t.i] = support.vc + along;
+}
+
+// A point that was born in a shape, or that a shape has swept over: out along the nearest way that is known, with the
+// velocity that it has. Where it is then moving inwards it meets the surface as any other.
+void Collisions::leave_shape(Traveller& t, const Contact& contact, int o, const Vec3d& a)
+{
+    t.supports = 0;
+    if (++t.rescues > most_rescues) {
+        ++trapped;
+        t.left = 0;
+    } else if (!contact.n.isZero()) {
+        P_[t.i] += contact.depth * contact.n;
+    } else if (contact.back != Contact::none) {
+        P_[t.i] -= contact.back * v_[t.i];
+    } else {
+        // It has not come in by itself: out against what pulls, or upwards.
+        const double pull = a.norm();
+        const Vec3d down = pull > 0 ? Vec3d(a / pull) : Vec3d(-Vec3d::UnitY());
+        const Path fall{P_[t.i], down, Vec3d::Zero(), 0, obstacles_[o].radius[first_ + t.i]};
+        Contact above;
+        obstacles_[o].shape->first_contact({&fall, 1}, {&above, 1});
+        if (above.back == Contact::none) {
+            ++trapped;
+            t.left = 0;
+        } else {
+            P_[t.i] -= above.back * down;
+        }
+    }
+}
+
+// The path is free up to its end.
+void Collisions::proceed(Traveller& t, const Path& path, const Bend& end)
+{
+    Support& on = t.on[0];
+    if (t.way == Traveller::Curved) {
+        P_[t.i] = end.P;
+        v_[t.i] = end.v;
+        on.n = end.n;
+        on.curvature = end.curvature;
+    } else {
+        P_[t.i] = place(path, path.duration);
+        v_[t.i] = t.stops ? on.vc : Vec3d(path.v + path.duration * path.a);
+    }
+    t.left -= path.duration;
+    if (t.supports == 2 && !(on.flat && t.on[1].flat)) t.supports = 0;
+}
+
+void Collisions::finish(const Traveller& t)
+{
+    for (int k = 0; k < 2; ++k) surfaces_[t.i][k] = k < t.supports ? t.on[k].n : Vec3d(Vec3d::Zero());
+}
+
+// To nearest, which can leave a point on the inner side of its surface by half an ulp an axis. Then the coordinate that
+// matters most is moved until the point is out again: by the least that is enough, so that nothing creeps.
+void Collisions::round(std::span<const Vec3d> P, std::span<Vec3f> rounded) const
+{
+    for (std::size_t i = 0; i < size_; ++i) {
+        rounded[i] = P[i].cast<float>();
+        if (!met_[i]) continue;
+        for (const Vec3d& n : surfaces_[i]) {
+            const double sunk = n.dot(P[i] - rounded[i].cast<double>());
+            if (!(sunk > 0)) continue;
+            int k;
+            n.cwiseAbs().maxCoeff(&k);
+            const double wanted = rounded[i][k] + sunk / n[k];
+            float lifted = static_cast<float>(wanted);
+            if (n[k] > 0 ? lifted < wanted : lifted > wanted)
+                lifted = std::nextafter(lifted, std::copysign(std::numeric_limits<float>::infinity(), float(n[k])));
+            rounded[i][k] = lifted;
+        }
+    }
+}
+
+double Collisions::deepest(std::span<const Vec3f> P)
+{
+    double depth = 0;
+    for (const Obstacle& obstacle : obstacles_) {
+        asked_.clear();
+        asked_P_.clear();
+        for (std::size_t i = 0; i < size_; ++i) {
+            if (!met_[i] || !obstacle.members[first_ + i]) continue;
+            const double radius = obstacle.radius[first_ + i];
+            const Vec3d at = P[i].cast<double>();
+            if (((at - obstacle.bounds.max()).array() > radius).any()) continue;
+            if (((obstacle.bounds.min() - at).array() > radius).any()) continue;
+            asked_.push_back(i);
+            asked_P_.push_back(at);
+        }
+        if (asked_.empty()) continue;
+        phi_.resize(asked_.size());
+        obstacle.shape->distance(asked_P_, phi_, {});
+        for (std::size_t j = 0; j < asked_.size(); ++j)
+            depth = std::max(depth, obstacle.radius[first_ + asked_[j]] - phi_[j]);
+    }
+    return depth;
+}
+
+}  // namespace rapid

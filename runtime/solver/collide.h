@@ -1,0 +1,128 @@
+// Moves a block of points along their paths through all shapes at once: to the first contact along each path, whichever
+// shape it is with; from there by the response, or along the surface where the point comes to rest on it; until the
+// sub-step is over (numerics.md, Collision).
+//
+// The points of a block that have met something go on together, round by round, so that a shape is called once a round
+// and never once a point. What becomes of a point does not depend on the others.
+//
+// That a point rests is not stored: at the next step it is found flush with the surface and pressed to it again.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/points/column.h"
+#include "runtime/shapes/shape.h"
+#include "runtime/solver/dynamics.h"
+#include "runtime/solver/slide.h"
+
+namespace rapid {
+
+// A collider with its parameters looked up for all points of a set.
+struct Obstacle {
+    // Error: a parameter's attribute is missing.
+    Obstacle(const Collider& collider, const PointSet& points);
+
+    const Shape* shape;
+    Box3d bounds;
+    double feature;  // m, the shape's smallest
+    Strided<float> bounce, friction, radius;
+    Strided<std::uint8_t> members;  // of its group; 1 for all where it has none
+};
+
+// What a point may meet in one sub-step before the rest of it is dropped, counted in contacts and in pieces of a way
+// along a curved surface.
+constexpr int most_contacts = 100000;
+
+class Collisions {
+public:
+    explicit Collisions(std::span<const Obstacle> obstacles) : obstacles_(obstacles) {}
+
+    // A new block: the points [first, first + size) of the set.
+    void begin(std::size_t first, std::size_t size);
+
+    // Advances them by a sub-step: P and v by dt under the accelerations a, which are constant within it.
+    void advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt);
+
+    // Rounds the positions to single precision. What is on a surface stays on its outer side.
+    void round(std::span<const Vec3d> P, std::span<Vec3f> rounded) const;
+
+    // The deepest that a point which has met a shape since begin() is in one of them, m.
+    double deepest(std::span<const Vec3f> P);
+
+    std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
+    std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
+    std::uint64_t trapped = 0;   // points that found no way out of a shape
+
+private:
+    // A point that has met something in this sub-step.
+    struct Traveller {
+        enum Way { Free, Straight, Curved, Waits };
+
+        std::uint32_t i;   // place in the block
+        double left;       // s of the sub-step
+        double piece;      // s: the length of the next piece along a curved surface
+        int events = 0;    // towards most_contacts
+        int rescues = 0;   // times that it was taken out of a shape
+        int supports = 0;  // surfaces that it rests on: of two, it moves along their edge
+        Support on[2] = {};
+
+        // Of the round.
+        Way way = Free;
+        bool stops = false;  // at the end of the path, on the surface
+    };
+
+    // The end of a piece along a curved surface.
+    struct Bend {
+        Vec3d P, v, n;
+        Vec3d a;  // of the piece, at its beginning
+        double curvature;
+    };
+
+    void find_near(Strided<Vec3d> a, std::span<const double> dt);
+    void fly(Strided<Vec3d> a, std::span<const double> dt);
+    void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
+    bool plan(Traveller& t, Path& path, const Vec3d& a, double dt);
+    void bend(Strided<Vec3d> a, std::span<const double> dt);
+    void bend_on(int obstacle, Strided<Vec3d> a, std::span<const double> dt);
+    void search(std::size_t n, bool all);
+    void search(int obstacle, std::size_t n, bool all);
+    void meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d& a, const Contact& contact, int obstacle,
+              double dt);
+    void meet_on_bend(Traveller& t, const Path& chord, const Bend& bend, const Contact& contact, int obstacle,
+                      double dt);
+    void meet_on_path(Traveller& t, std::size_t k, double dt);
+    void leave_shape(Traveller& t, const Contact& contact, int obstacle, const Vec3d& a);
+    void settle(Traveller& t, const Support& support, const Vec3d& v);
+    void proceed(Traveller& t, const Path& path, const Bend& bend);
+    void finish(const Traveller& t);
+
+    std::span<const Obstacle> obstacles_;
+    std::size_t first_ = 0, size_ = 0;
+    std::vector<double> widest_;  // of each obstacle, the largest radius in the block, m
+
+    // By point of the block.
+    std::vector<std::uint8_t> met_;               // whether it has met a shape since begin()
+    std::vector<std::array<Vec3d, 2>> surfaces_;  // where it has: normals of those that it is on now, zero for none
+    std::span<Vec3d> P_, v_;
+
+    std::vector<int> near_;  // the obstacles that some point of the block may reach in this sub-step
+
+    // By traveller; in the first flight, by point.
+    std::vector<Traveller> travellers_, going_on_;
+    std::vector<Path> paths_;
+    std::vector<int> obstacle_;  // the first that the path meets, or -1
+    std::vector<Contact> contact_;
+    std::vector<Bend> bends_;
+
+    // What a shape is asked.
+    std::vector<std::size_t> asked_;
+    std::vector<Path> asked_paths_;
+    std::vector<Contact> answers_;
+    std::vector<Vec3d> asked_P_, gradients_;
+    std::vector<double> phi_;
+};
+
+}  // namespace rapid

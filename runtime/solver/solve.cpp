@@ -1,0 +1,345 @@
+#include "runtime/solver/solve.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <exception>
+#include <mutex>
+
+#include "runtime/parallel.h"
+#include "runtime/solver/collide.h"
+
+namespace rapid {
+namespace {
+
+// Points that go through their sub-steps together: their state, paths and contacts stay in the first and second-level
+// caches. A chunk of threads' work is several of these.
+constexpr std::size_t block_size = 256;
+
+const float unit_mass = 1;
+
+// A force that has to be asked, or that acts on a group only.
+struct LocalForce {
+    const Force* force;
+    std::optional<Vec3d> uniform;
+    Strided<std::uint8_t> members;
+    bool all;
+};
+
+// What the dynamics are for this set and frame.
+struct Scene {
+    Vec3d uniform = Vec3d::Zero();  // acceleration of all points, m/s²
+    std::vector<LocalForce> forces;
+    std::vector<Obstacle> obstacles;
+    const Column<Vec3f>* force = nullptr;
+    Strided<float> mass{&unit_mass, 0};
+
+    bool is_uniform() const { return forces.empty() && !force; }
+};
+
+template <class F>
+void at_node(const Dynamic& dynamic, const F& f)
+{
+    try {
+        f();
+    } catch (Error& error) {
+        error.in_node(dynamic.node).at(dynamic.location);
+        throw;
+    }
+}
+
+const std::uint8_t nobody = 0;
+
+Scene scene_of(const PointSet& points, std::span<const DynamicPtr> dynamics)
+{
+    Scene scene;
+    for (const DynamicPtr& dynamic : dynamics)
+        at_node(*dynamic, [&] {
+            if (const auto* collider = dynamic_cast<const Collider*>(dynamic.get())) {
+                scene.obstacles.emplace_back(*collider, points);
+            } else if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
+                const std::optional<Vec3d> uniform = force->uniform_acceleration();
+                if (uniform && !uniform->allFinite())
+                    throw Error(fmt::format("its acceleration is {{{:g}, {:g}, {:g}}}; it must be finite", uniform->x(),
+                                            uniform->y(), uniform->z()));
+                if (uniform && force->group.empty()) {
+                    scene.uniform += *uniform;
+                    return;
+                }
+                const Column<std::uint8_t>* group = points.find_group(force->group);
+                scene.forces.push_back(
+                    {force, uniform, group ? group->read() : Strided<std::uint8_t>{&nobody, 0}, force->group.empty()});
+            }
+        });
+    // A force that is zero everywhere needs no pass.
+    const Column<Vec3f>* force = points.find<Vec3f>("force");
+    if (force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero())) scene.force = force;
+    if (points.has("mass")) scene.mass = points.column<float>("mass").read();
+    return scene;
+}
+
+// The largest absolute value of a range of floats, as bits: those of infinity and NaN are at least 0x7f800000.
+std::uint32_t largest_bits(std::span<const Vec3f> values)
+{
+    const float* x = values.empty() ? nullptr : values.front().data();
+    std::uint32_t largest = 0;
+    for (std::size_t j = 0; j < 3 * values.size(); ++j)
+        largest = std::max(largest, std::bit_cast<std::uint32_t>(x[j]) & 0x7fffffffu);
+    return largest;
+}
+bool all_finite(std::span<const Vec3f> values) { return largest_bits(values) < 0x7f800000u; }
+
+class Step {
+public:
+    Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+        : points_(points),
+          options_(options),
+          scene_(scene_of(points, dynamics)),
+          P_(points.P().write()),
+          v_(points.v().write())
+    {
+        if (!options.group.empty()) {
+            const Column<std::uint8_t>* group = points.find_group(options.group);
+            members_ = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};
+        }
+        if (points.has("dt")) own_dt_ = points.column<float>("dt").read();
+    }
+
+    SolveResult run()
+    {
+        for_each_chunk(points_.size(), [&](std::size_t begin, std::size_t end) {
+            try {
+                advance(begin, end);
+            } catch (...) {
+                const std::scoped_lock lock(mutex_);
+                if (!error_ || begin < failed_) error_ = std::current_exception(), failed_ = begin;
+            }
+        });
+        if (error_) std::rethrow_exception(error_);
+        return result_;
+    }
+
+private:
+    // The whole frame in double, whether or not newborn points make a column of it.
+    double dt(std::size_t i) const
+    {
+        if (!own_dt_.data || own_dt_[i] == static_cast<float>(options_.h)) return options_.h;
+        return own_dt_[i];
+    }
+
+    void advance(std::size_t begin, std::size_t end)
+    {
+        require_finite(begin, end, "is", "before the step; a node before this one made it so");
+        if (!scene_.obstacles.empty() || !scene_.is_uniform() || members_.data)
+            advance_by_substeps(begin, end);
+        else if (!own_dt_.data)
+            fall(begin, end);
+        else
+            fall_for_own_time(begin, end);
+        require_finite(begin, end, "became", "in the step; the frame was not written");
+    }
+
+    // Nothing but one acceleration: the parabola is exact, and sub-steps would only repeat it. Three constants recur
+    // along the packed coordinates.
+    void fall(std::size_t begin, std::size_t end)
+    {
+        constexpr std::size_t period = 24;  // whole vectors of 8, whole points
+        const double dt = options_.h;
+        double half[period], gain[period];
+        for (std::size_t l = 0; l < period; ++l) {
+            half[l] = 0.5 * dt * scene_.uniform[l % 3];
+            gain[l] = dt * scene_.uniform[l % 3];
+        }
+        float* P = P_[begin].data();
+        float* v = v_[begin].data();
+        const auto fall_by = [&](std::size_t l) {
+            const double speed = v[l];
+            P[l] = static_cast<float>(P[l] + dt * (speed + half[l]));
+            v[l] = static_cast<float>(speed + gain[l]);
+        };
+        std::size_t left = 3 * (end - begin);
+        for (; left >= period; left -= period, P += period, v += period)
+            for (std::size_t l = 0; l < period; ++l) fall_by(l);
+        for (std::size_t l = 0; l < left; ++l) fall_by(l);
+    }
+
+    void fall_for_own_time(std::size_t begin, std::size_t end)
+    {
+        for (std::size_t i = begin; i < end; ++i) {
+            const double dt = this->dt(i);
+            for (int k = 0; k < 3; ++k) {
+                const double speed = v_[i][k];
+                P_[i][k] = static_cast<float>(P_[i][k] + dt * (speed + 0.5 * dt * scene_.uniform[k]));
+                v_[i][k] = static_cast<float>(speed + dt * scene_.uniform[k]);
+            }
+        }
+    }
+
+    void advance_by_substeps(std::size_t begin, std::size_t end)
+    {
+        Collisions collisions(scene_.obstacles);
+        Block block;
+        double deepest = 0;
+        for (; begin < end; begin += block_size) {
+            const std::size_t size = std::min(block_size, end - begin);
+            block.begin(*this, begin, size);
+            if (!scene_.obstacles.empty()) collisions.begin(begin, size);
+            for (int substep = 0; substep < options_.substeps; ++substep) {
+                const Strided<Vec3d> a = accelerations(block, substep);
+                if (!scene_.obstacles.empty())
+                    collisions.advance(block.P, block.v, a, block.dt);
+                else
+                    block.drift(a);
+            }
+            const std::span<Vec3f> P = P_.subspan(begin, size), v = v_.subspan(begin, size);
+            if (members_.data) block.restore_others(*this);
+            for (std::size_t i = 0; i < size; ++i) v[i] = block.v[i].cast<float>();
+            if (!scene_.obstacles.empty()) {
+                collisions.round(block.P, P);
+                deepest = std::max(deepest, collisions.deepest(P));
+            } else {
+                for (std::size_t i = 0; i < size; ++i) P[i] = block.P[i].cast<float>();
+            }
+        }
+        const std::scoped_lock lock(mutex_);
+        result_.collisions += collisions.contacts;
+        result_.contact_limit += collisions.limited;
+        result_.trapped += collisions.trapped;
+        result_.penetration_max = std::max(result_.penetration_max, deepest);
+    }
+
+    // The state of a block within the frame.
+    struct Block {
+        std::size_t first = 0;
+        std::vector<Vec3d> P, v, middle, a;
+        std::vector<double> dt, time;
+        Forces sum, one;
+
+        void begin(const Step& step, std::size_t at, std::size_t size)
+        {
+            first = at;
+            P.resize(size);
+            v.resize(size);
+            dt.resize(size);
+            for (std::size_t i = 0; i < size; ++i) {
+                P[i] = step.P_[at + i].cast<double>();
+                v[i] = step.v_[at + i].cast<double>();
+                dt[i] = step.dt(at + i) / step.options_.substeps;
+            }
+        }
+
+        // Points that are not of the group stay as they were.
+        void restore_others(const Step& step)
+        {
+            for (std::size_t i = 0; i < P.size(); ++i) {
+                if (step.members_[first + i]) continue;
+                P[i] = step.P_[first + i].cast<double>();
+                v[i] = step.v_[first + i].cast<double>();
+            }
+        }
+
+        void drift(Strided<Vec3d> acceleration)
+        {
+            for (std::size_t i = 0; i < P.size(); ++i) {
+                P[i] += dt[i] * (v[i] + 0.5 * dt[i] * acceleration[i]);
+                v[i] += dt[i] * acceleration[i];
+            }
+        }
+    };
+
+    // Of the sub-step, constant within it: forces that are not the same everywhere are asked at its middle, half a
+    // drift on, which makes them right to second order.
+    Strided<Vec3d> accelerations(Block& block, int substep)
+    {
+        if (scene_.is_uniform()) return {&scene_.uniform, 0};
+        const std::size_t size = block.P.size();
+        block.a.assign(size, scene_.uniform);
+        if (scene_.force) add_force_attribute(block);
+        if (scene_.forces.empty()) return {block.a.data(), 1};
+
+        block.middle.resize(size);
+        block.time.resize(size);
+        for (std::size_t i = 0; i < size; ++i) {
+            block.middle[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
+            block.time[i] = options_.time - block.dt[i] * (options_.substeps - substep - 0.5);
+        }
+        const Chunk chunk{points_, block.first, block.middle, block.v, block.dt, block.time, substep};
+        for (const LocalForce& local : scene_.forces) {
+            block.one.reset(size);
+            if (local.uniform)
+                block.one.add_uniform(*local.uniform);
+            else
+                at_node(*local.force, [&] { local.force->contribute(chunk, block.one); });
+            for (std::size_t i = 0; i < size; ++i) {
+                if (!local.all && !local.members[block.first + i]) continue;
+                const Vec3d a = block.one.acceleration(i);
+                if (!a.allFinite())
+                    throw Error(
+                        fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written",
+                                    name_of(block.first + i), a.x(), a.y(), a.z()))
+                        .in_node(local.force->node)
+                        .at(local.force->location);
+                block.a[i] += a;
+            }
+        }
+        return {block.a.data(), 1};
+    }
+
+    void add_force_attribute(Block& block)
+    {
+        for (std::size_t i = 0; i < block.P.size(); ++i) {
+            const Vec3d force = (*scene_.force)[block.first + i].cast<double>();
+            if (force.isZero(0)) continue;
+            const float mass = scene_.mass[block.first + i];
+            if (!(mass > 0) || !force.allFinite())
+                throw Error(
+                    fmt::format("{}: a force of {{{:g}, {:g}, {:g}}} on a mass of {:g}; the force must be finite "
+                                "and the mass above 0",
+                                name_of(block.first + i), force.x(), force.y(), force.z(), mass));
+            block.a[i] += force / mass;
+        }
+    }
+
+    std::string name_of(std::size_t i) const
+    {
+        return fmt::format("point {}, frame {}", points_.id()[i], options_.frame);
+    }
+
+    void require_finite(std::size_t begin, std::size_t end, const char* verb, const char* when) const
+    {
+        const std::size_t n = end - begin;
+        if (all_finite(P_.subspan(begin, n)) && all_finite(v_.subspan(begin, n))) return;
+        for (std::size_t i = begin; i < end; ++i)
+            for (const auto& [name, value] : {std::pair("P", P_[i]), std::pair("v", v_[i])})
+                if (!value.allFinite())
+                    throw Error(fmt::format("{}: {} {} {{{:g}, {:g}, {:g}}} {}", name_of(i), name, verb, value.x(),
+                                            value.y(), value.z(), when));
+    }
+
+    const PointSet& points_;
+    const SolveOptions& options_;
+    const Scene scene_;
+    std::span<Vec3f> P_, v_;
+    Strided<float> own_dt_{nullptr, 0};
+    Strided<std::uint8_t> members_{nullptr, 0};  // of the group that is advanced; null for all
+
+    std::mutex mutex_;
+    SolveResult result_;
+    std::exception_ptr error_;
+    std::size_t failed_ = 0;  // the beginning of the chunk that the error is of
+};
+
+}  // namespace
+
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+{
+    RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
+    if (points.empty()) return {};
+    const SolveResult result = Step(points, dynamics, options).run();
+    if (auto* force = points.find<Vec3f>("force")) force->fill(Vec3f::Zero());
+    return result;
+}
+
+}  // namespace rapid

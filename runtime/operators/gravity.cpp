@@ -1,0 +1,25 @@
+// gravity: one acceleration for all points, whatever their mass.
+//
+//   a = g        exact at any step: the integrator moves along the parabola
+#include "runtime/graph/node.h"
+
+namespace rapid {
+namespace {
+
+struct Gravity {
+    Vec3d g;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Gravity>("gravity", "Accelerates all points alike.")
+            .param(&Gravity::g, "g", Vec3d(0, -9.81, 0), any_number(), "m/s²", "acceleration");
+    }
+
+    std::optional<Vec3d> uniform_acceleration() const { return g; }
+    void contribute(const Chunk&, Forces& forces) const { forces.add_uniform(g); }
+};
+RAPID_NODE(Gravity);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,145 @@
+// solve: advances the points by one frame under all that is upstream, lets them age and die, and hands them to the next
+// frame's Create (paper §2.1).
+#include "runtime/solver/solve.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "runtime/graph/node.h"
+#include "runtime/parallel.h"
+#include "runtime/shapes/level_set.h"
+
+namespace rapid {
+namespace {
+
+struct Solve {
+    int substeps = 1;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Solve>("solve", "Advances the points by one frame: forces, motion, collision.")
+            .kind(NodeKind::Solve)
+            .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
+            .writes("P")
+            .writes("v");
+    }
+
+    // The initial state, before any dynamics: of the nodes upstream none but Create has run.
+    Flow start(std::span<Flow> inputs, const Evaluation&)
+    {
+        Flow flow = std::move(inputs[0]);
+        flow.dynamics.clear();
+        flow.simulation->state = flow.points;
+        return flow;
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        PointSet& points = flow.points;
+        widen(points, flow.dynamics);
+
+        SolveOptions options;
+        options.substeps = substeps;
+        options.time = now.frame.time;
+        options.h = now.frame.dt;
+        options.frame = static_cast<std::int64_t>(now.frame.number);
+        options.group = group;
+        const SolveResult result = solve(points, flow.dynamics, options);
+        now.figures.substeps = std::max(now.figures.substeps, substeps);
+        now.figures.collisions += result.collisions;
+        now.figures.contact_limit += result.contact_limit;
+        now.figures.penetration_max = std::max(now.figures.penetration_max, result.penetration_max);
+
+        if (result.trapped > 0)
+            now.warnings.push_back(fmt::format(
+                "node \"{}\": frame {}: {} points are deep in a shape, where its field shows no way out; a level set "
+                "of a larger half_width shows it farther",
+                now.node, options.frame, result.trapped));
+
+        age(points, now);
+        points.remove("dt");
+        flow.dynamics.clear();
+        // Pointers: the values are the state's alone again as soon as the flow has been used.
+        flow.simulation->state = points;
+        return flow;
+    }
+
+private:
+    void age(PointSet& points, const Evaluation& now) const
+    {
+        auto* ages = points.find<float>("age");
+        if (!ages || points.empty()) return;
+        const float h = static_cast<float>(now.frame.dt);
+        const Column<float>* own = points.find<float>("dt");
+        const Strided<float> dt = own ? own->read() : Strided<float>{&h, 0};
+        const auto* lives = points.find<float>("life");
+        const float immortal = std::numeric_limits<float>::infinity();
+        const Strided<float> life = lives ? lives->read() : Strided<float>{&immortal, 0};
+
+        const std::uint8_t everybody = 1, nobody = 0;
+        Strided<std::uint8_t> members{&everybody, 0};
+        if (!group.empty()) {
+            const Column<std::uint8_t>* column = points.find_group(group);
+            members = column ? column->read() : Strided<std::uint8_t>{&nobody, 0};
+        }
+
+        std::vector<std::uint8_t> keep(points.size());
+        const std::span<float> age = ages->write();
+        for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                if (members[i]) age[i] += dt[i];
+                keep[i] = age[i] < life[i];
+            }
+        });
+        const std::size_t before = points.size();
+        if (lives) points.keep(keep);
+        now.figures.died += before - points.size();
+    }
+
+    // A level set's band must be as wide as the largest radius, and two voxels more for the cells at its edge (§4.3).
+    // Widened once for each shape, and only as far as it takes.
+    void widen(const PointSet& points, std::vector<DynamicPtr>& dynamics)
+    {
+        std::map<ShapePtr, LevelSetPtr> wide;
+        for (DynamicPtr& dynamic : dynamics) {
+            const auto collider = std::dynamic_pointer_cast<const Collider>(dynamic);
+            const auto level_set = collider ? std::dynamic_pointer_cast<const LevelSet>(collider->shape) : nullptr;
+            if (!level_set) continue;
+            const double needed = largest_radius(*collider, points) + 2 * level_set->voxel();
+            const auto known = wide_.find(collider->shape);
+            LevelSetPtr shape = known == wide_.end() ? level_set : known->second;
+            if (shape->band() < needed) shape = shape->with_band(needed);
+            if (const auto other = wide.find(collider->shape); other != wide.end() && other->second->band() >= needed)
+                shape = other->second;
+            wide[collider->shape] = shape;
+            if (shape == level_set) continue;
+            auto widened = std::make_shared<Collider>(*collider);
+            widened->shape = shape;
+            dynamic = std::move(widened);
+        }
+        wide_ = std::move(wide);
+    }
+
+    static double largest_radius(const Collider& collider, const PointSet& points)
+    {
+        Strided<float> radius{nullptr, 0};
+        if (collider.radius)
+            radius = collider.radius->read(points);
+        else if (const auto* pscale = points.find<float>("pscale"))
+            radius = pscale->read();
+        float largest = 0;
+        if (radius.data)
+            for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i)
+                largest = std::max(largest, radius[i]);
+        return largest;
+    }
+
+    std::map<ShapePtr, LevelSetPtr> wide_;  // of the frame before
+};
+RAPID_NODE(Solve);
+
+}  // namespace
+}  // namespace rapid

@@ -27,6 +27,9 @@ local function load_node(name)
   return definition
 end
 
+-- Loops are compiled at once, before the functions that they call count as hot; large kernels get room.
+jit.opt.start("hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxirconst=2000", "maxmcode=16384")
+
 local rapid = language.make(native, load_node)
 loaded.rapid = rapid
 env.vec3 = vector.make

@@ -11,33 +11,33 @@ local vec3, quat = vector.type, vector.quat
 
 -- One attribute's getter and setter by type. $N is its column's number, $S its name.
 local getter_text = {
-  float = "return tonumber(c$N[i * s$N])",
-  int32 = "return tonumber(c$N[i * s$N])",
-  int64 = "return tonumber(c$N[i * s$N])",
-  vec3 = "local k = i * s$N return vec3(c$N[k], c$N[k + 1], c$N[k + 2])",
-  quat = "local k = i * s$N return quat(c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3])",
+  float = "return tonumber(c$N[cursor.i * s$N])",
+  int32 = "return tonumber(c$N[cursor.i * s$N])",
+  int64 = "return tonumber(c$N[cursor.i * s$N])",
+  vec3 = "local k = cursor.i * s$N return vec3(c$N[k], c$N[k + 1], c$N[k + 2])",
+  quat = "local k = cursor.i * s$N return quat(c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3])",
 }
 
 local setter_text = {
   float = [[
     if type(x) ~= "number" then wrong_type($S, "a number", x) end
     if not (x >= -MAX and x <= MAX) then not_finite($S, x) end
-    c$N[i] = x]],
+    c$N[cursor.i] = x]],
   int32 = [[
     if type(x) ~= "number" then wrong_type($S, "a whole number", x) end
     if not (x >= -2147483648 and x <= 2147483647 and floor(x) == x) then not_whole($S, x) end
-    c$N[i] = x]],
+    c$N[cursor.i] = x]],
   int64 = [[
     if type(x) ~= "number" then wrong_type($S, "a whole number", x) end
     if not (x >= -9007199254740992 and x <= 9007199254740992 and floor(x) == x) then not_whole($S, x) end
-    c$N[i] = x]],
+    c$N[cursor.i] = x]],
   vec3 = [[
     if not istype(vec3, x) then wrong_type($S, "a vec3", x) end
     local x1, x2, x3 = x.x, x.y, x.z
     if not (x1 >= -MAX and x1 <= MAX and x2 >= -MAX and x2 <= MAX and x3 >= -MAX and x3 <= MAX) then
       not_finite($S, x)
     end
-    local k = i * 3
+    local k = cursor.i * 3
     c$N[k], c$N[k + 1], c$N[k + 2] = x1, x2, x3]],
   quat = [[
     if not istype(quat, x) then wrong_type($S, "a quat", x) end
@@ -46,7 +46,7 @@ local setter_text = {
         and x4 <= MAX) then
       not_finite($S, x)
     end
-    local k = i * 4
+    local k = cursor.i * 4
     c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3] = x1, x2, x3, x4]],
 }
 
@@ -89,44 +89,56 @@ local ffi, vec3, quat, kernel, frame_type, rand, refuse, layout = ...
 local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole, missing = refuse.wrong_type, refuse.not_finite, refuse.not_whole, refuse.missing
 local MAX = 3.4028234663852886e38
-local i, first, frame, random, params = -1, 0, nil, 0, nil
+local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that setting it spoils no other load
+cursor.i = -1
+local first, frame, random, params = 0, nil, 0, nil
 local kill, result, members
 local getters, setters, methods, attach = {}, {}, {}, {}
 local id_column, id_stride
 ]]
 
 local text_methods = [[
-function methods.rand(_, use, frame_or_number)
+function methods.rand(...)
+  local _, use, frame_or_number = ...
   if type(use) ~= "number" then wrong_use(use) end
   local anew = 0
   if frame_or_number ~= nil then
     anew = type(frame_or_number) == "number" and frame_or_number or frame_or_number.number
   end
-  return rand(random, id_column[i * id_stride], use, anew)
+  local drawn = rand(random, id_column[cursor.i * id_stride], use, anew)
+  return drawn
 end
 
-function methods.kill()
+function methods.kill(...)
   if kill == nil then error("kill is out of reach here", 0) end
-  kill[i] = 1
+  kill[cursor.i] = 1
 end
 
-local function alive()
-  if i < 0 then error("a point can't be used outside its kernel", 0) end
+local function dead()
+  error("a point can't be used outside its kernel", 0)
 end
 
-local function read(_, name)
-  alive()
+local function read(...)
+  local _, name = ...
+  if cursor.i < 0 then dead() end
   local get = getters[name]
-  if get then return get() end
+  if get then
+    local value = get() -- no tail call: the trace compiler gives up after fifteen of them
+    return value
+  end
   local method = methods[name]
   if method then return method end
-  return missing(name, getters)
+  missing(name, getters)
 end
 
-local function write(_, name, x)
-  alive()
+local function write(...)
+  local _, name, x = ...
+  if cursor.i < 0 then dead() end
   local set = setters[name]
-  if set then return set(x) end
+  if set then
+    set(x)
+    return
+  end
   refuse.write(name, getters)
 end
 
@@ -163,36 +175,41 @@ local function make_runner(kernel, layout, pointers)
   end
   text[#text + 1] = table.concat(locals, "\n") .. "\n"
   for _, column in ipairs(layout.columns) do
-    add("getters[$S] = function() " .. getter_text[column.type] .. " end", column.name, tostring(column.slot))
+    add("getters[$S] = function(...) " .. getter_text[column.type] .. " end", column.name, tostring(column.slot))
     if column.writable then
-      add("setters[$S] = function(x)\n" .. setter_text[column.type] .. "\nend", column.name, tostring(column.slot))
+      add("setters[$S] = function(...) local x = ...\n" .. setter_text[column.type] .. "\nend", column.name, tostring(column.slot))
     end
   end
   text[#text + 1] = [[
-if not getters.dt then getters.dt = function() return frame.dt end end
-getters.index = function() return first + i + 1 end
+if not getters.dt then getters.dt = function(...) return frame.dt end end
+getters.index = function(...) return first + cursor.i + 1 end
 ]]
 
   -- Groups by name: a chain of closures, chosen when the name is looked up.
   text[#text + 1] = "local within, join, leave = {}, {}, {}"
   for _, group in ipairs(layout.groups) do
     local n = tostring(group.slot)
-    add("within[$S] = function() return g$N[i * t$N] ~= 0 end", group.name, n)
+    add("within[$S] = function(...) return g$N[cursor.i * t$N] ~= 0 end", group.name, n)
     if group.writable then
-      add("join[$S] = function() g$N[i] = 1 end leave[$S] = function() g$N[i] = 0 end", group.name, n)
+      add("join[$S] = function(...) g$N[cursor.i] = 1 end leave[$S] = function(...) g$N[cursor.i] = 0 end", group.name, n)
     end
   end
   text[#text + 1] = [[
-function methods.within(_, name)
+function methods.within(...)
+  local _, name = ...
   local ask = within[name]
-  return ask ~= nil and ask()
+  if ask == nil then return false end
+  local member = ask()
+  return member
 end
-function methods.join(_, name)
+function methods.join(...)
+  local _, name = ...
   local act = join[name]
   if not act then refuse.group(name, "join") end
   act()
 end
-function methods.leave(_, name)
+function methods.leave(...)
+  local _, name = ...
   local act = leave[name]
   if not act then refuse.group(name, "leave") end
   act()
@@ -211,17 +228,17 @@ end
 ]]
 
   local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0" or "kernel(p, frame, params)"
-  local test = layout.masked and "if members[k] ~= 0 then i = k " .. body .. " end" or "i = k " .. body
+  local test = layout.masked and "if members[k] ~= 0 then cursor.i = k " .. body .. " end" or "cursor.i = k " .. body
   text[#text + 1] = [[
 local function run(pointer)
   local chunk = cast("rapid_chunk*", pointer)
   begin(chunk)
   for k = 0, tonumber(chunk.size) - 1 do ]] .. test .. [[ end
-  i = -1
+  cursor.i = -1
 end
 local function at()
-  local place = i
-  i = -1
+  local place = cursor.i
+  cursor.i = -1
   return place < 0 and -1 or first + place
 end
 local function set_params(values)

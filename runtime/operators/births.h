@@ -37,8 +37,8 @@ private:
     double due(std::int64_t frame, double fps) const;
 
     std::uint64_t total_ = 0;  // births of the emitter
-    double rate_ = 0;          // since the end of the frame anchor_
-    std::int64_t anchor_;      //
+    double rate_ = 0;          // 1/s
+    std::int64_t anchor_;      // frame at whose end this rate began
     double carry_ = 0;         // births due at the anchor that were not borne yet, in [0, 1)
     std::uint64_t borne_ = 0;  // births since the anchor
 };

@@ -1,4 +1,4 @@
-#include "tests/operators/node_test.h"
+#include "tests/operators/graph_test.h"
 
 namespace rapid {
 
@@ -50,6 +50,23 @@ TEST_CASE("what attribute makes is the value of all points without one, whoever 
     REQUIRE(uses.makes.size() == 1);
     REQUIRE(uses.defaults.size() == 1);
     CHECK(std::get<float>(uses.defaults[0].fallback) == 2);
+}
+
+TEST_CASE("all points have the value from their birth, but those that brought their own", "[attribute]")
+{
+    GraphTest graph;
+    const Value place = ObjectPtr(source_of(points_at({{0, 0, 0}})));
+    const auto create = graph.node("create", {{"points", place}});
+    const auto hot =
+        graph.node("emit", {{"source", place}, {"count", 1.0}, {"attributes", named({{"heat", 7.0}})}}, {create});
+    const auto plain = graph.node("emit", {{"source", place}, {"count", 1.0}}, {hot});
+    const auto attribute =
+        graph.node("attribute", {{"heat", of_frame([](const Frame& f) { return f.number; })}}, {plain});
+    graph.run(graph.node("hold", {}, {attribute}));
+
+    CHECK(values_of<float>(graph.next_frame(), "heat") == std::vector<float>{1});
+    CHECK(values_of<float>(graph.next_frame(), "heat") == std::vector<float>{1, 7, 2});
+    CHECK(values_of<float>(graph.next_frame(), "heat") == std::vector<float>{1, 7, 2, 7, 3});
 }
 
 TEST_CASE("attribute refuses names and values that can't be", "[attribute]")

@@ -1,5 +1,5 @@
 #include "runtime/graph/adopted_ids.h"
-#include "tests/operators/node_test.h"
+#include "tests/operators/graph_test.h"
 
 namespace rapid {
 
@@ -121,6 +121,39 @@ TEST_CASE("the initial points of all inputs are there at the first frame", "[mer
     const auto here = simulation(), there = simulation();
     NodeTest merge("merge", {});
     CHECK(merge.start({flow_of(here, with_ids({0}), 1), flow_of(there, with_ids({0, 1}), 2)}).points.size() == 3);
+}
+
+TEST_CASE("merged before Solve, each point of another create comes in once and is then fed back", "[merge]")
+{
+    GraphTest graph;
+    const auto place = [](float x) { return ObjectPtr(source_of(points_at({{x, 0, 0}}))); };
+    const auto here = graph.node("create", {{"points", place(1)}});
+    const auto there = graph.node("create", {{"points", place(2)}});
+    const auto born = graph.node("emit", {{"source", place(3)}, {"count", 1.0}}, {there});
+    graph.run(graph.node("hold", {}, {graph.node("merge", {}, {here, born})}));
+
+    CHECK(values_of<Vec3f>(graph.next_frame(), "P") == std::vector<Vec3f>{{1, 0, 0}, {2, 0, 0}});
+    CHECK(values_of<Vec3f>(graph.next_frame(), "P") == std::vector<Vec3f>{{1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
+    const PointSet third = graph.next_frame();
+    CHECK(third.size() == 4);
+    CHECK(ids_of(third) == Ids{0, 1, 2, 3});
+}
+
+TEST_CASE("merged after Solve, both simulations go on by themselves", "[merge]")
+{
+    GraphTest graph;
+    const Value place = ObjectPtr(source_of(points_at({{0, 0, 0}})));
+    std::vector<NodePtr> solved;
+    for (int i = 0; i < 2; ++i)
+        solved.push_back(
+            graph.node("hold", {}, {graph.node("emit", {{"source", place}, {"count", 1.0}}, {graph.node("create")})}));
+    graph.run(graph.node("merge", {}, solved));
+
+    CHECK(graph.next_frame().empty());
+    CHECK(ids_of(graph.next_frame()) == Ids{0, 1});
+    // The first simulation's second birth takes the next free id, and the other's points keep theirs.
+    CHECK(ids_of(graph.next_frame()) == Ids{0, 2, 1, 3});
+    CHECK(ids_of(graph.next_frame()) == Ids{0, 2, 4, 1, 3, 5});
 }
 
 TEST_CASE("inputs may be empty, and there may be one alone", "[merge][extreme]")

@@ -54,9 +54,10 @@ void check_column_names(std::span<const std::string> names, std::string_view for
         if (name.empty()) throw Error("a column has no name; every attribute must have one");
         const std::size_t bad = name.find_first_of(forbidden);
         if (bad != std::string::npos)
-            throw Error(fmt::format("the name \"{}\" can't be written: this format has no place for the character "
-                                    "'{}' in names; rename the attribute or group",
-                                    name, name[bad]));
+            throw Error(
+                fmt::format("the name \"{}\" can't be written: this format has no place for the character "
+                            "'{}' in names; rename the attribute or group",
+                            name, name[bad]));
         if (!seen.insert(name).second)
             throw Error(fmt::format("two columns would be called \"{}\"; rename one of the attributes", name));
     }

@@ -49,11 +49,14 @@ HoudiniType houdini_type(const std::string& name, AttributeType type)
 {
     switch (type) {
         case AttributeType::Int32:
-        case AttributeType::Int64: return IntType;
+        case AttributeType::Int64:
+            return IntType;
         // Vectors turn with the geometry; colours do not.
-        case AttributeType::Vec3: return name == "Cd" ? FloatType : VectorType;
+        case AttributeType::Vec3:
+            return name == "Cd" ? FloatType : VectorType;
         case AttributeType::Float:
-        case AttributeType::Quat: break;
+        case AttributeType::Quat:
+            break;
     }
     return FloatType;
 }
@@ -90,9 +93,9 @@ void write_bgeo(const std::filesystem::path& path, const PointSet& points, const
 
     BigEndianText header;
     header.bytes("BgeoV");
-    for (const std::size_t count : {std::size_t{5}, points.size(), std::size_t{0}, std::size_t{0}, std::size_t{0},
-                                    names.size() + points.groups().size(), std::size_t{0}, std::size_t{0},
-                                    std::size_t{0}})
+    for (const std::size_t count :
+         {std::size_t{5}, points.size(), std::size_t{0}, std::size_t{0}, std::size_t{0},
+          names.size() + points.groups().size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
         header.int32(count);
 
     RecordWriter records(ByteOrder::Big);

@@ -26,7 +26,9 @@ struct Match {
 Match match_ids(const PointSet& a, const PointSet& b, Comparison& result)
 {
     const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
-    const auto place = [](const std::vector<std::size_t>& order, std::size_t i) { return order.empty() ? i : order[i]; };
+    const auto place = [](const std::vector<std::size_t>& order, std::size_t i) {
+        return order.empty() ? i : order[i];
+    };
     Match match;
     std::size_t i = 0, j = 0;
     while (i < a.size() || j < b.size()) {
@@ -145,8 +147,8 @@ double bounds_diagonal(const PointSet& a, const PointSet& b)
     return bounds.isEmpty() ? 0 : bounds.diagonal().norm();
 }
 
-AttributeDifference compare_attribute(const std::string& name, const PointSet& a, const PointSet& b,
-                                      const Match& match, const Comparison& comparison)
+AttributeDifference compare_attribute(const std::string& name, const PointSet& a, const PointSet& b, const Match& match,
+                                      const Comparison& comparison)
 {
     AttributeDifference result;
     result.name = name;
@@ -162,8 +164,8 @@ AttributeDifference compare_attribute(const std::string& name, const PointSet& a
     }
     const double absolute = name == "P" ? comparison.tolerance_P : 0;
     const double relative = name == "P" ? 0 : comparison.tolerance;
-    std::visit([&](const auto& x, const auto& y) { compare_columns(result, x, y, match, a, absolute, relative); }, *in_a,
-               *in_b);
+    std::visit([&](const auto& x, const auto& y) { compare_columns(result, x, y, match, a, absolute, relative); },
+               *in_a, *in_b);
     return result;
 }
 
@@ -219,7 +221,8 @@ std::string missing_text(const std::vector<std::int64_t>& ids, const char* set)
     constexpr std::size_t shown = 8;
     std::string text = fmt::format("{} {} only in {}: {}", ids.size(), ids.size() == 1 ? "point is" : "points are", set,
                                    ids.size() == 1 ? "id" : "ids");
-    for (std::size_t i = 0; i < std::min(shown, ids.size()); ++i) text += fmt::format("{} {}", i > 0 ? "," : "", ids[i]);
+    for (std::size_t i = 0; i < std::min(shown, ids.size()); ++i)
+        text += fmt::format("{} {}", i > 0 ? "," : "", ids[i]);
     return text + (ids.size() > shown ? ", ...\n" : "\n");
 }
 
@@ -227,8 +230,8 @@ std::string attribute_text(const AttributeDifference& d, std::size_t width)
 {
     const std::string head = fmt::format("  {:<{}}  ", d.name, width);
     if (d.type_a.empty() || d.type_b.empty())
-        return head + fmt::format("only in {} ({})\n", d.type_a.empty() ? "B" : "A",
-                                  d.type_a.empty() ? d.type_b : d.type_a);
+        return head +
+               fmt::format("only in {} ({})\n", d.type_a.empty() ? "B" : "A", d.type_a.empty() ? d.type_b : d.type_a);
     const std::string type = d.type_a == d.type_b ? d.type_a : d.type_a + " / " + d.type_b;
     if (d.max == 0 && d.same) return head + fmt::format("{:<5}  equal\n", type);
     if (!d.same && d.max == 0) return head + fmt::format("{:<5}  can't be compared\n", type);

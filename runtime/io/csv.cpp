@@ -1,6 +1,7 @@
 // .csv: a header line, then a point a line in order of id.
 //
-//   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then groups as group:NAME, 0 or 1
+//   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then groups as group:NAME, 0 or
+//   1
 //
 // Floats have 9 significant digits, which give back the same float. Read back, every column but id is float, since the
 // file does not say more: but a column of whole numbers, of which float would round one, is int32, or int64 where
@@ -25,7 +26,10 @@ namespace {
 constexpr std::string_view group_prefix = "group:";
 constexpr std::size_t number_chars = 24;  // the longest: an int64 has 20, a float of 9 digits 15
 
-char* put(char* to, float value) { return std::to_chars(to, to + number_chars, value, std::chars_format::general, 9).ptr; }
+char* put(char* to, float value)
+{
+    return std::to_chars(to, to + number_chars, value, std::chars_format::general, 9).ptr;
+}
 
 template <class Integer>
 char* put(char* to, Integer value)
@@ -110,19 +114,15 @@ void write_csv(const std::filesystem::path& path, const PointSet& points, const 
     constexpr std::size_t tokens = 16;
     std::size_t next = 0;
     tbb::parallel_pipeline(
-        tokens, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order,
-                                                    [&](tbb::flow_control& control) {
-                                                        if (next >= points.size()) control.stop();
-                                                        return std::exchange(next, next + chunk_size);
-                                                    }) &
-                    tbb::make_filter<std::size_t, std::string>(
-                        tbb::filter_mode::parallel,
-                        [&](std::size_t begin) {
-                            return csv_lines(table, order, begin, std::min(begin + chunk_size, points.size()));
-                        }) &
-                    tbb::make_filter<std::string, void>(tbb::filter_mode::serial_in_order, [&](const std::string& text) {
-                        file.append(text.data(), text.size());
-                    }));
+        tokens,
+        tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& control) {
+            if (next >= points.size()) control.stop();
+            return std::exchange(next, next + chunk_size);
+        }) & tbb::make_filter<std::size_t, std::string>(tbb::filter_mode::parallel, [&](std::size_t begin) {
+            return csv_lines(table, order, begin, std::min(begin + chunk_size, points.size()));
+        }) & tbb::make_filter<std::string, void>(tbb::filter_mode::serial_in_order, [&](const std::string& text) {
+            file.append(text.data(), text.size());
+        }));
     file.close();
 }
 
@@ -163,10 +163,7 @@ struct CsvColumn {
     }
 };
 
-Error csv_error(std::size_t line, const std::string& what)
-{
-    return Error(fmt::format("line {}: {}", line, what));
-}
+Error csv_error(std::size_t line, const std::string& what) { return Error(fmt::format("line {}: {}", line, what)); }
 
 std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
                                      const std::vector<std::string>& names)
@@ -190,8 +187,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
                 double& number = columns[c].numbers[i];
                 std::int64_t& whole = columns[c].whole[i];
                 const auto parsed = std::from_chars(at, stop, number);
-                if (parsed.ec != std::errc())
-                    throw csv_error(i + 2, fmt::format("{} is not a number", names[c]));
+                if (parsed.ec != std::errc()) throw csv_error(i + 2, fmt::format("{} is not a number", names[c]));
                 const auto parsed_whole = std::from_chars(at, stop, whole);
                 if (parsed_whole.ec != std::errc() || parsed_whole.ptr != parsed.ptr)
                     broken[c].store(true, std::memory_order_relaxed);
@@ -237,9 +233,8 @@ PointSet read_csv(const std::filesystem::path& path)
         begin = end + 1;
     }
     const std::vector<JoinedColumns> attributes = join_components(names);
-    const bool placed = std::any_of(attributes.begin(), attributes.end(), [](const JoinedColumns& a) {
-        return a.name == "P" && a.columns.size() == 3;
-    });
+    const bool placed = std::any_of(attributes.begin(), attributes.end(),
+                                    [](const JoinedColumns& a) { return a.name == "P" && a.columns.size() == 3; });
     if (!placed) throw csv_error(1, "there are no columns Px,Py,Pz; the first line must name the columns");
     check_column_names(names, "");
 

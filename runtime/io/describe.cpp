@@ -68,8 +68,8 @@ PointSummary describe(const PointSet& points)
     }
     const AttributeSummary& P = summary.attributes[0];
     if (!P.min.empty())
-        summary.bounds = Box3f(Vec3d(P.min[0], P.min[1], P.min[2]).cast<float>(),
-                               Vec3d(P.max[0], P.max[1], P.max[2]).cast<float>());
+        summary.bounds =
+            Box3f(Vec3d(P.min[0], P.min[1], P.min[2]).cast<float>(), Vec3d(P.max[0], P.max[1], P.max[2]).cast<float>());
     for (const auto& [name, members] : points.groups()) {
         std::size_t count = 0;
         for (std::size_t i = 0; i < points.size(); ++i) count += members[i] != 0;

@@ -13,9 +13,9 @@ namespace rapid {
 struct AttributeSummary {
     std::string name;
     AttributeType type;
-    bool uniform;                   // all points have the same bits
-    std::vector<double> min, max;   // for each number of a value; empty where no value is finite
-    std::size_t not_finite = 0;     // points with a NaN or an infinity
+    bool uniform;                  // all points have the same bits
+    std::vector<double> min, max;  // for each number of a value; empty where no value is finite
+    std::size_t not_finite = 0;    // points with a NaN or an infinity
 };
 
 struct GroupSummary {

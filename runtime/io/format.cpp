@@ -28,8 +28,8 @@ std::string lower_extension(const std::filesystem::path& path)
 FormatRegistration::FormatRegistration(Format format)
 {
     std::vector<Format>& all = registry();
-    const auto after = std::find_if(all.begin(), all.end(),
-                                    [&](const Format& other) { return other.extension > format.extension; });
+    const auto after =
+        std::find_if(all.begin(), all.end(), [&](const Format& other) { return other.extension > format.extension; });
     all.insert(after, std::move(format));
 }
 

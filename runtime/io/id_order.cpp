@@ -16,9 +16,8 @@ std::vector<std::size_t> id_order(const Column<std::int64_t>& id)
     std::vector<std::size_t> order(id.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     // With the place as the second key the order is total, so that a parallel sort has one result.
-    tbb::parallel_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return ids[a] != ids[b] ? ids[a] < ids[b] : a < b;
-    });
+    tbb::parallel_sort(order.begin(), order.end(),
+                       [&](std::size_t a, std::size_t b) { return ids[a] != ids[b] ? ids[a] < ids[b] : a < b; });
     return order;
 }
 

@@ -101,11 +101,11 @@ std::vector<std::string> split(std::string_view line)
 ScalarType scalar_type(const std::string& name)
 {
     static const std::map<std::string, ScalarType> types = {
-        {"char", ScalarType::Int8},     {"int8", ScalarType::Int8},      {"uchar", ScalarType::UInt8},
-        {"uint8", ScalarType::UInt8},   {"short", ScalarType::Int16},    {"int16", ScalarType::Int16},
-        {"ushort", ScalarType::UInt16}, {"uint16", ScalarType::UInt16},  {"int", ScalarType::Int32},
-        {"int32", ScalarType::Int32},   {"uint", ScalarType::UInt32},    {"uint32", ScalarType::UInt32},
-        {"float", ScalarType::Float},   {"float32", ScalarType::Float},  {"double", ScalarType::Double},
+        {"char", ScalarType::Int8},     {"int8", ScalarType::Int8},     {"uchar", ScalarType::UInt8},
+        {"uint8", ScalarType::UInt8},   {"short", ScalarType::Int16},   {"int16", ScalarType::Int16},
+        {"ushort", ScalarType::UInt16}, {"uint16", ScalarType::UInt16}, {"int", ScalarType::Int32},
+        {"int32", ScalarType::Int32},   {"uint", ScalarType::UInt32},   {"uint32", ScalarType::UInt32},
+        {"float", ScalarType::Float},   {"float32", ScalarType::Float}, {"double", ScalarType::Double},
         {"float64", ScalarType::Double}};
     const auto found = types.find(name);
     if (found == types.end()) throw Error(fmt::format("not a valid PLY file: unknown type \"{}\"", name));
@@ -141,8 +141,7 @@ PlyHeader read_header(std::string_view text)
         } else if (words[0] == "element" && words.size() == 3) {
             PlyElement& element = header.elements.emplace_back();
             element.name = words[1];
-            const auto parsed =
-                std::from_chars(words[2].data(), words[2].data() + words[2].size(), element.count);
+            const auto parsed = std::from_chars(words[2].data(), words[2].data() + words[2].size(), element.count);
             if (parsed.ec != std::errc() || parsed.ptr != words[2].data() + words[2].size()) throw wrong();
         } else if (words[0] == "property" && words.size() == 3 && !header.elements.empty()) {
             header.elements.back().properties.push_back({words[2], scalar_type(words[1])});
@@ -180,13 +179,12 @@ std::vector<RecordAttribute> attributes_of(const PlyElement& vertex)
     std::vector<RecordAttribute> attributes;
     for (const JoinedColumns& joined : join_components(names)) {
         const PlyProperty& first = vertex.properties[joined.columns[0]];
-        const bool one_type = std::all_of(joined.columns.begin(), joined.columns.end(), [&](std::size_t c) {
-            return vertex.properties[c].type == first.type;
-        });
+        const bool one_type = std::all_of(joined.columns.begin(), joined.columns.end(),
+                                          [&](std::size_t c) { return vertex.properties[c].type == first.type; });
         const bool colour = joined.name == "Cd" && first.type == ScalarType::UInt8;
         if (joined.columns.size() == 1 && first.name.starts_with(group_prefix) && first.type == ScalarType::UInt8) {
-            attributes.push_back({first.name.substr(group_prefix.size()), first.type, {offsets[joined.columns[0]]},
-                                  true});
+            attributes.push_back(
+                {first.name.substr(group_prefix.size()), first.type, {offsets[joined.columns[0]]}, true});
         } else if (one_type && (joined.columns.size() == 1 || first.type == ScalarType::Float ||
                                 first.type == ScalarType::Double || colour)) {
             RecordAttribute& attribute = attributes.emplace_back();
@@ -223,14 +221,30 @@ std::vector<unsigned char> parse_ascii(std::string_view text, const PlyElement& 
                 to += sizeof number;
             };
             switch (property.type) {
-                case ScalarType::Int8: store(static_cast<std::int8_t>(value)); break;
-                case ScalarType::UInt8: store(static_cast<std::uint8_t>(value)); break;
-                case ScalarType::Int16: store(static_cast<std::int16_t>(value)); break;
-                case ScalarType::UInt16: store(static_cast<std::uint16_t>(value)); break;
-                case ScalarType::Int32: store(static_cast<std::int32_t>(value)); break;
-                case ScalarType::UInt32: store(static_cast<std::uint32_t>(value)); break;
-                case ScalarType::Float: store(static_cast<float>(value)); break;
-                case ScalarType::Double: store(value); break;
+                case ScalarType::Int8:
+                    store(static_cast<std::int8_t>(value));
+                    break;
+                case ScalarType::UInt8:
+                    store(static_cast<std::uint8_t>(value));
+                    break;
+                case ScalarType::Int16:
+                    store(static_cast<std::int16_t>(value));
+                    break;
+                case ScalarType::UInt16:
+                    store(static_cast<std::uint16_t>(value));
+                    break;
+                case ScalarType::Int32:
+                    store(static_cast<std::int32_t>(value));
+                    break;
+                case ScalarType::UInt32:
+                    store(static_cast<std::uint32_t>(value));
+                    break;
+                case ScalarType::Float:
+                    store(static_cast<float>(value));
+                    break;
+                case ScalarType::Double:
+                    store(value);
+                    break;
             }
         }
     return records;

@@ -61,9 +61,10 @@ void check_fits_int32(const std::string& name, const Column<std::int64_t>& colum
     for_each_chunk(distinct, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
             if (values[i] != static_cast<std::int32_t>(values[i]))
-                throw Error(fmt::format("{} = {} does not fit the int32 of this format (at most {}); write .vdb or "
-                                        ".csv, which hold int64",
-                                        name, values[i], std::numeric_limits<std::int32_t>::max()));
+                throw Error(
+                    fmt::format("{} = {} does not fit the int32 of this format (at most {}); write .vdb or "
+                                ".csv, which hold int64",
+                                name, values[i], std::numeric_limits<std::int32_t>::max()));
     });
 }
 
@@ -81,14 +82,22 @@ template <class F>
 auto with_loader(ScalarType type, ByteOrder order, const F& f)
 {
     switch (type) {
-        case ScalarType::Int8: return f([=](const unsigned char* p) { return load<std::int8_t>(p, order); });
-        case ScalarType::UInt8: return f([=](const unsigned char* p) { return load<std::uint8_t>(p, order); });
-        case ScalarType::Int16: return f([=](const unsigned char* p) { return load<std::int16_t>(p, order); });
-        case ScalarType::UInt16: return f([=](const unsigned char* p) { return load<std::uint16_t>(p, order); });
-        case ScalarType::Int32: return f([=](const unsigned char* p) { return load<std::int32_t>(p, order); });
-        case ScalarType::UInt32: return f([=](const unsigned char* p) { return load<std::uint32_t>(p, order); });
-        case ScalarType::Float: return f([=](const unsigned char* p) { return load<float>(p, order); });
-        case ScalarType::Double: break;
+        case ScalarType::Int8:
+            return f([=](const unsigned char* p) { return load<std::int8_t>(p, order); });
+        case ScalarType::UInt8:
+            return f([=](const unsigned char* p) { return load<std::uint8_t>(p, order); });
+        case ScalarType::Int16:
+            return f([=](const unsigned char* p) { return load<std::int16_t>(p, order); });
+        case ScalarType::UInt16:
+            return f([=](const unsigned char* p) { return load<std::uint16_t>(p, order); });
+        case ScalarType::Int32:
+            return f([=](const unsigned char* p) { return load<std::int32_t>(p, order); });
+        case ScalarType::UInt32:
+            return f([=](const unsigned char* p) { return load<std::uint32_t>(p, order); });
+        case ScalarType::Float:
+            return f([=](const unsigned char* p) { return load<float>(p, order); });
+        case ScalarType::Double:
+            break;
     }
     return f([=](const unsigned char* p) { return load<double>(p, order); });
 }
@@ -183,9 +192,12 @@ void RecordWriter::weave(const Part& part, std::size_t begin, std::size_t end, u
                 if (part.words == 1) return weave_words<swapped, 1>(from, part.stride, to, record_bytes_, n);
                 if (part.words == 3) return weave_words<swapped, 3>(from, part.stride, to, record_bytes_, n);
                 return weave_words<swapped, 4>(from, part.stride, to, record_bytes_, n);
-            case Part::Narrowed: return weave_narrowed<swapped>(from, part.stride, to, record_bytes_, n);
-            case Part::ByteAsWord: return weave_byte_as_word<swapped>(from, part.stride, to, record_bytes_, n);
-            case Part::Byte: break;
+            case Part::Narrowed:
+                return weave_narrowed<swapped>(from, part.stride, to, record_bytes_, n);
+            case Part::ByteAsWord:
+                return weave_byte_as_word<swapped>(from, part.stride, to, record_bytes_, n);
+            case Part::Byte:
+                break;
         }
         for (std::size_t i = 0; i < n; ++i) to[i * record_bytes_] = from[i * part.stride];
     };
@@ -232,8 +244,7 @@ PointSet read_records(std::span<const unsigned char> bytes, std::size_t n, std::
             points.set(attribute.name, records.column<Quatf, float>(attribute, offsets));
         } else {
             for (std::size_t c = 0; c < offsets.size(); ++c) {
-                const std::string name =
-                    offsets.size() == 1 ? attribute.name : fmt::format("{}{}", attribute.name, c);
+                const std::string name = offsets.size() == 1 ? attribute.name : fmt::format("{}{}", attribute.name, c);
                 const std::span<const std::size_t> one = offsets.subspan(c, 1);
                 if (floating)
                     points.set(name, records.column<float, float>(attribute, one));

@@ -19,8 +19,9 @@
 #include <openvdb/tools/PointIndexGrid.h>
 #include <openvdb/tree/LeafManager.h>
 
+#include <bit>
 #include <cmath>
-#include <fstream>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <ostream>
@@ -47,6 +48,9 @@ using LeafManager = vdb::tree::LeafManager<PointDataTree>;
 // an array an attribute), many make queries by place slow and leave the threads nothing to share.
 constexpr double leaf_points = 2048;
 constexpr double leaf_width = 8;  // voxels
+
+// OpenVDB refuses a map whose determinant, the cube of the voxel size, is below 3e-15: 2^-16 m is the finest.
+constexpr int smallest_exponent = -16;
 
 // Before any other use of OpenVDB.
 void initialize_openvdb()
@@ -80,9 +84,10 @@ double largest_coordinate(const PointSet& points)
     for (std::size_t i = 0; i < points.size(); ++i) {
         const double here = P[i].cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
         if (!std::isfinite(here))
-            throw Error(fmt::format("point {}: P = {} {} {} has no place in a grid; write .bgeo, .ply or .csv, or "
-                                    "remove the point",
-                                    points.id()[i], P[i].x(), P[i].y(), P[i].z()));
+            throw Error(
+                fmt::format("point {}: P = {} {} {} has no place in a grid; write .bgeo, .ply or .csv, or "
+                            "remove the point",
+                            points.id()[i], P[i].x(), P[i].y(), P[i].z()));
         largest = std::max(largest, here);
     }
     return largest;
@@ -114,7 +119,7 @@ int voxel_exponent(const PointSet& points)
     const double largest = largest_coordinate(points);
     if (largest == 0) return 0;
     // Finer, and the voxels of the farthest point could not be counted in int32.
-    const int finest = std::ilogb(largest) - 29;
+    const int finest = std::max(std::ilogb(largest) - 29, smallest_exponent);
 
     constexpr std::size_t sample_size = 4096;
     constexpr double sampled_in_cell = 8;
@@ -130,11 +135,12 @@ int voxel_exponent(const PointSet& points)
         if (static_cast<double>(sample.size()) / static_cast<double>(finer) < sampled_in_cell) break;
         coarser = std::exchange(occupied, finer);
     }
-    const double dimension = std::clamp(std::log2(static_cast<double>(occupied) / static_cast<double>(coarser)), 1.0, 3.0);
+    const double dimension =
+        std::clamp(std::log2(static_cast<double>(occupied) / static_cast<double>(coarser)), 1.0, 3.0);
     const double points_in_cell = static_cast<double>(points.size()) / static_cast<double>(occupied);
     const double finer_by = std::log2(points_in_cell / leaf_points) / dimension;
     const int exponent = cell - static_cast<int>(std::lround(finer_by)) - std::ilogb(leaf_width);
-    return std::clamp(exponent, finest, std::ilogb(largest) + 2);
+    return std::clamp(exponent, finest, std::max(finest, std::ilogb(largest) + 2));
 }
 
 // Positions as OpenVDB's tools ask for them.
@@ -145,10 +151,7 @@ struct Positions {
     std::size_t count;
 
     std::size_t size() const { return count; }
-    void getPos(std::size_t i, vdb::Vec3d& position) const
-    {
-        position = vdb::Vec3d(P[i].x(), P[i].y(), P[i].z());
-    }
+    void getPos(std::size_t i, vdb::Vec3d& position) const { position = vdb::Vec3d(P[i].x(), P[i].y(), P[i].z()); }
 };
 
 // Writes the leaf's share of a column: a uniform array where all its values have the same bits.
@@ -196,8 +199,7 @@ PointDataGrid::Ptr make_grid(const PointSet& points)
         std::visit(
             [&](const auto& c) {
                 using Value = typename VdbValue<std::decay_t<decltype(c[0])>>::Type;
-                vdb::points::appendAttribute(tree, name,
-                                             vdb::points::TypedAttributeArray<Value>::attributeType());
+                vdb::points::appendAttribute(tree, name, vdb::points::TypedAttributeArray<Value>::attributeType());
             },
             column);
     }
@@ -205,7 +207,7 @@ PointDataGrid::Ptr make_grid(const PointSet& points)
 
     const auto& descriptor = tree.cbeginLeaf()->attributeSet().descriptor();
     LeafManager leaves(tree);
-    leaves.foreach([&](Leaf& leaf, std::size_t) {
+    leaves.foreach ([&](Leaf& leaf, std::size_t) {
         const auto& order = indices->tree().probeConstLeaf(leaf.origin())->indices();
         for (const auto& [name, column] : points.columns())
             if (name != "P")
@@ -287,6 +289,26 @@ public:
     }
 };
 
+// OpenVDB marks each file with a random UUID, and the same points would never give the same bytes. This one is made
+// from the frame and a sample of its positions.
+std::string file_uuid(const PointSet& points, const FrameInfo& frame)
+{
+    std::uint64_t hash = 14695981039346656037ull;
+    const auto add = [&](std::uint64_t bits) { hash = (hash ^ bits) * 0x9e3779b97f4a7c15ull, hash ^= hash >> 31; };
+    add(static_cast<std::uint64_t>(frame.number));
+    add(points.size());
+    const std::size_t step = std::max<std::size_t>(1, points.size() / 1024);
+    for (std::size_t i = 0; i < points.size(); i += step)
+        for (int axis = 0; axis < 3; ++axis) add(std::bit_cast<std::uint32_t>(points.P()[i][axis]));
+    const std::uint64_t first = hash;
+    add(~first);
+    return fmt::format("{:08x}-{:04x}-4{:03x}-8{:03x}-{:012x}", first >> 32, first >> 16 & 0xffff, first & 0xfff,
+                       hash >> 48 & 0xfff, hash & 0xffffffffffff);
+}
+
+// Where the UUID is: behind the magic number, three versions and a flag.
+constexpr std::uint64_t uuid_offset = 8 + 3 * 4 + 1;
+
 void write_vdb(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame)
 {
     initialize_openvdb();
@@ -302,6 +324,8 @@ void write_vdb(const std::filesystem::path& path, const PointSet& points, const 
         stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);  // rethrows the buffer's own error
         Archive().write_to(stream, {grid});
         buffer.flush();
+        const std::string uuid = file_uuid(points, frame);
+        file.write_at(uuid_offset, uuid.data(), uuid.size());
         file.close();
     } catch (const vdb::Exception& error) {
         throw Error(fmt::format("can't be written: {}", error.what()));
@@ -440,8 +464,8 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
         if (name == "P" || vdb::points::isGroup(array)) continue;
         const std::string type = descriptor.valueType(position);
         if (name == "id" && array.stride() == 1 && (type == "int32" || type == "int64")) {
-            (type == "int32" ? read_attribute<std::int64_t, std::int32_t> : read_attribute<std::int64_t, std::int64_t>)(
-                points, places, name, name, 0);
+            (type == "int32" ? read_attribute<std::int64_t, std::int32_t>
+                             : read_attribute<std::int64_t, std::int64_t>)(points, places, name, name, 0);
             has_id = true;
             continue;
         }

@@ -18,9 +18,9 @@ namespace rapid::test {
 struct RandomPoints {
     std::size_t size = 0;
     unsigned seed = 1;
-    float extent = 2;             // m
+    float extent = 2;  // m
     std::int64_t first_id = 0;
-    bool wide = true;             // an int64 attribute beside id
+    bool wide = true;  // an int64 attribute beside id
 };
 
 inline PointSet random_points(const RandomPoints& wanted)

@@ -64,7 +64,7 @@ TEST_CASE("the bytes of a .csv do not depend on the number of threads", "[io][cs
         write_points(folder / "a.csv", points);
         const std::string bytes = file_text(folder / "a.csv");
         if (first.empty()) first = bytes;
-        CHECK(bytes == first);
+        CHECK((bytes == first));
     }
 }
 

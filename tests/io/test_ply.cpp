@@ -77,7 +77,7 @@ TEST_CASE("a big-endian PLY is read", "[io][ply]")
     std::string text =
         "ply\nformat binary_big_endian 1.0\nelement camera 1\nproperty short f\nelement vertex 1\n"
         "property float x\nproperty float y\nproperty float z\nend_header\n";
-    text += std::string("\x00\x00", 2);                                        // the camera
+    text += std::string("\x00\x00", 2);                                           // the camera
     text += std::string("\x3f\x80\x00\x00\x40\x00\x00\x00\xc0\x40\x00\x00", 12);  // 1 2 -3
     std::ofstream(folder / "a.ply", std::ios::binary) << text;
 

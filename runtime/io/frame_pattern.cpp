@@ -1,0 +1,156 @@
+#include "runtime/io/frame_pattern.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <climits>
+#include <system_error>
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+struct FramePlace {
+    std::size_t begin, end;  // in the text
+    int digits;
+};
+
+// The digits of a width that begins at `at`, and where they end.
+int read_width(const std::string& text, std::size_t& at)
+{
+    int width = 0;
+    while (at < text.size() && is_digit(text[at]) && width < 100) width = 10 * width + (text[at++] - '0');
+    return width;
+}
+
+std::optional<FramePlace> place_at(const std::string& text, std::size_t begin)
+{
+    std::size_t end = begin;
+    if (text[begin] == '#') {
+        while (end < text.size() && text[end] == '#') ++end;
+        const std::size_t count = end - begin;
+        return FramePlace{begin, end, count == 1 ? 4 : static_cast<int>(count)};
+    }
+    if (text[begin] == '$' && text.compare(begin, 2, "$F") == 0) {
+        end = begin + 2;
+        const int width = read_width(text, end);
+        return FramePlace{begin, end, std::max(1, width)};
+    }
+    if (text[begin] == '%') {
+        end = begin + 1;
+        const int width = read_width(text, end);
+        if (end == text.size() || text[end] != 'd')
+            throw Error(fmt::format("\"{}\": the % must be a frame number such as %04d", text));
+        return FramePlace{begin, end + 1, std::max(1, width)};
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+FramePattern::FramePattern(std::string text) : text_(std::move(text)), before_(text_)
+{
+    for (std::size_t at = 0; at < text_.size(); ++at) {
+        const std::optional<FramePlace> place = place_at(text_, at);
+        if (!place) continue;
+        if (digits_) throw Error(fmt::format("\"{}\" has two frame numbers; it must have one", text_));
+        before_ = text_.substr(0, place->begin);
+        after_ = text_.substr(place->end);
+        digits_ = place->digits;
+        at = place->end - 1;
+    }
+    if (digits_ && after_.find('/') != std::string::npos)
+        throw Error(fmt::format("\"{}\": the frame number must be in the name of the file, not of its folder", text_));
+}
+
+namespace {
+
+std::string with_output(std::string text, std::string_view output)
+{
+    constexpr std::string_view place = "{output}";
+    for (std::size_t at = 0; (at = text.find(place, at)) != std::string::npos; at += output.size())
+        text.replace(at, place.size(), output);
+    return text;
+}
+
+}  // namespace
+
+std::string FramePattern::expand(int frame, std::string_view output) const
+{
+    if (!digits_) return with_output(text_, output);
+    // A minus sign does not count as a digit: -1 is -0001, as Houdini has it.
+    const std::string number =
+        fmt::format("{}{:0{}}", frame < 0 ? "-" : "", std::abs(static_cast<long long>(frame)), *digits_);
+    return with_output(before_, output) + number + with_output(after_, output);
+}
+
+std::map<int, fs::path> FramePattern::existing(std::string_view output) const
+{
+    std::map<int, fs::path> found;
+    if (!digits_) {
+        const fs::path path = with_output(text_, output);
+        if (fs::exists(path)) found.emplace(0, path);
+        return found;
+    }
+    const fs::path prefix_path = with_output(before_, output);
+    const fs::path folder = prefix_path.parent_path();
+    const std::string prefix = prefix_path.filename().string(), suffix = with_output(after_, output);
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+        const std::string name = entry.path().filename().string();
+        if (name.size() <= prefix.size() + suffix.size() || !name.starts_with(prefix) || !name.ends_with(suffix))
+            continue;
+        const std::string number = name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
+        int frame = 0;
+        const auto parsed = std::from_chars(number.data(), number.data() + number.size(), frame);
+        if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size()) continue;
+        // Only the name that this pattern would write: 7 and 0007 are not the same file.
+        if (fs::path(expand(frame, output)).filename() == name) found.emplace(frame, folder / name);
+    }
+    return found;
+}
+
+OutputTarget parse_output_target(const std::string& text)
+{
+    // The attributes follow the last colon of the file's name, behind its extension: C:/x.vdb and a:b.vdb have none.
+    const std::size_t name = text.find_last_of('/') == std::string::npos ? 0 : text.find_last_of('/') + 1;
+    const std::size_t colon = text.find_last_of(':');
+    const bool has_attributes =
+        colon != std::string::npos && colon > name && text.find('.', colon) == std::string::npos;
+    if (!has_attributes) return {text, std::nullopt};
+
+    OutputTarget target{text.substr(0, colon), std::vector<std::string>()};
+    const std::string list = text.substr(colon + 1);
+    for (std::size_t begin = 0; begin < list.size();) {
+        const std::size_t end = std::min(list.find(',', begin), list.size());
+        if (end > begin) target.attributes->push_back(list.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return target;
+}
+
+PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names)
+{
+    for (const std::string& name : names)
+        if (!points.has(name) && !points.find_group(name)) {
+            std::vector<std::string> known = points.column_names();
+            for (const std::string& group : points.group_names()) known.push_back(group);
+            throw Error(
+                fmt::format("there is no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
+        }
+    const auto wanted = [&](const std::string& name) {
+        return name == "P" || name == "v" || name == "id" || std::find(names.begin(), names.end(), name) != names.end();
+    };
+    PointSet selected = points;
+    for (const std::string& name : points.column_names())
+        if (!wanted(name)) selected.remove(name);
+    for (const std::string& name : points.group_names())
+        if (!wanted(name)) selected.remove_group(name);
+    return selected;
+}
+
+}  // namespace rapid

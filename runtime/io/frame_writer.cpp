@@ -1,0 +1,138 @@
+#include "runtime/io/frame_writer.h"
+
+#include <chrono>
+#include <system_error>
+#include <utility>
+
+namespace rapid {
+
+FrameWriter::FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting) : waiting_(waiting)
+{
+    for (const OutputTarget& target : targets) {
+        const bool picture = format_of(target.pattern).extension == ".png";
+        targets_.push_back({FramePattern(target.pattern), target.attributes, picture});
+    }
+    thread_ = std::thread([this] { run(); });
+}
+
+FrameWriter::~FrameWriter()
+{
+    {
+        const std::lock_guard lock(mutex_);
+        jobs_.clear();
+        stopping_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+}
+
+void FrameWriter::submit(PointSet points, FrameInfo frame, std::string output)
+{
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return error_ || jobs_.size() < std::max<std::size_t>(1, waiting_); });
+    if (error_) std::rethrow_exception(error_);
+    jobs_.push_back({std::move(points), std::move(frame), std::move(output)});
+    changed_.notify_all();
+}
+
+void FrameWriter::finish()
+{
+    {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [&] { return error_ || (jobs_.empty() && !busy_); });
+        if (error_) std::rethrow_exception(error_);
+    }
+    for (auto& [output, pictures] : pictures_)
+        if (!pictures.waiting.empty()) {
+            const Job& last = pictures.waiting.back().second;
+            write_waiting(pictures, std::make_shared<PictureView>(pictures.fit.next(last.points, last.frame)));
+        }
+}
+
+double FrameWriter::seconds(int frame) const
+{
+    const std::lock_guard lock(mutex_);
+    double total = 0;
+    for (const Written& file : written_)
+        if (file.frame == frame) total += file.seconds;
+    return total;
+}
+
+std::vector<FrameWriter::Written> FrameWriter::written() const
+{
+    const std::lock_guard lock(mutex_);
+    return written_;
+}
+
+void FrameWriter::run()
+{
+    std::unique_lock lock(mutex_);
+    while (true) {
+        changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
+        if (jobs_.empty()) return;
+        Job job = std::move(jobs_.front());
+        jobs_.pop_front();
+        busy_ = true;
+        changed_.notify_all();
+        lock.unlock();
+
+        std::exception_ptr error;
+        try {
+            write(job);
+        } catch (...) {
+            error = std::current_exception();
+        }
+        job = {};  // its columns are released before a waiting submit() goes on
+
+        lock.lock();
+        busy_ = false;
+        if (error) {
+            error_ = error;
+            jobs_.clear();
+        }
+        changed_.notify_all();
+        if (error) return;
+    }
+}
+
+void FrameWriter::write(const Job& job)
+{
+    std::shared_ptr<const PictureView> view = job.frame.view;
+    for (const Target& target : targets_) {
+        if (target.picture && !view) {
+            Pictures& pictures = pictures_[job.output];
+            if (job.points.empty() && !pictures.fit.settled()) {
+                pictures.waiting.emplace_back(&target, job);
+                continue;
+            }
+            view = std::make_shared<PictureView>(pictures.fit.next(job.points, job.frame));
+            write_waiting(pictures, view);
+        }
+        write_file(target, job, view);
+    }
+}
+
+void FrameWriter::write_waiting(Pictures& pictures, const std::shared_ptr<const PictureView>& view)
+{
+    for (const auto& [target, job] : std::exchange(pictures.waiting, {})) write_file(*target, job, view);
+}
+
+void FrameWriter::write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view)
+{
+    const auto begin = std::chrono::steady_clock::now();
+    const std::string path = target.pattern.expand(job.frame.number, job.output);
+    FrameInfo frame = job.frame;
+    frame.view = std::move(view);
+    try {
+        write_points(path, target.attributes ? select_attributes(job.points, *target.attributes) : job.points, frame);
+    } catch (Error& error) {
+        throw error.at({path, 0});
+    }
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+    std::error_code ignored;
+    const std::uintmax_t bytes = std::filesystem::file_size(path, ignored);
+    const std::lock_guard lock(mutex_);
+    written_.push_back({job.frame.number, path, spent.count(), bytes});
+}
+
+}  // namespace rapid

@@ -1,0 +1,89 @@
+// Writing a million points of 32 bytes (P, v, int64 id) in each format, beside what the machine allows: the same bytes
+// from one interleaved array. On a memory file system, so that the disk does not count.
+#include <benchmark/benchmark.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <random>
+#include <vector>
+
+#include "runtime/io/format.h"
+#include "runtime/io/picture.h"
+
+namespace {
+
+using namespace rapid;
+
+constexpr std::size_t count = 1'000'000;
+
+const PointSet& million()
+{
+    static const PointSet points = [] {
+        std::mt19937 random(1);
+        std::normal_distribution<float> normal;
+        PointSet made;
+        made.append(count);
+        std::span<Vec3f> P = made.P().overwrite(), v = made.v().overwrite();
+        std::span<std::int64_t> id = made.id().overwrite();
+        for (std::size_t i = 0; i < count; ++i) {
+            P[i] = Vec3f(normal(random), normal(random), normal(random));
+            v[i] = Vec3f(normal(random), normal(random), normal(random));
+            id[i] = static_cast<std::int64_t>(i);
+        }
+        return made;
+    }();
+    return points;
+}
+
+std::filesystem::path scratch(const std::string& name)
+{
+    const std::filesystem::path memory = "/dev/shm";
+    const std::filesystem::path folder =
+        std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path();
+    return folder / ("rapid-bench-" + std::to_string(getpid()) + name);
+}
+
+void raw_interleaved(benchmark::State& state)
+{
+    const std::vector<char> bytes(32 * count, 1);
+    const std::filesystem::path path = scratch(".raw");
+    for (auto _ : state) {
+        const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+        for (std::size_t at = 0; at < bytes.size();)
+            at += static_cast<std::size_t>(std::max<ssize_t>(0, write(file, bytes.data() + at, bytes.size() - at)));
+        close(file);
+    }
+    std::filesystem::remove(path);
+    state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
+}
+BENCHMARK(raw_interleaved)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void write_format(benchmark::State& state, const std::string& extension)
+{
+    const std::filesystem::path path = scratch(extension);
+    for (auto _ : state) write_points(path, million());
+    state.counters["bytes"] = static_cast<double>(std::filesystem::file_size(path));
+    std::filesystem::remove(path);
+    state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
+}
+BENCHMARK_CAPTURE(write_format, vdb, ".vdb")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(write_format, bgeo, ".bgeo")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(write_format, ply, ".ply")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(write_format, csv, ".csv")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(write_format, png, ".png")->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void read_format(benchmark::State& state, const std::string& extension)
+{
+    const std::filesystem::path path = scratch(extension);
+    write_points(path, million());
+    for (auto _ : state) benchmark::DoNotOptimize(read_points(path).size());
+    std::filesystem::remove(path);
+    state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
+}
+BENCHMARK_CAPTURE(read_format, vdb, ".vdb")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(read_format, bgeo, ".bgeo")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(read_format, ply, ".ply")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(read_format, csv, ".csv")->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace

@@ -1,0 +1,76 @@
+#include "runtime/io/frame_pattern.h"
+
+#include "tests/io/random_points.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+TEST_CASE("every way to write a frame number in a name is expanded and padded", "[io][pattern]")
+{
+    const auto name = [](const char* pattern, int frame) { return FramePattern(pattern).expand(frame); };
+    CHECK(name("a.####.vdb", 7) == "a.0007.vdb");
+    CHECK(name("a.##.vdb", 7) == "a.07.vdb");
+    CHECK(name("a.##.vdb", 12345) == "a.12345.vdb");
+    CHECK(name("a.#.vdb", 7) == "a.0007.vdb");  // a lone # means four digits
+    CHECK(name("a.$F4.vdb", 7) == "a.0007.vdb");
+    CHECK(name("a.$F.vdb", 7) == "a.7.vdb");
+    CHECK(name("a.$F3x.vdb", 7) == "a.007x.vdb");
+    CHECK(name("a.%04d.vdb", 7) == "a.0007.vdb");
+    CHECK(name("a.%d.vdb", 7) == "a.7.vdb");
+    CHECK(name("a.####.vdb", -3) == "a.-0003.vdb");
+    CHECK(name("a.####.vdb", 0) == "a.0000.vdb");
+    CHECK(name("a.vdb", 7) == "a.vdb");
+    CHECK(FramePattern("{output}/{output}.##.vdb").expand(1, "sparks") == "sparks/sparks.01.vdb");
+}
+
+TEST_CASE("a pattern that is not one frame number in a file's name is refused", "[io][pattern]")
+{
+    CHECK(error_of([] { FramePattern("a.%s.vdb"); }) == "\"a.%s.vdb\": the % must be a frame number such as %04d");
+    CHECK(error_of([] { FramePattern("a.##.$F4.vdb"); }) == "\"a.##.$F4.vdb\" has two frame numbers; it must have one");
+    CHECK(error_of([] { FramePattern("####/a.vdb"); }) ==
+          "\"####/a.vdb\": the frame number must be in the name of the file, not of its folder");
+}
+
+TEST_CASE("the existing files of a sequence are those that the pattern would write", "[io][pattern]")
+{
+    const TemporaryFolder folder;
+    for (const char* name :
+         {"a.0001.vdb", "a.0012.vdb", "a.10000.vdb", "a.12.vdb", "a.x.vdb", "b.0003.vdb", "a.0004.ply"})
+        std::ofstream(folder / name) << "x";
+
+    const auto found = FramePattern((folder / "a.####.vdb").string()).existing();
+
+    REQUIRE(found.size() == 3);
+    CHECK(found.at(1) == folder / "a.0001.vdb");
+    CHECK(found.at(12) == folder / "a.0012.vdb");
+    CHECK(found.at(10000) == folder / "a.10000.vdb");
+    CHECK(FramePattern((folder / "none" / "a.####.vdb").string()).existing().empty());
+    CHECK(FramePattern((folder / "b.0003.vdb").string()).existing().size() == 1);
+}
+
+TEST_CASE("the attributes behind an output's file name are told from colons in the name", "[io][pattern]")
+{
+    const OutputTarget plain = parse_output_target("out/a.####.vdb");
+    CHECK(plain.pattern == "out/a.####.vdb");
+    CHECK_FALSE(plain.attributes);
+
+    const OutputTarget some = parse_output_target("out:1/a:b.####.vdb:age,Cd");
+    CHECK(some.pattern == "out:1/a:b.####.vdb");
+    CHECK(some.attributes == std::vector<std::string>{"age", "Cd"});
+
+    CHECK_FALSE(parse_output_target("a:b.vdb").attributes);
+    CHECK(parse_output_target("a.vdb:").attributes->empty());
+}
+
+TEST_CASE("selected attributes are P, v, id and the named ones, groups too", "[io][pattern]")
+{
+    const PointSet points = random_points({.size = 5});
+
+    const PointSet selected = select_attributes(points, {"age", "hot"});
+
+    CHECK(selected.column_names() == std::vector<std::string>{"P", "age", "id", "v"});
+    CHECK(selected.group_names() == std::vector<std::string>{"hot"});
+    CHECK(error_of([&] { select_attributes(points, {"agee"}); }) ==
+          "there is no attribute or group \"agee\" to write; did you mean \"age\"?");
+}

@@ -1,0 +1,247 @@
+#include "runtime/io/frame_writer.h"
+
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "runtime/io/file.h"
+#include "tests/io/random_points.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+namespace {
+
+// A memory file system of a megabyte, where the test may mount one.
+class SmallDisk {
+public:
+    SmallDisk() { mounted_ = ::mount("tmpfs", folder_.path().c_str(), "tmpfs", 0, "size=1m") == 0; }
+    ~SmallDisk()
+    {
+        if (mounted_) ::umount(folder_.path().c_str());
+    }
+    bool mounted() const { return mounted_; }
+    const TemporaryFolder& folder() const { return folder_; }
+
+private:
+    TemporaryFolder folder_;
+    bool mounted_;
+};
+
+// Becomes another user, whom permissions bind, for as long as it lives.
+class Unprivileged {
+public:
+    Unprivileged() { changed_ = ::geteuid() == 0 && ::seteuid(65534) == 0; }
+    ~Unprivileged()
+    {
+        if (changed_ && ::seteuid(0) != 0) std::abort();
+    }
+
+private:
+    bool changed_;
+};
+
+// Small pictures, for quick tests.
+std::shared_ptr<const PictureOptions> small_picture()
+{
+    return std::make_shared<PictureOptions>(PictureOptions{.width = 160, .height = 90});
+}
+
+std::string four_digits(int frame) { return FramePattern("####").expand(frame); }
+
+std::string pattern(const TemporaryFolder& folder, const std::string& name) { return (folder / name).string(); }
+
+}  // namespace
+
+TEST_CASE("all frames are written to all patterns, with missing folders made", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    FrameWriter writer({{pattern(folder, "new/deep/a.####.ply"), {}},
+                        {pattern(folder, "new/{output}.####.csv"), std::vector<std::string>{"age"}}});
+    for (int frame = 1; frame <= 10; ++frame)
+        writer.submit(random_points({.size = 100, .seed = static_cast<unsigned>(frame), .wide = false}),
+                      {.number = frame}, "sparks");
+    writer.finish();
+
+    CHECK(file_names(folder / "new/deep").size() == 10);
+    for (int frame = 1; frame <= 10; ++frame) {
+        const PointSet expected = random_points({.size = 100, .seed = static_cast<unsigned>(frame), .wide = false});
+        const std::string number = four_digits(frame);
+        CHECK(differing_columns(expected, read_points(folder / ("new/deep/a." + number + ".ply"))) == "");
+        CHECK(read_points(folder / ("new/sparks." + number + ".csv")).column_names() ==
+              std::vector<std::string>{"P", "age", "id", "v"});
+        CHECK(writer.seconds(frame) > 0);
+    }
+    CHECK(writer.seconds(11) == 0);
+    CHECK(writer.written().size() == 20);
+    CHECK(writer.written()[0].bytes == std::filesystem::file_size(folder / "new/deep/a.0001.ply"));
+}
+
+TEST_CASE("what changes in a point set after it was submitted is not in the file", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    PointSet points = random_points({.size = 20000, .wide = false});
+    const PointSet before = points;
+    FrameWriter writer({{pattern(folder, "a.##.ply"), {}}});
+    writer.submit(points, {.number = 1});
+    for (Vec3f& P : points.P().write()) P = Vec3f(9, 9, 9);
+    points.keep(std::vector<std::uint8_t>(20000, 0));
+    writer.finish();
+
+    CHECK(differing_columns(before, read_points(folder / "a.01.ply")) == "");
+}
+
+TEST_CASE("a full disk is an error that names the file, earlier frames stay, nothing unfinished does", "[io][writer]")
+{
+    const std::string extension = GENERATE(".ply", ".bgeo", ".vdb", ".csv", ".png");
+    CAPTURE(extension);
+    const SmallDisk disk;
+    if (!disk.mounted()) return;  // not allowed to mount: nothing to fill
+    const std::string name = "a.####" + extension;
+    const PointSet points = random_points({.size = 4000, .wide = false});
+
+    FrameWriter writer({{pattern(disk.folder(), name), {}}});
+    const std::string error = error_of([&] {
+        for (int frame = 1; frame <= 40; ++frame) writer.submit(points, {.number = frame});
+        writer.finish();
+    });
+
+    const std::vector<std::string> names = file_names(disk.folder().path());
+    REQUIRE(!names.empty());
+    const int complete = static_cast<int>(names.size());
+    CHECK(error == pattern(disk.folder(), "a." + four_digits(complete + 1) + extension) +
+                       ": can't be written: No space left on device");
+    for (int frame = 1; frame <= complete; ++frame)
+        CHECK(names[static_cast<std::size_t>(frame - 1)] == "a." + four_digits(frame) + extension);
+    if (extension != ".png") CHECK(read_points(disk.folder() / names.back()).size() == 4000);
+    // The same error again: a caller that went on would lose frames without knowing.
+    CHECK(error_of([&] { writer.submit(points, {.number = 41}); }) == error);
+}
+
+TEST_CASE("a read-only folder, a folder that is a file and a file that is a folder are errors that say so",
+          "[io][writer]")
+{
+    const TemporaryFolder folder;
+    const PointSet points = random_points({.size = 2, .wide = false});
+    const auto error = [&](const std::string& name) { return error_of([&] { write_points(folder / name, points); }); };
+    std::ofstream(folder / "file") << "x";
+    CHECK_THAT(error("file/a.ply"), Catch::StartsWith(pattern(folder, "file/a.ply") + ": can't make the folder") &&
+                                        Catch::EndsWith("Not a directory"));
+    std::filesystem::create_directories(folder / "b.ply");
+    CHECK(error("b.ply") == pattern(folder, "b.ply") + ": can't be written: it is not a regular file");
+
+    std::filesystem::create_directories(folder / "locked");
+    std::filesystem::permissions(folder / "locked",
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec |
+                                     std::filesystem::perms::others_read | std::filesystem::perms::others_exec);
+    std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
+    const Unprivileged someone;
+    CHECK(error("locked/a.ply") == pattern(folder, "locked/a.ply") + ": can't be written: Permission denied");
+}
+
+TEST_CASE("a file has its name only when it is complete, and replaces the old one at once", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "a.ply") << "old";
+    {
+        UnfinishedFile file(folder / "a.ply");
+        OutputFile output(file.path());
+        output.append("half", 4);
+        CHECK(file.path().parent_path() == folder.path());
+        CHECK(file.path().filename().string()[0] == '.');
+        CHECK(file_text(folder / "a.ply") == "old");
+    }
+    CHECK(file_names(folder.path()) == std::vector<std::string>{"a.ply"});
+    CHECK(file_text(folder / "a.ply") == "old");
+
+    UnfinishedFile file(folder / "a.ply");
+    OutputFile output(file.path());
+    output.append("whole", 5);
+    output.close();
+    file.finish();
+    CHECK(file_text(folder / "a.ply") == "whole");
+    CHECK(file_names(folder.path()) == std::vector<std::string>{"a.ply"});
+}
+
+TEST_CASE("a signal handler's call removes what is unfinished, and no file is begun after it", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    // In a process of its own: the call is for one that ends.
+    const pid_t child = ::fork();
+    if (child == 0) {
+        UnfinishedFile file(folder / "a.ply");
+        OutputFile output(file.path());
+        output.append("half", 4);
+        remove_unfinished_files();
+        bool refused = false;
+        try {
+            UnfinishedFile another(folder / "b.ply");
+        } catch (const Error&) {
+            refused = true;
+        }
+        ::_exit(refused ? 0 : 1);
+    }
+    int status = -1;
+    ::waitpid(child, &status, 0);
+    CHECK(status == 0);
+    CHECK(file_names(folder.path()).empty());
+}
+
+TEST_CASE("pictures before the first points wait, and share the view of the first frame that has some", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    FrameWriter writer({{pattern(folder, "a.##.png"), {}}, {pattern(folder, "a.##.csv"), {}}});
+    writer.submit(PointSet(), {.number = 1, .picture = small_picture()});
+    writer.submit(PointSet(), {.number = 2, .time = 1.0 / 24, .picture = small_picture()});
+    PointSet far_away = random_points({.size = 50});
+    for (Vec3f& P : far_away.P().write()) P += Vec3f(1000, 0, 0);
+    writer.submit(far_away, {.number = 3, .time = 2.0 / 24, .picture = small_picture()});
+    writer.finish();
+
+    CHECK(file_names(folder.path()).size() == 6);
+    // Frame 2 shows the same lines on the ground as one of no points with the third frame's view.
+    PictureFit fit;
+    const PictureView view = fit.next(far_away, {.number = 3, .time = 2.0 / 24, .picture = small_picture()});
+    write_points(folder / "expected.png", PointSet(),
+                 {.number = 2, .picture = small_picture(), .view = std::make_shared<PictureView>(view)});
+    CHECK((file_text(folder / "a.02.png") == file_text(folder / "expected.png")));
+}
+
+TEST_CASE("pictures of a sequence without any points are written in the end", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    FrameWriter writer({{pattern(folder, "a.##.png"), {}}});
+    writer.submit(PointSet(), {.number = 1, .picture = small_picture()});
+    writer.submit(PointSet(), {.number = 2, .picture = small_picture()});
+    writer.finish();
+    CHECK(file_names(folder.path()) == std::vector<std::string>{"a.01.png", "a.02.png"});
+}
+
+TEST_CASE("an unknown extension is refused with the known ones, before anything runs", "[io][writer]")
+{
+    CHECK(error_of([] {
+              FrameWriter(std::vector<OutputTarget>{{"a.####.abc", {}}});
+          }) == "a.####.abc: unknown extension \".abc\"; it must be one of .bgeo, .csv, .ply, .png, .vdb");
+    CHECK(error_of([] { format_of("a"); }) ==
+          "a: it has no extension; it must be one of .bgeo, .csv, .ply, .png, .vdb");
+    CHECK(format_of("A.VDB").extension == ".vdb");
+    CHECK(error_of([] { read_points("a.png"); }) == "a.png: a .png file holds no points that could be read");
+    CHECK(error_of([] { read_points("/nowhere/a.vdb"); }) ==
+          "/nowhere/a.vdb: can't be read: No such file or directory");
+}
+
+TEST_CASE("a writer that is dropped writes no half frame and leaves nothing hidden", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    const PointSet points = random_points({.size = 50000});
+    {
+        FrameWriter writer({{pattern(folder, "a.##.vdb"), {}}});
+        for (int frame = 1; frame <= 3; ++frame) writer.submit(points, {.number = frame});
+    }
+    const std::vector<std::string> names = file_names(folder.path());
+    for (const std::string& name : names) {
+        CHECK(name[0] == 'a');
+        CHECK(read_points(folder / name).size() == 50000);
+    }
+}

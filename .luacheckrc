@@ -13,5 +13,5 @@ files["lua/host.lua"] = { globals = { string = { fields = { "dump" } } } }
 
 files["tests"] = {
   std = "luajit+busted",
-  read_globals = { "vec3", assert = { fields = { "near", "points", "same_points" } } },
+  read_globals = { "rapid", "vec3", assert = { fields = { "near", "points", "same_points" } } },
 }

@@ -15,6 +15,7 @@ require "busted.luajit" ()
 local rapid = require "testing.rapid" (native)
 package.preload.rapid = function() return rapid end
 rawset(_G, "rapid", rapid)
+rawset(_G, "vec3", require("vec3").make)
 require "testing.assertions" (native)
 
 -- The names of the enclosing describe blocks and of the test itself.

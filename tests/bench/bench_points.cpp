@@ -1,0 +1,81 @@
+// The cost of what every frame does to a point set: births, deaths, and a copy of which one column is written.
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <string>
+
+#include "runtime/points/point_set.h"
+#include "runtime/random.h"
+
+namespace rapid {
+namespace {
+
+// P, v, id and seven floats, none of them uniform: 60 bytes a point.
+PointSet ten_columns(std::size_t size)
+{
+    PointSet points;
+    points.append(size);
+    for (int i = 0; i < 7; ++i) points.add({fmt::format("f{}", i), 0.0f});
+    for (const std::string& name : points.column_names())
+        std::visit([](auto& column) { column.write(); }, *points.find(name));
+    return points;
+}
+
+// 48 frames' births of an emitter, into a set that starts empty.
+void append(benchmark::State& state)
+{
+    const auto births = static_cast<std::size_t>(state.range(0));
+    constexpr int frames = 48;
+    for (auto _ : state) {
+        PointSet points;
+        for (int frame = 0; frame < frames; ++frame) {
+            const std::size_t before = points.size();
+            points.append(births);
+            auto P = points.P().write();
+            auto v = points.v().write();
+            auto id = points.id().write();
+            for (std::size_t i = before; i < points.size(); ++i) {
+                P[i] = Vec3f(0, 1, 0);
+                v[i] = Vec3f(0, 2, 0);
+                id[i] = static_cast<std::int64_t>(i);
+            }
+        }
+        benchmark::DoNotOptimize(points);
+    }
+    state.SetItemsProcessed(state.iterations() * frames * static_cast<std::int64_t>(births));
+}
+BENCHMARK(append)->Arg(2000)->Arg(20000)->Arg(200000)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// A tenth of the points dies, spread over the set.
+void kill_a_tenth(benchmark::State& state)
+{
+    const auto size = static_cast<std::size_t>(state.range(0));
+    std::vector<std::uint8_t> keep(size);
+    for (std::size_t i = 0; i < size; ++i) keep[i] = uniform4(RandomKey(7, "kill"), i, 0)[0] >= 0.1;
+    for (auto _ : state) {
+        state.PauseTiming();
+        PointSet points = ten_columns(size);
+        state.ResumeTiming();
+        points.keep(keep);
+        state.PauseTiming();
+        points = PointSet();
+        state.ResumeTiming();
+    }
+    state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(kill_a_tenth)->Arg(10000)->Arg(1000000)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void copy_and_write_one(benchmark::State& state)
+{
+    const PointSet original = ten_columns(static_cast<std::size_t>(state.range(0)));
+    for (auto _ : state) {
+        PointSet copy = original;
+        for (float& value : copy.column<float>("f3").write()) value += 1;
+        benchmark::DoNotOptimize(copy);
+    }
+    state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(copy_and_write_one)->Arg(10000)->Arg(1000000)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace rapid

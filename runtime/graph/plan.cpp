@@ -260,6 +260,7 @@ void Plan::check_names(const PlanOptions& options)
                             fmt::format("no node makes a group \"{}\"{}", name, did_you_mean(name, group_names)));
             });
         }
+        if (makers.count("life") || asked.count("life")) asked.insert("age");  // Solve compares them
         for (const std::string& name : asked)
             if (known_attribute(name) && !makers.count(name)) known_names_[s].push_back(name);
     }

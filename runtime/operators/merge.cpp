@@ -35,6 +35,7 @@ void append_points(PointSet& into, const PointSet& from)
         if (members.is_uniform() && !from.empty() && members[0]) joined.push_back(name);
     }
     const std::size_t old = into.size();
+    if (from.empty()) return;
     into.append(from.size(), uniform, joined);
 
     const auto copy_values = [&](auto& column, const auto& added) {

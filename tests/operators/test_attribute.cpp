@@ -69,6 +69,17 @@ TEST_CASE("all points have the value from their birth, but those that brought th
     CHECK(values_of<float>(graph.next_frame(), "heat") == std::vector<float>{1, 7, 2, 7, 3});
 }
 
+TEST_CASE("points that are given a life have an age", "[attribute]")
+{
+    GraphTest graph;
+    const Value place = ObjectPtr(source_of(points_at({{0, 0, 0}})));
+    const auto create = graph.node("create", {{"points", place}});
+    graph.run(graph.node("hold", {}, {graph.node("attribute", {{"life", 2.0}}, {create})}));
+    const PointSet points = graph.next_frame();
+    CHECK(values_of<float>(points, "life") == std::vector<float>{2});
+    CHECK(values_of<float>(points, "age") == std::vector<float>{0});
+}
+
 TEST_CASE("attribute refuses names and values that can't be", "[attribute]")
 {
     const auto refusal = [](const std::string& name, Value value) {

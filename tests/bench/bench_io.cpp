@@ -57,7 +57,7 @@ void raw_interleaved(benchmark::State& state)
     std::filesystem::remove(path);
     state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
 }
-BENCHMARK(raw_interleaved)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(raw_interleaved)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
 void write_format(benchmark::State& state, const std::string& extension)
 {
@@ -67,11 +67,11 @@ void write_format(benchmark::State& state, const std::string& extension)
     std::filesystem::remove(path);
     state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
 }
-BENCHMARK_CAPTURE(write_format, vdb, ".vdb")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_format, bgeo, ".bgeo")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_format, ply, ".ply")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_format, csv, ".csv")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_format, png, ".png")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(write_format, vdb, ".vdb")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_format, bgeo, ".bgeo")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_format, ply, ".ply")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_format, csv, ".csv")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(write_format, png, ".png")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
 void read_format(benchmark::State& state, const std::string& extension)
 {
@@ -81,9 +81,9 @@ void read_format(benchmark::State& state, const std::string& extension)
     std::filesystem::remove(path);
     state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
 }
-BENCHMARK_CAPTURE(read_format, vdb, ".vdb")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(read_format, bgeo, ".bgeo")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(read_format, ply, ".ply")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(read_format, csv, ".csv")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(read_format, vdb, ".vdb")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(read_format, bgeo, ".bgeo")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(read_format, ply, ".ply")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(read_format, csv, ".csv")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
 }  // namespace

@@ -34,6 +34,25 @@ const std::uint8_t everybody = 1, nobody = 0;
 
 Vec3d place(const Path& path, double s) { return path.P + s * (path.v + 0.5 * s * path.a); }
 
+// s, of a piece along a curved surface
+double least_piece(const Obstacle& obstacle, const Path& path, double dt)
+{
+    if (!(obstacle.feature > 0)) return least_bending * dt;
+    return detail::time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm());
+}
+
+// Moves one coordinate, the one along which the normal is longest, by the least that lifts the point by `height`.
+Vec3f lifted(Vec3f P, const Vec3d& n, double height)
+{
+    int k;
+    n.cwiseAbs().maxCoeff(&k);
+    const double wanted = P[k] + height / n[k];
+    const float outward = std::copysign(std::numeric_limits<float>::infinity(), static_cast<float>(n[k]));
+    P[k] = static_cast<float>(wanted);
+    if (n[k] > 0 ? P[k] < wanted : P[k] > wanted) P[k] = std::nextafter(P[k], outward);
+    return P;
+}
+
 }  // namespace
 
 Obstacle::Obstacle(const Collider& collider, const PointSet& points)
@@ -212,7 +231,7 @@ bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
 
 void Collisions::bend(Strided<Vec3d> a, std::span<const double> dt)
 {
-    for (const int o : near_) bend_on(o, a, dt);
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) bend_on(static_cast<int>(o), a, dt);
 }
 
 // Pieces along the curved surface of one shape, of second order in position and velocity: velocity Verlet in the plane
@@ -260,9 +279,7 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
         const Vec3d n1 = slope > 0 ? Vec3d(gradients_[j] / slope) : n;
         const double cosine = n.dot(n1), turn = length > 0 ? (n1 - n).dot(d) / length : 0;
         const double curvature = length > 0 ? turn / length : 0;
-        const double least = obstacle.feature > 0
-                                 ? detail::time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm())
-                                 : least_bending * dt[t.i];
+        const double least = least_piece(obstacle, path, dt[t.i]);
         const bool leaves = -a[t.i].dot(n) - curvature * path.v.squaredNorm() < 0;
         const bool kink = turn < -least_kink && -curvature * 2 * obstacle.feature > 1;
         if (s > least && (cosine < least_cosine || leaves || kink || !(slope > 0))) {
@@ -324,10 +341,22 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
             there.n = end.n;
             there.curvature = end.curvature;
             const Vec3d v1 = turned(path.v + s * path.a);
-            const Slide next = slide_on(there, v1 + on.vc, a[t.i], s, 0);
-            const Vec3d a1 = next.kind == Slide::Moves ? next.a : turned(path.a);
+            const Slide next = slide_on(there, v1 + on.vc, a[t.i], 0, 0);
+            if (next.kind == Slide::Leaves && s > least_piece(obstacle, path, dt[t.i])) {
+                t.piece = std::max(s / 4, least_piece(obstacle, path, dt[t.i]));
+                t.way = Traveller::Waits;
+                continue;
+            }
+            const Vec3d a1 = next.kind == Slide::Moves ? next.a : Vec3d(a[t.i] - a[t.i].dot(end.n) * end.n);
             end.v = turned(path.v + 0.5 * s * path.a) + 0.5 * s * a1;
             end.v -= end.n.dot(end.v) * end.n;
+            // The energy is known better than the velocity, whose direction that leaves: the weight's work along the
+            // way, less that of friction, which is what else is in the accelerations. A point that turns back is left
+            // out: its speed is the small difference of larger ones.
+            const double friction0 = (a[t.i] - path.a).dot(path.v), friction1 = (a[t.i] - a1).dot(end.v);
+            const double speed2 = path.v.squaredNorm() + 2 * a[t.i].dot(end.P - path.P) - s * (friction0 + friction1);
+            const double scale2 = speed2 / end.v.squaredNorm();
+            if (scale2 > 0.8 && scale2 < 1.25) end.v *= std::sqrt(scale2);
         }
         end.v += on.vc;
         end.P += s * on.vc;
@@ -344,7 +373,10 @@ void Collisions::search(std::size_t n, bool all)
 {
     obstacle_.assign(n, -1);
     contact_.resize(std::max(contact_.size(), n));
-    for (const int o : near_) search(o, n, all);
+    if (all)
+        for (const int o : near_) search(o, n, true);
+    else  // a bounce may lead anywhere
+        for (std::size_t o = 0; o < obstacles_.size(); ++o) search(static_cast<int>(o), n, false);
 }
 
 void Collisions::search(int o, std::size_t n, bool all)
@@ -361,11 +393,13 @@ void Collisions::search(int o, std::size_t n, bool all)
             i = first_ + t.i;
         }
         if (!obstacle.members[i]) continue;
-        asked_.push_back(k);
-        asked_paths_.push_back(paths_[k]);
-        asked_paths_.back().radius = obstacle.radius[i];
+        Path path = paths_[k];
+        path.radius = obstacle.radius[i];
         // Of a further shape, only an earlier contact is of interest.
-        if (obstacle_[k] >= 0) asked_paths_.back().duration = contact_[k].time;
+        if (obstacle_[k] >= 0) path.duration = contact_[k].time;
+        if (!may_reach(path, obstacle.bounds)) continue;
+        asked_.push_back(k);
+        asked_paths_.push_back(path);
     }
     if (asked_.empty()) return;
     answers_.resize(asked_.size());
@@ -516,28 +550,60 @@ void Collisions::proceed(Traveller& t, const Path& path, const Bend& end)
 
 void Collisions::finish(const Traveller& t)
 {
-    for (int k = 0; k < 2; ++k) surfaces_[t.i][k] = k < t.supports ? t.on[k].n : Vec3d(Vec3d::Zero());
+    for (int k = 0; k < 2; ++k)
+        surfaces_[t.i][k] = k < t.supports ? Surface{t.on[k].collider, t.on[k].n} : Surface{-1, Vec3d::Zero()};
+}
+
+// Calls use(i, surface, f, flush) for the points that are on a surface and have moved, with f = distance - radius at
+// place(i). Surfaces of an edge come one after the other.
+template <class Place, class Use>
+void Collisions::ask_surfaces(const Place& place, const Use& use)
+{
+    for (int side = 0; side < 2; ++side) {
+        for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+            const Obstacle& obstacle = obstacles_[o];
+            asked_.clear();
+            asked_P_.clear();
+            for (std::size_t i = 0; i < size_; ++i) {
+                if (!moved_[i] || surfaces_[i][side].obstacle != static_cast<int>(o)) continue;
+                asked_.push_back(i);
+                asked_P_.push_back(place(i));
+            }
+            if (asked_.empty()) continue;
+            phi_.resize(asked_.size());
+            obstacle.shape->distance(asked_P_, phi_, {});
+            for (std::size_t j = 0; j < asked_.size(); ++j) {
+                const std::size_t i = asked_[j];
+                const double radius = obstacle.radius[first_ + i];
+                // Of the way, not of its end, which may be 0.
+                const Vec3d largest = asked_P_[j].cwiseAbs().cwiseMax(before_[i].cast<double>().cwiseAbs());
+                const double flush = flush_within(largest, radius, obstacle.feature * 0x1p-21);
+                use(i, surfaces_[i][side], phi_[j] - radius, flush);
+            }
+        }
+    }
 }
 
 // To nearest, which can leave a point on the inner side of its surface by half an ulp an axis. Then the coordinate that
-// matters most is moved until the point is out again: by the least that is enough, so that nothing creeps.
-void Collisions::round(std::span<const Vec3d> P, std::span<Vec3f> rounded) const
+// matters most is moved until the point is out again: by the least that is enough. A point that has not moved keeps its
+// bits, so that nothing creeps.
+double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
 {
-    for (std::size_t i = 0; i < size_; ++i) {
-        rounded[i] = P[i].cast<float>();
-        if (!met_[i]) continue;
-        for (const Vec3d& n : surfaces_[i]) {
-            const double sunk = n.dot(P[i] - rounded[i].cast<double>());
-            if (!(sunk > 0)) continue;
-            int k;
-            n.cwiseAbs().maxCoeff(&k);
-            const double wanted = rounded[i][k] + sunk / n[k];
-            float lifted = static_cast<float>(wanted);
-            if (n[k] > 0 ? lifted < wanted : lifted > wanted)
-                lifted = std::nextafter(lifted, std::copysign(std::numeric_limits<float>::infinity(), float(n[k])));
-            rounded[i][k] = lifted;
-        }
-    }
+    moved_.resize(size_);
+    before_.assign(rounded.begin(), rounded.end());
+    for (std::size_t i = 0; i < size_; ++i) moved_[i] = met_[i] && P[i] != before_[i].cast<double>();
+
+    // First onto the surface as far as double goes: what the way there has left of rounding is not to be seen.
+    ask_surfaces([&](std::size_t i) { return P[i]; },
+                 [&](std::size_t i, const Surface& surface, double f, double flush) {
+                     if (std::abs(f) <= flush) P[i] -= f * surface.n;
+                 });
+    for (std::size_t i = 0; i < size_; ++i) rounded[i] = P[i].cast<float>();
+    ask_surfaces([&](std::size_t i) { return Vec3d(rounded[i].cast<double>()); },
+                 [&](std::size_t i, const Surface& surface, double f, double flush) {
+                     if (f < 0 && f >= -flush) rounded[i] = lifted(rounded[i], surface.n, -f);
+                 });
+    return deepest(rounded);
 }
 
 double Collisions::deepest(std::span<const Vec3f> P)

@@ -46,11 +46,10 @@ public:
     // Advances them by a sub-step: P and v by dt under the accelerations a, which are constant within it.
     void advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt);
 
-    // Rounds the positions to single precision. What is on a surface stays on its outer side.
-    void round(std::span<const Vec3d> P, std::span<Vec3f> rounded) const;
-
-    // The deepest that a point which has met a shape since begin() is in one of them, m.
-    double deepest(std::span<const Vec3f> P);
+    // Rounds the positions to single precision; `rounded` holds those at the beginning of the frame. What is on a
+    // surface stays on its outer side. Returns the deepest that a point which has met a shape since begin() is in one
+    // of them, m.
+    double round(std::span<Vec3d> P, std::span<Vec3f> rounded);
 
     std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
     std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
@@ -81,6 +80,11 @@ private:
         double curvature;
     };
 
+    struct Surface {
+        int obstacle;  // -1 for none
+        Vec3d n;
+    };
+
     void find_near(Strided<Vec3d> a, std::span<const double> dt);
     void fly(Strided<Vec3d> a, std::span<const double> dt);
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
@@ -98,17 +102,23 @@ private:
     void settle(Traveller& t, const Support& support, const Vec3d& v);
     void proceed(Traveller& t, const Path& path, const Bend& bend);
     void finish(const Traveller& t);
+    template <class Place, class Use>
+    void ask_surfaces(const Place& place, const Use& use);
+    double deepest(std::span<const Vec3f> P);
 
     std::span<const Obstacle> obstacles_;
     std::size_t first_ = 0, size_ = 0;
     std::vector<double> widest_;  // of each obstacle, the largest radius in the block, m
 
     // By point of the block.
-    std::vector<std::uint8_t> met_;               // whether it has met a shape since begin()
-    std::vector<std::array<Vec3d, 2>> surfaces_;  // where it has: normals of those that it is on now, zero for none
+    std::vector<std::uint8_t>
+        moved_;                      // whether it has met a shape, and is elsewhere than at the beginning of the frame
+    std::vector<std::uint8_t> met_;  // whether it has met a shape since begin()
+    std::vector<Vec3f> before_;      // at the beginning of the frame
+    std::vector<std::array<Surface, 2>> surfaces_;  // where it has: those that it is on now
     std::span<Vec3d> P_, v_;
 
-    std::vector<int> near_;  // the obstacles that some point of the block may reach in this sub-step
+    std::vector<int> near_;  // the obstacles that a free path of the block may reach in this sub-step
 
     // By traveller; in the first flight, by point.
     std::vector<Traveller> travellers_, going_on_;

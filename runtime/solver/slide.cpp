@@ -11,7 +11,7 @@ constexpr double never = std::numeric_limits<double>::infinity();
 
 // How far the direction of friction may turn within a piece, in radians. The error of a piece is of the third order in
 // it; a point that slides straight down, or along, is exact at any.
-constexpr double most_turn = 0.1;
+constexpr double most_turn = 0.05;
 
 // Two surfaces within 0.06 degrees of each other are one: along their edge the forces would be ill determined.
 constexpr double parallel = 1e-3;  // sine of the angle between the normals
@@ -24,7 +24,7 @@ constexpr double rounding = 0x1p-48;
 // With N = g - κ |vt|² the surface's force a mass, g = -a·n, and at = a + g n:
 //
 //   at rest    the point stays while |at| <= μ N, else a' = at (1 - μ N / |at|)
-//   moving     a' = at - μ N vt/|vt|, until it stops
+//   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece
 Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& a, double left, double least)
 {
     const Vec3d& n = support.n;
@@ -52,6 +52,8 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& a, double le
         slide.duration = stop;
         slide.stops = true;
     }
+    const Vec3d middle = vt + 0.5 * slide.duration * slide.a;
+    if (const double size = middle.norm(); size > 0) slide.a = at - holds / size * middle;
     return slide;
 }
 

@@ -197,8 +197,7 @@ private:
             if (members_.data) block.restore_others(*this);
             for (std::size_t i = 0; i < size; ++i) v[i] = block.v[i].cast<float>();
             if (!scene_.obstacles.empty()) {
-                collisions.round(block.P, P);
-                deepest = std::max(deepest, collisions.deepest(P));
+                deepest = std::max(deepest, collisions.round(block.P, P));
             } else {
                 for (std::size_t i = 0; i < size; ++i) P[i] = block.P[i].cast<float>();
             }

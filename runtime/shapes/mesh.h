@@ -35,6 +35,8 @@ public:
     struct Openness {
         std::size_t boundary_edges = 0;      // one face
         std::size_t non_manifold_edges = 0;  // three or more, or two of the same sense
+        std::size_t odd_edges = 0;           // one, three, ...: rays cross an odd number of faces outside
+        std::size_t unbalanced_edges = 0;    // more faces one way than the other: windings are not whole turns
         bool closed() const { return boundary_edges == 0 && non_manifold_edges == 0; }
     };
     Openness openness() const;

@@ -1,0 +1,160 @@
+// Meshes from files, by Assimp.
+//
+// A mesh is its surface: normals and texture coordinates are left behind, because at a seam a vertex has several and
+// every point born on the mesh would carry them. Vertex colours become Cd, and Alpha where any is not 1.
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/Importer.hpp>
+#include <bit>
+#include <cctype>
+#include <cmath>
+#include <unordered_map>
+
+#include "runtime/error.h"
+#include "runtime/shapes/mesh.h"
+
+namespace rapid {
+namespace {
+
+// What a file says, before vertices are joined: importers split them at seams of normals and texture coordinates, and
+// STL never shares any. A deforming sequence has the same corners in each file, and so can be joined as its first is.
+struct Corners {
+    std::vector<Vec3f> positions;
+    std::vector<Vec3f> colours;  // empty, or shape [positions]
+    std::vector<float> alphas;   // empty, or shape [positions]
+    std::vector<Mesh::Triangle> triangles;
+};
+
+void append(const aiMesh& part, const aiMatrix4x4& to_world, Corners& corners)
+{
+    const auto first = corners.positions.size();
+    const bool moved = !to_world.IsIdentity();
+    for (unsigned i = 0; i < part.mNumVertices; ++i) {
+        const aiVector3D P = moved ? to_world * part.mVertices[i] : part.mVertices[i];
+        corners.positions.emplace_back(P.x, P.y, P.z);
+    }
+    if (part.HasVertexColors(0)) {
+        corners.colours.resize(first, Vec3f::Ones());  // parts without colours are white
+        corners.alphas.resize(first, 1.0f);
+        for (unsigned i = 0; i < part.mNumVertices; ++i) {
+            const aiColor4D& colour = part.mColors[0][i];
+            corners.colours.emplace_back(colour.r, colour.g, colour.b);
+            corners.alphas.push_back(colour.a);
+        }
+    }
+    const bool mirrored = to_world.Determinant() < 0;
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+        const aiFace& face = part.mFaces[f];
+        if (face.mNumIndices != 3) continue;  // lines and points, which have no surface
+        Mesh::Triangle t;
+        for (int k = 0; k < 3; ++k) t[k] = static_cast<std::int32_t>(first + face.mIndices[k]);
+        if (mirrored) std::swap(t[1], t[2]);
+        corners.triangles.push_back(t);
+    }
+}
+
+void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, Corners& corners)
+{
+    const aiMatrix4x4 to_world = to_parent * node.mTransformation;
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) append(*scene.mMeshes[node.mMeshes[i]], to_world, corners);
+    for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, corners);
+}
+
+Corners read_corners(const std::filesystem::path& path)
+{
+    Assimp::Importer importer;
+    const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
+    if (!scene)
+        throw Error(fmt::format("cannot read the mesh \"{}\": {}; it must be an OBJ, PLY, STL or glTF file",
+                                path.string(), importer.GetErrorString()));
+    Corners corners;
+    if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), corners);
+    if (!corners.colours.empty()) {
+        corners.colours.resize(corners.positions.size(), Vec3f::Ones());
+        corners.alphas.resize(corners.positions.size(), 1.0f);
+    }
+    return corners;
+}
+
+// For each corner the vertex that it becomes: corners at one place are one vertex, numbered in the order of the file.
+std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
+{
+    struct Hash {
+        std::size_t operator()(const std::array<std::uint32_t, 3>& bits) const
+        {
+            std::uint64_t hash = 0;
+            for (const std::uint32_t word : bits) hash = (hash ^ word) * 0x9E3779B97F4A7C15ull, hash ^= hash >> 29;
+            return hash;
+        }
+    };
+    std::unordered_map<std::array<std::uint32_t, 3>, std::int32_t, Hash> vertices;
+    vertices.reserve(positions.size());
+    std::vector<std::int32_t> vertex_of(positions.size());
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        std::array<std::uint32_t, 3> place;
+        for (int axis = 0; axis < 3; ++axis)
+            place[axis] = std::bit_cast<std::uint32_t>(positions[i][axis] + 0.0f);  // -0 is 0
+        vertex_of[i] = vertices.try_emplace(place, static_cast<std::int32_t>(vertices.size())).first->second;
+    }
+    return vertex_of;
+}
+
+std::string lower_case(std::string text)
+{
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+}  // namespace
+
+MeshPtr read_mesh(const std::filesystem::path& path)
+{
+    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
+    static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
+    const std::string extension = lower_case(path.extension().string());
+    if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
+        throw Error(fmt::format(
+            "\"{}\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
+
+    const Corners corners = read_corners(path);
+    for (std::size_t i = 0; i < corners.positions.size(); ++i)
+        if (!corners.positions[i].allFinite())
+            throw Error(fmt::format("vertex {} of the mesh \"{}\" is at ({}, {}, {}); coordinates must be finite", i,
+                                    path.string(), corners.positions[i].x(), corners.positions[i].y(),
+                                    corners.positions[i].z()));
+
+    const std::vector<std::int32_t> vertex_of = join_by_place(corners.positions);
+    auto mesh = std::make_shared<Mesh>();
+    mesh->name = path.string();
+    std::vector<Vec3f> colours;
+    std::vector<float> alphas;
+    for (std::size_t i = 0; i < corners.positions.size(); ++i) {
+        if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its place
+        mesh->positions.push_back(corners.positions[i]);
+        if (!corners.colours.empty()) {
+            colours.push_back(corners.colours[i]);
+            alphas.push_back(corners.alphas[i]);
+        }
+    }
+    for (const Mesh::Triangle& t : corners.triangles) {
+        const Mesh::Triangle joined(vertex_of[t[0]], vertex_of[t[1]], vertex_of[t[2]]);
+        // A face whose corners fell together is a line, and its edges cancel: what it bounded is closed without it.
+        if (joined[0] != joined[1] && joined[1] != joined[2] && joined[2] != joined[0])
+            mesh->triangles.push_back(joined);
+    }
+    if (mesh->triangles.empty())
+        throw Error(fmt::format("the mesh \"{}\" has {} vertices and no faces; a mesh needs at least one triangle",
+                                path.string(), mesh->positions.size()));
+
+    if (std::any_of(alphas.begin(), alphas.end(), [](float alpha) { return alpha != 1.0f; }))
+        mesh->values.emplace("Alpha", std::move(alphas));
+    if (!colours.empty()) mesh->values.emplace("Cd", std::move(colours));
+    return mesh;
+}
+
+}  // namespace rapid

@@ -104,6 +104,17 @@ void Kernel::analyse()
     asks_any_ = flag_of(L, "asks_any");
     kills_ = flag_of(L, "kills");
 
+    lua_getfield(L, -1, "writes");
+    for (const char* name : {"id", "dt", "index"}) {
+        lua_getfield(L, -1, name);
+        const int line = static_cast<int>(lua_tointeger(L, -1));
+        lua_pop(L, 1);
+        if (line == 0) continue;
+        lua_pop(L, 2);
+        throw Error(fmt::format("the kernel assigns p.{}, which is read only", name)).at({location.file, line});
+    }
+    lua_pop(L, 1);
+
     lua_getfield(L, -1, "stores");
     lua_rawgeti(L, -1, 1);
     if (lua_istable(L, -1)) {
@@ -135,10 +146,6 @@ void Kernel::analyse()
     state.call(1, 1);
     fingerprint = lua_tostring(L, -1);
     lua_pop(L, 1);
-
-    for (const char* name : {"id", "dt", "index"})
-        if (writes_.count(name))
-            throw Error(fmt::format("the kernel assigns p.{}, which is read only", name)).at(location);
 }
 
 void Kernel::uses(Uses& uses) const

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <lua.hpp>
 
 #include "bindings/maker.h"
@@ -44,6 +45,16 @@ std::shared_ptr<const Table> table_at(State& state, int index)
     return *table;
 }
 
+// Error: a value without a name, as in :gravity { 0, -9.81, 0 }.
+void check_named(const std::string& what, const Table& options)
+{
+    const Value* value = !options.list.empty()       ? &options.list.front()
+                         : !options.numbered.empty() ? &options.numbered.begin()->second
+                                                     : nullptr;
+    if (value)
+        throw Error(fmt::format("{} has no name for {}; it takes {{ NAME = value, ... }}", what, describe(*value)));
+}
+
 // What the main state's call of this constructor made; for the main state itself, what `make` makes.
 template <class F>
 int construct(State& state, const F& make)
@@ -75,7 +86,9 @@ int make_object(State& state)
         const Maker& maker = find_maker(text_at(state, 1));
         ScriptHost& host = state.host();
         MakeContext context{host.folder(), host.warnings, host.options().may_write};
-        return maker.make(maker, *table_at(state, 2), context);
+        const auto options = table_at(state, 2);
+        check_named("rapid." + text_at(state, 1), *options);
+        return maker.make(maker, *options, context);
     });
 }
 
@@ -108,7 +121,8 @@ Value parse_setting(const std::string& name, const std::string& text, const Valu
         const std::string word = rest.substr(begin, end - begin);
         char* stop = nullptr;
         numbers.push_back(std::strtod(word.c_str(), &stop));
-        if (word.empty() || *stop != '\0') return refuse(fallback.get<double>() ? "a number" : "a vec3 x,y,z");
+        if (word.empty() || *stop != '\0' || std::isnan(numbers.back()))
+            return refuse(fallback.get<double>() ? "a number" : "a vec3 x,y,z");
         begin = end + 1;
     }
     if (fallback.get<double>()) return numbers.size() == 1 ? Value(numbers[0]) : refuse("a number");
@@ -123,7 +137,7 @@ int declare_parameter(State& state)
     const std::string name = text_at(state, 1);
     const auto known = std::find_if(host.parameters.begin(), host.parameters.end(),
                                     [&](const Session::Parameter& p) { return p.name == name; });
-    if (known != host.parameters.end()) {
+    if (known != host.parameters.end() && !state.is_main()) {
         state.push(known->value);
         return 1;
     }
@@ -140,6 +154,15 @@ int declare_parameter(State& state)
         throw Error(
             fmt::format("rapid.param(\"{}\"): the default is {}; it must be a number, a boolean, a string or a vec3",
                         name, describe(fallback)));
+    if (known != host.parameters.end()) {
+        if (describe(known->fallback) != describe(fallback))
+            throw Error(
+                fmt::format("rapid.param(\"{}\"): its default was {} before and is {} here; give each parameter "
+                            "one default, or another name",
+                            name, describe(known->fallback), describe(fallback)));
+        state.push(known->value);
+        return 1;
+    }
     const auto setting = host.options().set.find(name);
     const Value value = setting == host.options().set.end() ? fallback : parse_setting(name, setting->second, fallback);
     host.parameters.push_back({name, text_at(state, 3), value, fallback});
@@ -207,7 +230,9 @@ int make_node(State& state)
         node->serial = host.graph.nodes.size();
         const std::string what = type.name;
         try {
-            node->arguments = table_at(state, 2)->named;
+            const auto options = table_at(state, 2);
+            check_named(":" + what, *options);
+            node->arguments = options->named;
             const auto named = node->arguments.find("name");
             if (named != node->arguments.end() && !type.find("name")) {
                 const std::string* name = named->second.get<std::string>();
@@ -326,6 +351,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"unknown_type", native<unknown_type>},
                                       {"kind", native<kind_of>},
                                       {"set_index", native<set_index>},
+                                      {"run", run_body},
                                       {"read_module", native<read_source<false>>},
                                       {"read_node", native<read_source<true>>}};
     lua_newtable(L);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <lua.hpp>
 #include <sstream>
@@ -63,9 +65,9 @@ ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options
     file_ = file;
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))
-        throw Error(fmt::format("{} is a folder; give a graph file", file.string()));
+        throw Error("this is a folder; give a graph file").at({file.string(), 0});
     const std::optional<std::string> text = read_text(file);
-    if (!text) throw Error(fmt::format("can't read {}: {}", file.string(), std::strerror(errno)));
+    if (!text) throw Error(std::strerror(errno)).at({file.string(), 0});
     text_ = *text;
     graph.file = shown(file);
 

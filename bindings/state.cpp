@@ -6,6 +6,7 @@
 #include <fstream>
 #include <lua.hpp>
 #include <sstream>
+#include <utility>
 
 #include "bindings/natives.h"
 #include "bindings/script_host.h"
@@ -28,6 +29,16 @@ std::string read_text(const std::filesystem::path& path)
 // Chunk names of graph code begin with @ and are shown as they are; Rapid's own begin with =[rapid.
 bool is_graph_code(const lua_Debug& info) { return info.source[0] == '@'; }
 
+// Whether the frame is run_body(): if a file's body has left by a tail call, it would lie directly above it.
+bool runs_body(lua_State* L, lua_Debug& info)
+{
+    if (*info.what != 'C') return false;
+    lua_getinfo(L, "f", &info);
+    const bool it_is = lua_tocfunction(L, -1) == run_body;
+    lua_pop(L, 1);
+    return it_is;
+}
+
 // Takes the error value on top and leaves a text: position and message. The position is that of the error's own line
 // where it is in graph code, else the nearest line of graph code that led there.
 int describe_error(lua_State* L)
@@ -43,10 +54,13 @@ int describe_error(lua_State* L)
         message = fmt::format("error raised with a {} instead of a message", luaL_typename(L, 1));
     }
 
+    State& state = State::of(L);
     std::string place;
     lua_Debug info;
     for (int level = 1; lua_getstack(L, level, &info); ++level) {
-        if (!lua_getinfo(L, "Sl", &info) || info.currentline < 0) continue;
+        lua_getinfo(L, "Sl", &info);
+        if (place.empty() && runs_body(L, info) && state.tail_call.line > 0) break;
+        if (info.currentline < 0) continue;
         const std::string prefix = fmt::format("{}:{}: ", info.short_src, info.currentline);
         const bool own = message.rfind(prefix, 0) == 0;
         if (own) message.erase(0, prefix.size());
@@ -54,6 +68,11 @@ int describe_error(lua_State* L)
             place = fmt::format("{}:{}", info.source + 1, info.currentline);
         if (own && is_graph_code(info)) break;
     }
+    if (place.empty() && state.tail_call.line > 0)
+        place = fmt::format("{}:{}", state.tail_call.file, state.tail_call.line);
+    // The language's own words for `p.v.x = 1`.
+    if (message == "attempt to write to constant location")
+        message = "a component can't be assigned: a vec3 does not change; make a new one: p.v = vec3(1, p.v.y, p.v.z)";
     luaL_traceback(L, L, nullptr, 1);
     const std::string trace = lua_tostring(L, -1);
     lua_settop(L, 0);
@@ -85,14 +104,14 @@ Location parse_place(const std::string& place)
     return {place.substr(0, colon), std::atoi(place.c_str() + colon + 1)};
 }
 
-// A message that begins with a place, as load errors do: "file:12: what". A module's file may differ from the graph's.
+// A message that begins with a place, as load errors and those of nodes do, keeps it: "file:12: what".
 Error with_place(const std::string& message, const std::string& place)
 {
-    if (!place.empty()) return Error(message).at(parse_place(place));
     const std::size_t end = message.find(": ");
     const std::size_t colon = end == std::string::npos ? end : message.rfind(':', end - 1);
     if (colon != std::string::npos && colon + 1 < end && message.find_first_not_of("0123456789", colon + 1) == end)
         return Error(message.substr(end + 2)).at(parse_place(message.substr(0, end)));
+    if (!place.empty()) return Error(message).at(parse_place(place));
     return Error(message);
 }
 
@@ -149,6 +168,12 @@ private:
 int guarded(lua_State* L, int (*f)(State& state))
 {
     State& state = State::of(L);
+    // A coroutine has a stack of its own, where the arguments are.
+    struct Running {
+        State& state;
+        lua_State* before;
+        ~Running() { state.L_ = before; }
+    } const running{state, std::exchange(state.L_, L)};
     std::string message;
     try {
         return f(state);
@@ -160,6 +185,20 @@ int guarded(lua_State* L, int (*f)(State& state))
         message = error.what();
     }
     return raise(state, message);
+}
+
+int run_body(lua_State* L)
+{
+    State& state = State::of(L);
+    struct Ending {
+        Location& place;
+        Location before;
+        ~Ending() { place = before; }
+    } const ending{state.tail_call,
+                   std::exchange(state.tail_call, {lua_tostring(L, 2), static_cast<int>(lua_tointeger(L, 3))})};
+    lua_settop(L, 1);
+    lua_call(L, 0, 1);
+    return 1;
 }
 
 State::State(ScriptHost& host, bool main) : host_(host), main_(main)
@@ -286,10 +325,12 @@ std::size_t State::add_kernel()
 Location State::where() const
 {
     lua_Debug info;
-    for (int level = 0; lua_getstack(L_, level, &info); ++level)
-        if (lua_getinfo(L_, "Sl", &info) && info.currentline > 0 && is_graph_code(info))
-            return {info.source + 1, info.currentline};
-    return {};
+    for (int level = 0; lua_getstack(L_, level, &info); ++level) {
+        lua_getinfo(L_, "Sl", &info);
+        if (info.currentline > 0 && is_graph_code(info)) return {info.source + 1, info.currentline};
+        if (runs_body(L_, info) && tail_call.line > 0) break;
+    }
+    return tail_call;
 }
 
 ObjectPtr State::to_object(int index)

@@ -28,6 +28,7 @@ public:
 
     static State& of(lua_State* L);
 
+    // The coroutine that runs now, or the main thread of the state.
     lua_State* lua() const { return L_; }
     ScriptHost& host() const { return host_; }
     bool is_main() const { return main_; }
@@ -57,10 +58,15 @@ public:
     // The number of the next constructor call.
     std::size_t next_made = 0;
 
+    // The place of the call that ends the body of the file that runs, `return ...:solve {}`: it leaves no frame behind
+    // for where(). Line 0: none.
+    Location tail_call;
+
     // Bytes of Lua memory in use.
     std::size_t memory() const { return memory_; }
 
 private:
+    friend int guarded(lua_State* L, int (*f)(State& state));
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     void open_libraries();
     void register_natives();
@@ -72,6 +78,9 @@ private:
     int entries_ = 0;
     std::vector<int> kernel_references_;
 };
+
+// native.run(chunk, file, line): calls the body of a file, which ends in a call at that line, or in none (nil).
+int run_body(lua_State* L);
 
 // Runs f and turns an Error into a Lua error with the place of the calling graph code. For functions that Lua calls.
 int guarded(lua_State* L, int (*f)(State& state));

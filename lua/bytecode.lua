@@ -6,7 +6,8 @@
 --
 --   reads, writes    names indexed on the point itself
 --   may              names indexed anywhere in helpers, and on values that are not known to be no point
---   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants
+--   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
+--                    are the calls of a method `join` of anything
 --   kills            whether `kill` is called or could be
 --   stores           places (line, what) where it writes upvalues, globals or shared tables
 --
@@ -56,8 +57,34 @@ end
 
 local analyse_function
 
+-- What the upvalue of a function holds: { kind = "shared", value } or, where it is a local of the kernel around a
+-- closure, nil. A closure that the kernel makes does not exist yet; its upvalues are told from the kernel's own by
+-- name.
+local function upvalue_of(f, place, outer)
+  if type(f) == "function" then
+    local _, value = getupvalue(f, place + 1)
+    return { kind = "shared", value = value }
+  end
+  return outer and outer(util.funcuvname(f, place))
+end
+
+-- The same by name, for the closures that f makes.
+local function upvalues_by_name(f, outer)
+  return function(name)
+    for place = 0, util.funcinfo(f).upvalues - 1 do
+      if util.funcuvname(f, place) == name then return upvalue_of(f, place, outer) end
+    end
+    return nil
+  end
+end
+
+-- Functions of Lua that write into their first argument.
+local writers = {
+  [table.insert] = "table.insert", [table.remove] = "table.remove", [table.sort] = "table.sort",
+}
+
 -- One pass of instructions from `pc` with the registers `regs`; returns the successors. Findings go to `found`.
-local function step(f, pc, regs, found)
+local function step(f, pc, regs, found, outer)
   local ins, mode = util.funcbc(f, pc)
   if not ins then return {} end
   local name = names[band(ins, 0xff)]
@@ -83,6 +110,7 @@ local function step(f, pc, regs, found)
     else
       found.may[key] = true
       if key == "kill" then found.kills = true end
+      if methods[key] then return { kind = "method", value = key, of_unknown = true } end
     end
     return nil
   end
@@ -92,12 +120,7 @@ local function step(f, pc, regs, found)
   elseif name == "KSTR" then
     result = { kind = "string", value = string_constant(f, d) }
   elseif name == "UGET" then
-    local value
-    if type(f) == "function" then
-      local _
-      _, value = getupvalue(f, d + 1)
-    end
-    result = { kind = "shared", value = value }
+    result = upvalue_of(f, d, outer)
   elseif name == "GGET" then
     local key = string_constant(f, d)
     result = { kind = "shared", value = found.env[key] }
@@ -130,21 +153,19 @@ local function step(f, pc, regs, found)
       store("assigns into a table that all points share")
     end
   elseif name == "USETV" or name == "USETS" or name == "USETN" or name == "USETP" then
-    local upvalue = type(f) == "function" and getupvalue(f, a + 1) or util.funcuvname(f, a)
-    -- A closure's upvalue may be a local of the kernel itself, which is its own.
-    if type(f) == "function" then store(("assigns the upvalue %q"):format(upvalue)) end
+    if upvalue_of(f, a, outer) then store(("assigns the upvalue %q"):format(util.funcuvname(f, a))) end
   elseif name == "GSET" then
     store(("assigns the global %q"):format(string_constant(f, d)))
   elseif name == "FNEW" then
     local child = util.funck(f, -d - 1)
-    if child then analyse_function(child, found, false) end
+    if child then analyse_function(child, found, false, upvalues_by_name(f, outer)) end
   elseif name == "CALL" or name == "CALLM" or name == "CALLT" or name == "CALLMT" then
     local callee, first = regs[a], a + 2 -- two slots a frame
     if callee and callee.kind == "method" and (callee.value == "join" or callee.value == "leave") then
       local group = regs[first + 1]
       if group and group.kind == "string" then
         found.joins[group.value] = true
-      else
+      elseif not callee.of_unknown then
         found.computed_group = found.computed_group or line()
       end
     elseif callee and callee.kind == "method" and callee.value == "within" then
@@ -152,6 +173,10 @@ local function step(f, pc, regs, found)
       if group and group.kind == "string" then found.asks[group.value] = true else found.asks_any = true end
     elseif callee and callee.kind == "shared" and type(callee.value) == "function" then
       analyse_function(callee.value, found, false)
+      local target = regs[first]
+      if writers[callee.value] and target and target.kind == "shared" then
+        store(("changes a table that all points share by %s"):format(writers[callee.value]))
+      end
     end
     for slot = a, a + 250 do regs[slot] = nil end
   end
@@ -182,9 +207,9 @@ local function step(f, pc, regs, found)
   return { pc + 1 }
 end
 
--- f: a function, or the prototype of one that a kernel makes. The kernel's first parameter is the point; of helpers
--- nothing is known.
-function analyse_function(f, found, is_kernel)
+-- f: a function, or the prototype of one that a kernel makes; outer: of a prototype, what finds the upvalues of the
+-- functions around it by name. The kernel's first parameter is the point; of helpers nothing is known.
+function analyse_function(f, found, is_kernel, outer)
   if found.seen[f] then return end
   found.seen[f] = true
   local info = util.funcinfo(f)
@@ -199,7 +224,7 @@ function analyse_function(f, found, is_kernel)
     local pc = table.remove(open)
     local regs = {}
     for slot, value in pairs(states[pc]) do regs[slot] = value end
-    for _, next_pc in ipairs(step(f, pc, regs, found)) do
+    for _, next_pc in ipairs(step(f, pc, regs, found, outer)) do
       local known = states[next_pc]
       if not known then
         states[next_pc] = {}
@@ -221,14 +246,16 @@ end
 
 -- env: the environment in which the kernel's globals live.
 local function analyse(kernel, env)
-  local found = { reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, stores = {}, seen = {}, env = env }
+  local found = {
+    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, stores = {}, seen = {}, env = env,
+  }
   analyse_function(kernel, found, true)
   found.seen, found.env = nil, nil
   return found
 end
 
--- Instructions and constants, as text: equal for the same function in two states. Tables of constants are left out: their
--- order differs from state to state.
+-- Instructions and constants, as text: equal for the same function in two states. Tables of constants are left out:
+-- their order differs from state to state.
 local function fingerprint(f)
   local info = util.funcinfo(f)
   local words = { ("%s:%d"):format(info.source, info.linedefined) }
@@ -242,4 +269,12 @@ local function fingerprint(f)
   return table.concat(words, " ")
 end
 
-return { analyse = analyse, fingerprint = fingerprint }
+-- The line of the last call in tail position, `return f()`: such a call leaves no frame behind that would tell it.
+local function tail_call_line(f)
+  for pc = util.funcinfo(f).bytecodes - 1, 1, -1 do
+    local name = names[band(util.funcbc(f, pc), 0xff)]
+    if name == "CALLT" or name == "CALLMT" then return util.funcinfo(f, pc).currentline end
+  end
+end
+
+return { analyse = analyse, fingerprint = fingerprint, tail_call_line = tail_call_line }

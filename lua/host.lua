@@ -11,8 +11,13 @@ local language = require "rapid"
 local vector = require "vec3"
 local ffi = require "ffi"
 
+-- Runs the body of a file; the place of a call that ends it is kept for errors, because no frame of it is left then.
+local function run(chunk, name)
+  return native.run(chunk, (name:gsub("^@", "")), bytecode.tail_call_line(chunk))
+end
+
 -- Nothing of ours is on the search path of graph code; what it may load stands beside the graph, or on RAPID_PATH.
-local env, loaded, load_text = sandbox.make(native.read_module, native.is_worker)
+local env, loaded, load_text = sandbox.make(native.read_module, native.is_worker, run)
 string.dump = nil -- it is reached through no copy, and through no method of strings
 
 local function load_node(name)
@@ -20,7 +25,7 @@ local function load_node(name)
   if not text then return nil end
   local chunk, message = load_text(text, where)
   if not chunk then error(message, 0) end
-  local definition = chunk(name)
+  local definition = run(chunk, where)
   if type(definition) ~= "table" or definition.name ~= name then
     error(("%s does not return rapid.node{ name = %q, ... }"):format(where:gsub("^@", ""), name), 0)
   end
@@ -44,7 +49,7 @@ function entry.run(text, name)
   if not chunk then error(message, 0) end
   -- Interpreted: a graph's body runs once, and bytecode that is compiled is no longer what bytecode.lua reads.
   jit.off()
-  return chunk()
+  return run(chunk, name)
 end
 
 function entry.loaded()

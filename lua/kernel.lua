@@ -1,9 +1,9 @@
 -- Runners: what carries a kernel over the points of a chunk.
 --
--- A kernel sees the point through a view `p` whose reads and writes are closures over the chunk's columns; it never gets
--- a pointer, and an index outside its own point cannot be said. The trace compiler inlines all of it. Each kernel gets a
--- runner from generated text, with function prototypes of its own: kernels that share one runner share its traces, and
--- fall to a fifth of their speed.
+-- A kernel sees the point through a view `p` whose reads and writes are closures over the chunk's columns; it never
+-- gets a pointer, and an index outside its own point cannot be said. The trace compiler inlines all of it. Each kernel
+-- gets a runner from generated text, with function prototypes of its own: kernels that share one runner share its
+-- traces, and fall to a fifth of their speed.
 local ffi = require "ffi"
 local vector = require "vec3"
 
@@ -60,12 +60,13 @@ local function describe(value)
   return value == nil and "nil" or "a " .. type(value)
 end
 
--- Level 3 is the kernel's line: error <- these <- setter <- __newindex would be 4, but setters are tail-called.
+-- The host adds the place, the nearest line of graph code, and the point.
 local function wrong_type(name, wanted, value)
-  error(("attribute %q takes %s, not %s"):format(name, wanted, describe(value)), 0)
+  local remedy = wanted == "a vec3" and type(value) == "table" and "; vec3(x, y, z) makes one" or ""
+  error(("attribute %q takes %s, not %s%s"):format(name, wanted, describe(value), remedy), 0)
 end
 local function not_finite(name, value)
-  error(("%s became %s, which is not a finite number"):format(name, describe(value)), 0)
+  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe(value)), 0)
 end
 local function not_whole(name, value)
   error(("attribute %q takes a whole number, not %s"):format(name, describe(value)), 0)
@@ -80,14 +81,15 @@ end
 
 -- A view's refusals.
 local function missing(name, getters)
-  error(("no attribute %q here; a name that is computed must be an attribute that the kernel also names as a constant "
-    .. "(it names: %s)"):format(tostring(name), table.concat(sorted_names(getters), ", ")), 0)
+  error(("no attribute %q here; a computed name must be one that the kernel also names as a constant (it names %s)")
+    :format(tostring(name), table.concat(sorted_names(getters), ", ")), 0)
 end
 
 local text_head = [[
 local ffi, vec3, quat, kernel, frame_type, rand, refuse, layout = ...
 local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.floor, type, tonumber, error
-local wrong_type, not_finite, not_whole, missing = refuse.wrong_type, refuse.not_finite, refuse.not_whole, refuse.missing
+local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
+local missing, wrong_use = refuse.missing, refuse.use
 local MAX = 3.4028234663852886e38
 local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that setting it spoils no other load
 cursor.i = -1
@@ -100,10 +102,13 @@ local id_column, id_stride
 local text_methods = [[
 function methods.rand(...)
   local _, use, frame_or_number = ...
-  if type(use) ~= "number" then wrong_use(use) end
+  if type(use) ~= "number" then wrong_use("a number, which of the point's random numbers", use) end
   local anew = 0
   if frame_or_number ~= nil then
-    anew = type(frame_or_number) == "number" and frame_or_number or frame_or_number.number
+    anew = frame_or_number
+    if istype(frame_type, anew) then anew = anew.number end
+    if type(anew) ~= "number" then wrong_use("the frame, or a number, behind the comma", anew) end
+    if anew == 0 then anew = 5e-324 end -- 0 is the number that stays the same in every frame
   end
   local drawn = rand(random, id_column[cursor.i * id_stride], use, anew)
   return drawn
@@ -154,7 +159,8 @@ view.__tostring = function() return "a point" end
 local function make_runner(kernel, layout, pointers)
   local text = { text_head }
   local function add(line, name, slot)
-    text[#text + 1] = (line:gsub("%$N", slot or ""):gsub("%$S", name and ("%q"):format(name) or ""))
+    -- A function gives the name, in which % means nothing.
+    text[#text + 1] = (line:gsub("%$N", slot or ""):gsub("%$S", function() return ("%q"):format(name) end))
   end
 
   local locals, setup = {}, {}
@@ -177,7 +183,8 @@ local function make_runner(kernel, layout, pointers)
   for _, column in ipairs(layout.columns) do
     add("getters[$S] = function(...) " .. getter_text[column.type] .. " end", column.name, tostring(column.slot))
     if column.writable then
-      add("setters[$S] = function(...) local x = ...\n" .. setter_text[column.type] .. "\nend", column.name, tostring(column.slot))
+      add("setters[$S] = function(...) local x = ...\n" .. setter_text[column.type] .. "\nend", column.name,
+        tostring(column.slot))
     end
   end
   text[#text + 1] = [[
@@ -191,7 +198,8 @@ getters.index = function(...) return first + cursor.i + 1 end
     local n = tostring(group.slot)
     add("within[$S] = function(...) return g$N[cursor.i * t$N] ~= 0 end", group.name, n)
     if group.writable then
-      add("join[$S] = function(...) g$N[cursor.i] = 1 end leave[$S] = function(...) g$N[cursor.i] = 0 end", group.name, n)
+      add("join[$S] = function(...) g$N[cursor.i] = 1 end", group.name, n)
+      add("leave[$S] = function(...) g$N[cursor.i] = 0 end", group.name, n)
     end
   end
   text[#text + 1] = [[
@@ -214,7 +222,6 @@ function methods.leave(...)
   if not act then refuse.group(name, "leave") end
   act()
 end
-local function wrong_use(use) refuse.use(use) end
 ]]
   text[#text + 1] = text_methods
   text[#text + 1] = table.concat(setup, "\n")
@@ -242,9 +249,10 @@ local function at()
   return place < 0 and -1 or first + place
 end
 local function set_params(values)
+  setmetatable(values, { __index = function(_, name) refuse.param(name, values) end })
   params = setmetatable({}, {
     __index = values,
-    __newindex = function(_, name) error(("params.%s can't be assigned: parameters are the graph's"):format(name), 2) end,
+    __newindex = function(_, name) refuse.assign(name) end,
     __metatable = false,
   })
 end
@@ -259,11 +267,18 @@ return run, at, set_params
     end
     error(("no attribute %q; add :attribute{ %s = 0 } before it"):format(tostring(name), tostring(name)), 0)
   end
-  function refuse.group(name, what)
-    error(("can't %s the group %s: a kernel names the groups that it joins and leaves as constants"):format(what, describe(name)), 0)
+  function refuse.param(name, values)
+    error(("no parameter %q; the node has %s"):format(tostring(name), table.concat(sorted_names(values), ", ")), 0)
   end
-  function refuse.use(use)
-    error(("p:rand takes a number, the use, not %s"):format(describe(use)), 0)
+  function refuse.assign(name)
+    error(("params.%s can't be assigned; parameters are the graph's"):format(tostring(name)), 0)
+  end
+  function refuse.group(name, what)
+    error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
+      :format(what, describe(name), what), 0)
+  end
+  function refuse.use(wanted, value)
+    error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)
   end
   local chunk = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
   return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, refuse, layout)

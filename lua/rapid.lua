@@ -1,7 +1,7 @@
 -- The graph language: the table that `require "rapid"` gives to graph code.
 --
--- Everything here only gathers arguments; the host makes the values, checks them and remembers where they were asked for.
--- A call with a place of its own among the arguments (a path, a mesh, a motion) is turned into named arguments.
+-- Everything here only gathers arguments; the host makes the values, checks them and remembers where they were asked
+-- for. A call with a place of its own among the arguments (a path, a mesh, a motion) is turned into named arguments.
 local vector = require "vec3"
 
 local function options_of(what, options)

@@ -1,10 +1,16 @@
 -- The environment of graph code: ordinary Lua without a way out.
 --
--- Out of reach: files, processes, ffi, debug, bytecode, other environments, addresses, and whatever depends on chance (the
--- order of a string hash, math.random). Libraries are copies, so nothing that graph code does to them reaches ours.
+-- Out of reach: files, processes, ffi, debug, bytecode, other environments, addresses, and whatever depends on chance
+-- (the order of a string hash, math.random). Libraries are copies, so nothing that graph code does to them reaches
+-- ours.
 local ffi = require "ffi"
 
 local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
+
+-- "nil", "a number", "a table"
+local function article(value)
+  return value == nil and "nil" or "a " .. type(value)
+end
 
 local function copy(library, without)
   local result = {}
@@ -16,30 +22,43 @@ end
 -- tostring without addresses.
 local function safe_tostring(value)
   local text = raw_tostring(value)
-  if type(text) == "string" and text:find "0x%x%x%x" then
+  if type(value) ~= "string" and type(text) == "string" and text:find "0x%x%x%x" then
     return (text:gsub(": 0x%x+", ""):gsub("0x%x+", "?"))
   end
   return text
 end
 
--- Keys in an order that does not depend on the hash: numbers, then strings, then false, true, then the rest as found.
-local function sorted_keys(map)
+-- Keys in an order that does not depend on the hash: numbers, then strings, then false, true. Of other keys (tables,
+-- functions, nodes) there may be one: their order would be that of their addresses.
+local function sorted_keys(map, what)
   local numbers, strings, others = {}, {}, {}
   for key in raw_pairs(map) do
     local kind = type(key)
-    local list = kind == "number" and numbers or kind == "string" and strings or others
-    list[#list + 1] = key
+    if kind == "number" then
+      numbers[#numbers + 1] = key
+    elseif kind == "string" then
+      strings[#strings + 1] = key
+    elseif kind ~= "boolean" then
+      others[#others + 1] = key
+    end
+  end
+  if #others > 1 then
+    error(("%s can't order keys that are neither numbers nor strings (here: %s); keep them in a list"):format(what,
+      type(others[1])), 3)
   end
   table.sort(numbers)
   table.sort(strings)
   for _, key in ipairs(strings) do numbers[#numbers + 1] = key end
-  for _, key in ipairs(others) do numbers[#numbers + 1] = key end
+  for _, key in ipairs { false, true } do
+    if rawget(map, key) ~= nil then numbers[#numbers + 1] = key end
+  end
+  numbers[#numbers + 1] = others[1]
   return numbers
 end
 
 local function sorted_pairs(map)
-  if type(map) ~= "table" then error(("pairs takes a table, not a %s"):format(type(map)), 2) end
-  local keys, place = sorted_keys(map), 0
+  if type(map) ~= "table" then error(("pairs takes a table, not %s"):format(article(map)), 2) end
+  local keys, place = sorted_keys(map, "pairs"), 0
   return function()
     repeat
       place = place + 1
@@ -50,8 +69,8 @@ local function sorted_pairs(map)
 end
 
 local function sorted_next(map, key)
-  if type(map) ~= "table" then error(("next takes a table, not a %s"):format(type(map)), 2) end
-  local keys = sorted_keys(map)
+  if type(map) ~= "table" then error(("next takes a table, not %s"):format(article(map)), 2) end
+  local keys = sorted_keys(map, "next")
   if key == nil then return keys[1], map[keys[1]] end
   for place, known in ipairs(keys) do
     if known == key then
@@ -75,16 +94,16 @@ local function safe_format(format, ...)
   return raw_format(format, unpack(values, 1, count))
 end
 
--- read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and where it was
--- looked for. In a quiet environment (a worker's) print says nothing: the first state has said it.
-local function make(read_module, quiet)
+-- read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and where it
+-- was looked for. In a quiet environment (a worker's) print says nothing: the first state has said it.
+local function make(read_module, quiet, run)
   local env = {}
   local strings = copy(string, { "dump" })
   strings.format = safe_format
 
-  -- Methods of strings come from here too.
+  -- Methods of strings are a copy of their own, which graph code gets no hold of: our modules call them too.
   local of_strings = debug.getmetatable("")
-  of_strings.__index = strings
+  of_strings.__index = copy(strings)
   of_strings.__metatable = false
 
   env._G = env
@@ -115,24 +134,31 @@ local function make(read_module, quiet)
 
   -- Text only: bytecode could say what Lua cannot.
   local function load_text(text, name)
-    if type(text) ~= "string" then return nil, "load takes a string" end
+    if type(text) ~= "string" then return nil, "load takes a text, not " .. article(text) end
     if text:byte(1) == 27 then return nil, "bytecode is not loaded" end
     local chunk, message = loadstring(text, name)
     if not chunk then return nil, message end
     return setfenv(chunk, env)
   end
-  env.load = load_text
-  env.loadstring = load_text
+  -- A chunk named "=..." would pass for one of ours.
+  function env.load(text, name)
+    if type(name) == "string" then name = "@" .. name:gsub("^[@=]", "") end
+    return load_text(text, name)
+  end
+  env.loadstring = env.load
 
-  local loaded = {}
+  local loaded, loading = {}, {}
   function env.require(name)
     if type(name) ~= "string" then error("require takes the name of a module", 2) end
     if loaded[name] ~= nil then return loaded[name] end
+    if loading[name] then error(("module %q requires itself, by way of those that it requires"):format(name), 2) end
     local text, where = read_module(name)
     if not text then error(("no module %q; looked for %s"):format(name, where), 2) end
     local chunk, message = load_text(text, where)
     if not chunk then error(message, 0) end
-    local result = chunk(name)
+    loading[name] = true
+    local result = run(chunk, where)
+    loading[name] = nil
     loaded[name] = result == nil and true or result
     return loaded[name]
   end

@@ -109,7 +109,7 @@ std::string progress_bar(std::int64_t frame, std::int64_t first, std::int64_t la
     if (const int room = width - length() - 2; room >= least_bar) {
         const int columns = std::min(room, 40);
         const auto done = static_cast<int>(columns * (frame - first + 1) / (last - first + 1));
-        text = "[" + std::string(done, '=') + std::string(columns - done, ' ') + "]";
+        text = fmt::format("[{:=<{}}{: <{}}]", "", done, "", columns - done);
     }
     for (const std::string& word : words) text += word;
     return text.substr(0, static_cast<std::size_t>(std::max(0, width)));

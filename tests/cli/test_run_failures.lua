@@ -48,7 +48,7 @@ describe("what is wrong before the first frame", function()
   it("misses a graph that is not there", function()
     local result = command.rapid "run no_such_graph.lua"
     assert.equal(2, result.status)
-    assert.truthy(result.stderr:find("^no_such_graph.lua: "), result.stderr)
+    assert.truthy(result.stderr:find("no_such_graph.lua: No such file", 1, true), result.stderr)
   end)
 end)
 
@@ -65,7 +65,7 @@ return rapid.create { points = points }
     local result = new_folder(failing):run "-f 1-6"
     assert.equal(1, result.status)
     assert.truthy(result.stderr:find('^scene.lua:3: node "fails": '), result.stderr)
-    assert.truthy(result.stderr:find("point 0, frame 3", 1, true), result.stderr)
+    assert.truthy(result.stderr:find("(point id 0, frame 3)", 1, true), result.stderr)
     assert.falsy(result.stderr:find("traceback", 1, true))
   end)
 
@@ -96,7 +96,8 @@ return rapid.create { points = points }
 ]])
     local result = folder:run "-f 1-4 -o a.####.csv"
     assert.equal(1, result.status)
-    assert.truthy(result.stderr:find('node "zero": point 1, frame 3', 1, true), result.stderr)
+    assert.truthy(result.stderr:find('^scene.lua:4: node "zero": v became vec3%(nan'), result.stderr)
+    assert.truthy(result.stderr:find("(point id 1, frame 3)", 1, true), result.stderr)
     assert.same({ "a.0001.csv", "a.0002.csv", "scene.lua" }, folder:list())
   end)
 end)
@@ -135,7 +136,7 @@ return rapid.create {}
   it("ends the run with 1, names the file and the reason, and leaves the frames before it", function()
     local folder = new_folder(growing)
     -- Files of at most 32 KiB: a frame has 100 points more than the one before.
-    local result = command.shell('ulimit -f 64; "$RAPID" run scene.lua -f 1-20 -o a.####.csv --stats stats.json',
+    local result = command.shell('ulimit -f 64; "$RAPID" run scene.lua -f 1-40 -o a.####.csv --stats stats.json',
       { cwd = folder.path })
     assert.equal(1, result.status, result.stderr)
     local failed = result.stderr:match "^a%.(%d+)%.csv: can't be written: File too large"

@@ -444,8 +444,9 @@ void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d&
     if (-vn > rising) ++contacts;
 
     const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature};
-    if (vn >= 0 && g < 0) {
-        // Flush with the surface, and drawn off it: the next moments belong to the path.
+    if (vn >= -tangential * relative.norm() && g < 0) {
+        // Flush with the surface, and drawn off it: the next moments belong to the path. (An approach by rounding alone
+        // would be met here again and again, at the same moment.)
         const double s = std::min(t.left, least_bending * dt);
         P_[t.i] += s * (v + 0.5 * s * a);
         v_[t.i] += s * a;

@@ -16,6 +16,11 @@ describe("graphs/spray.lua", function()
     end
   end)
 
+  it("traps no drop where the ball falls away from under it", function()
+    -- Drops that lift off met the same facet of the level set again and again, up to the limit of contacts.
+    assert.same({}, rapid.run("graphs/spray.lua", { frames = {96, 96} }).warnings)
+  end)
+
   it("pulses: births follow the rate of their frame", function()
     for _, frame in ipairs { 2, 9, 20 } do
       local rate = 3000 * (0.55 + 0.45 * math.cos(9 * (frame - 1) / 24))

@@ -25,7 +25,7 @@ public:
 
     virtual double voxel() const = 0;  // m
     virtual std::uint64_t active_voxels() const = 0;
-    virtual MeshPtr surface() const = 0;  // the zero crossing as a mesh
+    MeshPtr surface() const override = 0;  // the zero crossing as a mesh
     // The same surface with a band of at least `metres` on each side; this one where it is wide enough.
     virtual std::shared_ptr<const LevelSet> with_band(double metres) const = 0;
     virtual void write(const std::filesystem::path& path, const std::string& grid) const = 0;
@@ -33,6 +33,9 @@ public:
 
 using LevelSetPtr = std::shared_ptr<const LevelSet>;
 
+// Inside is where the mesh's faces wind around a place: pieces may overlap, and one that is turned inwards inside
+// another is a cavity. A mesh with holes keeps those smaller than a voxel closed (see level_set_grid.h).
+//
 // Warnings are collected in `warnings` where something is doubtful but usable (a mesh with holes, faces turned inside
 // out), with the numbers. Errors: a voxel that would make over 2^31 voxels, or that is larger than the mesh (nothing
 // would be left of it), an empty mesh.

@@ -303,7 +303,7 @@ int set_index(State& state)
     lua_pushcfunction(L, [](lua_State* state_of) {
         return guarded(state_of, [](State& s) {
             const ObjectPtr object = s.to_object(1);
-            const std::string text = object ? fmt::format("a {}", object->kind()) : "a value";
+            const std::string text = describe(Value(object));
             lua_pushlstring(s.lua(), text.data(), text.size());
             return 1;
         });

@@ -1,0 +1,266 @@
+#include "runtime/shapes/first_contact.h"
+
+#include <cmath>
+#include <random>
+
+#include "runtime/shapes/analytic.h"
+#include "runtime/shapes/level_set.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using test::close_to;
+
+Contact meet(const ShapePtr& shape, const Path& path)
+{
+    Contact contact;
+    shape->first_contact({&path, 1}, {&contact, 1});
+    return contact;
+}
+
+double distance(const ShapePtr& shape, const Vec3d& P)
+{
+    double phi;
+    shape->distance({&P, 1}, {&phi, 1}, {});
+    return phi;
+}
+
+class Random {
+public:
+    explicit Random(unsigned seed) : engine_(seed) {}
+    double in(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(engine_); }
+    Vec3d direction()
+    {
+        std::normal_distribution<double> normal;
+        return Vec3d(normal(engine_), normal(engine_), normal(engine_)).normalized();
+    }
+
+private:
+    std::mt19937_64 engine_;
+};
+
+// From around a shape of this size, more or less towards it, bent by an acceleration.
+Path path_to(const Vec3d& center, Random& random, double radius)
+{
+    const Vec3d P = center + random.in(1, 3) * random.direction();
+    const Vec3d v = random.in(0.5, 4) * (center + random.in(0, 1.5) * random.direction() - P);
+    return {P, v, random.in(0, 20) * random.direction(), 1, radius};
+}
+
+Vec3d place(const Path& path, double s) { return path.P + s * path.v + s * s / 2 * path.a; }
+
+TEST_CASE("a ball meets a plane at the root of its parabola", "[first_contact]")
+{
+    const double height = GENERATE(1e-3, 1.0, 1e5), speed = GENERATE(-30.0, 0.0, 4.0), radius = GENERATE(0.0, 1e-4);
+    CAPTURE(height, speed, radius);
+    const Path path{{7, height, 1}, {1, speed, 0}, {0, -9.81, 0}, 1e9, radius};
+    const Contact contact = meet(make_plane({0, 1, 0}, 0), path);
+
+    const long double f = height - radius, g = 9.81;
+    const long double root = (speed + std::sqrt(speed * speed + 2 * g * f)) / g;
+    CHECK(contact.time == Approx(double(root)).epsilon(1e-13));
+    CHECK(contact.n == Vec3d(0, 1, 0));
+    CHECK(contact.flat);
+}
+
+TEST_CASE("a path that turns before it reaches a plane does not meet it", "[first_contact]")
+{
+    const ShapePtr plane = make_plane({0, 1, 0}, 0);
+    const Vec3d lift(0, 10, 0);
+    // It turns at the height 1 - v²/20: at v = √20 it grazes.
+    CHECK(meet(plane, {{0, 1, 0}, {0, -4.47, 0}, lift, 10, 0}).time == Contact::none);
+    CHECK(meet(plane, {{0, 1, 0}, {0, -4.48, 0}, lift, 10, 0}).time == Approx(0.448 - std::sqrt(0.448 * 0.448 - 0.2)));
+    CHECK(meet(plane, {{0, 1, 0}, {0, -4.48, 0}, lift, 0.3, 0}).time == Contact::none);  // not yet
+}
+
+TEST_CASE("a straight path meets a sphere at the root of its quadratic", "[first_contact]")
+{
+    Random random(1);
+    int met = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const Vec3d center = 3 * random.direction();
+        const double R = random.in(0.01, 2), r = i % 2 ? random.in(0, 0.5) : 0;
+        const Vec3d P = center + (R + r + random.in(1e-3, 10)) * random.direction();
+        const Vec3d v =
+            random.in(0.1, 1000) * (center + random.in(0, 1.2) * (R + r) * random.direction() - P).normalized();
+        const Contact contact = meet(make_sphere_shape(R, center), {P, v, Vec3d::Zero(), 1e6, r});
+
+        const Vec3d d = P - center;
+        const double b = d.dot(v), c = d.squaredNorm() - (R + r) * (R + r), a = v.squaredNorm();
+        const double discriminant = b * b - a * c;
+        CAPTURE(i, discriminant);
+        if (std::abs(discriminant) < 1e-9 * b * b) continue;  // a graze, which rounding decides
+        if (discriminant < 0) {
+            CHECK(contact.time == Contact::none);
+            continue;
+        }
+        ++met;
+        const double root = c / (-b + std::sqrt(discriminant));
+        CHECK(contact.time == Approx(root).epsilon(1e-9));
+        CHECK_THAT(contact.n, close_to(Vec3d((P + root * v - center).normalized()), 1e-7));
+        // Of the surface that keeps points of this radius out; by a difference over a millionth of the sphere.
+        CHECK(contact.curvature == Approx(1 / (R + r)).epsilon(1e-4));
+    }
+    CHECK(met > 500);
+}
+
+// The contact is on the surface, and the path was outside until then: looked at in small steps.
+void require_first(const ShapePtr& shape, const Path& path, const Contact& contact, double tolerance)
+{
+    const double until = std::min(contact.time, path.duration);
+    double lowest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 2000; ++k) lowest = std::min(lowest, distance(shape, place(path, until * k / 2000)));
+    REQUIRE(lowest >= path.radius - tolerance);
+    if (contact.time == Contact::none) return;
+    REQUIRE(contact.time <= path.duration);
+    REQUIRE(distance(shape, place(path, contact.time)) == Approx(path.radius).margin(tolerance));
+    REQUIRE(contact.n.norm() == Approx(1));
+}
+
+TEST_CASE("parabolas meet spheres and boxes where they first touch them", "[first_contact]")
+{
+    const ShapePtr shape =
+        GENERATE(make_sphere_shape(0.7, {0.1, 0.2, 0.3}), make_box_shape({1, 0.4, 2}, {0.1, 0.2, 0.3}));
+    CAPTURE(shape->kind());
+    Random random(2);
+    int met = 0, missed = 0;
+    for (int i = 0; i < 300; ++i) {
+        const double radius = i % 3 ? random.in(0, 0.3) : 0;
+        const Path path = path_to({0.1, 0.2, 0.3}, random, radius);
+        if (distance(shape, path.P) < radius) continue;
+        CAPTURE(i);
+        const Contact contact = meet(shape, path);
+        require_first(shape, path, contact, 1e-9);
+        (contact.time == Contact::none ? missed : met)++;
+    }
+    CHECK(met > 50);
+    CHECK(missed > 50);
+}
+
+TEST_CASE("a point flush with a surface is outside it", "[first_contact]")
+{
+    const ShapePtr shape = GENERATE(make_plane({0, 1, 0}, 1), make_sphere_shape(1, {0, 0, 0}),
+                                    make_box_shape({2, 2, 2}, {0, 0, 0}), level_set_sphere(1, {0, 0, 0}, {0.05, 3}));
+    const double off = GENERATE(-1e-7, 0.0, 1e-7);  // what single precision does to a position
+    CAPTURE(shape->kind(), off);
+    Vec3d P(0, 1, 0);
+    P.y() += off - distance(shape, P);  // on the field's own surface, where that is not exactly at 1
+    const Vec3d pull(0, -9.81, 0), none(0, 0, 0);
+
+    CHECK(meet(shape, {P, {0, 1, 0}, none, 1, 0}).time == Contact::none);    // leaves
+    CHECK(meet(shape, {P, {0, 1, 0}, pull, 0.1, 0}).time == Contact::none);  // leaves, for longer than this
+    CHECK(meet(shape, {P, {0, 3, 0}, pull, 1, 0}).time == Approx(6 / 9.81).epsilon(1e-5));  // and comes back
+    CHECK(meet(shape, {P, {0, -1, 0}, none, 1, 0}).time == 0);                              // moves in
+    CHECK(meet(shape, {P, none, pull, 1, 0}).time == 0);                                    // is pressed in
+    CHECK(meet(shape, {P, {0, 1e-6, 0}, pull, 1, 0}).time == 0);              // hops by less than rounding
+    CHECK(meet(shape, {P, none, none, 1, 0}).time == Contact::none);          // stays
+    CHECK(meet(shape, {P, none, {0, 9.81, 0}, 1, 0}).time == Contact::none);  // is drawn off
+    CHECK(meet(shape, {P, {0, -1, 0}, none, 1, 0}).depth == 0);
+}
+
+TEST_CASE("a fast point that is pressed to a ball leaves it tangentially", "[first_contact]")
+{
+    const ShapePtr ball = make_sphere_shape(1, {0, 0, 0});
+    const Vec3d top(0, 1, 0), pull(0, -9.81, 0);
+    CHECK(meet(ball, {top, {3, 0, 0}, pull, 1, 0}).time == 0);                // v² < g R
+    CHECK(meet(ball, {top, {3.3, 0, 0}, pull, 1, 0}).time == Contact::none);  // v² > g R
+}
+
+TEST_CASE("a path that starts inside says how deep and which way is out", "[first_contact]")
+{
+    const Path path{{0.5, 0.2, 0}, {0, 0, 3}, {0, 0, 0}, 1, 0.1};
+    const Contact in_box = meet(make_box_shape({2, 2, 2}, {0, 0, 0}), path);
+    CHECK(in_box.time == 0);
+    CHECK(in_box.depth == Approx(0.6));
+    CHECK(in_box.n == Vec3d(1, 0, 0));
+    const Contact in_plane = meet(make_plane({0, 1, 0}, 1), path);
+    CHECK(in_plane.depth == Approx(0.9));
+    CHECK(in_plane.n == Vec3d(0, 1, 0));
+}
+
+TEST_CASE("deep in a level set the way out is the way in", "[first_contact]")
+{
+    const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});
+    const Contact contact = meet(ball, {{0, 0, 0.2}, {0, 0, -4}, {0, 0, 0}, 1, 0});
+    CHECK(contact.time == 0);
+    CHECK(contact.depth > 0);
+    CHECK(contact.n == Vec3d(0, 0, 0));
+    const double z = 0.2 + 4 * contact.back;  // there the field has a gradient, or it is outside
+    CHECK(z > 0.8);
+    CHECK(z < 1.3);
+    CHECK(meet(ball, {{0, 0, 0.2}, {0, 0, 0}, {0, 0, 0}, 1, 0}).back == Contact::none);
+}
+
+TEST_CASE("paths meet a level set where they first touch its field", "[first_contact]")
+{
+    const ShapePtr shape = GENERATE(level_set_sphere(0.7, {0.1, 0.2, 0.3}, {0.05, 5}),
+                                    level_set_box({1, 0.4, 2}, {0.1, 0.2, 0.3}, {0.05, 5}),
+                                    level_set_torus(0.8, 0.25, {0, 0, 0}, {0.05, 5}));
+    Random random(3);
+    int met = 0;
+    for (int i = 0; i < 200; ++i) {
+        const double radius = i % 3 ? random.in(0, 0.1) : 0;
+        const Path path = path_to({0.1, 0.2, 0.3}, random, radius);
+        if (distance(shape, path.P) < radius) continue;
+        CAPTURE(i);
+        const Contact contact = meet(shape, path);
+        met += contact.time != Contact::none;
+        // A graze of a quarter voxel's chord may be stepped over: it is 0.0125²/(8 · 0.25) deep on the torus' tube, and
+        // half as deep as it is long at an edge.
+        require_first(shape, path, contact, 7e-3);
+        if (contact.time != Contact::none)
+            REQUIRE(distance(shape, place(path, contact.time)) == Approx(radius).margin(1e-6));
+    }
+    CHECK(met > 40);
+}
+
+TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_contact][extreme]")
+{
+    const double voxel = 0.1;
+    const ShapePtr wall = level_set_box({2 * voxel, 4, 4}, {0.013, 0, 0}, {voxel, 3});
+    const double speed = std::pow(10.0, GENERATE(range(-1, 8)));
+    CAPTURE(speed);
+    Random random(4);
+    for (int i = 0; i < 300; ++i) {
+        const Vec3d from(-random.in(0.5, 3), random.in(-1, 1), random.in(-1, 1)),
+            to(3, random.in(-1, 1), random.in(-1, 1));
+        const Vec3d v = speed * (to - from).normalized();
+        const Vec3d a = random.in(0, 0.1) * speed * speed * random.direction();  // it bends, by up to 0.05 of its way²
+        const Path path{from, v, a, (to - from).norm() / speed, 0};
+        if (place(path, path.duration).x() < 0.3) continue;  // bent back, or not through yet
+        const Contact contact = meet(wall, path);
+        CAPTURE(i);
+        REQUIRE(contact.time < path.duration);
+        REQUIRE(place(path, contact.time).x() == Approx(0.013 - voxel).margin(0.2 * voxel));
+    }
+}
+
+TEST_CASE("a surface is not looked for beyond its bounds, and found from any distance", "[first_contact]")
+{
+    const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});
+    CHECK(meet(ball, {{1e6, 0, 0}, {-1e6, 0, 0}, {0, 0, 0}, 2, 0}).time == Approx(1 - 1e-6).epsilon(1e-9));
+    CHECK(meet(ball, {{1e6, 1.3, 0}, {-1e6, 0, 0}, {0, 0, 0}, 2, 0}).time == Contact::none);
+    CHECK(meet(ball, {{1e6, 1.3, 0}, {-1e6, 0, 0}, {0, 0, 0}, 2, 0.31}).time < 1);
+    CHECK(meet(ball, {{5, 0, 0}, {1e6, 0, 0}, {0, 1e6, 0}, 10, 0}).time == Contact::none);
+}
+
+TEST_CASE("an answer does not depend on what else is asked", "[first_contact]")
+{
+    const ShapePtr shape = GENERATE(make_plane({0.2, 1, 0}, 0), make_sphere_shape(1, {0, 0, 0}),
+                                    level_set_torus(0.8, 0.25, {0, 0, 0}, {0.05, 3}));
+    Random random(6);
+    std::vector<Path> paths;
+    for (int i = 0; i < 100; ++i)
+        paths.push_back({2 * random.direction(), 10 * random.direction(), 10 * random.direction(), 1, 0.01});
+    std::vector<Contact> together(paths.size());
+    shape->first_contact(paths, together);
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        const Contact alone = meet(shape, paths[i]);
+        CHECK(alone.time == together[i].time);
+        CHECK(alone.n == together[i].n);
+    }
+}
+
+}  // namespace
+}  // namespace rapid

@@ -48,7 +48,7 @@ struct SceneRun {
     SessionOptions session;
 };
 
-// The arguments that lua/testing/rapid.lua gives, checked there: (path, {first, last, seed, threads, script_timeout, set}).
+// The arguments that lua/testing/rapid.lua gives, checked there: (path, options).
 SceneRun read_run(lua_State* L)
 {
     const Host& host = host_of(L);

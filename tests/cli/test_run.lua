@@ -339,6 +339,69 @@ return rapid.create {}
   end)
 end)
 
+describe("a picture", function()
+  local ball = [[
+local rapid = require "rapid"
+local points = rapid.points.grid { size = {2, 0.1, 2}, spacing = 0.1, center = {0, 2, 0} }
+local scene = rapid.create { points = points } :gravity {}
+if rapid.param("ball", true) then scene = scene:collide { shape = rapid.shape.sphere { radius = 0.8 } } end
+return scene:solve {}
+]]
+
+  -- Width and height, as a PNG's header has them.
+  local function size_of(png)
+    local wide, wide_low = png:byte(19, 20)
+    local high, high_low = png:byte(23, 24)
+    return 256 * wide + wide_low, 256 * high + high_low
+  end
+
+  it("has 1280 x 720 pixels, or those of --size", function()
+    local folder = new_folder(ball)
+    assert.equal(0, folder:run("-f 1 -o usual.png").status)
+    assert.equal(0, folder:run("-f 1 -o small.png --size 64x48").status)
+    assert.same({ 1280, 720 }, { size_of(folder:read "usual.png") })
+    assert.same({ 64, 48 }, { size_of(folder:read "small.png") })
+  end)
+
+  it("is taken from where --camera says", function()
+    local folder = new_folder(ball)
+    for name, camera in pairs { a = "0,3,6,0,1,0", b = "0,3,6,0,1,0,35", c = "0,3,6,0,1,0,90", d = "0,1,6,0,1,0" } do
+      assert.equal(0, folder:run(("-f 2 -o %s.png --size 64x48 --camera %s"):format(name, camera)).status)
+    end
+    local a = folder:read "a.png"
+    assert.is_true(a ~= folder:read "c.png" and a ~= folder:read "d.png")
+    local wrong = folder:run "-f 1 --camera 0,3,6,0,1"
+    assert.equal(2, wrong.status)
+    assert.truthy(wrong.stderr:find('--camera = "0,3,6,0,1"; it must be PX,PY,PZ,TX,TY,TZ', 1, true), wrong.stderr)
+  end)
+
+  it("shows the shapes that the points collide with", function()
+    local folder = new_folder(ball)
+    local camera = " --size 64x48 --camera 0,1,6,0,1,0"
+    assert.equal(0, folder:run("-f 1 -o with.png" .. camera).status)
+    assert.equal(0, folder:run("-f 1 -o without.png --set ball=false" .. camera).status)
+    assert.is_true(folder:read "with.png" ~= folder:read "without.png")
+  end)
+end)
+
+describe(":write", function()
+  it("writes the points as they are there, of the frames of -f", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 10, 0}}, heat = {3} } }
+  :gravity {} :solve {} :write { file = "inner/a.####.csv", attributes = {"heat"} } :attribute { late = 1 }
+]]
+    local result = folder:run "-f 3-5x2 -o outer.####.csv"
+    assert.equal(0, result.status, result.stderr)
+    assert.same({ "inner/a.0003.csv", "inner/a.0005.csv", "outer.0003.csv", "outer.0005.csv", "scene.lua" },
+      folder:list())
+    local rows, header = rows_of(folder:read "inner/a.0005.csv")
+    assert.same({ "id", "Px", "Py", "Pz", "vx", "vy", "vz", "heat" }, header)
+    assert.near(height_at(5), rows[1].Py, 1e-5)
+    assert.truthy(folder:read("outer.0005.csv"):find "^[^\n]*,late\n")
+  end)
+end)
+
 describe("an empty scene", function()
   it("just works", function()
     local folder = new_folder [[return require("rapid").create {} :gravity {} :solve {}]]

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "runtime/shapes/first_contact.h"
 #include "runtime/solver/response.h"
@@ -24,6 +25,14 @@ constexpr double least_kink = 0.02;
 // The part of its size that a velocity after a bounce may have along the normal of a surface that the point rests on,
 // and leave the point on it: rounding.
 constexpr double tangential = 1e-9;
+
+// The part of its size that a velocity along one side of a valley may have out of the other side, of a point that stays
+// in the valley: what two responses leave of a velocity across it.
+constexpr double valley = 1e-6;
+
+// A point that has gone nowhere, to rounding, in this many contacts and pieces is at rest: in a pit of a field it can
+// chatter at 1e-10 m/s between facets that each would let it slide. Real impacts move a point farther than that.
+constexpr int chatter = 1024;
 
 // The shortest pieces of a slide, as parts of the sub-step: where friction turns, and where a surface without a
 // smallest feature does.
@@ -93,6 +102,7 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> 
 {
     P_ = P;
     v_ = v;
+    a_ = a;
     find_near(a, dt);
     fly(a, dt);
     while (!travellers_.empty()) round_of_travellers(a, dt);
@@ -189,6 +199,11 @@ bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
         t.way = Traveller::Free;
         t.stops = false;
         if (t.supports == 0) return true;
+        if (chatters(t)) {
+            v = t.on[0].vc;
+            P_[t.i] += t.left * v;
+            return false;
+        }
 
         Slide slide;
         bool flat = t.on[0].flat;
@@ -223,10 +238,26 @@ bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
             // Along the edge of curved surfaces in short straight pieces; each ends in the air, or within rounding of
             // the surfaces, where the next contact finds it.
             t.way = Traveller::Straight;
-            if (path.duration > dt / 16) path.duration = dt / 16, t.stops = false;
+            double most = dt / 16;
+            if (const double feature = std::max(t.on[0].feature, t.on[1].feature); feature > 0)
+                most = std::min(most, detail::time_to_travel(feature, path.v.norm(), path.a.norm()));
+            if (path.duration > most) path.duration = most, t.stops = false;
+            if (++t.events >= most_contacts) return ++limited, false;
         }
         return true;
     }
+}
+
+// Whether a point on a surface has been busy for long without getting anywhere in the surface's frame. On one that
+// moves it gets somewhere with it.
+bool Collisions::chatters(Traveller& t)
+{
+    if (t.events < t.watched + chatter) return false;
+    t.watched = t.events;
+    const Vec3d before = std::exchange(t.stood, P_[t.i]);
+    const Support& on = t.on[0];
+    const double radius = obstacles_[on.collider].radius[first_ + t.i];
+    return (P_[t.i] - before).norm() <= flush_within(P_[t.i], radius, on.feature * 0x1p-21);
 }
 
 void Collisions::bend(Strided<Vec3d> a, std::span<const double> dt)
@@ -288,6 +319,12 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
             continue;
         }
         if (leaves) {
+            // The next moments belong to the path: at an edge the surface may seem to curve less where the point
+            // touches than along its way, and would be met at once again.
+            const double moment = std::min(t.left, std::max(s, least_bending * dt[t.i]));
+            P_[t.i] += moment * (v_[t.i] + 0.5 * moment * a[t.i]);
+            v_[t.i] += moment * a[t.i];
+            t.left -= moment;
             t.supports = 0;
             t.piece = dt[t.i];
             t.way = Traveller::Free;
@@ -479,12 +516,19 @@ void Collisions::meet_on_bend(Traveller& t, const Path& chord, const Bend& end, 
     meet(t, chord.P + u * d + 0.5 * end.curvature * d.squaredNorm() * u * (1 - u) * on.n, v, end.a, contact, o, dt);
 }
 
-// Rests on one more surface: on one it slides, on two along their edge, on three nowhere.
+// Rests on one more surface: on one it slides, on two along their edge, on three nowhere. Two facets of one field are
+// two surfaces where they make a valley, and the point lies in it: neither moving out of it nor drawn out.
 void Collisions::settle(Traveller& t, const Support& support, const Vec3d& v)
 {
     Vec3d along = v - support.vc;
     along -= along.dot(support.n) * support.n;
-    const bool again = t.supports > 0 && t.on[t.supports - 1].collider == support.collider;
+    bool again = t.supports > 0 && t.on[t.supports - 1].collider == support.collider;
+    if (again && t.supports == 1) {
+        const Vec3d& other = t.on[0].n;
+        const Vec3d& a = a_[t.i];
+        const Vec3d pull = a - a.dot(support.n) * support.n;
+        again = along.dot(other) > valley * along.norm() || pull.dot(other) >= 0 || edge_of(t.on[0], support).isZero();
+    }
     if (t.supports == 0 || again) {
         t.supports = std::max(t.supports, 1);
         t.on[t.supports - 1] = support;

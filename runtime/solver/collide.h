@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -60,11 +61,13 @@ private:
     struct Traveller {
         enum Way { Free, Straight, Curved, Waits };
 
-        std::uint32_t i;   // place in the block
-        double left;       // s of the sub-step
-        double piece;      // s: the length of the next piece along a curved surface
-        int events = 0;    // towards most_contacts
-        int rescues = 0;   // times that it was taken out of a shape
+        std::uint32_t i;  // place in the block
+        double left;      // s of the sub-step
+        double piece;     // s: the length of the next piece along a curved surface
+        int events = 0;   // towards most_contacts
+        int rescues = 0;  // times that it was taken out of a shape
+        int watched = 0;  // events when `stood` was taken
+        Vec3d stood = Vec3d::Constant(std::numeric_limits<double>::infinity());  // where it was then
         int supports = 0;  // surfaces that it rests on: of two, it moves along their edge
         Support on[2] = {};
 
@@ -89,6 +92,7 @@ private:
     void fly(Strided<Vec3d> a, std::span<const double> dt);
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
     bool plan(Traveller& t, Path& path, const Vec3d& a, double dt);
+    bool chatters(Traveller& t);
     void bend(Strided<Vec3d> a, std::span<const double> dt);
     void bend_on(int obstacle, Strided<Vec3d> a, std::span<const double> dt);
     void search(std::size_t n, bool all);
@@ -117,6 +121,7 @@ private:
     std::vector<Vec3f> before_;      // at the beginning of the frame
     std::vector<std::array<Surface, 2>> surfaces_;  // where it has: those that it is on now
     std::span<Vec3d> P_, v_;
+    Strided<Vec3d> a_{nullptr, 0};  // of the sub-step, without the forces of surfaces
 
     std::vector<int> near_;  // the obstacles that a free path of the block may reach in this sub-step
 

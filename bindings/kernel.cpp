@@ -104,6 +104,17 @@ void Kernel::analyse()
     asks_any_ = flag_of(L, "asks_any");
     kills_ = flag_of(L, "kills");
 
+    for (const std::string& name : keys_of(L, "calls")) {
+        lua_getfield(L, -1, "calls");
+        lua_getfield(L, -1, name.c_str());
+        const int line = static_cast<int>(lua_tointeger(L, -1));
+        lua_pop(L, 3);
+        const std::string near = did_you_mean(name, {"join", "leave", "within", "kill", "rand"});
+        throw Error(fmt::format("p has no method \"{}\"{}", name,
+                                near.empty() ? "; it has join, leave, within, kill and rand" : near))
+            .at({location.file, line});
+    }
+
     lua_getfield(L, -1, "writes");
     for (const char* name : {"id", "dt", "index"}) {
         lua_getfield(L, -1, name);

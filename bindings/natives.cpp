@@ -229,6 +229,9 @@ int make_node(State& state)
         node->location = state.where();
         node->serial = host.graph.nodes.size();
         const std::string what = type.name;
+        const auto same = std::count_if(host.graph.nodes.begin(), host.graph.nodes.end(),
+                                        [&](const NodePtr& other) { return other->type == &type; });
+        node->name = fmt::format("{}{}", what, same + 1);
         try {
             const auto options = table_at(state, 2);
             check_named(":" + what, *options);
@@ -240,21 +243,17 @@ int make_node(State& state)
                     throw Error(fmt::format("name = {}; it must be a string", describe(named->second)));
                 node->name = *name;
                 node->arguments.erase(named);
-            } else {
-                const auto same = std::count_if(host.graph.nodes.begin(), host.graph.nodes.end(),
-                                                [&](const NodePtr& other) { return other->type == &type; });
-                node->name = fmt::format("{}{}", what, same + 1);
             }
             for (auto& [param, kernel] : kernels) node->arguments[param] = Value(kernel);
             for (int i = 3; i <= lua_gettop(L); ++i) {
                 const auto input = std::dynamic_pointer_cast<const NodeHandle>(state.to_object(i));
                 if (!input)
                     throw Error(fmt::format("input {} is {}; it must be a node: call it as node:{}{{ ... }}", i - 2,
-                                            luaL_typename(L, i), what));
+                                            describe(state.to_value(i)), what));
                 node->inputs.push_back(input->node);
             }
         } catch (Error& error) {
-            error.in_node(node->name.empty() ? what : node->name).at(node->location);
+            error.in_node(node->name).at(node->location);
             throw;
         }
         host.graph.nodes.push_back(node);
@@ -281,6 +280,16 @@ int unknown_type(State& state)
 {
     state.host().registry.at(text_at(state, 1));  // says what is near
     return 0;
+}
+
+// native.did_you_mean(name, names): `; did you mean "NEAREST"?`, or nothing.
+int suggest(State& state)
+{
+    std::vector<std::string> names;
+    read_value(Param(), Value(table_at(state, 2)), names);
+    const std::string text = did_you_mean(text_at(state, 1), names);
+    lua_pushlstring(state.lua(), text.data(), text.size());
+    return 1;
 }
 
 int kind_of(State& state)
@@ -349,6 +358,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"complete", native<complete_arguments>},
                                       {"has_type", native<has_type>},
                                       {"unknown_type", native<unknown_type>},
+                                      {"did_you_mean", native<suggest>},
                                       {"kind", native<kind_of>},
                                       {"set_index", native<set_index>},
                                       {"run", run_body},

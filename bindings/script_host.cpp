@@ -116,7 +116,12 @@ void ScriptHost::run_file(State& state)
     lua_pushlstring(L, text_.data(), text_.size());
     const std::string name = "@" + graph.file;
     lua_pushlstring(L, name.data(), name.size());
-    state.call(2, 1);
+    try {
+        state.call(2, 1);
+    } catch (Error& error) {
+        error.at({graph.file, 0});  // where no line is known: a stack overflow, no memory left
+        throw;
+    }
 }
 
 void ScriptHost::collect_outputs(State& state)
@@ -139,8 +144,8 @@ void ScriptHost::collect_outputs(State& state)
             lua_pop(L, 1);
         }
     } else if (!lua_isnil(L, -1)) {
-        throw Error(fmt::format("the graph returns a {}; it must return a node, or a table of nodes by name",
-                                luaL_typename(L, -1)))
+        throw Error(fmt::format("the graph returns {}; it must return a node, or a table of nodes by name",
+                                describe(state.to_value(-1))))
             .at({graph.file, 0});
     }
     lua_pop(L, 1);

@@ -15,6 +15,7 @@ namespace rapid {
 namespace {
 
 constexpr char object_metatable[] = "rapid.object";
+constexpr int levels_searched = 50;  // for an error's own line, which `error(text, level)` may put further down
 constexpr int cdata_type = 10;  // LUA_TCDATA, which lua.h does not name
 
 std::string read_text(const std::filesystem::path& path)
@@ -67,6 +68,7 @@ int describe_error(lua_State* L)
         if (is_graph_code(info) && (place.empty() || own))
             place = fmt::format("{}:{}", info.source + 1, info.currentline);
         if (own && is_graph_code(info)) break;
+        if (!place.empty() && level > levels_searched) break;
     }
     if (place.empty() && state.tail_call.line > 0)
         place = fmt::format("{}:{}", state.tail_call.file, state.tail_call.line);
@@ -140,7 +142,8 @@ public:
     Value call(const Frame& frame) const override
     {
         lua_State* L = state_.lua();
-        ScriptHost::Section section(state_.host(), "a parameter's function");
+        const ScriptHost::Section section(
+            state_.host(), fmt::format("{}:{}: a parameter's function", location_.file, location_.line));
         state_.push_entry("call");
         lua_rawgeti(L, LUA_REGISTRYINDEX, reference_);
         lua_pushnumber(L, frame.number);
@@ -226,7 +229,8 @@ State& State::of(lua_State* L)
     return *state;
 }
 
-// Lua's memory of one state is limited: a request beyond it is Lua's own "not enough memory".
+// Lua's memory of one state is limited while scripts run: a request beyond it is Lua's own "not enough memory". What the
+// host itself puts on the stack between them is not: outside of a protected call that error would end the process.
 void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t new_size)
 {
     State& state = *static_cast<State*>(self);
@@ -235,7 +239,8 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         state.memory_ -= old_size;
         return nullptr;
     }
-    if (new_size > old_size && state.memory_ + (new_size - old_size) > state.host_.options().script_memory)
+    if (state.limited_ && new_size > old_size &&
+        state.memory_ + (new_size - old_size) > state.host_.options().script_memory)
         return nullptr;
     void* moved = std::realloc(block, new_size);
     if (moved) state.memory_ += new_size - old_size;
@@ -283,7 +288,9 @@ void State::call(int arguments, int results)
     const int base = lua_gettop(L_) - arguments;  // of the function
     lua_pushcfunction(L_, describe_error);
     lua_insert(L_, base);
+    const bool limited = std::exchange(limited_, true);
     const int status = lua_pcall(L_, arguments, results, base);
+    limited_ = limited;
     lua_remove(L_, base);
     if (status == 0) return;
 
@@ -301,6 +308,7 @@ void State::call(int arguments, int results)
         message = text ? text : "an error that could not be described";
     }
     lua_pop(L_, 1);
+    if (message == "stack overflow") message += ": a function calls itself without end";
     if (message == "not enough memory")
         message = fmt::format("the script needs more than {} MiB of Lua memory; --script-memory sets the limit",
                               host_.options().script_memory >> 20);

@@ -74,6 +74,7 @@ private:
     ScriptHost& host_;
     bool main_;
     std::size_t memory_ = 0;
+    bool limited_ = false;  // to options().script_memory, now
     lua_State* L_ = nullptr;
     int entries_ = 0;
     std::vector<int> kernel_references_;

@@ -173,7 +173,8 @@ void run_test_file(const std::filesystem::path& file, const TestOptions& options
     register_points(L);
     lua_pushstring(L, file.c_str());
     lua_pushstring(L, options.filter.c_str());
-    if (lua_pcall(L, 3, 0, 0) != 0) throw Error(lua_tostring(L, -1));
+    lua_pushinteger(L, options.already_run);
+    if (lua_pcall(L, 4, 0, 0) != 0) throw Error(lua_tostring(L, -1));
 }
 
 }  // namespace rapid

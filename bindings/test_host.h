@@ -21,8 +21,9 @@ struct TestEvent {
 };
 
 struct TestOptions {
-    std::string filter;  // a Lua pattern that a test's name must match; empty: all
-    int threads = 0;     // of scenes that do not say; 0: all
+    std::string filter;   // a Lua pattern that a test's name must match; empty: all
+    int already_run = 0;  // tests at the beginning of the file that are passed over
+    int threads = 0;      // of scenes that do not say; 0: all
     // A scene's script overran, on the watchdog's thread; must not return.
     std::function<void(const std::string& message)> on_timeout;
 };

@@ -8,6 +8,7 @@
 --   may              names indexed anywhere in helpers, and on values that are not known to be no point
 --   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
 --                    are the calls of a method `join` of anything
+--   calls            names on the point itself that it calls as if they were methods
 --   kills            whether `kill` is called or could be
 --   stores           places (line, what) where it writes upvalues, globals or shared tables
 --
@@ -105,6 +106,7 @@ local function step(f, pc, regs, found, outer)
         return { kind = "method", value = key }
       end
       found.reads[key] = found.reads[key] or line()
+      return { kind = "attribute", value = key }
     elseif object and object.kind == "shared" then
       return { kind = "shared", value = field(object.value, key) }
     else
@@ -171,6 +173,8 @@ local function step(f, pc, regs, found, outer)
     elseif callee and callee.kind == "method" and callee.value == "within" then
       local group = regs[first + 1]
       if group and group.kind == "string" then found.asks[group.value] = true else found.asks_any = true end
+    elseif callee and callee.kind == "attribute" then
+      found.calls[callee.value] = found.calls[callee.value] or line()
     elseif callee and callee.kind == "shared" and type(callee.value) == "function" then
       analyse_function(callee.value, found, false)
       local target = regs[first]
@@ -247,7 +251,8 @@ end
 -- env: the environment in which the kernel's globals live.
 local function analyse(kernel, env)
   local found = {
-    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, stores = {}, seen = {}, env = env,
+    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, seen = {},
+    env = env,
   }
   analyse_function(kernel, found, true)
   found.seen, found.env = nil, nil

@@ -14,6 +14,13 @@ local function options_of(what, options)
   return copy
 end
 
+local function names_of(map)
+  local names = {}
+  for name in pairs(map) do names[#names + 1] = name end
+  table.sort(names)
+  return names
+end
+
 -- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil.
 local function make(native, load_node)
   local rapid = {}
@@ -171,15 +178,28 @@ local function make(native, load_node)
       if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
       return method_of(name)
     end
-    local known = value_methods[kind]
-    local method = known and known[name]
-    if method then return method end
-    error(("a %s has no %q"):format(kind, tostring(name)), 2)
+    local known = value_methods[kind] or {}
+    if known[name] then return known[name] end
+    local what = kind == "points" and "points have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
+      or "a " .. kind .. " has"
+    name = tostring(name)
+    error(("%s no %q%s"):format(what, name, native.did_you_mean(name, names_of(known))), 2)
   end, function(a, b)
     return native.make("motion.product", { first = a, second = b })
   end)
 
-  return rapid
+  -- A misspelt name is an error of its own, before it is called.
+  local function closed(library, what)
+    return setmetatable(library, {
+      __index = function(_, name)
+        name = tostring(name)
+        error(("%s has no %q%s"):format(what, name, native.did_you_mean(name, names_of(library))), 2)
+      end,
+      __metatable = false,
+    })
+  end
+  for _, name in ipairs { "mesh", "levelset", "shape", "points" } do closed(rapid[name], "rapid." .. name) end
+  return closed(rapid, "rapid")
 end
 
 return { make = make }

@@ -42,6 +42,7 @@ void RunReport::line(const std::string& text)
 void RunReport::warning(const std::string& text)
 {
     const std::lock_guard lock(mutex_);
+    if (!warned_.insert(text).second) return;
     if (progress_) progress_->finish();
     print_warning(text);
 }

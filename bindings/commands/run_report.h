@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,7 @@ public:
     void begin(std::int64_t first, std::int64_t last);
     void frame(const FrameResult& result);
     void line(const std::string& text);
+    // Once: what is doubtful in one frame often is in the next ones.
     void warning(const std::string& text);
 
     // The statistics file and the summary. Error: the file can't be written.
@@ -52,6 +54,7 @@ private:
     std::timed_mutex mutex_;
     RunStatistics run_;
     std::optional<Progress> progress_;
+    std::set<std::string> warned_;
 };
 
 }  // namespace rapid

@@ -80,7 +80,9 @@ public:
     {
         app.add_option("FILES", files_, "test files, or folders of test_*.lua")->type_name("")->required();
         app.add_option("--filter", filter_, "only tests whose name this Lua pattern matches")->type_name("PATTERN");
-        app.add_flag("--child", child_)->group("");  // of our own: the process of one file
+        // Our own: the process of one file.
+        app.add_flag("--child", child_)->group("");
+        app.add_option("--already-run", already_run_)->group("");
     }
 
     int run(const CommonOptions& common) override
@@ -101,41 +103,60 @@ public:
 private:
     TestOptions options(const CommonOptions& common) const
     {
-        return {filter_, common.threads, [](const std::string& message) {
+        return {filter_, already_run_, common.threads, [](const std::string& message) {
                     print_error(Error(message), false);
                     _exit(status_failed);
                 }};
     }
 
+    // After a test that ended its process, the file goes on behind that test.
     void run_file(const std::string& program, const fs::path& file, const CommonOptions& common, Counts& counts) const
     {
-        int ends[2];
-        if (pipe2(ends, O_CLOEXEC) != 0) throw Error(fmt::format("no pipe: {}", std::strerror(errno)));
-        const pid_t child = spawn(program, file, common, ends[1]);
-        close(ends[1]);
-        std::string running;
-        const bool ended = follow(ends[0], common.verbose, running, counts);
-        int status = 0;
-        waitpid(child, &status, 0);
-        if (ended && WIFEXITED(status) && WEXITSTATUS(status) == status_done) return;
-
-        // Its own words, if it had any, are on standard error already.
-        const std::string how = WIFSIGNALED(status)
-                                    ? fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
-                                    : fmt::format("status {}", WEXITSTATUS(status));
-        if (running.empty()) {
-            ++counts.broken;
-            print(fmt::format("BROKEN {}\n{}", file.string(), indented("the tests ended with " + how)));
-        } else {
+        int already_run = 0;
+        while (true) {
+            const Ending ending = run_process(program, file, common, already_run, counts);
+            if (ending.orderly) return;
+            // Its own words, if it had any, are on standard error already.
+            if (ending.running.empty()) {
+                ++counts.broken;
+                print(fmt::format("BROKEN {}\n{}", file.string(), indented("the tests ended with " + ending.how)));
+                return;
+            }
             ++counts.failed;
-            print(fmt::format("FAILED {}\n{}", running,
-                              indented(fmt::format("{}: the test ended the process with {}", file.string(), how))));
+            print(fmt::format(
+                "FAILED {}\n{}", ending.running,
+                indented(fmt::format("{}: the test ended the process with {}", file.string(), ending.how))));
+            already_run += ending.started;
         }
     }
 
-    pid_t spawn(const std::string& program, const fs::path& file, const CommonOptions& common, int report) const
+    struct Ending {
+        bool orderly;
+        std::string how;      // where it is not: "signal 9 (Killed)"
+        std::string running;  // the test that was running then
+        int started;          // tests, in this process
+    };
+    Ending run_process(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run,
+                       Counts& counts) const
     {
-        std::vector<std::string> words = {"rapid", "test", "--child", fmt::format("--threads={}", common.threads)};
+        int ends[2];
+        if (pipe2(ends, O_CLOEXEC) != 0) throw Error(fmt::format("no pipe: {}", std::strerror(errno)));
+        const pid_t child = spawn(program, file, common, already_run, ends[1]);
+        close(ends[1]);
+        Ending ending = follow(ends[0], common.verbose, counts);
+        int status = 0;
+        waitpid(child, &status, 0);
+        ending.orderly = ending.orderly && WIFEXITED(status) && WEXITSTATUS(status) == status_done;
+        ending.how = WIFSIGNALED(status) ? fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
+                                         : fmt::format("status {}", WEXITSTATUS(status));
+        return ending;
+    }
+
+    pid_t spawn(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run,
+                int report) const
+    {
+        std::vector<std::string> words = {"rapid", "test", "--child", fmt::format("--already-run={}", already_run),
+                                          fmt::format("--threads={}", common.threads)};
         if (!filter_.empty()) words.push_back("--filter=" + filter_);
         words.insert(words.end(), {"--", file.string()});
         std::vector<char*> arguments;
@@ -153,28 +174,31 @@ private:
         return child;
     }
 
-    // Reads what the child tells, to its end. `running`: the test that was running then. False where it ended early.
-    bool follow(int descriptor, bool verbose, std::string& running, Counts& counts) const
+    // Reads what the child tells, to its end.
+    static Ending follow(int descriptor, bool verbose, Counts& counts)
     {
         const std::unique_ptr<std::FILE, decltype(&std::fclose)> pipe(fdopen(descriptor, "r"), &std::fclose);
+        Ending ending{false, "", "", 0};
         char* text = nullptr;
         std::size_t capacity = 0;
-        bool ended = false;
         while (getline(&text, &capacity, pipe.get()) > 0) {
             const json event = json::parse(text, nullptr, false);
             if (event.is_discarded()) break;  // cut off with the process
-            ended = event.contains("end");
-            if (!ended) count(event, verbose, running, counts);
+            ending.orderly = event.contains("end");
+            if (ending.orderly) break;
+            const bool starts = event.at("kind").get<TestEvent::Kind>() == TestEvent::Started;
+            ending.running = starts ? event.at("name").get<std::string>() : "";
+            ending.started += starts;
+            count(event, verbose, counts);
         }
         std::free(text);
-        return ended;
+        return ending;
     }
 
-    static void count(const json& event, bool verbose, std::string& running, Counts& counts)
+    static void count(const json& event, bool verbose, Counts& counts)
     {
         const std::string name = event.at("name");
         const auto kind = event.at("kind").get<TestEvent::Kind>();
-        running = kind == TestEvent::Started ? name : "";
         const auto tell = [&](const char* what) {
             print(fmt::format("{} {}\n{}", what, name, indented(event.at("message"))));
         };
@@ -201,6 +225,7 @@ private:
     std::vector<std::string> files_;
     std::string filter_;
     bool child_ = false;
+    int already_run_ = 0;
 };
 RAPID_COMMAND(Test);
 

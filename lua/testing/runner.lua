@@ -1,7 +1,7 @@
 -- Runs one file of tests in busted's language, and tells the host of each test.
 --
 -- busted's own command line is left out: what it prints, which files it looks for and how it ends are ours.
-local native, path, filter = ...
+local native, path, filter, already_run = ...
 
 local ok, busted = pcall(function()
   return require "busted.core" ()
@@ -29,16 +29,21 @@ local function full_name(element)
 end
 
 local message -- of the running test, once something is wrong with it
-local tests = 0
+local tests = 0 -- started; the first `already_run` of them did so in an earlier process of this file
 
 busted.subscribe({ "test", "start" }, function(element)
   message = nil
   tests = tests + 1
-  native.tell("started", full_name(element))
+  if tests > already_run then
+    native.tell("started", full_name(element))
+  else
+    element.run = function() end
+  end
   return nil, true
 end)
 
 busted.subscribe({ "test", "end" }, function(element, _, status)
+  if tests <= already_run then return nil, true end
   local kind = status == "success" and "passed" or status == "pending" and "skipped" or "failed"
   native.tell(kind, full_name(element), kind == "failed" and (message or "no message") or nil)
   message = nil

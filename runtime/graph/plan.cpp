@@ -47,6 +47,21 @@ bool has_function_argument(const Node& node)
                        [](const auto& argument) { return argument.second.function() != nullptr; });
 }
 
+// Asks a function of the frame. An Error of it tells the frame.
+void assign_at(const Param& param, Operator& op, const FrameFunction& function, const Frame& frame)
+{
+    try {
+        const Value result = function.call(frame);
+        if (result.is_nil()) wrong_type(param, result);
+        if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
+        param.assign(param, op.fields(), result);
+    } catch (const Error& error) {
+        Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
+        placed.at(error.location()).with_trace(error.trace());
+        throw placed;
+    }
+}
+
 }  // namespace
 
 void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions)
@@ -65,12 +80,7 @@ void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool onl
         if (const FrameFunction* function = value.function()) {
             if (!param->of_the_frame)
                 throw Error(fmt::format("{} can't be a function of the frame; it must be a constant", name));
-            Value result = function->call(frame);
-            if (result.is_nil())
-                throw Error(
-                    fmt::format("{} is a function that returned nothing; it must return a {}", name, param->type));
-            if (result.function()) throw Error(fmt::format("{} is a function that returned a function", name));
-            param->assign(*param, op.fields(), result);
+            assign_at(*param, op, *function, frame);
         } else if (!only_functions) {
             param->assign(*param, op.fields(), value);
         }

@@ -82,9 +82,12 @@ describe("rapid test", function()
     end
   end)
 
-  it("runs each file in a process of its own, so that one that ends its process is one failure", function()
+  it("runs each file in a process of its own, and a test that ends it is one failure", function()
     local folder = new_folder {
-      ["test_a.lua"] = 'it("ends", function() os.exit(7) end)',
+      ["test_a.lua"] = [[
+describe("a", function() it("comes first", function() end) end)
+it("ends", function() os.exit(7) end)
+it("comes after", function() end)]],
       ["test_b.lua"] = 'it("kills", function() os.execute("kill -9 $PPID") end)',
       ["test_c.lua"] = 'leaked = 1\n' .. passing,
       ["test_d.lua"] = 'it("sees nothing of others", function() assert.is_nil(rawget(_G, "leaked")) end)',
@@ -93,7 +96,7 @@ describe("rapid test", function()
     assert.equal(1, result.status)
     assert.equal("FAILED ends\n  ./test_a.lua: the test ended the process with status 7\n" ..
       "FAILED kills\n  ./test_b.lua: the test ended the process with signal 9 (Killed)\n" ..
-      "2 passed, 2 failed, 0 skipped\n", result.stdout)
+      "4 passed, 2 failed, 0 skipped\n", result.stdout)
   end)
 
   it("counts what fails around tests", function()
@@ -214,13 +217,13 @@ describe("a test", function()
       ["spin.lua"] = "while true do end",
       ["t.lua"] = [[
 it("spins", function() rapid.run("spin.lua", { frames = {1, 2}, script_timeout = 0.3 }) end)
-it("is not reached", function() end)]],
+it("comes after", function() end)]],
       ["u.lua"] = passing,
     }
     local result = folder:test "t.lua u.lua"
     assert.equal(1, result.status)
     assert.truthy(result.stderr:find("--script-timeout", 1, true), result.stderr)
     assert.truthy(result.stdout:find("FAILED spins\n", 1, true), result.stdout)
-    assert.truthy(result.stdout:find("\n1 passed, 1 failed, 0 skipped\n$"), result.stdout)
+    assert.truthy(result.stdout:find("\n2 passed, 1 failed, 0 skipped\n$"), result.stdout)
   end)
 end)

@@ -25,7 +25,7 @@ describe("graph code", function()
       "setfenv", "getfenv", "newproxy", "collectgarbage", "gcinfo", "arg", "string.dump", "('').dump", "math.random",
       "math.randomseed", "getmetatable('')", "getmetatable(rapid.create {})", "getmetatable(two)",
       "getmetatable(vec3(0, 0, 0))", "getmetatable(print)", "getmetatable(1)", "_G.io", "_G._G.debug",
-      "package and package.loaded", "rapid.native", "table.foreach", "bit.ffi", "coroutine.debug",
+      "package and package.loaded", "table.foreach", "bit.ffi", "coroutine.debug",
     } do
       local in_body, in_kernel = try(("local found = %s if found ~= nil then error('found', 0) end"):format(name))
       assert.is_nil(in_body, name)

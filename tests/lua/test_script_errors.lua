@@ -1,0 +1,158 @@
+-- What goes wrong while a script runs: said in one line, with file, line, node, point and frame, and never the end of
+-- Rapid itself.
+local scene = require "testing.scene"
+
+local at = " (point id 0, frame 2)"
+
+describe("an error in a kernel", function()
+  it("is told with its own line, in whatever form it was raised", function()
+    for body, expected in pairs {
+      ["error 'too hot'"] = "too hot",
+      ["error('too hot', 0)"] = "too hot",
+      ["error({})"] = "error raised with a table instead of a message",
+      ["error(print)"] = "error raised with a function instead of a message",
+      ["error(vec3(0, 0, 0))"] = "error raised with a cdata instead of a message",
+      ["error()"] = "error raised without a message",
+      ["error(true)"] = "error raised with a boolean instead of a message",
+      ["assert(p.v.x > 1, 'too slow')"] = "too slow",
+      ["local t = nil; t.x = 1"] = "attempt to index local 't' (a nil value)",
+      ["local x = p.v.x .. {}"] = "attempt to concatenate a table value",
+      ["local x = ('x'):rep(3) + 1"] = "attempt to perform arithmetic on a string value",
+      ["wnid(p)"] = "attempt to call global 'wnid' (a nil value)",
+      ["local x = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time and dt',
+      ["local x = p:rand()"] = "p:rand takes a number, which of the point's random numbers, not nil",
+      ["local x = p:rand(1, 'frame')"] = 'p:rand takes the frame, or a number, behind the comma, not "frame"',
+    } do
+      assert.equal('scene.lua:2: node "kernel": ' .. expected .. at, scene.kernel_error(body), body)
+    end
+  end)
+
+  it("that calls a method which is not there is found before the first frame", function()
+    assert.equal('scene.lua:2: node "kernel": p has no method "jion"; did you mean "join"?',
+      scene.kernel_error "p:jion 'hot'")
+    assert.equal('scene.lua:2: node "kernel": p has no method "explode"; it has join, leave, within, kill and rand',
+      scene.kernel_error "if p.id > 5 then p:explode() end")
+  end)
+
+  it("inside a helper shows the helper's line", function()
+    assert.equal('scene.lua:3: node "wind": attempt to perform arithmetic on a nil value' .. at, scene.error [[
+local function push(p)
+  -- a line of its own
+  return p.v * (nil + 1)
+end
+return rapid.create { points = two } :points("wind", function(p)
+  p.v = push(p)
+end) :solve {}]])
+  end)
+
+  it("behind pcall is the script's own business", function()
+    local points = scene.kernel("if not pcall(function() error {} end) then p.v = vec3(0, 24, 0) end")
+    assert.near({0, 2, 0}, points[1].P, 1e-6)
+  end)
+
+  it("of endless recursion ends the run with 1, not the program", function()
+    local text = scene.kernel_text("deeper(p)", nil, "local function deeper(x) return 1 + deeper(x) end")
+    local result = scene.command("run", text, "-f 1-3")
+    assert.equal(1, result.status)
+    assert.equal('scene.lua:1: node "kernel": stack overflow: a function calls itself without end' .. at .. "\n",
+      result.stderr)
+  end)
+
+  it("of runaway memory ends the run with 1, and names the limit", function()
+    for _, body in ipairs {
+      "local t = {} for i = 1, 1e9 do t[i] = {} end",
+      "local s = 'x' while true do s = s .. s end",
+      "local s = ('x'):rep(1e9)",
+    } do
+      local result = scene.command("run", scene.kernel_text(body), "-f 1-3 --script-memory 32M --quiet")
+      assert.equal(1, result.status, body)
+      assert.equal('scene.lua:2: node "kernel": the script needs more than 32 MiB of Lua memory; ' ..
+        "--script-memory sets the limit" .. at .. "\n", (result.stderr:gsub("scene.lua:1:", "scene.lua:2:")))
+    end
+  end)
+
+  it("leaves memory for the next frame when it is caught", function()
+    local text = scene.kernel_text [[
+local ok = pcall(function() local t = {} for i = 1, 1e9 do t[i] = i end end)
+if not ok then p.v = vec3(0, 24, 0) end]]
+    local result = scene.command("run", text, "-f 1-3 -o a.####.csv --script-memory 32M --quiet")
+    assert.equal("", result.stderr)
+    assert.truthy(scene.folder:read("a.0003.csv"):find "\n0,0,3,0,")
+  end)
+end)
+
+describe("a script that does not end", function()
+  it("is ended after --script-timeout with its name, wherever it runs", function()
+    for place, text in pairs {
+      ["scene.lua: the graph's body"] = "while true do end",
+      ["scene.lua: the graph's body "] = "local t = {} for i = 1, 40 do t = { t, t } end return rapid.create(t)",
+      ['scene.lua:1: node "kernel"'] = scene.kernel_text "local x = 0 while true do x = x + 1 end",
+      ['scene.lua:1: node "delete1"'] = "return rapid.create { points = two } " ..
+        ":delete { where = function(p) while true do end end }",
+      ["scene.lua:1: a parameter's function"] = "return rapid.create { points = two } " ..
+        ":gravity { g = function() repeat until false end } :solve {}",
+    } do
+      local result = scene.command("run", text, "-f 1-3 --script-timeout 0.2")
+      assert.equal(1, result.status)
+      assert.equal(place:gsub(" $", "") .. ": the script runs for more than 0.2 s; --script-timeout sets the limit\n",
+        result.stderr)
+    end
+  end)
+end)
+
+describe("a kernel that keeps something for other points", function()
+  local keep = "; kernels run in parallel, in states of their own: keep it in an attribute of the point, or do it " ..
+    "once for the whole set in :detail"
+  local field = 'assigns the field "%s" of a table that all points share'
+
+  it("is refused before the first frame, with the line of the assignment", function()
+    for body, case in pairs {
+      ["count = count + 1"] = { "local count = 0", 'assigns the upvalue "count"' },
+      ["total = p.id"] = { "", 'assigns the global "total"' },
+      ["_G.total = p.id"] = { "", field:format "total" },
+      ["box.n = p.id"] = { "local box = {}", field:format "n" },
+      ["local b = box b.n = p.id"] = { "local box = {}", field:format "n" },
+      ["box.deep.er = p.id"] = { "local box = { deep = {} }", field:format "er" },
+      ["box[p.id] = 1"] = { "local box = {}", "assigns into a table that all points share" },
+      ["box[1] = 1"] = { "local box = {}", "assigns into a table that all points share" },
+      ["box[#box + 1] = p.P"] = { "local box = {}", "assigns into a table that all points share" },
+      ["table.insert(box, p.P)"] = { "local box = {}", "changes a table that all points share by table.insert" },
+      ["table.sort(box)"] = { "local box = {3, 1}", "changes a table that all points share by table.sort" },
+      ["(p.id > 0 and box or { }).n = 1"] = { "local box = {}", field:format "n" },
+      ["if p.id > 3 then box.n = 1 end"] = { "local box = {}", field:format "n" },
+      ["bump(p)"] = { "local n = 0 local function bump() n = n + 1 end", 'assigns the upvalue "n"' },
+      ["lib.bump(p)"] = { "local n = 0 local lib = { bump = function() n = n + 1 end }", 'assigns the upvalue "n"' },
+      ["local f = bump f()"] = { "local n = 0 local function bump() n = n + 1 end", 'assigns the upvalue "n"' },
+      ["local function inc() count = count + 1 end inc()"] = { "local count = 0", 'assigns the upvalue "count"' },
+      ["pcall(bump)"] = { "local n = 0 local function bump() n = n + 1 end", 'assigns the upvalue "n"' },
+    } do
+      local before, what = case[1], case[2]
+      local line = before:find "bump" and 1 or 2
+      assert.equal(('scene.lua:%d: node "kernel": the kernel %s%s'):format(line, what, keep),
+        scene.kernel_error(body, nil, before), body)
+    end
+  end)
+
+  it("is refused by rapid check", function()
+    local result = scene.command("check", scene.kernel_text("n = n + 1", nil, "local n = 0"))
+    assert.equal(2, result.status)
+    assert.equal('scene.lua:2: node "kernel": the kernel assigns the upvalue "n"' .. keep .. "\n", result.stderr)
+  end)
+
+  it("is refused in a test of a point too", function()
+    assert.equal('scene.lua:1: node "delete1": the kernel assigns the upvalue "n"' .. keep, scene.error [[
+local n = 0 return rapid.create { points = two } :delete { where = function() n = n + 1 return n > 1 end }]])
+  end)
+end)
+
+describe("a graph that is not the same each time it runs", function()
+  it("is refused when a second state runs it", function()
+    -- What differs from state to state is out of reach of graph code; a file that changes between them is not.
+    scene.folder:write("twice.lua", "return 1")
+    local result = scene.run([[
+local height = require "twice"
+return rapid.create { points = rapid.points.grid { size = {30, 30, 30}, spacing = 1 } }
+  :points("k", function(p) p.v = vec3(0, height, 0) end) :solve {}]], { threads = 4 })
+    assert.near({0, 1, 0}, result[3]:max "v", 0)
+  end)
+end)

@@ -134,15 +134,17 @@ void improve_until_done(Band& band, const Improve& improve)
     band.find_leaves();
 }
 
-// The 26 neighbours of a voxel and how far they are, in voxels.
+// The 26 neighbours of a voxel, or the six across its faces alone, and how far they are, in voxels.
 template <class F>
-void for_each_neighbour(const Coord& voxel, const F& f)
+void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
 {
     static constexpr double far[4] = {0, 1, std::numbers::sqrt2, std::numbers::sqrt3};
     for (int x = -1; x <= 1; ++x)
         for (int y = -1; y <= 1; ++y)
-            for (int z = -1; z <= 1; ++z)
-                if (x || y || z) f(voxel.offsetBy(x, y, z), far[x * x + y * y + z * z]);
+            for (int z = -1; z <= 1; ++z) {
+                const int steps = std::abs(x) + std::abs(y) + std::abs(z);
+                if (steps == 1 || (steps > 1 && !across_faces)) f(voxel.offsetBy(x, y, z), far[steps]);
+            }
 }
 
 // A voxel takes the triangle of a neighbour that is nearer to the mesh where that is nearer to it too, and a voxel that
@@ -151,25 +153,25 @@ void shorten_distances(Band& band, const InVoxels& mesh)
 {
     // m: what is worth a round. Half of it ends the rounds, and single precision leaves 1e-6 of a voxel.
     const double worth = 1e-3 * band.voxel;
-    // m: nearer voxels have been asked for their distance to each triangle.
-    const double exact = 0.75 * band.voxel;
+    // m: OpenVDB asks each triangle about the voxels within √3/2 of it and all their neighbours, so nearer ones are
+    // right.
+    const double exact = 1.5 * band.voxel;
     const double half_width = band.distance->background();
     improve_until_done(band, [&](const Leaf& leaf, const Accessor& accessor, const NearestAccessor& nearest,
                                  auto& updates) {
         for (auto it = leaf.cbeginValueOn(); it; ++it) {
-            if (*it < exact) continue;
             const Coord voxel = it.getCoord();
             const openvdb::Int32 own = nearest.getValue(voxel);
             double best = *it;
             openvdb::Int32 triangle = own, tried = own;
-            for_each_neighbour(voxel, [&](const Coord& other, double far) {
+            for_each_neighbour(voxel, *it < exact, [&](const Coord& other, double far) {
                 const double phi = accessor.getValue(other);
                 if (phi >= half_width) {
                     if (*it + far * band.voxel < half_width)
                         updates.push_back({other, static_cast<float>(mesh.distance_to(own, other) * band.voxel), own});
                     return;
                 }
-                if (phi >= best) return;
+                if (phi >= best || *it < exact) return;
                 const openvdb::Int32 candidate = nearest.getValue(other);
                 if (candidate == tried || candidate == triangle) return;
                 tried = candidate;
@@ -241,7 +243,7 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
                                const Coord voxel = it.getCoord();
                                double best = half_width;
                                openvdb::Int32 triangle = -1;
-                               for_each_neighbour(voxel, [&](const Coord& other, double) {
+                               for_each_neighbour(voxel, /*across_faces=*/false, [&](const Coord& other, double) {
                                    const float phi = accessor.getValue(other);
                                    if (!(phi < half_width && phi > -half_width)) return;
                                    const openvdb::Int32 candidate = nearest.getValue(other);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr char object_metatable[] = "rapid.object";
 constexpr int levels_searched = 50;  // for an error's own line, which `error(text, level)` may put further down
-constexpr int cdata_type = 10;  // LUA_TCDATA, which lua.h does not name
+constexpr int cdata_type = 10;       // LUA_TCDATA, which lua.h does not name
 
 std::string read_text(const std::filesystem::path& path)
 {
@@ -142,8 +142,8 @@ public:
     Value call(const Frame& frame) const override
     {
         lua_State* L = state_.lua();
-        const ScriptHost::Section section(
-            state_.host(), fmt::format("{}:{}: a parameter's function", location_.file, location_.line));
+        const ScriptHost::Section section(state_.host(),
+                                          fmt::format("{}:{}: a parameter's function", location_.file, location_.line));
         state_.push_entry("call");
         lua_rawgeti(L, LUA_REGISTRYINDEX, reference_);
         lua_pushnumber(L, frame.number);
@@ -229,8 +229,8 @@ State& State::of(lua_State* L)
     return *state;
 }
 
-// Lua's memory of one state is limited while scripts run: a request beyond it is Lua's own "not enough memory". What the
-// host itself puts on the stack between them is not: outside of a protected call that error would end the process.
+// Lua's memory of one state is limited while scripts run: a request beyond it is Lua's own "not enough memory". What
+// the host itself puts on the stack between them is not: outside of a protected call that error would end the process.
 void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t new_size)
 {
     State& state = *static_cast<State*>(self);

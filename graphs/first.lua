@@ -1,5 +1,5 @@
--- first: water-blue beads pour out of a ring, are turned by a wind that exists only in Lua, and bounce down a torus to the
--- floor.
+-- first: water-blue beads pour out of a ring, are turned by a wind that exists only in Lua, and bounce down a torus to
+-- the floor.
 --
 -- Shows:  the four nodes of every simulation (create, emit, collide, solve) and a Lua node between them.
 -- Proves: no bead is inside the torus or below the floor at any frame (tests/graphs/test_first.lua).

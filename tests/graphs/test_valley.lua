@@ -6,10 +6,12 @@ local rapid = require "rapid"
 local roof = rapid.mesh.from {
   points = { {-1, 0, -1}, {1, 0, -1}, {1, 1, -1}, {0.1, 0.37, -1}, {-1, 0.9, -1},
              {-1, 0, 1}, {1, 0, 1}, {1, 1.2, 1}, {-0.1, 0.43, 1}, {-1, 0.8, 1} },
-  faces = { {5, 4, 3, 2, 1}, {6, 7, 8, 9, 10}, {1, 2, 7, 6}, {2, 3, 8, 7}, {3, 4, 9, 8}, {4, 5, 10, 9}, {5, 1, 6, 10} } }
+  faces = { {5, 4, 3, 2, 1}, {6, 7, 8, 9, 10}, {1, 2, 7, 6}, {2, 3, 8, 7}, {3, 4, 9, 8}, {4, 5, 10, 9},
+            {5, 1, 6, 10} } }
 local solid = rapid.levelset.from_mesh(roof, { voxel = 0.035 })
 return rapid.create { seed = 2 }
-  :emit { source = rapid.mesh.grid { size = {2.2, 2.2}, center = {0, 1.6, 0} }, rate = 4000, attributes = { pscale = 0.006 } }
+  :emit { source = rapid.mesh.grid { size = {2.2, 2.2}, center = {0, 1.6, 0} }, rate = 4000,
+          attributes = { pscale = 0.006 } }
   :points("breeze", function(p, frame) p.v = p.v + vec3(0.6 * math.sin(3 * frame.time + p.P.y), 0, 0) * p.dt end)
   :gravity {} :collide { shape = solid, bounce = 0.25, friction = 0.3 }
   :collide { shape = rapid.shape.plane {}, bounce = 0.2, friction = 0.5 } :solve { substeps = 2 }

@@ -103,7 +103,7 @@ TEST_CASE("frame after frame, nothing is copied that nobody else holds", "[solve
     flow = {};  // as a frame's result is let go
     for (int f = 3; f < 6; ++f) {
         PointSet state = std::move(simulation->state);  // as Create does
-        std::vector<Flow> inputs(1);  // a list in braces would hold a second one
+        std::vector<Flow> inputs(1);                    // a list in braces would hold a second one
         inputs[0] = falling(std::move(state), simulation);
         flow = solve.evaluate(f, std::move(inputs));
         CHECK(flow.points.P().read().data == P);

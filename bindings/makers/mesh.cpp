@@ -91,7 +91,7 @@ struct TorusMesh {
             .param(&TorusMesh::radius, "radius", 1.0, above(0), "m", "from the axis to the middle of the tube")
             .param(&TorusMesh::tube, "tube", 0.25, above(0), "m", "radius of the tube")
             .param(&TorusMesh::divisions, "divisions", 24.0, between(3, 4096), "",
-                   "around the axis and around the tube")
+                   "around the axis; around the tube as many as make edges of that length")
             .param(&TorusMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
     }
     ObjectPtr make(MakeContext&) const { return make_torus(radius, tube, divisions, center); }

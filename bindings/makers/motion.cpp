@@ -1,8 +1,6 @@
 // rapid.translate, rapid.rotate, rapid.scale, their products, and what they move.
 #include "runtime/shapes/motion.h"
 
-#include <numbers>
-
 #include "bindings/maker.h"
 #include "runtime/shapes/mesh.h"
 
@@ -24,20 +22,19 @@ RAPID_MAKER(Translate);
 
 struct Rotate {
     Vec3d axis;
-    double degrees;
+    double angle;  // rad
 
     static Maker declare()
     {
         return maker<Rotate>("motion.rotate", "Turns about an axis through the origin.")
             .param(&Rotate::axis, "axis", Value(), any_number(), "", "any length but zero")
             .required()
-            .param(&Rotate::degrees, "degrees", Value(), any_number(), "deg", "the angle, by the right-hand rule")
+            .param(&Rotate::angle, "degrees", Value(), any_number(), "deg", "the angle, by the right-hand rule")
             .required();
     }
     ObjectPtr make(MakeContext&) const
     {
         if (axis.norm() == 0) throw Error("rotate: the axis has length 0; it needs a direction");
-        const double angle = degrees * std::numbers::pi / 180;
         return std::make_shared<Motion>(Eigen::Affine3d(Eigen::AngleAxisd(angle, axis.normalized())));
     }
 };

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "tests/operators/graph_test.h"
 
 namespace rapid {
@@ -86,9 +88,8 @@ TEST_CASE("attribute refuses names and values that can't be", "[attribute]")
         return error_of([&] { NodeTest("attribute", {{name, value}}); });
     };
     for (const char* own : {"P", "v", "id", "dt", "index", "kill"})
-        CHECK(refusal(own, 1.0) == "\"" + std::string(own) +
-                                       "\" can't be an attribute: Rapid itself uses it; choose "
-                                       "another name");
+        CHECK(refusal(own, 1.0) ==
+              fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", own));
     CHECK(refusal("2nd", 1.0) == "attribute name \"2nd\" can't be used; take letters, digits and _, no digit first");
     CHECK(refusal("heat", "hot") ==
           "heat = \"hot\" has the wrong type; it must be a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}");

@@ -46,13 +46,22 @@ std::shared_ptr<const Table> table_at(State& state, int index)
 }
 
 // Error: a value without a name, as in :gravity { 0, -9.81, 0 }.
-void check_named(const std::string& what, const Table& options)
+void check_named(const Table& options)
 {
     const Value* value = !options.list.empty()       ? &options.list.front()
                          : !options.numbered.empty() ? &options.numbered.begin()->second
                                                      : nullptr;
     if (value)
-        throw Error(fmt::format("{} has no name for {}; it takes {{ NAME = value, ... }}", what, describe(*value)));
+        throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}", describe(*value)));
+}
+
+// A maker as graph code calls it: rapid.mesh.box, rapid.rotate, :transform.
+std::string shown_name(const Maker& maker)
+{
+    const std::size_t dot = maker.name.find('.');
+    if (dot == std::string::npos) return ":" + maker.name;
+    if (maker.name == "levelset.write") return ":write";
+    return "rapid." + (maker.name.rfind("motion.", 0) == 0 ? maker.name.substr(dot + 1) : maker.name);
 }
 
 // What the main state's call of this constructor made; for the main state itself, what `make` makes.
@@ -86,9 +95,13 @@ int make_object(State& state)
         const Maker& maker = find_maker(text_at(state, 1));
         ScriptHost& host = state.host();
         MakeContext context{host.folder(), host.warnings, host.options().may_write};
-        const auto options = table_at(state, 2);
-        check_named("rapid." + text_at(state, 1), *options);
-        return maker.make(maker, *options, context);
+        try {
+            const auto options = table_at(state, 2);
+            check_named(*options);
+            return maker.make(maker, *options, context);
+        } catch (const Error& error) {
+            throw Error(fmt::format("{}: {}", shown_name(maker), error.message()));
+        }
     });
 }
 
@@ -234,7 +247,7 @@ int make_node(State& state)
         node->name = fmt::format("{}{}", what, same + 1);
         try {
             const auto options = table_at(state, 2);
-            check_named(":" + what, *options);
+            check_named(*options);
             node->arguments = options->named;
             const auto named = node->arguments.find("name");
             if (named != node->arguments.end() && !type.find("name")) {

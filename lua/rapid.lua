@@ -28,11 +28,12 @@ local function make(native, load_node)
   -- A maker with the named positional arguments first.
   local function maker(what, ...)
     local positional = { ... }
+    local shown = "rapid." .. what:gsub("^motion%.", "")
     return function(...)
-      local options = options_of("rapid." .. what, (select(#positional + 1, ...)))
+      local options = options_of(shown, (select(#positional + 1, ...)))
       for place, name in ipairs(positional) do
         local value = select(place, ...)
-        if value == nil then error(("rapid.%s: the %s is missing"):format(what, name), 2) end
+        if value == nil then error(("%s: the %s is missing"):format(shown, name), 2) end
         options[name] = value
       end
       return native.make(what, options)
@@ -63,15 +64,19 @@ local function make(native, load_node)
     read = maker("points.read", "path"),
     grid = maker "points.grid",
     from = function(columns)
+      if type(columns) ~= "table" then error("rapid.points.from takes a table of columns: { P = {{x, y, z}, ...} }", 2) end
       return native.make("points.from", { columns = columns })
     end,
   }
 
   function rapid.translate(x, y, z)
+    for _, part in ipairs { x or false, y or false, z or false } do
+      if type(part) ~= "number" then error("rapid.translate takes three numbers: rapid.translate(x, y, z)", 2) end
+    end
     return native.make("motion.translate", { by = vector.make(x, y, z) })
   end
   rapid.rotate = maker("motion.rotate", "axis", "degrees")
-  rapid.scale = maker("motion.scale", "by")
+  rapid.scale = maker("motion.scale", "factor")
 
   function rapid.attr(name)
     return native.attribute(name)

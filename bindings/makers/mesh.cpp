@@ -74,7 +74,7 @@ struct GridMesh {
     ObjectPtr make(MakeContext&) const
     {
         const double x = size.empty() ? 1 : size[0], z = size.empty() ? 1 : size.back();
-        if (size.size() > 2 || !(x > 0) || !(z > 0)) throw Error("mesh.grid: size is two lengths above 0, {x, z}");
+        if (size.size() > 2 || !(x > 0) || !(z > 0)) throw Error("size is two lengths above 0, {x, z}");
         return make_grid(x, z, divisions, center);
     }
 };
@@ -117,7 +117,7 @@ struct MeshFrom {
             std::vector<std::int32_t>& face = indices.emplace_back();
             for (const double corner : faces[f]) {
                 if (!(corner >= 1 && corner <= static_cast<double>(points.size())) || corner != std::floor(corner))
-                    throw Error(fmt::format("mesh.from: face {} has the corner {}; corners are whole, from 1 to {}",
+                    throw Error(fmt::format("face {} has the corner {}; corners are whole, from 1 to {}",
                                             f + 1, corner, points.size()));
                 face.push_back(static_cast<std::int32_t>(corner) - 1);
             }

@@ -34,7 +34,7 @@ struct Rotate {
     }
     ObjectPtr make(MakeContext&) const
     {
-        if (axis.norm() == 0) throw Error("rotate: the axis has length 0; it needs a direction");
+        if (axis.norm() == 0) throw Error("the axis has length 0; it needs a direction");
         return std::make_shared<Motion>(Eigen::Affine3d(Eigen::AngleAxisd(angle, axis.normalized())));
     }
 };
@@ -46,7 +46,7 @@ struct Scale {
     static Maker declare()
     {
         return maker<Scale>("motion.scale", "Scales about the origin.")
-            .param(&Scale::by, "by", Value(), above(0), "", "the factor")
+            .param(&Scale::by, "factor", Value(), above(0), "", "of all lengths")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return std::make_shared<Motion>(Eigen::Affine3d(Eigen::Scaling(by))); }

@@ -49,7 +49,7 @@ struct GridPoints {
         const double nx = along(0), ny = along(1), nz = along(2);
         if (!(size.minCoeff() >= 0) || !(nx * ny * nz <= 2147483648.0))
             throw Error(
-                fmt::format("points.grid of size {} at spacing {} would have {:.3g} points; at most 2^31 can be",
+                fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
                             describe(Value(size)), spacing, nx * ny * nz));
         PointSet points;
         points.append(static_cast<std::size_t>(nx * ny * nz));
@@ -77,17 +77,17 @@ struct PointsFrom {
     ObjectPtr make(MakeContext&) const
     {
         const auto place = columns.find("P");
-        if (place == columns.end()) throw Error("points.from: P is missing; give P = {{x, y, z}, ...}");
+        if (place == columns.end()) throw Error("P is missing; give P = {{x, y, z}, ...}");
         PointSet points;
         const std::vector<Vec3f> P = vectors("P", place->second);
         points.append(P.size());
         points.P() = Column<Vec3f>(P);
         for (const auto& [name, value] : columns) {
             if (name == "P") continue;
-            if (name == "id") throw Error("points.from: id can't be given; ids count from 0 in order");
+            if (name == "id") throw Error("id can't be given; ids count from 0 in order");
             const Table* table = value.table();
             if (!table || table->list.size() != P.size())
-                throw Error(fmt::format("points.from: {} has {}; it must be a list of {} values, as P is", name,
+                throw Error(fmt::format("{} has {}; it must be a list of {} values, as P is", name,
                                         table ? fmt::format("{} values", table->list.size()) : describe(value),
                                         P.size()));
             if (name == "v")
@@ -102,7 +102,7 @@ struct PointsFrom {
     {
         Param param;
         param.name = name;
-        param.type = "a list of {x, y, z}";
+        param.type = "list of {x, y, z}";
         std::vector<Vec3f> result;
         read_value(param, list, result);
         return result;
@@ -125,7 +125,7 @@ struct PointsFrom {
                     read_value(param, list[i], given);
                     const T* same = std::get_if<T>(&given);
                     if (!same)
-                        throw Error(fmt::format("points.from: {}[{}] is {}; it must be {} as the first is", name, i + 1,
+                        throw Error(fmt::format("{}[{}] is {}; it must be a {}, as the first is", name, i + 1,
                                                 describe(list[i]), type_name(type_of(AttributeValue(first)))));
                     values[i] = *same;
                 }

@@ -98,10 +98,10 @@ return rapid.create { points = two }
     for text, expected in pairs {
       ["rapid.create {} :gravity(5)"] = ":gravity takes a table of parameters: :gravity{ ... }",
       ["rapid.create(24)"] = ":create takes a table of parameters: :create{ ... }",
-      ["rapid.create {} :gravity { 0, -9.81, 0 }"] = 'node "gravity1": :gravity has no name for 0; it takes ' ..
+      ["rapid.create {} :gravity { 0, -9.81, 0 }"] = 'node "gravity1": 0 has no name; write ' ..
         "{ NAME = value, ... }",
-      ["rapid.create {} :gravity { { 0, 1, 0 } }"] = 'node "gravity1": :gravity has no name for {0, 1, 0}; ' ..
-        "it takes { NAME = value, ... }",
+      ["rapid.create {} :gravity { { 0, 1, 0 } }"] = 'node "gravity1": {0, 1, 0} has no name; ' ..
+        "write { NAME = value, ... }",
       ["rapid.create {} :gravity({}, {})"] = ":gravity takes one table of parameters",
       ["rapid.create {} :points('k')"] = ":points takes a name and a function, or a table { name = ..., kernel = ... }",
       ["rapid.create {} :points(function() end)"] = ":points takes a name and a function, or a table " ..

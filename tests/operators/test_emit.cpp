@@ -386,7 +386,7 @@ TEST_CASE("newborn have the given attributes and join the group; older points do
                            {"attributes", named({{"heat", 3.0}, {"Cd", list({1.0, 0.5, 0.0})}, {"pscale", 0.1}})}});
     const PointSet points = emit(2, points_at({{0, 0, 0}}));
     CHECK(values_of<float>(points, "heat") == std::vector<float>{0, 3, 3});
-    CHECK(values_of<Vec3f>(points, "Cd") == std::vector<Vec3f>{{0, 0, 0}, {1, 0.5f, 0}, {1, 0.5f, 0}});
+    CHECK(values_of<Vec3f>(points, "Cd") == std::vector<Vec3f>{{1, 1, 1}, {1, 0.5f, 0}, {1, 0.5f, 0}});
     CHECK(values_of<float>(points, "pscale") == std::vector<float>{0, 0.1f, 0.1f});
     const Column<std::uint8_t>& hot = *points.find_group("hot");
     CHECK((hot[0] == 0 && hot[1] == 1 && hot[2] == 1));

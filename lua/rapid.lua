@@ -64,7 +64,9 @@ local function make(native, load_node)
     read = maker("points.read", "path"),
     grid = maker "points.grid",
     from = function(columns)
-      if type(columns) ~= "table" then error("rapid.points.from takes a table of columns: { P = {{x, y, z}, ...} }", 2) end
+      if type(columns) ~= "table" then
+        error("rapid.points.from takes a table of columns: { P = {{x, y, z}, ...} }", 2)
+      end
       return native.make("points.from", { columns = columns })
     end,
   }

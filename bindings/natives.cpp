@@ -51,8 +51,7 @@ void check_named(const Table& options)
     const Value* value = !options.list.empty()       ? &options.list.front()
                          : !options.numbered.empty() ? &options.numbered.begin()->second
                                                      : nullptr;
-    if (value)
-        throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}", describe(*value)));
+    if (value) throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}", describe(*value)));
 }
 
 // A maker as graph code calls it: rapid.mesh.box, rapid.rotate, :transform.

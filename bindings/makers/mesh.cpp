@@ -117,8 +117,8 @@ struct MeshFrom {
             std::vector<std::int32_t>& face = indices.emplace_back();
             for (const double corner : faces[f]) {
                 if (!(corner >= 1 && corner <= static_cast<double>(points.size())) || corner != std::floor(corner))
-                    throw Error(fmt::format("face {} has the corner {}; corners are whole, from 1 to {}",
-                                            f + 1, corner, points.size()));
+                    throw Error(fmt::format("face {} has the corner {}; corners are whole, from 1 to {}", f + 1, corner,
+                                            points.size()));
                 face.push_back(static_cast<std::int32_t>(corner) - 1);
             }
         }

@@ -48,9 +48,8 @@ struct GridPoints {
         const auto along = [this](int axis) { return std::max(1.0, std::floor(size[axis] / spacing * (1 + 1e-9))); };
         const double nx = along(0), ny = along(1), nz = along(2);
         if (!(size.minCoeff() >= 0) || !(nx * ny * nz <= 2147483648.0))
-            throw Error(
-                fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
-                            describe(Value(size)), spacing, nx * ny * nz));
+            throw Error(fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
+                                    describe(Value(size)), spacing, nx * ny * nz));
         PointSet points;
         points.append(static_cast<std::size_t>(nx * ny * nz));
         const std::span<Vec3f> P = points.P().overwrite();

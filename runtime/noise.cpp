@@ -1,0 +1,198 @@
+#include "runtime/noise.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace rapid {
+namespace {
+
+// The same text computes one point, or eight with the processor's vectors (types of g++ and clang; a machine without
+// vectors of that length gets several short ones).
+struct One {
+    static constexpr std::size_t size = 1;
+    using Real = double;
+    using Int = std::int32_t;
+    using Bits = std::uint32_t;
+    using Words = std::uint64_t;
+
+    static Bits low(Words words) { return static_cast<Bits>(words); }
+    static Real real(Int whole) { return whole; }
+};
+
+struct Eight {
+    static constexpr std::size_t size = 8;
+    typedef double Real __attribute__((vector_size(64)));
+    typedef std::int32_t Int __attribute__((vector_size(32)));
+    typedef std::uint32_t Bits __attribute__((vector_size(32)));
+    typedef std::uint64_t Words __attribute__((vector_size(64)));
+
+    static Bits low(const Words& words) { return __builtin_convertvector(words, Bits); }
+    static Real real(const Int& whole) { return __builtin_convertvector(whole, Real); }
+};
+
+// Wellons' lowbias32: each bit of x changes each bit of the result in close to half of all cases.
+template <class Bits>
+inline Bits mixed(Bits x)
+{
+    x ^= x >> 16;
+    x *= 0x7feb352du;
+    x ^= x >> 15;
+    x *= 0x846ca68bu;
+    x ^= x >> 16;
+    return x;
+}
+
+// One axis of a cell: the lattice number below x, how far x lies above it, and the weight of the corner above,
+// s = f³ (f (6f - 15) + 10), whose first and second derivatives vanish at both corners.
+template <class Lane>
+struct Axis {
+    typename Lane::Bits corner;
+    typename Lane::Real f, s, slope;
+
+    explicit Axis(const typename Lane::Real& x)
+    {
+        // Adding 1.5 · 2⁵² leaves the nearest whole number in the low bits; no conversion, so no x is out of range.
+        constexpr double whole = 0x1.8p52;
+        typename Lane::Real below = (x + whole) - whole;
+        below = below > x ? below - 1.0 : below;
+        corner = Lane::low(std::bit_cast<typename Lane::Words>(below + whole));
+        f = x - below;
+        f = f * f < 1.0 ? f : f - f;  // beyond 2⁵¹ numbers have no fractions left; NaN stays
+        s = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+        slope = f * f * (f * (f * 30.0 - 60.0) + 30.0);
+    }
+};
+
+// A lattice corner's gradient in place and time: three of its four components are 1 or -1, one is 0. Six bits choose
+// it. (In a plane of time that leaves the middles of a cube's edges, as Perlin has them, and its corners.)
+template <class Lane, int axis>
+inline typename Lane::Real component(const typename Lane::Bits& bits)
+{
+    using Int = typename Lane::Int;
+    const Int sign = std::bit_cast<Int>((bits >> (2 + axis)) & 1) * 2 - 1;
+    const Int absent = std::bit_cast<Int>((bits & 3) ^ axis);  // 0 where this is the component that is 0
+    return Lane::real(absent == 0 ? sign * 0 : sign);
+}
+
+// Values and gradients of `fields` independent noises on one lattice, at x, w; added to what is there.
+template <class Lane, int fields>
+inline void add_octave(const typename Lane::Real (&x)[3], double w, std::uint32_t seed, double amount,
+                       typename Lane::Real (&value)[fields], typename Lane::Real (&gradient)[fields][3])
+{
+    using Real = typename Lane::Real;
+    using Bits = typename Lane::Bits;
+    const Axis<One> time(w);
+    const Axis<Lane> axes[3] = {Axis<Lane>(x[0]), Axis<Lane>(x[1]), Axis<Lane>(x[2])};
+
+    for (std::uint32_t dw = 0; dw < (time.f == 0 ? 1u : 2u); ++dw) {
+        const double weight_w = amount * (dw ? time.s : 1 - time.s);
+        const std::uint32_t hash_w = mixed(mixed(seed) + time.corner + dw);
+        for (std::uint32_t dz = 0; dz < 2; ++dz) {
+            const Bits hash_z = mixed(axes[2].corner + (hash_w + dz));
+            const Real weight_z = dz ? axes[2].s : 1.0 - axes[2].s;
+            const Real slope_z = dz ? axes[2].slope : -axes[2].slope;
+            for (std::uint32_t dy = 0; dy < 2; ++dy) {
+                const Bits hash_y = mixed(axes[1].corner + (hash_z + dy));
+                const Real weight_y = dy ? axes[1].s : 1.0 - axes[1].s;
+                const Real slope_y = dy ? axes[1].slope : -axes[1].slope;
+                for (std::uint32_t dx = 0; dx < 2; ++dx) {
+                    Bits bits = mixed(axes[0].corner + (hash_y + dx));
+                    const Real weight_x = dx ? axes[0].s : 1.0 - axes[0].s;
+                    const Real slope_x = dx ? axes[0].slope : -axes[0].slope;
+                    const Real to[3] = {axes[0].f - dx, axes[1].f - dy, axes[2].f - dz};
+                    const Real weight = weight_x * weight_y * weight_z * weight_w;
+                    const Real slopes[3] = {slope_x * weight_y * weight_z * weight_w,
+                                            weight_x * slope_y * weight_z * weight_w,
+                                            weight_x * weight_y * slope_z * weight_w};
+                    for (int k = 0; k < fields; ++k, bits >>= 6) {
+                        const Real g[3] = {component<Lane, 0>(bits), component<Lane, 1>(bits),
+                                           component<Lane, 2>(bits)};
+                        const Real along =
+                            g[0] * to[0] + g[1] * to[1] + g[2] * to[2] + component<Lane, 3>(bits) * (time.f - dw);
+                        value[k] += weight * along;
+                        for (int axis = 0; axis < 3; ++axis)
+                            gradient[k][axis] += slopes[axis] * along + weight * g[axis];
+                    }
+                }
+            }
+        }
+    }
+}
+
+constexpr double roughness = 0.5;  // strength of an octave, in that of the one before
+
+// The sum of the octaves. Gradients are of each octave's own lattice where `of_lattice`: all as strong as its values.
+template <class Lane, int fields>
+inline void add_octaves(const typename Lane::Real (&P)[3], const NoiseOptions& options, bool of_lattice,
+                        typename Lane::Real (&value)[fields], typename Lane::Real (&gradient)[fields][3])
+{
+    double amount = 1, fineness = 1;
+    for (int octave = 0; octave < options.octaves; ++octave) {
+        // Shifted, or all octaves would be 0 at the corners of the first.
+        const double shift = 0.618033988749895 * octave;
+        const typename Lane::Real x[3] = {P[0] * fineness + shift, P[1] * fineness + 2 * shift,
+                                          P[2] * fineness + 3 * shift};
+        const std::uint32_t seed = options.seed + 0x9e3779b9u * static_cast<std::uint32_t>(octave);
+        typename Lane::Real slope[fields][3] = {};
+        add_octave<Lane, fields>(x, options.time * fineness, seed, amount, value, slope);
+        for (int k = 0; k < fields; ++k)
+            for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += slope[k][axis] * (of_lattice ? 1 : fineness);
+        amount *= roughness;
+        fineness *= 2;
+    }
+}
+
+// 1 + r + r² + ... of n octaves.
+double geometric(double r, int n) { return (1 - std::pow(r, n)) / (1 - r); }
+
+// Above what any choice of gradients gives at any place of a cell: 1.5366, found by climbing from 3,000 places.
+constexpr double largest_value = 1.54;
+// Root mean square length of the curl of one octave at whole times, measured over 3 · 10⁶ places.
+constexpr double curl_length = 1.83;
+
+// The curl of the octaves' potentials. Each octave's potential is as much weaker as it is finer, so that its curl is
+// `roughness` times that of the one before.
+template <class Lane>
+inline void curl_of(const typename Lane::Real (&P)[3], const NoiseOptions& options, typename Lane::Real (&curl)[3])
+{
+    typename Lane::Real potential[3] = {}, d[3][3] = {};
+    add_octaves<Lane, 3>(P, options, true, potential, d);
+    const double scale = 1 / (curl_length * std::sqrt(geometric(roughness * roughness, options.octaves)));
+    curl[0] = (d[2][1] - d[1][2]) * scale;
+    curl[1] = (d[0][2] - d[2][0]) * scale;
+    curl[2] = (d[1][0] - d[0][1]) * scale;
+}
+
+}  // namespace
+
+double noise(const Vec3d& P, const NoiseOptions& options, Vec3d* gradient)
+{
+    double value[1] = {}, d[1][3] = {};
+    add_octaves<One, 1>({P.x(), P.y(), P.z()}, options, false, value, d);
+    const double scale = 1 / (largest_value * geometric(roughness, options.octaves));
+    if (gradient) *gradient = Vec3d(d[0][0], d[0][1], d[0][2]) * scale;
+    return value[0] * scale;
+}
+
+Vec3d curl_noise(const Vec3d& P, const NoiseOptions& options)
+{
+    double curl[3];
+    curl_of<One>({P.x(), P.y(), P.z()}, options, curl);
+    return {curl[0], curl[1], curl[2]};
+}
+
+void curl_noise(std::span<const Vec3d> P, const NoiseOptions& options, std::span<Vec3d> curl)
+{
+    for (std::size_t first = 0; first < P.size(); first += Eight::size) {
+        const std::size_t count = std::min(Eight::size, P.size() - first);
+        Eight::Real x[3] = {}, result[3];
+        for (std::size_t i = 0; i < count; ++i)
+            for (int axis = 0; axis < 3; ++axis) x[axis][i] = P[first + i][axis];
+        curl_of<Eight>(x, options, result);
+        for (std::size_t i = 0; i < count; ++i)
+            for (int axis = 0; axis < 3; ++axis) curl[first + i][axis] = result[axis][i];
+    }
+}
+
+}  // namespace rapid

@@ -4,7 +4,7 @@ max_line_length = 120
 cache = false
 color = false
 
-local graph_code = { read_globals = { "vec3" } }
+local graph_code = { read_globals = { "vec3", "quat" } }
 files["graphs"] = graph_code
 files["lua/nodes"] = graph_code
 
@@ -13,5 +13,5 @@ files["lua/host.lua"] = { globals = { string = { fields = { "dump" } } } }
 
 files["tests"] = {
   std = "luajit+busted",
-  read_globals = { "rapid", "vec3", assert = { fields = { "near", "points", "same_points" } } },
+  read_globals = { "rapid", "vec3", "quat", assert = { fields = { "near", "points", "same_points" } } },
 }

@@ -144,7 +144,7 @@ void Kernel::analyse()
     lua_pop(L, 2);
 
     lua_getfield(L, -1, "computed_group");
-    if (lua_isnumber(L, -1)) {
+    if (lua_isnumber(L, -1) && !may_compute_groups) {
         const int line = static_cast<int>(lua_tonumber(L, -1));
         lua_pop(L, 2);
         throw Error("the kernel joins or leaves a group under a computed name; name it as a constant: p:join \"old\"")
@@ -171,20 +171,22 @@ void Kernel::uses(Uses& uses) const
     uses.makes_groups.insert(uses.makes_groups.end(), joins_.begin(), joins_.end());
 }
 
-Kernel::Layout Kernel::layout_for(const PointSet& points, bool predicate, bool masked) const
+Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate,
+                                  bool masked) const
 {
     Layout layout;
     layout.predicate = predicate;
     layout.masked = masked;
     for (const auto& [name, column] : points.columns()) {
-        const bool written =
-            !predicate && (writes_.count(name) || may_write_.count(name)) && name != "id" && name != "dt";
+        const bool named = writes_.count(name) || may_write_.count(name) || arguments.writes.count(name);
+        const bool written = !predicate && named && name != "id" && name != "dt";
         // p:rand needs the id.
-        if (!written && !reads_.count(name) && !may_.count(name) && name != "id") continue;
+        if (!written && !reads_.count(name) && !may_.count(name) && !arguments.reads.count(name) && name != "id")
+            continue;
         layout.columns.push_back({name, std::string(type_name(type_of(column))), written});
     }
     for (const auto& [name, members] : points.groups()) {
-        const bool written = !predicate && joins_.count(name);
+        const bool written = !predicate && (joins_.count(name) || arguments.joins.count(name));
         if (written || asks_any_ || asks_.count(name)) layout.groups.push_back({name, "", written});
     }
     layout.finish();
@@ -236,8 +238,8 @@ struct Kernel::Pass {
     const PointSet& points;
     const Evaluation& now;
     const Layout& layout;
-    std::uint64_t serial;                        // of this pass: parameters are handed to each state once a pass
-    const std::map<std::string, Value>& values;  // the third argument
+    std::uint64_t serial;  // of this pass: parameters are handed to each state once a pass
+    const std::map<std::string, Value>& values;
     std::vector<ColumnMemory> columns, groups;
     const std::uint8_t* members = nullptr;
     std::uint8_t* kill = nullptr;
@@ -336,17 +338,18 @@ void Kernel::run_pass(Pass& pass) const
 
 void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const
 {
-    const Layout layout = layout_for(points, true, false);
-    const std::map<std::string, Value> no_values;
-    Pass pass{points, now, layout, 0, no_values, {}, {}};
+    const KernelArguments nothing;
+    const Layout layout = layout_for(points, nothing, true, false);
+    Pass pass{points, now, layout, 0, nothing.values, {}, {}};
     pass.result = result.data();
     run_pass(pass);
 }
 
 void Kernel::run(PointSet& points, const std::string& group, const Evaluation& now,
-                 const std::map<std::string, Value>& values) const
+                 const KernelArguments& arguments) const
 {
-    for (const std::string& name : joins_) points.group(name);
+    for (const auto* names : {&joins_, &arguments.joins})
+        for (const std::string& name : *names) points.group(name);
     const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
     if (!group.empty() && !members) return;  // nobody is in it yet
     if (members && members->is_uniform()) {
@@ -354,7 +357,7 @@ void Kernel::run(PointSet& points, const std::string& group, const Evaluation& n
         members = nullptr;
     }
 
-    const Layout layout = layout_for(points, false, members != nullptr);
+    const Layout layout = layout_for(points, arguments, false, members != nullptr);
     for (const Layout::Entry& entry : layout.columns)
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
     // A kernel may leave the very group that chooses its points: the choice is the one before.
@@ -363,7 +366,7 @@ void Kernel::run(PointSet& points, const std::string& group, const Evaluation& n
         if (entry.writable) points.group(entry.name).write();
 
     std::vector<std::uint8_t> kill(kills_ ? points.size() : 0);
-    Pass pass{points, now, layout, 0, values, {}, {}};
+    Pass pass{points, now, layout, 0, arguments.values, {}, {}};
     pass.kill = kills_ ? kill.data() : nullptr;
     pass.members = members ? chosen.read().data : nullptr;
     run_pass(pass);

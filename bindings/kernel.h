@@ -14,6 +14,13 @@ namespace rapid {
 class ScriptHost;
 class State;
 
+// What a Lua node's kernel is given besides the points.
+struct KernelArguments {
+    std::map<std::string, Value> values;  // its third argument
+    // Attributes and groups that parameters name; the kernel gets at them under computed names.
+    std::set<std::string> reads, writes, joins;
+};
+
 class Kernel : public PointFunction {
 public:
     Kernel(ScriptHost& script_host, std::size_t number_, Location location_)
@@ -25,13 +32,12 @@ public:
     void test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const override;
 
     // Runs it over the points of `group` (all when empty), in parallel. Points that it killed are removed afterwards.
-    // values: the third argument of a Lua node's kernel.
-    void run(PointSet& points, const std::string& group, const Evaluation& now,
-             const std::map<std::string, Value>& values) const;
+    void run(PointSet& points, const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
 
-    const std::size_t number;  // in each state
-    const Location location;   // of the function
-    std::string fingerprint;   // of its bytecode, the same in each state
+    const std::size_t number;         // in each state
+    const Location location;          // of the function
+    std::string fingerprint;          // of its bytecode, the same in each state
+    bool may_compute_groups = false;  // it belongs to a node whose parameters name groups
 
     // Reads its bytecode, in the main state, once the file has run. Error: it writes what other points share.
     void analyse();
@@ -40,7 +46,7 @@ private:
     struct Layout;
     struct Pass;
 
-    Layout layout_for(const PointSet& points, bool predicate, bool masked) const;
+    Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate, bool masked) const;
     void run_pass(Pass& pass) const;
     void run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const;
     // Leaves the runner for this layout on the state's stack: a list of run, at, set_params and the pass whose

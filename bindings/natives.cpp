@@ -11,6 +11,8 @@
 #include "bindings/script_host.h"
 #include "bindings/script_node.h"
 #include "runtime/graph/registry.h"
+#include "runtime/noise.h"
+#include "runtime/shapes/shape.h"
 
 namespace rapid {
 namespace {
@@ -27,6 +29,32 @@ double draw(std::uint64_t random, std::int64_t id, double use, double anew)
     }
     const auto numbers = uniform4(key, static_cast<std::uint64_t>(id), std::bit_cast<std::uint64_t>(use + 0.0));
     return numbers[0] + numbers[1] * 0x1p-32 < 1 ? numbers[0] + numbers[1] * 0x1p-32 : numbers[0];
+}
+
+NoiseOptions noise_options(double time, double octaves, double seed)
+{
+    return {time, static_cast<int>(octaves), static_cast<std::uint32_t>(seed)};
+}
+
+// As draw(); lua/numeric.lua has checked the numbers.
+double noise_at(double x, double y, double z, double time, double octaves, double seed)
+{
+    return noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
+}
+void curl_noise_at(double x, double y, double z, double time, double octaves, double seed, double* curl)
+{
+    Eigen::Map<Vec3d>(curl, 3) = curl_noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
+}
+
+// Called from compiled kernels; lua/shape.lua keeps the shape.
+double shape_distance(const void* shape, double x, double y, double z, double* gradient)
+{
+    const Vec3d P(x, y, z);
+    double phi = 0;
+    Vec3d slope;
+    static_cast<const Shape*>(shape)->distance({&P, 1}, {&phi, 1}, {&slope, 1});
+    Eigen::Map<Vec3d>(gradient, 3) = slope;
+    return phi;
 }
 
 std::string text_at(State& state, int index)
@@ -206,6 +234,7 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
         const std::size_t number = state.add_kernel();
         if (state.is_main()) {
             host.kernels.push_back(std::make_shared<Kernel>(host, number, location));
+            host.kernels.back()->may_compute_groups = param.internal && names_groups(type);
             kernels[param.name] = host.kernels.back();
         } else if (number >= host.kernels.size()) {
             throw Error("the graph file made more kernels in a worker than at first; it must do the same each time");
@@ -333,6 +362,23 @@ int set_index(State& state)
     return 0;
 }
 
+// native.shape(object): the shape's pointer, valid while the object is; nil for any other object.
+int shape_of(State& state)
+{
+    const auto shape = std::dynamic_pointer_cast<const Shape>(state.to_object(1));
+    if (shape)
+        lua_pushlightuserdata(state.lua(), const_cast<Shape*>(shape.get()));
+    else
+        lua_pushnil(state.lua());
+    return 1;
+}
+
+int trace_aborted(State& state)
+{
+    state.host().options().on_trace_abort(text_at(state, 1));
+    return 0;
+}
+
 // native.read_module(name), native.read_node(name): text and chunk name, or nil and where it was looked for.
 template <bool node>
 int read_source(State& state)
@@ -374,6 +420,8 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"kind", native<kind_of>},
                                       {"set_index", native<set_index>},
                                       {"run", run_body},
+                                      {"shape", native<shape_of>},
+                                      {"trace_aborted", native<trace_aborted>},
                                       {"read_module", native<read_source<false>>},
                                       {"read_node", native<read_source<true>>}};
     lua_newtable(L);
@@ -385,8 +433,14 @@ void push_natives(State& state, const std::string& chunk_header)
     lua_setfield(L, -2, "is_worker");
     lua_pushlstring(L, chunk_header.data(), chunk_header.size());
     lua_setfield(L, -2, "chunk_header");
-    lua_pushlightuserdata(L, reinterpret_cast<void*>(&draw));
-    lua_setfield(L, -2, "rand");
+    const auto push_pointer = [L](const char* name, auto* function) {
+        lua_pushlightuserdata(L, reinterpret_cast<void*>(function));
+        lua_setfield(L, -2, name);
+    };
+    push_pointer("rand", &draw);
+    push_pointer("noise", &noise_at);
+    push_pointer("curl_noise", &curl_noise_at);
+    push_pointer("shape_distance", &shape_distance);
 }
 
 }  // namespace rapid

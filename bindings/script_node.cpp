@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <lua.hpp>
 
+#include "bindings/ramp.h"
 #include "bindings/script_host.h"
 #include "runtime/graph/registry.h"
+#include "runtime/shapes/shape.h"
 
 namespace rapid {
 namespace {
@@ -31,19 +34,23 @@ struct Points {
 };
 RAPID_NODE(Points);
 
-// A node type that rapid.node defines: its parameters' values by name, and its kernel.
+// A node type that rapid.node defines: its parameters' values by name, its kernel, and the attributes that it makes.
 class ScriptOperator : public Operator {
 public:
     struct Fields {
         std::string group;
         std::shared_ptr<const Kernel> kernel;
-        std::map<std::string, Value> values;
+        KernelArguments arguments;
     };
+
+    explicit ScriptOperator(std::vector<AttributeSpec> makes) : makes_(std::move(makes)) {}
 
     void* fields() override { return &fields_; }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
     {
-        fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.values);
+        // Points that come from elsewhere, and those behind Solve, may not have them yet.
+        for (const AttributeSpec& spec : makes_) inputs[0].points.add(spec);
+        fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.arguments);
         return std::move(inputs[0]);
     }
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
@@ -51,14 +58,23 @@ public:
     {
         if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
         fields_.kernel->uses(uses);
+        const KernelArguments& named = fields_.arguments;
+        uses.reads.insert(uses.reads.end(), named.reads.begin(), named.reads.end());
+        uses.writes.insert(uses.writes.end(), named.writes.begin(), named.writes.end());
+        uses.makes_groups.insert(uses.makes_groups.end(), named.joins.begin(), named.joins.end());
     }
     void check() const override {}
 
 private:
     Fields fields_;
+    std::vector<AttributeSpec> makes_;
 };
 
-// Reads a value as a T, for its checks, and keeps it as a plain value.
+// The types that a parameter is declared with, and how each is checked and kept for the kernel.
+constexpr std::string_view group_type = "name of a group", attribute_type = "name of an attribute";
+
+KernelArguments& arguments_of(void* fields) { return static_cast<ScriptOperator::Fields*>(fields)->arguments; }
+
 template <class T>
 void keep_as(const Param& param, void* fields, const Value& value)
 {
@@ -66,7 +82,66 @@ void keep_as(const Param& param, void* fields, const Value& value)
     read_value(param, value, field);
     Value kept = value;
     if constexpr (std::is_same_v<T, Vec3d>) kept = Value(field);
-    static_cast<ScriptOperator::Fields*>(fields)->values[param.name] = std::move(kept);
+    arguments_of(fields).values[param.name] = std::move(kept);
+}
+
+void keep_ramp(const Param& param, void* fields, const Value& value)
+{
+    arguments_of(fields).values[param.name] = Value(ObjectPtr(read_ramp(param, value)));
+}
+
+template <class T>
+void keep_list(const Param& param, void* fields, const Value& value)
+{
+    std::vector<T> list;
+    read_value(param, value, list);
+    Table kept;
+    for (const T& element : list) kept.list.emplace_back(element);
+    arguments_of(fields).values[param.name] = Value(std::make_shared<const Table>(std::move(kept)));
+}
+
+enum class Access { Reads, Writes, Joins };
+
+template <Access access>
+void keep_name(const Param& param, void* fields, const Value& value)
+{
+    keep_as<std::string>(param, fields, value);
+    const std::string& name = *value.get<std::string>();
+    if (name.empty()) throw Error(fmt::format("{} = \"\"; it must be the {}", param.name, param.type));
+    KernelArguments& arguments = arguments_of(fields);
+    if constexpr (access == Access::Joins) {
+        arguments.joins.insert(name);
+    } else {
+        if (access == Access::Writes && (name == "id" || name == "dt"))
+            throw Error(fmt::format("{} = \"{}\"; that attribute is read only", param.name, name));
+        (access == Access::Writes ? arguments.writes : arguments.reads).insert(name);
+    }
+}
+
+struct DeclaredType {
+    std::string_view shown;
+    decltype(Param::assign) assign;
+    bool ranged = false;    // min and max mean something
+    bool constant = false;  // takes no function of the frame
+};
+
+const std::map<std::string, DeclaredType>& declared_types()
+{
+    static const std::map<std::string, DeclaredType> types = {
+        {"bool", {"boolean", keep_as<bool>}},
+        {"float", {"number", keep_as<double>, true}},
+        {"floats", {"list of numbers", keep_list<double>, true}},
+        {"group", {group_type, keep_name<Access::Joins>, false, true}},
+        {"int", {"integer", keep_as<int>, true}},
+        {"ramp", {Ramp::param_type, keep_ramp, true}},
+        {"read", {attribute_type, keep_name<Access::Reads>, false, true}},
+        {"shape", {Shape::param_type, keep_as<ShapePtr>}},
+        {"string", {"string", keep_as<std::string>}},
+        {"vec3", {"vec3", keep_as<Vec3d>, true}},
+        {"vec3s", {"list of vec3", keep_list<Vec3d>, true}},
+        {"write", {attribute_type, keep_name<Access::Writes>, false, true}},
+    };
+    return types;
 }
 
 const Value* find(const Table& table, const char* name)
@@ -110,6 +185,7 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     if (const Value* hi = find(*table, "max")) {
         if (!hi->get<double>()) throw Error(fmt::format("{}: max = {}; it must be a number", what, describe(*hi)));
         param.range.hi = *hi->get<double>();
+        param.range.infinity = std::isinf(param.range.hi);  // max = math.huge takes it
     }
     if (const Value* required = find(*table, "required")) {
         const bool* flag = required->get<bool>();
@@ -120,17 +196,19 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     if (const Value* fallback = find(*table, "default")) param.fallback = *fallback;
     if (param.fallback.is_nil() && !param.required) throw Error(what + ": give it a default, or required = true");
 
-    const std::map<std::string, std::pair<std::string_view, decltype(Param::assign)>> types = {
-        {"float", {"number", keep_as<double>}}, {"int", {"integer", keep_as<int>}},
-        {"bool", {"boolean", keep_as<bool>}},   {"string", {"string", keep_as<std::string>}},
-        {"vec3", {"vec3", keep_as<Vec3d>}},
-    };
-    const auto known = types.find(*type);
-    if (known == types.end())
-        throw Error(fmt::format("{}: unknown type \"{}\"{}; there are bool, float, int, string and vec3", what, *type,
-                                did_you_mean(*type, {"bool", "float", "int", "string", "vec3"})));
-    param.type = known->second.first;
-    param.assign = known->second.second;
+    const auto known = declared_types().find(*type);
+    if (known == declared_types().end()) {
+        std::vector<std::string> names;
+        for (const auto& [name_of_type, declared_type] : declared_types()) names.push_back(name_of_type);
+        const std::string near = did_you_mean(*type, names);
+        throw Error(fmt::format("{}: unknown type \"{}\"{}", what, *type,
+                                near.empty() ? fmt::format("; there are {}", fmt::join(names, ", ")) : near));
+    }
+    if (param.range.bounded() && !known->second.ranged)
+        throw Error(fmt::format("{}: min and max mean nothing for a {}", what, *type));
+    param.type = known->second.shown;
+    param.assign = known->second.assign;
+    param.of_the_frame = !known->second.constant;
     ScriptOperator::Fields scratch;  // a default is checked where it is declared
     try {
         if (!param.fallback.is_nil()) param.assign(param, &scratch, param.fallback);
@@ -149,9 +227,10 @@ NodeType read_type(const Table& definition, bool has_points, bool has_expand)
     type.doc = text_of(definition, "doc", what);
     if (type.doc.empty()) throw Error(what + ": say what it does, doc = \"...\"");
     for (const auto& [field, value] : definition.named)
-        if (field != "name" && field != "doc" && field != "params" && field != "points" && field != "expand")
+        if (field != "name" && field != "doc" && field != "params" && field != "makes" && field != "points" &&
+            field != "expand")
             throw Error(fmt::format("{}: unknown field \"{}\"{}", what, field,
-                                    did_you_mean(field, {"name", "doc", "params", "points", "expand"})));
+                                    did_you_mean(field, {"name", "doc", "params", "makes", "points", "expand"})));
     if (has_points == has_expand)
         throw Error(what + ": give it points = function(p, frame, params), or expand = function(input, params)");
     type.varies = true;
@@ -181,7 +260,19 @@ NodeType read_type(const Table& definition, bool has_points, bool has_expand)
         };
         type.params.push_back(kernel);
     }
-    type.make = [] { return std::make_unique<ScriptOperator>(); };
+    if (const Value* makes = find(definition, "makes")) {
+        if (!has_points) throw Error(what + ": makes belongs to points = function(p, frame, params)");
+        Param param;
+        param.name = "makes";
+        std::map<std::string, AttributeValue> attributes;
+        try {
+            read_value(param, *makes, attributes);
+        } catch (const Error& error) {
+            throw Error(fmt::format("{}: {}", what, error.message()));
+        }
+        for (const auto& [name, value] : attributes) type.uses.makes.push_back({name, value});
+    }
+    type.make = [made = type.uses.makes] { return std::make_unique<ScriptOperator>(made); };
     return type;
 }
 
@@ -216,6 +307,11 @@ int define_node_type(State& state)
     return 0;
 }
 
+bool names_groups(const NodeType& type)
+{
+    return std::any_of(type.params.begin(), type.params.end(), [](const Param& p) { return p.type == group_type; });
+}
+
 void push_script_of(State& state, const std::string& type)
 {
     lua_State* L = state.lua();
@@ -233,7 +329,7 @@ int complete_arguments(State& state)
     ScriptOperator::Fields fields;
     assign_arguments(type.params, table->named, &fields);
     Table complete;
-    complete.named = std::move(fields.values);
+    complete.named = std::move(fields.arguments.values);
     state.push(Value(std::make_shared<const Table>(std::move(complete))));
     return 1;
 }

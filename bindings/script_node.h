@@ -6,10 +6,14 @@
 namespace rapid {
 
 class State;
+struct NodeType;
 
 // Native functions of lua/rapid.lua.
 int define_node_type(State& state);    // rapid.node{...}: adds the type (main state) and keeps its kernel
 int complete_arguments(State& state);  // (type, arguments): the arguments, checked, with the defaults filled in
+
+// Whether a parameter of the type is the name of a group that its kernel changes.
+bool names_groups(const NodeType& type);
 
 // Pushes the kernel of a type that rapid.node has defined in this state; nil where it has none.
 void push_script_of(State& state, const std::string& type);

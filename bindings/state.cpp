@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "bindings/natives.h"
+#include "bindings/ramp.h"
 #include "bindings/script_host.h"
 
 namespace rapid {
@@ -252,7 +253,7 @@ void State::open_libraries()
     luaL_openlibs(L_);
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();
-    for (const char* name : {"vec3", "bytecode", "kernel", "sandbox", "rapid"}) {
+    for (const char* name : {"vec3", "bytecode", "kernel", "numeric", "shape", "ramp", "sandbox", "rapid"}) {
         lua_getglobal(L_, "package");
         lua_getfield(L_, -1, "preload");
         const std::string text = read_text(folder / (std::string(name) + ".lua"));
@@ -281,6 +282,10 @@ void State::register_natives()
     push_natives(*this, read_text(folder / "chunk.h"));
     call(1, 1);
     entries_ = luaL_ref(L_, LUA_REGISTRYINDEX);
+    if (host_.options().on_trace_abort) {
+        push_entry("watch_traces");
+        call(0, 0);
+    }
 }
 
 void State::call(int arguments, int results)
@@ -438,6 +443,15 @@ void State::push(const Value& value)
         push_entry("make_vec3");
         for (int axis = 0; axis < 3; ++axis) lua_pushnumber(L_, (*v)[axis]);
         call(3, 1);
+    } else if (const auto ramp = value.object<Ramp>()) {
+        push_entry("make_ramp");
+        lua_createtable(L_, static_cast<int>(ramp->keys.size()), 0);
+        for (std::size_t i = 0; i < ramp->keys.size(); ++i) {
+            const auto& [position, of_key] = ramp->keys[i];
+            push(Value(std::make_shared<const Table>(Table{{Value(position), of_key}, {}, {}})));
+            lua_rawseti(L_, -2, static_cast<int>(i) + 1);
+        }
+        call(1, 1);
     } else if (const auto* object = value.get<ObjectPtr>()) {
         push_object(*object);
     } else if (const Table* table = value.table()) {

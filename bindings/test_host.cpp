@@ -4,6 +4,7 @@
 
 #include <lua.hpp>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -88,12 +89,28 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
     });
 }
 
-// native.run(path, options): outputs by name, of them point sets by frame; and the warnings, in order.
+void push_list(lua_State* L, const std::vector<std::string>& texts)
+{
+    lua_newtable(L);
+    for (std::size_t i = 0; i < texts.size(); ++i) {
+        lua_pushstring(L, texts[i].c_str());
+        lua_rawseti(L, -2, static_cast<int>(i) + 1);
+    }
+}
+
+// native.run(path, options): outputs by name, of them point sets by frame; the warnings, in order; and the traces that
+// were given up.
 int run(lua_State* L)
 {
     std::string error;
     try {
-        const SceneRun scene = read_run(L);
+        SceneRun scene = read_run(L);
+        std::mutex mutex;
+        std::vector<std::string> aborts;
+        scene.session.on_trace_abort = [&](const std::string& message) {
+            const std::lock_guard lock(mutex);
+            aborts.push_back(message);
+        };
         lua_newtable(L);
         const int outputs = lua_gettop(L);
         const std::vector<std::string> warnings = run_scene(scene, [&](FrameResult& result) {
@@ -112,12 +129,9 @@ int run(lua_State* L)
                 lua_pop(L, 1);
             }
         });
-        lua_newtable(L);
-        for (std::size_t i = 0; i < warnings.size(); ++i) {
-            lua_pushstring(L, warnings[i].c_str());
-            lua_rawseti(L, -2, static_cast<int>(i) + 1);
-        }
-        return 2;
+        push_list(L, warnings);
+        push_list(L, aborts);
+        return 3;
     } catch (const Error& raised) {
         error = raised.what();
     }

@@ -19,3 +19,10 @@ typedef struct rapid_chunk {
 } rapid_chunk;
 
 typedef double (*rapid_rand)(uint64_t random, int64_t id, double use, double frame);
+
+// Of a shape's own pointer; gradient: shape [3].
+typedef double (*rapid_shape_distance)(const void* shape, double x, double y, double z, double* gradient);
+
+// runtime/noise.h; curl: shape [3].
+typedef double (*rapid_noise)(double x, double y, double z, double time, double octaves, double seed);
+typedef void (*rapid_curl_noise)(double x, double y, double z, double time, double octaves, double seed, double* curl);

@@ -8,6 +8,9 @@ local bytecode = require "bytecode"
 local kernel = require "kernel"
 local sandbox = require "sandbox"
 local language = require "rapid"
+local numeric = require "numeric"
+local ramp = require "ramp"
+local shape = require "shape"
 local vector = require "vec3"
 local ffi = require "ffi"
 
@@ -35,11 +38,13 @@ end
 -- Loops are compiled at once, before the functions that they call count as hot; large kernels get room.
 jit.opt.start("hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxirconst=2000", "maxmcode=16384")
 
-local rapid = language.make(native, load_node)
-loaded.rapid = rapid
-env.vec3 = vector.make
+ffi.cdef(native.chunk_header)
+local shapes = shape.make(native)
+local engine = kernel.prepare(native.rand, shapes.pointer_of)
 
-local engine = kernel.prepare(native.chunk_header, native.rand)
+local rapid = language.make(native, load_node, numeric.make(native.noise, native.curl_noise), shapes)
+loaded.rapid = rapid
+env.vec3, env.quat = vector.make, vector.make_quat
 
 local entry = {}
 
@@ -53,6 +58,7 @@ function entry.run(text, name)
 end
 
 function entry.loaded()
+  collectgarbage() -- a finalizer that runs while a trace is recorded ends the recording
   jit.on()
 end
 
@@ -70,6 +76,24 @@ function entry.runner(f, layout)
   return engine.runner(f, layout)
 end
 
+-- Tells the host of each trace that the compiler gives up.
+function entry.watch_traces()
+  local vmdef = require "jit.vmdef"
+  local info = require("jit.util").funcinfo
+  jit.attach(function(what, _, f, pc, reason, argument)
+    if what ~= "abort" then return end
+    local place = info(f, pc)
+    if type(reason) == "number" then
+      if type(argument) == "function" then argument = info(argument).loc or "a native function" end
+      reason = vmdef.traceerr[reason]:format(argument):gsub("bytecode (%d+)", function(op)
+        return "bytecode " .. vmdef.bcnames:sub(op * 6 + 1, op * 6 + 6):gsub("%s", "")
+      end)
+    end
+    native.trace_aborted(("%s:%d: %s"):format((place.source or "native"):gsub("^[@=]", ""), place.currentline or 0,
+      tostring(reason)))
+  end, "trace")
+end
+
 -- A parameter given as a function.
 function entry.call(f, number, time, dt)
   return f(engine.frame(number, time, dt))
@@ -83,5 +107,7 @@ end
 function entry.make_vec3(x, y, z)
   return vector.type(x, y, z)
 end
+
+entry.make_ramp = ramp.make
 
 return entry

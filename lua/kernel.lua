@@ -62,7 +62,11 @@ end
 
 -- The host adds the place, the nearest line of graph code, and the point.
 local function wrong_type(name, wanted, value)
-  local remedy = wanted == "a vec3" and type(value) == "table" and "; vec3(x, y, z) makes one" or ""
+  local remedy = ""
+  if type(value) == "table" then
+    remedy = wanted == "a vec3" and "; vec3(x, y, z) makes one" or wanted == "a quat" and "; quat(x, y, z, w) makes one"
+      or ""
+  end
   error(("attribute %q takes %s, not %s%s"):format(name, wanted, describe(value), remedy), 0)
 end
 local function not_finite(name, value)
@@ -86,7 +90,7 @@ local function missing(name, getters)
 end
 
 local text_head = [[
-local ffi, vec3, quat, kernel, frame_type, rand, refuse, layout = ...
+local ffi, vec3, quat, kernel, frame_type, rand, adopt, refuse, layout = ...
 local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
@@ -95,7 +99,7 @@ local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that
 cursor.i = -1
 local first, frame, random, params = 0, nil, 0, nil
 local kill, result, members
-local getters, setters, methods, attach = {}, {}, {}, {}
+local getters, setters, methods = {}, {}, {}
 local id_column, id_stride
 ]]
 
@@ -167,17 +171,15 @@ local function make_runner(kernel, layout, pointers)
   for _, column in ipairs(layout.columns) do
     local n = tostring(column.slot)
     locals[#locals + 1] = ("local c%s, s%s"):format(n, n)
-    setup[#setup + 1] = ([[attach[#attach + 1] = function(chunk)
-      c%s, s%s = cast(%q, chunk.columns[%s].data), tonumber(chunk.columns[%s].stride) %s
-    end]]):format(n, n, pointer_type[column.type], n, n,
-      column.name == "id" and ("id_column, id_stride = c%s, s%s"):format(n, n) or "")
+    setup[#setup + 1] = ("  c%s, s%s = cast(%q, chunk.columns[%s].data), tonumber(chunk.columns[%s].stride)"):format(n,
+      n, pointer_type[column.type], n, n)
+    if column.name == "id" then setup[#setup + 1] = ("  id_column, id_stride = c%s, s%s"):format(n, n) end
   end
   for _, group in ipairs(layout.groups) do
     local n = tostring(group.slot)
     locals[#locals + 1] = ("local g%s, t%s"):format(n, n)
-    setup[#setup + 1] = ([[attach[#attach + 1] = function(chunk)
-      g%s, t%s = cast("uint8_t*", chunk.groups[%s].data), tonumber(chunk.groups[%s].stride)
-    end]]):format(n, n, n, n)
+    setup[#setup + 1] = ("  g%s, t%s = cast(\"uint8_t*\", chunk.groups[%s].data), tonumber(chunk.groups[%s].stride)")
+      :format(n, n, n, n)
   end
   text[#text + 1] = table.concat(locals, "\n") .. "\n"
   for _, column in ipairs(layout.columns) do
@@ -224,20 +226,20 @@ function methods.leave(...)
 end
 ]]
   text[#text + 1] = text_methods
-  text[#text + 1] = table.concat(setup, "\n")
+  -- Vararg, so that no trace starts here, nor in run(): the conversion of a pointer is not compiled.
   text[#text + 1] = [[
-local function begin(chunk)
+local function begin(...)
+  local chunk = ...
   first, random = tonumber(chunk.first), chunk.random
   frame = frame_type(chunk.number, chunk.time, chunk.dt)
-  kill, result, members = chunk.kill, chunk.result, chunk.members
-  for k = 1, #attach do attach[k](chunk) end
-end
-]]
+  kill, result, members = chunk.kill, chunk.result, chunk.members]]
+  text[#text + 1] = table.concat(setup, "\n") .. "\nend\n"
 
   local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0" or "kernel(p, frame, params)"
   local test = layout.masked and "if members[k] ~= 0 then cursor.i = k " .. body .. " end" or "cursor.i = k " .. body
   text[#text + 1] = [[
-local function run(pointer)
+local function run(...)
+  local pointer = ...
   local chunk = cast("rapid_chunk*", pointer)
   begin(chunk)
   for k = 0, tonumber(chunk.size) - 1 do ]] .. test .. [[ end
@@ -249,6 +251,9 @@ local function at()
   return place < 0 and -1 or first + place
 end
 local function set_params(values)
+  for _, value in next, values do
+    if type(value) == "userdata" then adopt(value) end
+  end
   setmetatable(values, { __index = function(_, name) refuse.param(name, values) end })
   params = setmetatable({}, {
     __index = values,
@@ -256,6 +261,7 @@ local function set_params(values)
     __metatable = false,
   })
 end
+jit.off(set_params) -- once a pass
 return run, at, set_params
 ]]
   local refuse = { wrong_type = wrong_type, not_finite = not_finite, not_whole = not_whole, missing = missing }
@@ -281,12 +287,13 @@ return run, at, set_params
     error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)
   end
   local chunk = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
-  return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, refuse, layout)
+  return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, pointers.adopt, refuse, layout)
 end
 
--- chunk_header: the text of lua/chunk.h; rand: a light userdata, the function that draws.
-local function prepare(chunk_header, rand)
-  ffi.cdef(chunk_header)
+jit.off(make_runner, true) -- once a kernel
+
+-- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua).
+local function prepare(rand, adopt)
   local frame_type = ffi.typeof "struct { const double number, time, dt; }"
   ffi.metatype(frame_type, {
     __tostring = function(frame) return ("frame %g"):format(frame.number) end,
@@ -294,7 +301,7 @@ local function prepare(chunk_header, rand)
       error(("the frame has no %q; it has number, time and dt"):format(tostring(name)), 2)
     end,
   })
-  local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand) }
+  local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand), adopt = adopt }
   return {
     frame = function(number, time, dt) return frame_type(number, time, dt) end,
     runner = function(kernel, layout) return make_runner(kernel, layout, pointers) end,

@@ -21,9 +21,10 @@ local function names_of(map)
   return names
 end
 
--- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil.
-local function make(native, load_node)
-  local rapid = {}
+-- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil;
+-- numeric: what rapid.math holds; shapes: what can be asked of shapes (lua/shape.lua).
+local function make(native, load_node, numeric, shapes)
+  local rapid = { math = numeric }
 
   -- A maker with the named positional arguments first.
   local function maker(what, ...)
@@ -168,7 +169,10 @@ local function make(native, load_node)
   end
   local value_methods = {
     mesh = { transform = transformed },
+    shape = shapes.queries,
     ["level set"] = {
+      distance = shapes.queries.distance,
+      gradient = shapes.queries.gradient,
       write = function(object, path, options)
         local named = options_of("levelset:write", options)
         named.levelset, named.path = object, path
@@ -179,7 +183,10 @@ local function make(native, load_node)
     motion = {},
   }
 
-  native.set_index(function(object, name)
+  native.set_index(function(...)
+    local object, name = ...
+    local query = shapes.queries[name] -- in kernels: what traces can follow comes first
+    if query and shapes.pointer_of(object) then return query end
     local kind = native.kind(object)
     if kind == "node" then
       if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
@@ -205,7 +212,7 @@ local function make(native, load_node)
       __metatable = false,
     })
   end
-  for _, name in ipairs { "mesh", "levelset", "shape", "points" } do closed(rapid[name], "rapid." .. name) end
+  for _, name in ipairs { "math", "mesh", "levelset", "shape", "points" } do closed(rapid[name], "rapid." .. name) end
   return closed(rapid, "rapid")
 end
 

@@ -6,7 +6,7 @@
 -- called from.
 local ffi = require "ffi"
 
-local sqrt = math.sqrt
+local sqrt, sin, acos = math.sqrt, math.sin, math.acos
 local istype = ffi.istype
 
 local vec3 = ffi.typeof "struct { const double x, y, z; }"
@@ -134,14 +134,102 @@ ffi.metatype(vec3, {
   end,
 })
 
+-- Rotations: (x, y, z) = axis sin(angle / 2), w = cos(angle / 2), as Houdini's orient holds them.
+local rotations = {}
+
+local function need_quat(what, value)
+  if not istype(quat, value) then error(("%s takes a quat, not %s"):format(what, show(value)), 0) end
+end
+
+-- v, turned: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
+function rotations.rotate(...)
+  local q, v = ...
+  if not istype(quat, q) then need_quat("q:rotate(v)", q) end
+  if not istype(vec3, v) then need_vec3("q:rotate(v)", v) end
+  local x, y, z = q.y * v.z - q.z * v.y, q.z * v.x - q.x * v.z, q.x * v.y - q.y * v.x
+  local w = q.w
+  return vec3(v.x + 2 * (w * x + q.y * z - q.z * y), v.y + 2 * (w * y + q.z * x - q.x * z),
+    v.z + 2 * (w * z + q.x * y - q.y * x))
+end
+
+-- The turn back, for a quaternion of length 1.
+function rotations.inverse(...)
+  local q = ...
+  if not istype(quat, q) then need_quat("q:inverse()", q) end
+  return quat(-q.x, -q.y, -q.z, q.w)
+end
+
+function rotations.length(...)
+  local q = ...
+  if not istype(quat, q) then need_quat("q:length()", q) end
+  return sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+end
+
+-- Of length 1; zero becomes no turn.
+function rotations.normalized(...)
+  local q = ...
+  if not istype(quat, q) then need_quat("q:normalized()", q) end
+  local length = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+  if length == 0 then return quat(0, 0, 0, 1) end
+  return quat(q.x / length, q.y / length, q.z / length, q.w / length)
+end
+
+-- The shortest turn from q (t = 0) to r (t = 1), at even speed; both of length 1.
+function rotations.slerp(...)
+  local q, r, t = ...
+  if not istype(quat, q) then need_quat("q:slerp(r, t)", q) end
+  if not istype(quat, r) then need_quat("q:slerp(r, t)", r) end
+  if type(t) ~= "number" then error(("q:slerp(r, t) takes a number t, not %s"):format(show(t)), 0) end
+  local dot = q.x * r.x + q.y * r.y + q.z * r.z + q.w * r.w
+  local sign = dot < 0 and -1 or 1 -- r and -r are the same turn
+  dot = dot * sign
+  local a, b = 1 - t, t * sign
+  if dot < 0.9999995 then -- else the arc is a line, within rounding
+    local angle = acos(dot)
+    local s = sin(angle)
+    a, b = sin((1 - t) * angle) / s, sin(t * angle) / s * sign
+  end
+  return quat(a * q.x + b * r.x, a * q.y + b * r.y, a * q.z + b * r.z, a * q.w + b * r.w)
+end
+
 ffi.metatype(quat, {
+  -- The turn r, and then q.
+  __mul = function(...)
+    local q, r = ...
+    if not (istype(quat, q) and istype(quat, r)) then
+      error(("can't compute %s * %s; both must be a quat, and a vec3 is turned by q:rotate(v)"):format(show(q),
+        show(r)), 2)
+    end
+    return quat(q.w * r.x + q.x * r.w + q.y * r.z - q.z * r.y, q.w * r.y - q.x * r.z + q.y * r.w + q.z * r.x,
+      q.w * r.z + q.x * r.y - q.y * r.x + q.z * r.w, q.w * r.w - q.x * r.x - q.y * r.y - q.z * r.z)
+  end,
   __eq = function(a, b)
     return istype(quat, a) and istype(quat, b) and a.x == b.x and a.y == b.y and a.z == b.z and a.w == b.w
+  end,
+  __newindex = function(_, name)
+    error(("a quat has no %q, and can't be changed; make a new one: quat(x, y, z, w)"):format(tostring(name)), 2)
   end,
   __tostring = function(a)
     return ("quat(%.9g, %.9g, %.9g, %.9g)"):format(a.x, a.y, a.z, a.w)
   end,
+  __concat = function(a, b) return tostring(a) .. tostring(b) end,
+  __index = function(...)
+    local _, name = ...
+    local method = rotations[name]
+    if method then return method end
+    error(("a quat has no %q; it has x, y, z, w, rotate, inverse, length, normalized and slerp"):format(
+      tostring(name)), 2)
+  end,
 })
+
+-- From four numbers.
+local function make_quat(...)
+  local x, y, z, w = ...
+  if not (type(x) == "number" and type(y) == "number" and type(z) == "number" and type(w) == "number") then
+    error("quat takes four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis", 2)
+  end
+  return quat(x, y, z, w)
+end
 
 -- From three numbers, or a list of three.
 local function make_vec3(...)
@@ -156,4 +244,4 @@ local function make_vec3(...)
   return vec3(x, y, z)
 end
 
-return { type = vec3, quat = quat, make = make_vec3 }
+return { type = vec3, quat = quat, make = make_vec3, make_quat = make_quat }

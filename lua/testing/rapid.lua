@@ -4,6 +4,7 @@
 --   result[48]                 the points of a frame: of the output main, or of the only one
 --   result:frames()            iterates: frame, points
 --   result:output "smoke"      the same of another output
+--   result.warnings, result.trace_aborts       lists of messages: what the run said, and what LuaJIT did not compile
 --   #points, points[1].P, points:by_id(7).heat, points:min "P", points:mean "v", points:group "hot"
 local vector = require "vec3"
 local ffi = require "ffi"
@@ -70,6 +71,7 @@ return function(native)
   local function result_of(run, output_name)
     return setmetatable({
       run = run, output_name = output_name or false, outputs = run.outputs, warnings = run.warnings,
+      trace_aborts = run.trace_aborts,
     }, result_metatable)
   end
 
@@ -130,7 +132,7 @@ return function(native)
 
     local set = {}
     for name, value in pairs(options.set or {}) do set[name] = setting(name, value) end
-    local ok, found, warnings = pcall(native.run, path, {
+    local ok, found, warnings, trace_aborts = pcall(native.run, path, {
       first = run.first,
       last = run.last,
       seed = options.seed and whole("seed", options.seed, 0),
@@ -139,7 +141,7 @@ return function(native)
       set = set,
     })
     if not ok then error(found, 0) end
-    run.frames, run.warnings = found, warnings
+    run.frames, run.warnings, run.trace_aborts = found, warnings, trace_aborts
     for name in pairs(found) do table.insert(run.outputs, name) end
     table.sort(run.outputs)
     return result_of(run, found.main and "main" or #run.outputs == 1 and run.outputs[1])

@@ -16,6 +16,7 @@ local rapid = require "testing.rapid" (native)
 package.preload.rapid = function() return rapid end
 rawset(_G, "rapid", rapid)
 rawset(_G, "vec3", require("vec3").make)
+rawset(_G, "quat", require("vec3").make_quat)
 require "testing.assertions" (native)
 
 -- The names of the enclosing describe blocks and of the test itself.

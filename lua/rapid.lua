@@ -169,7 +169,6 @@ local function make(native, load_node, numeric, shapes)
   end
   local value_methods = {
     mesh = { transform = transformed },
-    shape = shapes.queries,
     ["level set"] = {
       distance = shapes.queries.distance,
       gradient = shapes.queries.gradient,
@@ -192,7 +191,7 @@ local function make(native, load_node, numeric, shapes)
       if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
       return method_of(name)
     end
-    local known = value_methods[kind] or {}
+    local known = value_methods[kind] or shapes.pointer_of(object) and shapes.queries or {}
     if known[name] then return known[name] end
     local what = kind == "points" and "points have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
       or "a " .. kind .. " has"

@@ -31,7 +31,8 @@ local function make(native)
     if type(shape) ~= "userdata" or not pointer_of(shape) then
       error(("shape:%s(P) is asked of a shape: with a colon, not a dot"):format(what), 0)
     end
-    error(("shape:%s(P) takes a vec3, not %s"):format(what, type(P) == "number" and tostring(P) or "a " .. type(P)), 0)
+    local shown = (type(P) == "number" or P == nil) and tostring(P) or "a " .. type(P)
+    error(("shape:%s(P) takes a vec3, not %s"):format(what, shown), 0)
   end
 
   local queries = {}

@@ -1,0 +1,181 @@
+// Node types for the tests of plan and evaluation, one of each kind: the real ones are above this layer.
+#include <new>
+
+#include "tests/graph/graph_under_test.h"
+
+namespace rapid::test {
+namespace {
+
+// One point at the origin, handed on as the simulation's state.
+struct Source {
+    double fps = 24;
+    int start_frame = 1, seed = 0;
+
+    static NodeType declare()
+    {
+        return node<Source>("source", "One point.")
+            .kind(NodeKind::Source)
+            .param(&Source::fps, "fps", 24.0, above(0), "1/s", "frames a second")
+            .constant()
+            .param(&Source::start_frame, "start", 1.0, any_number(), "", "first frame")
+            .constant()
+            .param(&Source::seed, "seed", 0.0, at_least(0), "", "of random numbers")
+            .constant();
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        ++evaluations[now.node];
+        Flow flow = std::move(inputs[0]);
+        Simulation& simulation = *flow.simulation;
+        if (now.at_start) {
+            flow.points = points({Vec3f::Zero()});
+            simulation.next_id = 1;
+        } else {
+            flow.points = simulation.state;
+        }
+        for (const AttributeSpec& spec : simulation.columns) flow.points.set_fallback(spec);
+        for (const std::string& name : simulation.groups) flow.points.group(name);
+        return flow;
+    }
+};
+RAPID_NODE(Source);
+
+// Moves points, and says so.
+struct Shift {
+    Vec3d by;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Shift>("shift", "Moves points.")
+            .param(&Shift::by, "by", Vec3d(1, 0, 0), at_least(-100), "m", "how far")
+            .writes("P");
+    }
+
+    void edit(PointSet& points, const Evaluation& now) const
+    {
+        ++evaluations[now.node];
+        for (Vec3f& P : points.P().write()) P += by.cast<float>();
+        now.warnings.push_back("shifted");
+        now.figures.collisions += 1;
+    }
+};
+RAPID_NODE(Shift);
+
+// As Shift, but counted as changing from frame to frame whatever its arguments are.
+struct Jitter {
+    static NodeType declare() { return node<Jitter>("jitter", "Changes each frame.").varies(); }
+    void edit(PointSet&, const Evaluation& now) const { ++evaluations[now.node]; }
+};
+RAPID_NODE(Jitter);
+
+// Makes an attribute and a group.
+struct Make {
+    std::map<std::string, AttributeValue> values;
+    std::string member;
+
+    static NodeType declare()
+    {
+        return node<Make>("make", "Makes attributes.")
+            .param(&Make::member, "member", Value(), any_number(), "", "a group")
+            .rest(&Make::values, "the attribute's value");
+    }
+    void uses(Uses& uses) const
+    {
+        for (const auto& [name, value] : values) uses.makes.push_back({name, value});
+        if (!member.empty()) uses.makes_groups.push_back(member);
+    }
+    void edit(PointSet& points, const Evaluation& now) const
+    {
+        ++evaluations[now.node];
+        for (const auto& [name, value] : values) points.add({name, value});
+    }
+};
+RAPID_NODE(Make);
+
+// Reads an attribute of each point.
+struct Read {
+    PerPoint<float> value{0.0f};
+
+    static NodeType declare()
+    {
+        return node<Read>("read", "Reads an attribute.")
+            .param(&Read::value, "value", 0.0, any_number(), "", "what is read");
+    }
+    void edit(PointSet&, const Evaluation& now) const { ++evaluations[now.node]; }
+};
+RAPID_NODE(Read);
+
+struct Push {
+    static NodeType declare() { return node<Push>("push", "A force."); }
+    void contribute(const Chunk&, Forces&) const {}
+};
+RAPID_NODE(Push);
+
+// Posts the points back, and tells how many dynamics reached it.
+struct Post {
+    static NodeType declare() { return node<Post>("post", "Feeds back.").kind(NodeKind::Solve); }
+
+    Flow start(std::span<Flow> inputs, const Evaluation& now)
+    {
+        ++starts[now.node];
+        return post(inputs);
+    }
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        ++evaluations[now.node];
+        now.figures.substeps = static_cast<int>(inputs[0].dynamics.size());
+        return post(inputs);
+    }
+    static Flow post(std::span<Flow> inputs)
+    {
+        Flow flow = std::move(inputs[0]);
+        flow.dynamics.clear();
+        flow.simulation->state = flow.points;
+        return flow;
+    }
+};
+RAPID_NODE(Post);
+
+// The first input, where the second has been evaluated too.
+struct Both {
+    static NodeType declare() { return node<Both>("both", "The first of two.").kind(NodeKind::Merge); }
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        ++evaluations[now.node];
+        return std::move(inputs[0]);
+    }
+};
+RAPID_NODE(Both);
+
+// Fails when it is evaluated.
+struct Fail {
+    bool out_of_memory = false;
+
+    static NodeType declare()
+    {
+        return node<Fail>("fail", "Fails.")
+            .param(&Fail::out_of_memory, "out_of_memory", false, any_number(), "", "in this way")
+            .varies();
+    }
+    void edit(PointSet&, const Evaluation&) const
+    {
+        if (out_of_memory) throw std::bad_alloc();
+        throw Error("it can't be done");
+    }
+};
+RAPID_NODE(Fail);
+
+// What `:write` is to the plan: a node whose only effect is elsewhere.
+struct Write {
+    static NodeType declare() { return node<Write>("write", "Writes."); }
+    void edit(PointSet& points, const Evaluation& now) const
+    {
+        if (now.write) now.write("a.csv", points);
+    }
+};
+RAPID_NODE(Write);
+
+}  // namespace
+}  // namespace rapid::test

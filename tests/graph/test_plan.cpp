@@ -1,0 +1,238 @@
+#include "runtime/graph/plan.h"
+
+#include <algorithm>
+
+#include "tests/graph/graph_under_test.h"
+
+namespace rapid {
+namespace {
+
+using test::error_of;
+using test::GraphUnderTest;
+using test::of_frame;
+
+std::vector<std::string> names_of(const Plan& plan)
+{
+    std::vector<std::string> names;
+    for (const PlannedNode& planned : plan.nodes) names.push_back(planned.node->name);
+    return names;
+}
+
+const PlannedNode& planned(const Plan& plan, const std::string& name)
+{
+    const auto found = std::find_if(plan.nodes.begin(), plan.nodes.end(),
+                                    [&](const PlannedNode& node) { return node.node->name == name; });
+    REQUIRE(found != plan.nodes.end());
+    return *found;
+}
+
+std::string error_of_plan(const Graph& graph)
+{
+    return error_of([&] { Plan(graph, {}); });
+}
+
+}  // namespace
+
+TEST_CASE("nodes that no output comes from are left out of the plan", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    const NodePtr kept = scene.node("shift", {source}, {}, "kept");
+    scene.node("shift", {kept}, {}, "beside");
+    const NodePtr post = scene.node("post", {kept});
+    scene.node("shift", {post}, {}, "behind");
+    scene.node("source", {}, {}, "another");
+
+    const Plan plan(scene.returning(post), {});
+
+    CHECK(names_of(plan) == std::vector<std::string>{"source1", "kept", "post1"});
+    CHECK(plan.simulations.size() == 1);
+    CHECK(plan.warnings.empty());
+}
+
+TEST_CASE("wrong arguments of a node that is left out are no error", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    scene.node("shift", {source}, {{"byy", Value(1.0)}});
+    CHECK_NOTHROW(Plan(scene.returning(source), {}));
+}
+
+TEST_CASE("a write that is left out is warned of", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    scene.node("write", {source});
+    const Plan plan(scene.returning(source), {});
+    CHECK(plan.warnings ==
+          std::vector<std::string>{"scene.lua:2: node \"write1\": writes nothing: no output comes from "
+                                   "it; return it, or go on from it"});
+}
+
+TEST_CASE("each node comes once, after its inputs, and knows how many take its result", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    const NodePtr left = scene.node("shift", {source}, {}, "left"), right = scene.node("shift", {source}, {}, "right");
+    const NodePtr both = scene.node("both", {right, left});
+
+    const Plan plan(scene.returning({{"main", both}, {"early", left}}), {});
+
+    CHECK(names_of(plan) == std::vector<std::string>{"source1", "left", "right", "both1"});
+    CHECK(planned(plan, "source1").consumers == 2);
+    CHECK(planned(plan, "left").consumers == 2);  // both1, and the output
+    CHECK(planned(plan, "right").consumers == 1);
+    CHECK(planned(plan, "both1").consumers == 1);
+    CHECK(planned(plan, "both1").inputs == std::vector<std::size_t>{2, 1});
+    CHECK(plan.outputs == std::map<std::string, std::size_t>{{"early", 1}, {"main", 3}});
+}
+
+TEST_CASE("what changes from frame to frame, or comes from what does, is not evaluated once", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr still = scene.node("source", {}, {}, "still");
+    const NodePtr shifted = scene.node("shift", {still}, {{"by", Value(Vec3d(2, 0, 0))}}, "shifted");
+    const NodePtr jitter = scene.node("jitter", {shifted}, {}, "varies");
+    const NodePtr behind = scene.node("shift", {jitter}, {}, "behind");
+    const NodePtr moving =
+        scene.node("shift", {still}, {{"by", of_frame([](const Frame&) { return Value(Vec3d(1, 0, 0)); })}}, "moving");
+    const NodePtr both = scene.node("both", {shifted, moving});
+    const NodePtr source = scene.node("source", {}, {}, "fed back");
+    const NodePtr inside = scene.node("shift", {source}, {}, "in the loop");
+    const NodePtr post = scene.node("post", {inside});
+    const NodePtr after = scene.node("shift", {post}, {}, "after the loop");
+
+    const Plan plan(scene.returning({{"a", behind}, {"b", both}, {"c", after}}), {});
+
+    std::map<std::string, bool> once, in_loop;
+    for (const PlannedNode& node : plan.nodes) {
+        once[node.node->name] = node.once;
+        in_loop[node.node->name] = node.in_loop;
+    }
+    CHECK(once == std::map<std::string, bool>{{"still", true},
+                                              {"shifted", true},
+                                              {"varies", false},
+                                              {"behind", false},
+                                              {"moving", false},
+                                              {"both1", false},
+                                              {"fed back", false},
+                                              {"in the loop", false},
+                                              {"post1", false},
+                                              {"after the loop", false}});
+    for (const auto& [name, inside_loop] : in_loop)
+        CHECK(inside_loop == (name == "fed back" || name == "in the loop" || name == "post1"));
+}
+
+TEST_CASE("a simulation has its source's rate, first frame and seed, unless the run's seed replaces it", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr first = scene.node("source", {}, {{"fps", Value(30.0)}, {"start", Value(5.0)}, {"seed", Value(7.0)}});
+    const NodePtr second = scene.node("source", {}, {{"start", Value(-3.0)}});
+    const Graph& graph = scene.returning({{"a", first}, {"b", second}});
+
+    const Plan plan(graph, {});
+    REQUIRE(plan.simulations.size() == 2);
+    CHECK(plan.simulations[0].fps == 30);
+    CHECK(plan.simulations[0].start == 5);
+    CHECK(plan.simulations[0].seed == 7);
+    CHECK(plan.simulations[1].fps == 24);
+    CHECK(plan.simulations[1].solve == nullptr);
+    CHECK(plan.first_frame() == -3);
+
+    const Plan seeded(graph, {.seed = 9, .attributes = {}});
+    CHECK(seeded.simulations[0].seed == 9);
+    CHECK(seeded.simulations[1].seed == 9);
+}
+
+TEST_CASE("a second solve after one create is an error that names both", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    const NodePtr first = scene.node("post", {source});
+    const bool in_a_row = GENERATE(true, false);
+    const NodePtr second = scene.node("post", {in_a_row ? first : source}, {}, "again");
+    CHECK(error_of_plan(scene.returning({{"a", first}, {"b", second}})) ==
+          "scene.lua:3: node \"again\": a second solve after \"source1\": \"post1\" at line 2 feeds it back already; a "
+          "create has one solve");
+}
+
+TEST_CASE("two simulations have a solve each, and a solve behind both is one too many", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr one = scene.node("post", {scene.node("source")});
+    const NodePtr other = scene.node("post", {scene.node("source")});
+    const NodePtr both = scene.node("both", {one, other});
+    CHECK(Plan(scene.returning(both), {}).simulations[1].solve->name == "post2");
+    const NodePtr again = scene.node("post", {both});
+    CHECK_THAT(error_of_plan(scene.returning(again)),
+               Catch::StartsWith("scene.lua:6: node \"post3\": a second solve after \"source1\": \"post1\" at line 2"));
+}
+
+TEST_CASE("columns that a node of the loop makes exist from the first frame on, with its value", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    const NodePtr made = scene.node("make", {source}, {{"heat", Value(2.0)}, {"member", Value("hot")}});
+    const NodePtr post = scene.node("post", {scene.node("read", {made}, {{"value", Value(AttributeRef{"mass"})}})});
+    const NodePtr after = scene.node("make", {post}, {{"later", Value(1.0)}});
+
+    const Plan plan(scene.returning(after), {.seed = {}, .attributes = {"pscale"}});
+
+    std::map<std::string, AttributeValue> columns;
+    for (const AttributeSpec& spec : plan.columns_of(0)) columns[spec.name] = spec.fallback;
+    CHECK(columns == std::map<std::string, AttributeValue>{{"heat", 2.0f}, {"mass", 1.0f}, {"pscale", 0.0f}});
+    CHECK(plan.groups_of(0) == std::vector<std::string>{"hot"});
+}
+
+TEST_CASE("what a node can't be planned with names the node and its place", "[plan]")
+{
+    struct Case {
+        std::string type;
+        std::map<std::string, Value> arguments;
+        std::string message;
+    };
+    const auto c = GENERATE(values<Case>({
+        {"shift", {{"bye", Value(Vec3d(0, 0, 0))}}, "unknown parameter \"bye\"; did you mean \"by\"?"},
+        {"shift", {{"by", Value("far")}}, "by = \"far\" has the wrong type; it must be a vec3 or {x, y, z}"},
+        {"shift", {{"by", Value(Vec3d(0, -101, 0))}}, "by = -101 is out of range; it must be at least -100"},
+        {"shift", {{"group", Value("hott")}}, "no node makes a group \"hott\"; did you mean \"hot\"?"},
+        {"read",
+         {{"value", Value(AttributeRef{"haet"})}},
+         "no attribute \"haet\"; did you mean \"heat\"? (or add :attribute{ haet = 0 } before it)"},
+        {"read", {{"value", Value(AttributeRef{"zzz"})}}, "no attribute \"zzz\"; add :attribute{ zzz = 0 } before it"},
+        {"make",
+         {{"heat", Value(Vec3d(0, 0, 0))}},
+         "makes attribute \"heat\" as vec3, but node \"make1\" at line 2 makes it as float"},
+        {"shift",
+         {{"by", of_frame([](const Frame&) { return Value(); })}},
+         "by is nil; it must be a vec3 or {x, y, z} (frame 1)"},
+        {"source",
+         {{"fps", of_frame([](const Frame&) { return Value(24.0); })}},
+         "fps can't be a function of the frame; it must be a constant"},
+    }));
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    const NodePtr made = scene.node("make", {source}, {{"heat", Value(0.0)}, {"member", Value("hot")}});
+    const NodePtr wrong =
+        scene.node(c.type, c.type == "source" ? std::vector<NodePtr>() : std::vector{made}, c.arguments, "wrong");
+    CHECK(error_of_plan(scene.returning({{"a", made}, {"b", wrong}})) == "scene.lua:3: node \"wrong\": " + c.message);
+}
+
+TEST_CASE("two nodes of one name are an error at the second", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source");
+    const NodePtr one = scene.node("shift", {source}, {}, "twin");
+    const NodePtr two = scene.node("shift", {one}, {}, "twin");
+    CHECK(error_of_plan(scene.returning(two)) ==
+          "scene.lua:3: node \"twin\": the name is taken by the node at line 2; give each its own");
+}
+
+TEST_CASE("a graph without an output is an error of its file", "[plan]")
+{
+    GraphUnderTest scene;
+    CHECK(error_of_plan(scene.returning(std::map<std::string, NodePtr>())) ==
+          "scene.lua: the graph returns no output; end the file with `return` and a node");
+}
+
+}  // namespace rapid

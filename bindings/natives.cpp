@@ -127,7 +127,7 @@ int make_object(State& state)
             check_named(*options);
             return maker.make(maker, *options, context);
         } catch (const Error& error) {
-            throw Error(fmt::format("{}: {}", shown_name(maker), error.message()));
+            throw Error(fmt::format("{}: {}", shown_name(maker), error.what()));  // with the file that it names
         }
     });
 }
@@ -277,6 +277,10 @@ int make_node(State& state)
             const auto options = table_at(state, 2);
             check_named(*options);
             node->arguments = options->named;
+            for (const Param& param : type.params)
+                if (param.internal && node->arguments.count(param.name))
+                    throw Error(fmt::format("unknown parameter \"{}\"{}", param.name,
+                                            did_you_mean(param.name, type.param_names())));
             const auto named = node->arguments.find("name");
             if (named != node->arguments.end() && !type.find("name")) {
                 const std::string* name = named->second.get<std::string>();
@@ -317,9 +321,16 @@ int has_type(State& state)
     return 1;
 }
 
+// Error, always: what is near, among the shipped types too, which are loaded when they are first used.
 int unknown_type(State& state)
 {
-    state.host().registry.at(text_at(state, 1));  // says what is near
+    const Registry& registry = state.host().registry;
+    const std::string name = text_at(state, 1);
+    std::vector<std::string> names = ScriptHost::shipped_nodes();
+    for (const NodeType* type : registry.types()) names.push_back(type->name);
+    if (const std::string nearest = did_you_mean(name, names); !nearest.empty())
+        throw Error(fmt::format("unknown node \"{}\"{}", name, nearest));
+    registry.at(name);
     return 0;
 }
 

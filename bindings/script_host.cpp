@@ -215,14 +215,19 @@ std::optional<ScriptHost::Source> ScriptHost::find_module(std::string_view name,
     return std::nullopt;
 }
 
-void ScriptHost::load_shipped_nodes()
+std::vector<std::string> ScriptHost::shipped_nodes()
 {
     std::vector<std::string> names;
     std::error_code ignored;
     for (const auto& entry : std::filesystem::directory_iterator(lua_folder() / "nodes", ignored))
         if (entry.path().extension() == ".lua") names.push_back(entry.path().stem().string());
     std::sort(names.begin(), names.end());
-    for (const std::string& name : names) {
+    return names;
+}
+
+void ScriptHost::load_shipped_nodes()
+{
+    for (const std::string& name : shipped_nodes()) {
         main_->push_entry("load_node");
         lua_pushlstring(main_->lua(), name.data(), name.size());
         main_->call(1, 0);

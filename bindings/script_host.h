@@ -53,6 +53,8 @@ public:
         std::string text, name;
     };
     std::optional<Source> find_module(std::string_view name, bool node, std::string& looked_in) const;
+    // The names of Rapid's own nodes written in Lua.
+    static std::vector<std::string> shipped_nodes();
     void load_shipped_nodes();
 
     // While it lives the watchdog counts the script's time.

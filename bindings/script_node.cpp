@@ -327,7 +327,12 @@ int complete_arguments(State& state)
     const Table* table = given.table();
     if (!table) throw Error(fmt::format(":{} takes a table of parameters", type.name));
     ScriptOperator::Fields fields;
-    assign_arguments(type.params, table->named, &fields);
+    try {
+        assign_arguments(type.params, table->named, &fields);
+    } catch (Error& error) {
+        error.in_node(type.name);
+        throw;
+    }
     Table complete;
     complete.named = std::move(fields.arguments.values);
     state.push(Value(std::make_shared<const Table>(std::move(complete))));

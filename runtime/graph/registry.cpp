@@ -26,7 +26,8 @@ const Param* NodeType::find(std::string_view param) const
 std::vector<std::string> NodeType::param_names() const
 {
     std::vector<std::string> names;
-    for (const Param& param : params) names.push_back(param.name);
+    for (const Param& param : params)
+        if (!param.internal) names.push_back(param.name);
     return names;
 }
 

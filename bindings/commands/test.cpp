@@ -3,12 +3,15 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "bindings/commands/command.h"
 #include "bindings/test_host.h"
@@ -55,6 +58,13 @@ std::string indented(std::string text)
     return "  " + text + '\n';
 }
 
+// This process ends with its parent, however that ends.
+void end_with(pid_t parent)
+{
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(status_failed);  // it ended before the line above
+}
+
 // The child: runs the tests of one file and tells of each.
 int run_child(const std::string& file, const TestOptions& options)
 {
@@ -81,13 +91,16 @@ public:
         app.add_option("FILES", files_, "test files, or folders of test_*.lua")->type_name("")->required();
         app.add_option("--filter", filter_, "only tests whose name this Lua pattern matches")->type_name("PATTERN");
         // Our own: the process of one file.
-        app.add_flag("--child", child_)->group("");
+        app.add_option("--child-of", parent_)->group("");
         app.add_option("--already-run", already_run_)->group("");
     }
 
     int run(const CommonOptions& common) override
     {
-        if (child_) return run_child(files_.front(), options(common));
+        if (parent_) {
+            end_with(*parent_);
+            return run_child(files_.front(), options(common));
+        }
 
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         setenv("RAPID_BIN", program.c_str(), 0);  // for tests of the command itself
@@ -155,7 +168,8 @@ private:
     pid_t spawn(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run,
                 int report) const
     {
-        std::vector<std::string> words = {"rapid", "test", "--child", fmt::format("--already-run={}", already_run),
+        std::vector<std::string> words = {"rapid", "test", fmt::format("--child-of={}", getpid()),
+                                          fmt::format("--already-run={}", already_run),
                                           fmt::format("--threads={}", common.threads)};
         if (!filter_.empty()) words.push_back("--filter=" + filter_);
         words.insert(words.end(), {"--", file.string()});
@@ -224,7 +238,7 @@ private:
 
     std::vector<std::string> files_;
     std::string filter_;
-    bool child_ = false;
+    std::optional<pid_t> parent_;
     int already_run_ = 0;
 };
 RAPID_COMMAND(Test);

@@ -61,7 +61,8 @@ function command.folder()
   return folder
 end
 
--- Runs a line of the shell; $RAPID is the command. options: cwd, a folder; environment, a table.
+-- Runs a line of the shell; $RAPID is the command. options: cwd, a folder; environment, a table. The shell ends when
+-- this process does, and with it what it has replaced itself with.
 function command.shell(line, options)
   options = options or {}
   local out = command.folder()
@@ -70,14 +71,17 @@ function command.shell(line, options)
     setup = setup .. ("export %s=%s\n"):format(name, quoted(value))
   end
   local script = out:write("script", setup .. line .. "\n")
-  os.execute(("sh %s >%s 2>%s </dev/null; echo $? >%s"):format(quoted(script), quoted(out:file "stdout"),
-    quoted(out:file "stderr"), quoted(out:file "status")))
-  return { status = tonumber(out:read "status"), stdout = out:read "stdout", stderr = out:read "stderr" }
+  local status = os.execute(("exec setpriv --pdeathsig KILL sh %s >%s 2>%s </dev/null"):format(quoted(script),
+    quoted(out:file "stdout"), quoted(out:file "stderr")))
+  local signal = status % 256
+  return {
+    status = signal > 0 and 128 + signal or status / 256, stdout = out:read "stdout", stderr = out:read "stderr",
+  }
 end
 
 -- Runs the command with arguments as the shell reads them.
 function command.rapid(arguments, options)
-  return command.shell('"$RAPID" ' .. arguments, options)
+  return command.shell('exec "$RAPID" ' .. arguments, options)
 end
 
 -- The command under test: the one that runs the tests, or $RAPID_BIN.

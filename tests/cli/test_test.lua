@@ -99,6 +99,24 @@ it("comes after", function() end)]],
       "4 passed, 2 failed, 0 skipped\n", result.stdout)
   end)
 
+  it("leaves nothing running when it is killed", function()
+    local folder = new_folder { ["t.lua"] = [[
+local command = require "testing.command"
+it("sleeps", function() command.shell("echo $PPID $$ >ids; exec sleep 1000") end)]] }
+    local result = command.shell([[
+"$RAPID" test t.lua &
+until [ -s ids ]; do sleep 0.01; done
+kill -9 $!
+# A process that has ended may wait for its new parent to notice.
+runs() { grep -sq '^State:.[^ZX]' /proc/$1/status; }
+read -r child shell <ids
+for try in $(seq 500); do runs $child || runs $shell || exit 0; sleep 0.01; done
+echo "still there: $child $shell"
+]], { cwd = folder.path })
+    assert.equal("", result.stdout)
+    assert.equal(0, result.status)
+  end)
+
   it("counts what fails around tests", function()
     local folder = new_folder { ["a.lua"] = [[
 describe("x", function()

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <lua.hpp>
 #include <memory>
 #include <mutex>
@@ -68,7 +69,7 @@ SceneRun read_run(lua_State* L)
     return run;
 }
 
-// Runs the scene and returns its warnings; each frame from the first asked for goes to `keep`.
+// Runs the scene and returns its warnings, each once; each frame from the first asked for goes to `keep`.
 std::vector<std::string> run_scene(const SceneRun& run, const std::function<void(FrameResult&)>& keep)
 {
     Threads threads(run.threads);
@@ -77,12 +78,17 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
         const Plan plan(session.graph(), {run.seed, {}});
         if (run.first < plan.first_frame())
             throw Error(fmt::format("frames: {} is before the scene's first frame, {}", run.first, plan.first_frame()));
-        std::vector<std::string> warnings = session.warnings();
-        warnings.insert(warnings.end(), plan.warnings.begin(), plan.warnings.end());
+        std::vector<std::string> warnings;
+        const auto add = [&](const std::vector<std::string>& found) {
+            for (const std::string& warning : found)
+                if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end()) warnings.push_back(warning);
+        };
+        add(session.warnings());
+        add(plan.warnings);
         Evaluator evaluator(plan);
         while (evaluator.next_frame() <= run.last) {
             FrameResult result = evaluator.advance();
-            warnings.insert(warnings.end(), result.warnings.begin(), result.warnings.end());
+            add(result.warnings);
             if (result.frame >= run.first) keep(result);
         }
         return warnings;

@@ -117,8 +117,7 @@ private:
                 });
             while (evaluator.next_frame() <= frames.last) {
                 const FrameResult result = evaluator.advance();
-                for (const std::string& warning : result.warnings) report.warning(warning);
-                if (result.figures.contact_limit > 0) report.warning(contact_limit_warning(result));
+                for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
                 if (frames.contains(result.frame)) files_.write(result);
                 for (const std::string& name : files_.take_first_names()) report.line("writing " + name);
                 report.frame(result);
@@ -134,14 +133,6 @@ private:
             finish_files(known, report);
             return report.fail(known);
         }
-    }
-
-    static std::string contact_limit_warning(const FrameResult& result)
-    {
-        return fmt::format(
-            "frame {}: {} points reached the limit of contacts in a step and the rest of it was dropped; "
-            "take more substeps",
-            result.frame, result.figures.contact_limit);
     }
 
     // The frames before the one that failed are complete: they are written, or it is said why not.

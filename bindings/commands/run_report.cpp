@@ -39,12 +39,12 @@ void RunReport::line(const std::string& text)
     progress_->line(text);
 }
 
-void RunReport::warning(const std::string& text)
+void RunReport::warning(const std::string& text, std::optional<std::int64_t> frame)
 {
     const std::lock_guard lock(mutex_);
     if (!warned_.insert(text).second) return;
     if (progress_) progress_->finish();
-    print_warning(text);
+    print_warning(frame ? fmt::format("frame {}: {}", *frame, text) : text);
 }
 
 void RunReport::finish()

@@ -32,8 +32,8 @@ public:
     void begin(std::int64_t first, std::int64_t last);
     void frame(const FrameResult& result);
     void line(const std::string& text);
-    // Once: what is doubtful in one frame often is in the next ones.
-    void warning(const std::string& text);
+    // Once, with the frame where it is of one: what is doubtful in one frame often is in the next ones.
+    void warning(const std::string& text, std::optional<std::int64_t> frame = {});
 
     // The statistics file and the summary. Error: the file can't be written.
     void finish();

@@ -74,6 +74,7 @@ struct Flow {
 struct FrameFigures {
     std::uint64_t born = 0, died = 0, collisions = 0;
     std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
+    std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     int substeps = 0;
     double penetration_max = 0;
     double script_seconds = 0, solve_seconds = 0;
@@ -87,6 +88,7 @@ struct Evaluation {
     const Location& location;
     RandomKey random;       // (seed, name)
     FrameFigures& figures;  // what this frame's statistics count
+    // Said once in a run: without the frame, and without counts, which belong in the figures.
     std::vector<std::string>& warnings;
     // Hands a set to be written; empty where nothing may be written (check, explain, test).
     const std::function<void(const std::string& pattern, const PointSet& points)>& write;
@@ -133,7 +135,7 @@ struct NodeType {
     // One of `params`; null where there is none of that name. `name` is a parameter where it is declared (`:group`);
     // elsewhere it names the node.
     const Param* find(std::string_view param) const;
-    std::vector<std::string> param_names() const;
+    std::vector<std::string> param_names() const;  // those that users give
 };
 
 // A node as the graph file wrote it. Immutable; its inputs were made before it.

@@ -51,13 +51,19 @@ struct Solve {
         now.figures.substeps = std::max(now.figures.substeps, substeps);
         now.figures.collisions += result.collisions;
         now.figures.contact_limit += result.contact_limit;
+        now.figures.trapped += result.trapped;
         now.figures.penetration_max = std::max(now.figures.penetration_max, result.penetration_max);
 
+        if (result.contact_limit > 0)
+            now.warnings.push_back(
+                fmt::format("node \"{}\": points reached the limit of contacts in a step, and the rest of it was "
+                            "dropped; take more substeps",
+                            now.node));
         if (result.trapped > 0)
-            now.warnings.push_back(fmt::format(
-                "node \"{}\": frame {}: {} points are deep in a shape, where its field shows no way out; a level set "
-                "of a larger half_width shows it farther",
-                now.node, options.frame, result.trapped));
+            now.warnings.push_back(
+                fmt::format("node \"{}\": points are deep in a shape, where its field shows no way out; a level set of "
+                            "a larger half_width shows it farther",
+                            now.node));
 
         age(points, now);
         points.remove("dt");

@@ -26,6 +26,8 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.born = result.figures.born;
     frame.died = result.figures.died;
     frame.collisions = result.figures.collisions;
+    frame.contact_limit = result.figures.contact_limit;
+    frame.trapped = result.figures.trapped;
     frame.substeps = result.figures.substeps;
     frame.penetration_max = result.figures.penetration_max;
     frame.seconds.script = result.figures.script_seconds;
@@ -63,7 +65,27 @@ ordered_json to_json(const FrameStatistics& frame)
              {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}},
             {"penetration_max", frame.penetration_max},
             {"constraint_residual_max", frame.constraint_residual_max},
-            {"collisions", frame.collisions}};
+            {"collisions", frame.collisions},
+            {"contact_limit", frame.contact_limit},
+            {"trapped", frame.trapped}};
+}
+
+// "warning  points did so 5 times, in 3 frames from 7 to 48"; nothing where no frame counted any.
+std::string doubtful_frames(const RunStatistics& run, std::uint64_t FrameStatistics::*count, std::string_view what)
+{
+    std::uint64_t points = 0, frames = 0;
+    std::int64_t first = 0, last = 0;
+    for (const FrameStatistics& frame : run.frames) {
+        if (frame.*count == 0) continue;
+        if (frames == 0) first = frame.frame;
+        last = frame.frame;
+        points += frame.*count;
+        ++frames;
+    }
+    if (frames == 0) return "";
+    const std::string where = frames == 1 ? fmt::format("in frame {}", first)
+                                          : fmt::format("in {} frames from {} to {}", frames, first, last);
+    return fmt::format("warning  {} {}, {}\n", what, points == 1 ? "once" : with_separators(points) + " times", where);
 }
 
 }  // namespace
@@ -101,6 +123,8 @@ std::string summary(const RunStatistics& run)
     text += fmt::format("\nseconds  graph {:.3f}, script {:.3f}, solve {:.3f}, write {:.3f}\n", s.graph, s.script,
                         s.solve, s.write);
     text += fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes));
+    text += doubtful_frames(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");
+    text += doubtful_frames(run, &FrameStatistics::trapped, "points were deep in a shape");
     return text;
 }
 

@@ -25,6 +25,7 @@ struct FrameStatistics {
     std::int64_t frame = 0;
     std::uint64_t points = 0;  // of all outputs
     std::uint64_t born = 0, died = 0, collisions = 0;
+    std::uint64_t contact_limit = 0, trapped = 0;  // points that Solve warned of (FrameFigures)
     int substeps = 0;
     double penetration_max = 0;          // m
     double constraint_residual_max = 0;  // m; 0 where nothing is constrained
@@ -48,7 +49,7 @@ struct RunStatistics {
 // One frame a line. A run that ended early has the frames that it did.
 std::string to_json(const RunStatistics& run);
 
-// Points, frames, seconds by stage, memory: a line each.
+// Points, frames, seconds by stage, memory: a line each; and one for what Solve warned of, where it did.
 std::string summary(const RunStatistics& run);
 
 // Numbers as people read them: "1,234,567", "3.21 million", "85.2 MiB", "0.042 s", "2 min 05 s".

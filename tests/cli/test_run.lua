@@ -78,6 +78,26 @@ describe("rapid run", function()
     assert.truthy(result.stdout:match "points   3\r?\n")
   end)
 
+  it("warns once of what is doubtful in many frames, and adds it up in the summary", function()
+    -- A ball of no radius that bounces in a slit of a micrometre, 4 million times a frame.
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100, 0, 0}} } }
+  :collide { shape = rapid.shape.plane { normal = {1, 0, 0} }, bounce = 1 }
+  :collide { shape = rapid.shape.plane { normal = {-1, 0, 0}, offset = -1e-6 }, bounce = 1 }
+  :solve {}
+]]
+    local result = folder:run "-f 1-4 --stats s.json"
+    assert.equal(0, result.status)
+    assert.equal('warning: frame 2: node "solve1": points reached the limit of contacts in a step, and the rest of ' ..
+      "it was dropped; take more substeps\n", result.stderr)
+    assert.truthy(result.stdout:find(
+      "\nwarning  points reached the limit of contacts 3 times, in 3 frames from 2 to 4\n$"), result.stdout)
+    local counts = {}
+    for _, frame in ipairs(json.decode(folder:read "s.json").frames) do counts[#counts + 1] = frame.contact_limit end
+    assert.same({ 0, 1, 1, 1 }, counts)
+  end)
+
   it("is silent with --quiet", function()
     local result = new_folder():run "-f 1-4 --quiet -o a.####.csv"
     assert.equal(0, result.status)

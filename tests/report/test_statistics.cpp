@@ -17,6 +17,8 @@ FrameResult frame_result()
     result.figures.born = 4;
     result.figures.died = 1;
     result.figures.collisions = 12;
+    result.figures.contact_limit = 3;
+    result.figures.trapped = 2;
     result.figures.substeps = 2;
     result.figures.penetration_max = 0.25;
     result.figures.script_seconds = 0.125;
@@ -88,7 +90,8 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
     CHECK(json["frames"][0] == ordered_json::parse(R"({
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
-        "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12 })"));
+        "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12,
+        "contact_limit": 3, "trapped": 2 })"));
 }
 
 TEST_CASE("a run that ended before its first frame has an empty list of frames", "[report]")
@@ -121,6 +124,19 @@ TEST_CASE("the summary says points, frames, seconds by stage and memory", "[repo
           "frames   3 in 0.500 s, 7,200 points a second\n"
           "seconds  graph 0.500, script 0.500, solve 0.250, write 0.500\n"
           "memory   3.0 MiB at the peak\n");
+}
+
+TEST_CASE("the summary adds up what solve warned of, and in which frames", "[report]")
+{
+    RunStatistics run = run_of({1, 1, 1, 1});
+    CHECK_THAT(summary(run), !Catch::Contains("warning"));
+    run.frames[1].contact_limit = 1000;
+    run.frames[3].contact_limit = 234;
+    run.frames[2].trapped = 1;
+    CHECK_THAT(summary(run),
+               Catch::EndsWith("at the peak\n"
+                               "warning  points reached the limit of contacts 1,234 times, in 2 frames from 2 to 4\n"
+                               "warning  points were deep in a shape once, in frame 3\n"));
 }
 
 TEST_CASE("the summary of an empty scene is one of no points, not of none run", "[report]")

@@ -13,8 +13,9 @@ target_compile_features(rapid_public INTERFACE cxx_std_20)
 # for any would disagree about the layout of an Affine3d, and about who frees a heap block. 16 bytes is the same for
 # both, and costs nothing on processors that load across lines.
 target_compile_definitions(rapid_public INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
-# Inline functions of our headers may be compiled there and run here: the same bits need the same rule.
-target_compile_options(rapid_public INTERFACE -ffp-contract=off)
+# Inline functions of our headers may be compiled there and run here: the same bits need the same rule. Nobody asks for
+# the processor's exception flags nor for errno of a square root: without them loops become vectors, to the same bits.
+target_compile_options(rapid_public INTERFACE -ffp-contract=off -fno-math-errno -fno-trapping-math)
 target_link_libraries(rapid_public INTERFACE Eigen3::Eigen TBB::tbb fmt::fmt Random123::Random123 Threads::Threads)
 
 add_library(rapid_private INTERFACE)
@@ -26,9 +27,10 @@ target_compile_options(rapid_private INTERFACE
   # The same for executables as for the library, so that they share precompiled headers. Calls inside the library may
   # be inlined although it is shared: nobody replaces a function of it.
   -fPIC -fno-semantic-interposition)
-# g++ 12 sees overlapping copies in `"text" + std::string` where there are none (its bug 105651, mended in 13).
+# g++ 12 sees overlapping copies in `"text" + std::string` where there are none (its bug 105651, mended in 13), and
+# uninitialised values in its own AVX-512 functions (105593) and in vectors that Eigen leaves for the caller to set.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  target_compile_options(rapid_private INTERFACE -Wno-restrict -Wno-stringop-overflow)
+  target_compile_options(rapid_private INTERFACE -Wno-restrict -Wno-stringop-overflow -Wno-maybe-uninitialized)
 endif()
 if(RAPID_SANITIZE)
   target_compile_options(rapid_private INTERFACE

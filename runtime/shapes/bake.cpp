@@ -97,6 +97,37 @@ Survey survey_block(const float* values, const Eigen::Vector3i& first)
     return survey;
 }
 
+// Writes into the empty blocks of the index how many lie between them and the nearest with values: the chessboard
+// distance less one, by the two passes of Rosenfeld and Pfaltz (1966).
+void count_blocks_between(BakedGrid& baked)
+{
+    const Eigen::Vector3i& n = baked.blocks;
+    const auto pass = [&](int step) {
+        const auto begin = [&](int axis) { return step > 0 ? 0 : n[axis] - 1; };
+        const auto within = [&](int i, int axis) { return i >= 0 && i < n[axis]; };
+        const auto at = [&](int x, int y, int z) -> std::int32_t& {
+            return baked.index[(std::size_t(x) * n.y() + y) * n.z() + z];
+        };
+        for (int x = begin(0); within(x, 0); x += step)
+            for (int y = begin(1); within(y, 1); y += step)
+                for (int z = begin(2); within(z, 2); z += step) {
+                    std::int32_t& code = at(x, y, z);
+                    if (code >= 0) continue;
+                    int nearest = step > 0 ? n.maxCoeff() : BakedGrid::between(code) + 1;
+                    for (int neighbour = 0; neighbour < 13; ++neighbour) {  // those that the pass has been to
+                        const int i = x + step * (neighbour / 9 - 1), j = y + step * (neighbour / 3 % 3 - 1),
+                                  k = z + step * (neighbour % 3 - 1);
+                        if (!within(i, 0) || !within(j, 1) || !within(k, 2)) continue;
+                        const std::int32_t other = at(i, j, k);
+                        nearest = std::min(nearest, other >= 0 ? 1 : BakedGrid::between(other) + 2);
+                    }
+                    code = (BakedGrid::is_outside(code) ? BakedGrid::outside : BakedGrid::inside) - 2 * (nearest - 1);
+                }
+    };
+    pass(1);
+    pass(-1);
+}
+
 }  // namespace
 
 BakedGrid bake(const FloatGrid& grid)
@@ -161,6 +192,7 @@ BakedGrid bake(const FloatGrid& grid)
         }
     });
     for (int x = 0; x < baked.blocks.x(); ++x) varying[x + 1] += varying[x];
+    count_blocks_between(baked);
 
     baked.values.resize(std::size_t(varying.back()) * BakedGrid::block_values);
     const Survey survey = tbb::parallel_deterministic_reduce(

@@ -3,14 +3,15 @@
 //
 // Between voxels the field is trilinear: the same as OpenVDB's BoxSampler everywhere in the band, to float rounding;
 // the gradient is the derivative of that interpolant. Beyond the band the distance is a bound of the right sign and the
-// gradient zero: inside, -background; outside, the larger of background and the distance to the box around the surface,
-// so that a walk from far away takes few steps.
+// gradient zero. In an empty block it is the half width of the band and the blocks that lie between it and the nearest
+// with values; beyond the index, the distance to the box around the surface: so a walk from far away takes few steps.
 //
 // Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes a block, 1.4 times the leaf that
 // it copies (which stays, for building and for files). index, shape [blocks x, y, z], z fastest, covers the box around
 // the band: 4 bytes for each 8^3 voxels, empty or not.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -23,8 +24,13 @@ struct BakedGrid {
     static constexpr int block = 8;  // voxels along the edge of a block, as of OpenVDB's leaves
     static constexpr int edge = 9;   // values along it: the last is the upper neighbour's first
     static constexpr int block_values = edge * edge * edge;
-    static constexpr std::int32_t outside = -1,
-                                  inside = -2;  // in `index`: a block that has one value, and is beyond the band
+
+    // In `index`, a block that has one value and is beyond the band: outside - 2 k or inside - 2 k, where k blocks at
+    // least lie between it and the nearest with values.
+    static constexpr std::int32_t outside = -1, inside = -2;
+    static bool is_outside(std::int32_t code) { return code & 1; }
+    static int sign(std::int32_t code) { return 2 * (code & 1) - 1; }
+    static int between(std::int32_t code) { return (-code - 1) >> 1; }
 
     Vec3d origin = Vec3d::Zero();  // the place of the box's lowest voxel, m
     double voxel = 0;              // m
@@ -46,8 +52,10 @@ public:
     explicit BakedSampler(const BakedGrid& grid)
         : origin_(grid.origin),
           extent_(grid.blocks.cast<double>() * BakedGrid::block),
+          last_(extent_.array() - 1),
           per_voxel_(1 / grid.voxel),
           voxel_(grid.voxel),
+          block_width_(BakedGrid::block * grid.voxel),
           background_(grid.background),
           slope_(grid.slope),
           blocks_y_(grid.blocks.y()),
@@ -93,6 +101,10 @@ public:
         return c0 + cell.x * dx;
     }
 
+    // The same of up to `many` points at once, as vectors: to the bit what distance(P) gives.
+    static constexpr int many = 64;
+    void distances(int n, const double* X, const double* Y, const double* Z, double* phi) const;
+
     // The largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where bands of
     // two surfaces meet, anything for a field that is no distance. At least 1, the slope of the bounds beyond the band.
     double slope_bound() const { return slope_; }
@@ -128,7 +140,7 @@ private:
         if (!within) return {nullptr, 0, 0, 0, far_outside(P)};
         const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
         const std::int32_t code = index_[(std::size_t(i >> 3) * blocks_y_ + (j >> 3)) * blocks_z_ + (k >> 3)];
-        if (code < 0) return {nullptr, 0, 0, 0, code == BakedGrid::outside ? far_outside(P) : -background_};
+        if (code < 0) return {nullptr, 0, 0, 0, bound_of(code)};
         return {values_ + std::size_t(code) * BakedGrid::block_values + (i & 7) * slab + (j & 7) * row + (k & 7),
                 static_cast<float>(x - i), static_cast<float>(y - j), static_cast<float>(z - k), 0};
     }
@@ -141,12 +153,55 @@ private:
         return std::max(background_, beyond.norm() - voxel_);
     }
 
-    Vec3d origin_, extent_;  // extent in voxels
-    double per_voxel_, voxel_, background_, slope_;
+    double bound_of(std::int32_t code) const
+    {
+        return BakedGrid::sign(code) * (background_ + BakedGrid::between(code) * block_width_);
+    }
+
+    Vec3d origin_, extent_, last_;  // of the box's voxels: how many, and the last
+    double per_voxel_, voxel_, block_width_, background_, slope_;
     std::int64_t blocks_y_, blocks_z_;
     const std::int32_t* index_;
     const float* values_;
     Box3d surface_;
 };
+
+inline void BakedSampler::distances(int n, const double* X, const double* Y, const double* Z, double* phi) const
+{
+    float x[many], y[many], z[many];       // place in the cell
+    std::int64_t block[many], cell[many];  // of the index; within its values
+    std::uint8_t within[many];
+    int beyond = 0;
+    for (int i = 0; i < n; ++i) {
+        const double gx = (X[i] - origin_.x()) * per_voxel_, gy = (Y[i] - origin_.y()) * per_voxel_,
+                     gz = (Z[i] - origin_.z()) * per_voxel_;
+        within[i] = (gx >= 0) & (gy >= 0) & (gz >= 0) & (gx < extent_.x()) & (gy < extent_.y()) & (gz < extent_.z());
+        beyond += !within[i];
+        const auto a = static_cast<std::int32_t>(std::min(std::max(gx, 0.0), last_.x()));
+        const auto b = static_cast<std::int32_t>(std::min(std::max(gy, 0.0), last_.y()));
+        const auto c = static_cast<std::int32_t>(std::min(std::max(gz, 0.0), last_.z()));
+        x[i] = static_cast<float>(gx - a);
+        y[i] = static_cast<float>(gy - b);
+        z[i] = static_cast<float>(gz - c);
+        block[i] = ((a >> 3) * blocks_y_ + (b >> 3)) * blocks_z_ + (c >> 3);
+        cell[i] = (a & 7) * slab + (b & 7) * row + (c & 7);
+    }
+    std::int32_t code[many];
+    for (int i = 0; i < n; ++i) code[i] = index_[block[i]];
+    for (int i = 0; i < n; ++i) cell[i] += std::int64_t(std::max(code[i], 0)) * BakedGrid::block_values;
+    for (int i = 0; i < n; ++i) {
+        const float* c = values_ + cell[i];
+        const float c00 = c[0] + z[i] * (c[1] - c[0]);
+        const float c01 = c[row] + z[i] * (c[row + 1] - c[row]);
+        const float c10 = c[slab] + z[i] * (c[slab + 1] - c[slab]);
+        const float c11 = c[slab + row] + z[i] * (c[slab + row + 1] - c[slab + row]);
+        const float c0 = c00 + y[i] * (c01 - c00), c1 = c10 + y[i] * (c11 - c10);
+        phi[i] = c0 + x[i] * (c1 - c0);
+    }
+    for (int i = 0; i < n; ++i) phi[i] = code[i] < 0 ? bound_of(code[i]) : phi[i];
+    if (beyond > 0)
+        for (int i = 0; i < n; ++i)
+            if (!within[i]) phi[i] = far_outside({X[i], Y[i], Z[i]});
+}
 
 }  // namespace rapid

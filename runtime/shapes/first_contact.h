@@ -22,6 +22,7 @@
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
+inline thread_local long g_walks = 0, g_steps = 0, g_fc = 0;
 
 // How near to the surface a point is flush with it, m: what rounding its position to single precision can do (ulp(x) is
 // at most 2^-23 |x|, and half of it an axis), and the field's own error. A point that a frame leaves on the surface
@@ -35,19 +36,26 @@ inline double flush_within(const Vec3d& P, double radius, double rounding)
 // this a point that slides could meet its own floor again and again, and get nowhere.
 inline bool is_along(double vn, const Vec3d& v) { return vn < 0 && vn * vn < 0x1p-96 * v.squaredNorm(); }
 
-// Whether a path can come near a box, by the box around the path.
+inline Vec3d place(const Path& path, double s) { return path.P + s * (path.v + 0.5 * s * path.a); }
+
+// Whether a path can come near a box, by the box around the path. `end` is where it ends; on the way it is off the
+// straight line between by a T²/8 at most.
+inline bool may_reach(const Vec3d& P, const Vec3d& end, const Vec3d& a, double duration, double radius,
+                      const Box3d& bounds)
+{
+    const double sagging = duration * duration / 8;
+    bool may = true;
+    for (int k = 0; k < 3; ++k) {
+        // The factor keeps a point that is flush with the box and rounded away from it.
+        const double margin = sagging * std::abs(a[k]) + radius + 0x1p-21 * (std::abs(P[k]) + radius);
+        may &= std::max(P[k], end[k]) >= bounds.min()[k] - margin;
+        may &= std::min(P[k], end[k]) <= bounds.max()[k] + margin;
+    }
+    return may;
+}
 inline bool may_reach(const Path& path, const Box3d& bounds)
 {
-    const double half = path.duration * path.duration / 2;
-    for (int k = 0; k < 3; ++k) {
-        const double travel = path.v[k] * path.duration, fall = path.a[k] * half;
-        const double lowest = path.P[k] + std::min(0.0, travel) + std::min(0.0, fall);
-        const double highest = path.P[k] + std::max(0.0, travel) + std::max(0.0, fall);
-        // The factor keeps a point that is flush with the box and rounded away from it.
-        const double margin = path.radius + 0x1p-21 * (std::abs(path.P[k]) + path.radius);
-        if (highest < bounds.min()[k] - margin || lowest > bounds.max()[k] + margin) return false;
-    }
-    return true;
+    return may_reach(path.P, place(path, path.duration), path.a, path.duration, path.radius, bounds);
 }
 
 namespace detail {
@@ -60,8 +68,6 @@ double rounding_of(const Sampler& sampler)
     else
         return 0x1p-21 * sampler.smallest_feature();
 }
-
-inline Vec3d place(const Path& path, double s) { return path.P + s * (path.v + 0.5 * s * path.a); }
 
 // The time in which a point of this speed and acceleration can travel a distance: the root of
 // distance = speed s + acceleration s²/2, without cancellation. Infinite for a point that stays.
@@ -166,25 +172,150 @@ Contact contact_at(const Sampler& sampler, const Path& path, double s)
     return contact;
 }
 
-// The walk s += D / (|v| + ...), D = f / L: as far as the point can travel without reaching the surface. At least a
-// quarter of the smallest feature, so that it comes to an end, by a change of sign that is then refined; no wall of two
-// features is stepped over.
+// Distances along many paths: by the sampler's own loop where it has one.
 template <class Sampler>
-Contact walk(const Sampler& sampler, const Path& path, double s, double f, double level, double close)
+void distances(const Sampler& sampler, int n, const double* X, const double* Y, const double* Z, double* phi)
 {
-    const double least = sampler.smallest_feature() / 4, per_slope = 1 / sampler.slope_bound();
-    const double acceleration = path.a.norm();
-    while (s < path.duration) {
-        const double speed = (path.v + s * path.a).norm();
-        const double step = time_to_travel(std::max(f * per_slope, least), speed, acceleration);
-        const double next = std::min(path.duration, s + step);
-        if (!(next > s)) break;  // a step below the rounding of the time: as good as there
-        const double f_next = sampler.distance(place(path, next)) - level;
-        if (f_next < 0) return contact_at(sampler, path, refine(sampler, path, level, s, f, next, f_next, close));
-        s = next, f = f_next;
-    }
-    return {};
+    if constexpr (requires { sampler.distances(n, X, Y, Z, phi); })
+        sampler.distances(n, X, Y, Z, phi);
+    else
+        for (int k = 0; k < n; ++k) phi[k] = sampler.distance({X[k], Y[k], Z[k]});
 }
+
+// Walks by sphere tracing along many paths at once, a step of each in turn: their samples are independent, and the
+// loops over them have no branches.
+//
+// From a place at f >= 0 from the surface all of the way within D = f / L is free, behind as well as ahead. So the next
+// place to ask is ahead of D by as much as its own D will reach back to, going by the slope of the field along the way
+// so far (auto-relaxed sphere tracing, Bán and Valasek 2023); where it does not reach, the gap's near end is asked.
+// Steps are at least a quarter of the smallest feature, so that a walk comes to an end, by a change of sign that is
+// then refined; no wall of two features is stepped over.
+template <class Sampler>
+class Walks {
+public:
+    Walks(const Sampler& sampler, std::span<const Path> paths, std::span<Contact> contacts)
+        : sampler_(sampler), paths_(paths), contacts_(contacts)
+    {
+    }
+
+    // Along path i, from time s on, where the field is f above `level`. slope: of f there, m/s.
+    void begin(std::size_t i, double s, double f, double slope, double level, double close)
+    {
+        const Path& path = paths_[i];
+        const double T = path.duration;
+        // The speed is convex along the way.
+        const double fastest =
+            std::sqrt(std::max((path.v + s * path.a).squaredNorm(), (path.v + T * path.a).squaredNorm()));
+        const double per_f = 1 / (sampler_.slope_bound() * fastest);
+        if (!(fastest > 0) || s + f * per_f >= T) return;
+        const int k = n_++;
+        for (int axis = 0; axis < 3; ++axis) {
+            P_[axis][k] = path.P[axis];
+            v_[axis][k] = path.v[axis];
+            a_[axis][k] = path.a[axis];
+        }
+        T_[k] = T;
+        s_[k] = s;
+        f_[k] = f;
+        per_f_[k] = per_f;
+        least_[k] = 0.25 * sampler_.smallest_feature() / fastest;
+        slope_[k] = std::min(slope * per_f, flattest);
+        level_[k] = level;
+        close_[k] = close;
+        path_[k] = i;
+        if (n_ == most) finish();
+    }
+
+    // Walks all to their ends, and writes the contacts of those that have one.
+    void finish()
+    {
+        while (n_ > 0) step();
+    }
+
+private:
+    static constexpr int most = 64;
+    // Of what the slope promises; the largest slope away from the surface, and the longest step in D, to count on it.
+    static constexpr double cautious = 0.9, flattest = 0.9, farthest = 4;
+
+    void step()
+    {
+        double near[most], next[most], f[most];
+        for (int k = 0; k < n_; ++k) {
+            const double reach = f_[k] * per_f_[k], ahead = 2 * cautious / (1 - slope_[k]);
+            near[k] = s_[k] + std::max(reach, least_[k]);
+            const double far = s_[k] + reach * std::min(std::max(ahead, 1.0), farthest);
+            next[k] = std::min(std::max(near[k], far), T_[k]);
+        }
+        sample(next, f);
+        int gaps[most], gap_count = 0;
+        for (int k = 0; k < n_; ++k) {
+            gaps[gap_count] = k;
+            gap_count += (next[k] > near[k]) & ((f_[k] + f[k]) * per_f_[k] < next[k] - s_[k]);
+        }
+        for (int j = 0; j < gap_count; ++j) {
+            const int k = gaps[j];
+            next[k] = near[k];
+            f[k] = sampler_.distance(place(paths_[path_[k]], next[k])) - level_[k];
+        }
+
+        bool over[most];
+        for (int k = 0; k < n_; ++k) {
+            const double before = s_[k], slope = (f[k] - f_[k]) * per_f_[k] / (next[k] - before);
+            // The last: a step below the rounding of the time is as good as there.
+            over[k] = (f[k] < 0) | (next[k] + f[k] * per_f_[k] >= T_[k]) | !(next[k] > before);
+            slope_[k] = std::min(slope, flattest);
+        }
+        int still = 0;
+        for (int k = 0; k < n_; ++k) {
+            if (over[k]) {
+                if (f[k] < 0 && next[k] > s_[k]) meet(k, next[k], f[k]);
+                continue;
+            }
+            s_[k] = next[k];
+            f_[k] = f[k];
+            if (still != k) move(k, still);
+            ++still;
+        }
+        n_ = still;
+    }
+
+    void sample(const double* s, double* f)
+    {
+        double x[3][most];
+        for (int axis = 0; axis < 3; ++axis)
+            for (int k = 0; k < n_; ++k) x[axis][k] = P_[axis][k] + s[k] * (v_[axis][k] + 0.5 * s[k] * a_[axis][k]);
+        distances(sampler_, n_, x[0], x[1], x[2], f);
+        for (int k = 0; k < n_; ++k) f[k] -= level_[k];
+    }
+
+    void meet(int k, double next, double f)
+    {
+        const Path& path = paths_[path_[k]];
+        const double s = refine(sampler_, path, level_[k], s_[k], f_[k], next, f, close_[k]);
+        contacts_[path_[k]] = contact_at(sampler_, path, s);
+    }
+
+    void move(int from, int to)
+    {
+        for (int axis = 0; axis < 3; ++axis)
+            for (auto* x : {P_[axis], v_[axis], a_[axis]}) x[to] = x[from];
+        for (double* x : {T_, s_, f_, per_f_, least_, slope_, level_, close_}) x[to] = x[from];
+        path_[to] = path_[from];
+    }
+
+    const Sampler& sampler_;
+    std::span<const Path> paths_;
+    std::span<Contact> contacts_;
+
+    int n_ = 0;
+    std::size_t path_[most];
+    double P_[3][most], v_[3][most], a_[3][most], T_[most];
+    double s_[most], f_[most];  // where it is, s, and how far from the surface
+    double per_f_[most];        // s that are free, for each m of distance
+    double least_[most];        // s, the shortest step
+    double slope_[most];        // of the field along the way, as a part of the steepest there can be: -1 to 1
+    double level_[most], close_[most];
+};
 
 // For a convex shape the distance is a convex function, so along the path f'' >= n·a >= -|a|, and
 //
@@ -221,38 +352,57 @@ Contact approach(const Sampler& sampler, const Path& path, double s, double leve
 
 }  // namespace detail
 
-// The first contact of one path (see Contact).
+// The first contact of each path.
 template <class Sampler>
-Contact first_contact_on(const Sampler& sampler, const Path& path)
+void first_contacts(const Sampler& sampler, std::span<const Path> paths, std::span<Contact> contacts)
 {
-    Vec3d gradient;
-    const double f = sampler.distance(path.P, gradient) - path.radius;
-    const double rounding = detail::rounding_of(sampler);
-    const double flush = flush_within(path.P, path.radius, rounding);
-    if (f < -flush) return detail::start_inside(sampler, path, f, gradient);
+    const Box3d bounds = sampler.bounds();
+    const double rounding = detail::rounding_of(sampler), feature = sampler.smallest_feature();
+    detail::Walks walks(sampler, paths, contacts);
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        const Path& path = paths[i];
+        contacts[i] = Contact();
+        if (!may_reach(path, bounds)) continue;
 
-    const double close = std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + path.radius), rounding / 16);
-    // A point that rounding left a little below the surface goes by the level that it is on.
-    const double level = path.radius + std::min(f, 0.0);
-    double s = 0, ahead = f + path.radius - level;
-    if (f <= flush) {
-        const double vn = gradient.dot(path.v);
-        if (vn < 0 && !is_along(vn, path.v)) return detail::contact_at(sampler, path, 0);
-        // Pressed inwards, though it may still move outwards by less than will lift it by more than rounding: the test
-        // is where it is after the time of such a hop.
-        const double acceleration = path.a.norm();
-        if (acceleration > 0) {
-            double hop = 2 * std::sqrt(2 * flush / acceleration);
-            const double speed = path.v.norm(), feature = sampler.smallest_feature();
-            if (feature > 0 && hop * speed > feature / 4) hop = feature / (4 * speed);
-            hop = std::min(hop, path.duration);
-            const double after = sampler.distance(detail::place(path, hop)) - level;
-            if (after < 0) return detail::contact_at(sampler, path, 0);
-            s = hop, ahead = after;
+        Vec3d gradient;
+        const double f = sampler.distance(path.P, gradient) - path.radius;
+        const double flush = flush_within(path.P, path.radius, rounding);
+        if (f < -flush) {
+            contacts[i] = detail::start_inside(sampler, path, f, gradient);
+            continue;
         }
+        const double close = std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + path.radius), rounding / 16);
+        // A point that rounding left a little below the surface goes by the level that it is on.
+        const double level = path.radius + std::min(f, 0.0);
+        double s = 0, ahead = f + path.radius - level;
+        const double slope = gradient.dot(path.v);
+        if (f <= flush) {
+            if (slope < 0 && !is_along(slope, path.v)) {
+                contacts[i] = detail::contact_at(sampler, path, 0);
+                continue;
+            }
+            // Pressed inwards, though it may still move outwards by less than will lift it by more than rounding: the
+            // test is where it is after the time of such a hop.
+            const double acceleration = path.a.norm();
+            if (acceleration > 0) {
+                double hop = 2 * std::sqrt(2 * flush / acceleration);
+                const double speed = path.v.norm();
+                if (feature > 0 && hop * speed > feature / 4) hop = feature / (4 * speed);
+                hop = std::min(hop, path.duration);
+                const double after = sampler.distance(place(path, hop)) - level;
+                if (after < 0) {
+                    contacts[i] = detail::contact_at(sampler, path, 0);
+                    continue;
+                }
+                s = hop, ahead = after;
+            }
+        }
+        if (feature > 0)
+            walks.begin(i, s, ahead, slope, level, close);
+        else
+            contacts[i] = detail::approach(sampler, path, s, level, close);
     }
-    if (sampler.smallest_feature() > 0) return detail::walk(sampler, path, s, ahead, level, close);
-    return detail::approach(sampler, path, s, level, close);
+    walks.finish();
 }
 
 // A shape's queries, from its sampler. Base: Shape, or a kind of it that asks for more.
@@ -270,10 +420,7 @@ public:
 
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {
-        const auto sampler = derived().sampler();
-        const Box3d bounds = sampler.bounds();
-        for (std::size_t i = 0; i < paths.size(); ++i)
-            contacts[i] = may_reach(paths[i], bounds) ? first_contact_on(sampler, paths[i]) : Contact();
+        first_contacts(derived().sampler(), paths, contacts);
     }
 
     double smallest_feature() const override { return derived().sampler().smallest_feature(); }

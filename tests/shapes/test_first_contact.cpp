@@ -48,7 +48,7 @@ Path path_to(const Vec3d& center, Random& random, double radius)
     return {P, v, random.in(0, 20) * random.direction(), 1, radius};
 }
 
-Vec3d place(const Path& path, double s) { return path.P + s * path.v + s * s / 2 * path.a; }
+Vec3d on_path(const Path& path, double s) { return path.P + s * path.v + s * s / 2 * path.a; }
 
 TEST_CASE("a ball meets a plane at the root of its parabola", "[first_contact]")
 {
@@ -110,11 +110,11 @@ void require_first(const ShapePtr& shape, const Path& path, const Contact& conta
 {
     const double until = std::min(contact.time, path.duration);
     double lowest = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < 2000; ++k) lowest = std::min(lowest, distance(shape, place(path, until * k / 2000)));
+    for (int k = 0; k < 2000; ++k) lowest = std::min(lowest, distance(shape, on_path(path, until * k / 2000)));
     REQUIRE(lowest >= path.radius - tolerance);
     if (contact.time == Contact::none) return;
     REQUIRE(contact.time <= path.duration);
-    REQUIRE(distance(shape, place(path, contact.time)) == Approx(path.radius).margin(tolerance));
+    REQUIRE(distance(shape, on_path(path, contact.time)) == Approx(path.radius).margin(tolerance));
     REQUIRE(contact.n.norm() == Approx(1));
 }
 
@@ -210,7 +210,7 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
         // half as deep as it is long at an edge.
         require_first(shape, path, contact, 7e-3);
         if (contact.time != Contact::none)
-            REQUIRE(distance(shape, place(path, contact.time)) == Approx(radius).margin(1e-6));
+            REQUIRE(distance(shape, on_path(path, contact.time)) == Approx(radius).margin(1e-6));
     }
     CHECK(met > 40);
 }
@@ -228,11 +228,11 @@ TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_con
         const Vec3d v = speed * (to - from).normalized();
         const Vec3d a = random.in(0, 0.1) * speed * speed * random.direction();  // it bends, by up to 0.05 of its way²
         const Path path{from, v, a, (to - from).norm() / speed, 0};
-        if (place(path, path.duration).x() < 0.3) continue;  // bent back, or not through yet
+        if (on_path(path, path.duration).x() < 0.3) continue;  // bent back, or not through yet
         const Contact contact = meet(wall, path);
         CAPTURE(i);
         REQUIRE(contact.time < path.duration);
-        REQUIRE(place(path, contact.time).x() == Approx(0.013 - voxel).margin(0.2 * voxel));
+        REQUIRE(on_path(path, contact.time).x() == Approx(0.013 - voxel).margin(0.2 * voxel));
     }
 }
 

@@ -101,3 +101,43 @@ TEST_CASE("an empty grid bakes to one that is outside everywhere", "[level set]"
     CHECK(baked.crossings == 0);
     CHECK(BakedSampler(baked).distance({1, 2, 3}) >= 1.0);
 }
+
+TEST_CASE("distances of many points are to the bit those of each", "[level set]")
+{
+    const auto shape = GENERATE(0, 1);
+    const auto sphere = level_set_sphere(1, {0.3, -0.2, 5}, {0.05, 3});
+    const BakedGrid baked = shape == 0 ? bake(*noise(1.0f)) : dynamic_cast<const GridLevelSet&>(*sphere).baked();
+    const BakedSampler sampler(baked);
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> place(-3, 7);
+    for (const int n : {1, 7, BakedSampler::many}) {
+        for (int round = 0; round < 300; ++round) {
+            double X[BakedSampler::many], Y[BakedSampler::many], Z[BakedSampler::many], phi[BakedSampler::many];
+            for (int i = 0; i < n; ++i) {
+                X[i] = place(random), Y[i] = place(random) - 2, Z[i] = place(random) + 2;
+            }
+            sampler.distances(n, X, Y, Z, phi);
+            for (int i = 0; i < n; ++i) REQUIRE(phi[i] == sampler.distance({X[i], Y[i], Z[i]}));
+        }
+    }
+}
+
+TEST_CASE("beyond the band the distance is a bound of the right sign, and no mere half width", "[level set]")
+{
+    const double radius = 2, voxel = 0.05, half_width = 3 * voxel;
+    const Vec3d center{0.3, -0.2, 5};
+    const auto sphere = level_set_sphere(radius, center, {voxel, 3});
+    const BakedSampler sampler(dynamic_cast<const GridLevelSet&>(*sphere).baked());
+    std::mt19937_64 random(8);
+    std::uniform_real_distribution<double> offset(-3, 3);
+    double largest = 0;
+    for (int n = 0; n < 100'000; ++n) {
+        const Vec3d d(offset(random), offset(random), offset(random));
+        const double exact = d.norm() - radius, bound = sampler.distance(center + d);
+        if (std::abs(exact) <= half_width) continue;
+        REQUIRE(bound * exact > 0);
+        REQUIRE(std::abs(bound) <= std::abs(exact) + 1e-3);  // the field is within 1e-3 of the sphere
+        largest = std::max(largest, -bound);
+    }
+    CHECK(largest > radius / 3);
+}

@@ -17,6 +17,7 @@
 #include "runtime/points/column.h"
 #include "runtime/shapes/shape.h"
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/flight.h"
 #include "runtime/solver/slide.h"
 
 namespace rapid {
@@ -61,12 +62,12 @@ private:
     struct Traveller {
         enum Way { Free, Straight, Curved, Waits };
 
-        std::uint32_t i;  // place in the block
-        double left;      // s of the sub-step
-        double piece;     // s: the length of the next piece along a curved surface
-        int events = 0;   // towards most_contacts
-        int rescues = 0;  // times that it was taken out of a shape
-        int watched = 0;  // events when `stood` was taken
+        std::uint32_t i = 0;  // place in the block
+        double left = 0;      // s of the sub-step
+        double piece = 0;     // s: the length of the next piece along a curved surface
+        int events = 0;       // towards most_contacts
+        int rescues = 0;      // times that it was taken out of a shape
+        int watched = 0;      // events when `stood` was taken
         Vec3d stood = Vec3d::Constant(std::numeric_limits<double>::infinity());  // where it was then
         int supports = 0;  // surfaces that it rests on: of two, it moves along their edge
         Support on[2] = {};
@@ -74,6 +75,16 @@ private:
         // Of the round.
         Way way = Free;
         bool stops = false;  // at the end of the path, on the surface
+
+        void begin(std::uint32_t place, double dt)
+        {
+            i = place;
+            left = piece = dt;
+            events = rescues = watched = supports = 0;
+            stood.setConstant(std::numeric_limits<double>::infinity());
+            way = Free;
+            stops = false;
+        }
     };
 
     // The end of a piece along a curved surface.
@@ -87,21 +98,25 @@ private:
         int obstacle;  // -1 for none
         Vec3d n;
     };
+    inline static const Surface no_surface{-1, Vec3d::Zero()};
 
-    void find_near(Strided<Vec3d> a, std::span<const double> dt);
     void fly(Strided<Vec3d> a, std::span<const double> dt);
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
+    bool slides_on_plane(std::size_t i, const Vec3d& a, double dt);
+    bool goes_on(Traveller& t, const Vec3d& a, double dt);
     bool plan(Traveller& t, Path& path, const Vec3d& a, double dt);
     bool chatters(Traveller& t);
     void bend(Strided<Vec3d> a, std::span<const double> dt);
     void bend_on(int obstacle, Strided<Vec3d> a, std::span<const double> dt);
-    void search(std::size_t n, bool all);
-    void search(int obstacle, std::size_t n, bool all);
+    bool may_reach_shape(std::size_t i, const Path& path, int obstacle) const;
+    bool may_meet(const Traveller& t, const Path& path, int obstacle) const;
+    void search();
+    void ask_first_contacts(int obstacle);
     void meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d& a, const Contact& contact, int obstacle,
               double dt);
     void meet_on_bend(Traveller& t, const Path& chord, const Bend& bend, const Contact& contact, int obstacle,
                       double dt);
-    void meet_on_path(Traveller& t, std::size_t k, double dt);
+    void meet_on_path(Traveller& t, const Path& path, double dt);
     void leave_shape(Traveller& t, const Contact& contact, int obstacle, const Vec3d& a);
     void settle(Traveller& t, const Support& support, const Vec3d& v);
     void proceed(Traveller& t, const Path& path, const Bend& bend);
@@ -114,23 +129,26 @@ private:
     std::size_t first_ = 0, size_ = 0;
     std::vector<double> widest_;  // of each obstacle, the largest radius in the block, m
 
-    // By point of the block.
-    std::vector<std::uint8_t>
-        moved_;                      // whether it has met a shape, and is elsewhere than at the beginning of the frame
-    std::vector<std::uint8_t> met_;  // whether it has met a shape since begin()
-    std::vector<Vec3f> before_;      // at the beginning of the frame
-    std::vector<std::array<Surface, 2>> surfaces_;  // where it has: those that it is on now
     std::span<Vec3d> P_, v_;
     Strided<Vec3d> a_{nullptr, 0};  // of the sub-step, without the forces of surfaces
 
-    std::vector<int> near_;  // the obstacles that a free path of the block may reach in this sub-step
+    Flight flight_;
 
-    // By traveller; in the first flight, by point.
-    std::vector<Traveller> travellers_, going_on_;
+    // By point of the block.
+    std::vector<std::uint8_t> met_;      // whether it has met a shape since begin()
+    std::vector<int> obstacle_;          // the first that the path meets, or -1
+    std::vector<Contact> contact_;       // with it
+    std::vector<Traveller> travellers_;  // and the next three of those that have met something
     std::vector<Path> paths_;
-    std::vector<int> obstacle_;  // the first that the path meets, or -1
-    std::vector<Contact> contact_;
     std::vector<Bend> bends_;
+    std::vector<std::array<Surface, 2>> surfaces_;  // that it is on now
+    std::vector<Vec3f> before_;                     // at the beginning of the frame
+
+    // Places in the block.
+    std::vector<std::uint32_t> near_;     // those whose free path may come near a shape
+    std::vector<std::uint32_t> touched_;  // those that have met a shape since begin()
+    std::vector<std::uint32_t> moved_;    // of these, those that are elsewhere than at the beginning of the frame
+    std::vector<std::uint32_t> going_, going_on_;  // those whose sub-step is not over
 
     // What a shape is asked.
     std::vector<std::size_t> asked_;

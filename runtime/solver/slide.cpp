@@ -30,30 +30,37 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& a, double le
     const Vec3d& n = support.n;
     const Vec3d relative = v - support.vc;
     const Vec3d vt = relative - relative.dot(n) * n;
-    const double g = -a.dot(n), speed = vt.norm();
-    const double N = g - support.curvature * speed * speed;
+    const double g = -a.dot(n), speed2 = vt.squaredNorm();
+    const double N = g - support.curvature * speed2;
     if (N < 0) return {Slide::Leaves};
 
     const Vec3d at = a + g * n;
     const double holds = support.friction * N;
-    if (!(speed > 0)) {
+    if (!(speed2 > 0)) {
         const double drives = at.norm();
         if (drives <= holds + rounding * a.norm()) return {Slide::Sticks};
         return {Slide::Moves, at * (1 - holds / drives), left};
     }
+    if (holds == 0) return {Slide::Moves, at, left};
+
+    const double speed = std::sqrt(speed2);
     const Vec3d direction = vt / speed;
     Slide slide{Slide::Moves, at - holds * direction, left};
-    if (holds == 0) return slide;
-    const double along = slide.a.dot(direction);
-    const double aside = (slide.a - along * direction).norm();
-    if (slide.duration * aside > most_turn * speed)
-        slide.duration = std::min(left, std::max(most_turn * speed / aside, least));
+    const bool straight = at.isZero(0);  // as on a level floor: friction alone does not turn
+    const double along = straight ? -holds : slide.a.dot(direction);
+    if (!straight) {
+        const double aside2 = (slide.a - along * direction).squaredNorm();
+        if (slide.duration * slide.duration * aside2 > most_turn * most_turn * speed2)
+            slide.duration = std::min(left, std::max(most_turn * speed / std::sqrt(aside2), least));
+    }
     if (const double stop = along < 0 ? -speed / along : never; stop <= slide.duration) {
         slide.duration = stop;
         slide.stops = true;
     }
-    const Vec3d middle = vt + 0.5 * slide.duration * slide.a;
-    if (const double size = middle.norm(); size > 0) slide.a = at - holds / size * middle;
+    if (!straight) {
+        const Vec3d middle = vt + 0.5 * slide.duration * slide.a;
+        if (const double size = middle.norm(); size > 0) slide.a = at - holds / size * middle;
+    }
     return slide;
 }
 

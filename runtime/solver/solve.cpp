@@ -195,12 +195,11 @@ private:
             }
             const std::span<Vec3f> P = P_.subspan(begin, size), v = v_.subspan(begin, size);
             if (members_.data) block.restore_others(*this);
-            for (std::size_t i = 0; i < size; ++i) v[i] = block.v[i].cast<float>();
-            if (!scene_.obstacles.empty()) {
+            cast(std::span<const Vec3d>(block.v), v);
+            if (!scene_.obstacles.empty())
                 deepest = std::max(deepest, collisions.round(block.P, P));
-            } else {
-                for (std::size_t i = 0; i < size; ++i) P[i] = block.P[i].cast<float>();
-            }
+            else
+                cast(std::span<const Vec3d>(block.P), P);
         }
         const std::scoped_lock lock(mutex_);
         result_.collisions += collisions.contacts;
@@ -222,11 +221,10 @@ private:
             P.resize(size);
             v.resize(size);
             dt.resize(size);
-            for (std::size_t i = 0; i < size; ++i) {
-                P[i] = step.P_[at + i].cast<double>();
-                v[i] = step.v_[at + i].cast<double>();
-                dt[i] = step.dt(at + i) / step.options_.substeps;
-            }
+            cast(std::span<const Vec3f>(step.P_.subspan(at, size)), P);
+            cast(std::span<const Vec3f>(step.v_.subspan(at, size)), v);
+            const double substeps = step.options_.substeps;
+            for (std::size_t i = 0; i < size; ++i) dt[i] = step.dt(at + i) / substeps;
         }
 
         // Points that are not of the group stay as they were.

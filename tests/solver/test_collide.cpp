@@ -57,6 +57,38 @@ TEST_CASE("a bouncing ball is on its parabolas, at one sub-step as at many", "[c
     CHECK(scene.penetration_max == 0);
 }
 
+// A second plane that nothing touches reaches everywhere, so that points on the floor have it to look out for.
+TEST_CASE("points slide and rest on a floor to the same bits with and without another shape to look out for",
+          "[collide]")
+{
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> place(-2, 2), speed(-4, 4);
+    std::vector<Vec3f> P, v;
+    for (int i = 0; i < 2000; ++i) {
+        P.emplace_back(place(random), i % 3 == 0 ? 0.0f : std::abs(place(random)), place(random));
+        v.emplace_back(speed(random), i % 3 == 0 ? 0.0f : speed(random), speed(random));
+    }
+    const Vec3d pull = GENERATE(Vec3d(0, -9.81, 0), Vec3d(3, -9.81, 1));
+    const float friction = GENERATE(0.0f, 0.3f, 2.0f);
+    CAPTURE(pull.transpose(), friction);
+    const auto run = [&](bool another) {
+        PointSet set = points(P);
+        std::copy(v.begin(), v.end(), set.v().write().begin());
+        Scene scene(set);
+        scene.gravity(pull).floor(0.3f, friction);
+        if (another) scene.collide(make_plane(Vec3d(1, 3, 0), -1e4));
+        scene.run(48);
+        return scene;
+    };
+    const Scene with = run(true), without = run(false);
+    for (std::size_t i = 0; i < P.size(); ++i) {
+        REQUIRE(with.P(i) == without.P(i));
+        REQUIRE(with.v(i) == without.v(i));
+    }
+    CHECK(with.collisions == without.collisions);
+    CHECK(without.penetration_max == 0);
+}
+
 TEST_CASE("each bounce of a ball scales its energy by bounce squared", "[collide]")
 {
     const float bounce = 0.8f;

@@ -77,12 +77,12 @@ struct Kernel::Layout {
         bool writable;
     };
     std::vector<Entry> columns, groups;
-    bool predicate = false, masked = false;
+    bool predicate = false, masked = false, action = false;
     std::string key;  // equal for layouts that one runner serves
 
     void finish()
     {
-        key = fmt::format("{}{}", predicate ? 'p' : '-', masked ? 'm' : '-');
+        key = fmt::format("{}{}{}", predicate ? 'p' : '-', masked ? 'm' : '-', action ? 'a' : '-');
         for (const Entry& e : columns) key += fmt::format(" {}:{}{}", e.name, e.type, e.writable ? "!" : "");
         for (const Entry& e : groups) key += fmt::format(" ({}{})", e.name, e.writable ? "!" : "");
     }
@@ -159,6 +159,12 @@ void Kernel::analyse()
     lua_pop(L, 1);
 }
 
+void Kernel::uses_in_action(Uses& uses) const
+{
+    this->uses(uses);
+    for (auto* names : {&uses.reads, &uses.writes, &uses.may}) std::erase(*names, "force");
+}
+
 void Kernel::uses(Uses& uses) const
 {
     const auto attributes = [](const std::set<std::string>& names, std::vector<std::string>& into) {
@@ -189,6 +195,20 @@ Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments&
         const bool written = !predicate && (joins_.count(name) || arguments.joins.count(name));
         if (written || asks_any_ || asks_.count(name)) layout.groups.push_back({name, "", written});
     }
+    layout.finish();
+    return layout;
+}
+
+// P and v are in double inside Solve, and the force is the sub-step's.
+Kernel::Layout Kernel::layout_of_action(const PointSet& points, const KernelArguments& arguments, bool masked) const
+{
+    Layout layout = layout_for(points, arguments, false, masked);
+    layout.action = true;
+    std::erase_if(layout.columns, [](const Layout::Entry& e) { return e.name == "force"; });
+    for (Layout::Entry& entry : layout.columns)
+        if (entry.name == "P" || entry.name == "v") entry.type = "vec3d";
+    const bool pushes = writes_.count("force") || may_write_.count("force");
+    if (pushes || reads_.count("force") || may_.count("force")) layout.columns.push_back({"force", "vec3d", pushes});
     layout.finish();
     return layout;
 }
@@ -226,6 +246,8 @@ void Kernel::push_runner(State& state, const Layout& layout) const
     lua_setfield(L, -2, "predicate");
     lua_pushboolean(L, layout.masked);
     lua_setfield(L, -2, "masked");
+    lua_pushboolean(L, layout.action);
+    lua_setfield(L, -2, "action");
     state.call(2, 3);
     lua_createtable(L, 3, 0);
     lua_insert(L, -4);
@@ -234,12 +256,39 @@ void Kernel::push_runner(State& state, const Layout& layout) const
     lua_setfield(L, LUA_REGISTRYINDEX, slot.c_str());
 }
 
+// What a node's evaluation leaves for a pass that runs after it.
+struct Caller {
+    explicit Caller(const Evaluation& now)
+        : frame(now.frame), node(now.node), location(now.location), random(now.random)
+    {
+    }
+
+    Frame frame;
+    std::string node;
+    Location location;
+    RandomKey random;
+
+    std::string watched() const { return fmt::format("{}:{}: node \"{}\"", location.file, location.line, node); }
+};
+
 struct Kernel::Pass {
+    Pass(const PointSet& set, const Caller& who, const Layout& made_for, const std::map<std::string, Value>& third)
+        : points(set), caller(who), layout(made_for), values(third)
+    {
+        static std::atomic<std::uint64_t> last{0};
+        serial = ++last;
+        for (const Layout::Entry& entry : layout.columns)
+            columns.push_back(entry.type == "vec3d"
+                                  ? ColumnMemory{}
+                                  : std::visit([](const auto& c) { return memory_of(c); }, *points.find(entry.name)));
+        for (const Layout::Entry& entry : layout.groups) groups.push_back(memory_of(*points.find_group(entry.name)));
+    }
+
     const PointSet& points;
-    const Evaluation& now;
+    const Caller& caller;
     const Layout& layout;
-    std::uint64_t serial;  // of this pass: parameters are handed to each state once a pass
-    const std::map<std::string, Value>& values;
+    const std::map<std::string, Value>& values;  // the third argument
+    std::uint64_t serial;                        // of this pass: parameters are handed to each state once a pass
     std::vector<ColumnMemory> columns, groups;
     const std::uint8_t* members = nullptr;
     std::uint8_t* kill = nullptr;
@@ -248,21 +297,29 @@ struct Kernel::Pass {
 
 void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const
 {
-    std::vector<rapid_column> columns, groups;
+    std::vector<rapid_column> columns;
     for (const ColumnMemory& memory : pass.columns) columns.push_back(at_point(memory, begin));
-    for (const ColumnMemory& memory : pass.groups) groups.push_back(at_point(memory, begin));
     rapid_chunk chunk{};
     chunk.size = static_cast<std::int64_t>(end - begin);
     chunk.first = static_cast<std::int64_t>(begin);
     chunk.columns = columns.data();
-    chunk.groups = groups.data();
     chunk.kill = pass.kill ? pass.kill + begin : nullptr;
     chunk.result = pass.result ? pass.result + begin : nullptr;
+    run_chunk(pass, chunk);
+}
+
+// The chunk's place, columns and results are set.
+void Kernel::run_chunk(const Pass& pass, rapid_chunk& chunk) const
+{
+    const auto begin = static_cast<std::size_t>(chunk.first);
+    std::vector<rapid_column> groups;
+    for (const ColumnMemory& memory : pass.groups) groups.push_back(at_point(memory, begin));
+    chunk.groups = groups.data();
     chunk.members = pass.members ? const_cast<std::uint8_t*>(pass.members) + begin : nullptr;
-    chunk.random = pass.now.random.value;
-    chunk.number = pass.now.frame.number;
-    chunk.time = pass.now.frame.time;
-    chunk.dt = pass.now.frame.dt;
+    chunk.random = pass.caller.random.value;
+    chunk.number = pass.caller.frame.number;
+    chunk.time = pass.caller.frame.time;
+    chunk.dt = pass.caller.frame.dt;
 
     State& state = host_.local();
     lua_State* L = state.lua();
@@ -292,12 +349,12 @@ void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end) con
         const double place = lua_tonumber(L, -1);
         lua_settop(L, runner - 1);
         const std::string at =
-            place < 0 ? fmt::format("frame {}", pass.now.frame.number)
+            place < 0 ? fmt::format("frame {}", pass.caller.frame.number)
                       : fmt::format("point id {}, frame {}", pass.points.id()[static_cast<std::size_t>(place)],
-                                    pass.now.frame.number);
+                                    pass.caller.frame.number);
         const Location where = error.location().file.empty() ? location : error.location();
         Error placed(fmt::format("{} ({})", error.message(), at));
-        placed.at(where).in_node(pass.now.node).with_trace(error.trace());
+        placed.at(where).in_node(pass.caller.node).with_trace(error.trace());
         throw placed;
     }
     lua_settop(L, runner - 1);
@@ -305,16 +362,7 @@ void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end) con
 
 void Kernel::run_pass(Pass& pass) const
 {
-    const auto begin_time = std::chrono::steady_clock::now();
-    static std::atomic<std::uint64_t> serial{0};
-    pass.serial = ++serial;
-    for (const Layout::Entry& entry : pass.layout.columns)
-        pass.columns.push_back(std::visit([](const auto& c) { return memory_of(c); }, *pass.points.find(entry.name)));
-    for (const Layout::Entry& entry : pass.layout.groups)
-        pass.groups.push_back(memory_of(*pass.points.find_group(entry.name)));
-
-    const ScriptHost::Section section(
-        host_, fmt::format("{}:{}: node \"{}\"", pass.now.location.file, pass.now.location.line, pass.now.node));
+    const ScriptHost::Section section(host_, pass.caller.watched());
     // The first error in the order of the points is reported, whichever thread comes upon one first.
     std::mutex mutex;
     std::optional<Error> first;
@@ -332,43 +380,74 @@ void Kernel::run_pass(Pass& pass) const
         }
     });
     if (first) throw *first;
-    pass.now.figures.script_seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_time).count();
 }
+
+namespace {
+
+// Adds what a pass takes to the frame's figures.
+class Stopwatch {
+public:
+    explicit Stopwatch(FrameFigures& figures) : figures_(figures), begin_(std::chrono::steady_clock::now()) {}
+    ~Stopwatch()
+    {
+        figures_.script_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    }
+
+private:
+    FrameFigures& figures_;
+    std::chrono::steady_clock::time_point begin_;
+};
+
+}  // namespace
 
 void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const
 {
+    const Stopwatch watch(now.figures);
     const KernelArguments nothing;
     const Layout layout = layout_for(points, nothing, true, false);
-    Pass pass{points, now, layout, 0, nothing.values, {}, {}};
+    const Caller caller(now);
+    Pass pass(points, caller, layout, nothing.values);
     pass.result = result.data();
     run_pass(pass);
+}
+
+// Makes what the kernel writes writable; false where it has no point to visit. chosen: the group as it is now, since a
+// kernel may leave the very group that chooses its points.
+bool Kernel::make_writable(PointSet& points, const std::string& group, const KernelArguments& arguments,
+                           Column<std::uint8_t>& chosen, bool& masked) const
+{
+    for (const auto* names : {&joins_, &arguments.joins})
+        for (const std::string& name : *names) points.group(name);
+    const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
+    if (points.empty() || (!group.empty() && !members)) return false;  // nobody is in it yet
+    if (members && members->is_uniform()) {
+        if (!(*members)[0]) return false;
+        members = nullptr;
+    }
+    masked = members != nullptr;
+    if (masked) chosen = *members;
+    const Layout layout = layout_for(points, arguments, false, masked);
+    for (const Layout::Entry& entry : layout.columns)
+        if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
+    for (const Layout::Entry& entry : layout.groups)
+        if (entry.writable) points.group(entry.name).write();
+    return true;
 }
 
 void Kernel::run(PointSet& points, const std::string& group, const Evaluation& now,
                  const KernelArguments& arguments) const
 {
-    for (const auto* names : {&joins_, &arguments.joins})
-        for (const std::string& name : *names) points.group(name);
-    const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
-    if (!group.empty() && !members) return;  // nobody is in it yet
-    if (members && members->is_uniform()) {
-        if (points.empty() || !(*members)[0]) return;
-        members = nullptr;
-    }
+    const Stopwatch watch(now.figures);
+    Column<std::uint8_t> chosen;
+    bool masked = false;
+    if (!make_writable(points, group, arguments, chosen, masked)) return;
 
-    const Layout layout = layout_for(points, arguments, false, members != nullptr);
-    for (const Layout::Entry& entry : layout.columns)
-        if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
-    // A kernel may leave the very group that chooses its points: the choice is the one before.
-    const Column<std::uint8_t> chosen = members ? *members : Column<std::uint8_t>();
-    for (const Layout::Entry& entry : layout.groups)
-        if (entry.writable) points.group(entry.name).write();
-
+    const Layout layout = layout_for(points, arguments, false, masked);
+    const Caller caller(now);
     std::vector<std::uint8_t> kill(kills_ ? points.size() : 0);
-    Pass pass{points, now, layout, 0, arguments.values, {}, {}};
+    Pass pass(points, caller, layout, arguments.values);
     pass.kill = kills_ ? kill.data() : nullptr;
-    pass.members = members ? chosen.read().data : nullptr;
+    pass.members = masked ? std::as_const(chosen).read().data : nullptr;
     run_pass(pass);
 
     if (std::find(kill.begin(), kill.end(), 1) != kill.end()) {
@@ -377,6 +456,80 @@ void Kernel::run(PointSet& points, const std::string& group, const Evaluation& n
         points.keep(kill);
         now.figures.died += before - points.size();
     }
+}
+
+class Kernel::KernelActionPass : public ActionPass {
+public:
+    KernelActionPass(const Kernel& kernel, PointSet& points, const Caller& caller, Layout layout,
+                     const std::map<std::string, Value>& values, Column<std::uint8_t> chosen)
+        : kernel_(kernel),
+          section_(kernel.host_, caller.watched()),
+          layout_(std::move(layout)),
+          chosen_(std::move(chosen)),
+          pass_(points, caller, layout_, values)
+    {
+        if (layout_.masked) pass_.members = std::as_const(chosen_).read().data;
+    }
+
+    void act(const Chunk& chunk, std::span<Vec3d> force, std::span<std::uint8_t> dead) override
+    {
+        std::vector<rapid_column> columns;
+        for (std::size_t i = 0; i < layout_.columns.size(); ++i) {
+            const std::string& name = layout_.columns[i].name;
+            if (layout_.columns[i].type != "vec3d")
+                columns.push_back(at_point(pass_.columns[i], chunk.first));
+            else
+                columns.push_back({name == "P" ? chunk.P.data() : name == "v" ? chunk.v.data() : force.data(), 3});
+        }
+        rapid_chunk seen{};
+        seen.size = static_cast<std::int64_t>(chunk.size());
+        seen.first = static_cast<std::int64_t>(chunk.first);
+        seen.columns = columns.data();
+        seen.kill = dead.data();
+        seen.substep = chunk.substep;
+        seen.times = chunk.time.data();
+        seen.steps = chunk.dt.data();
+        kernel_.run_chunk(pass_, seen);
+    }
+
+private:
+    const Kernel& kernel_;
+    const ScriptHost::Section section_;
+    const Layout layout_;
+    const Column<std::uint8_t> chosen_;
+    Pass pass_;
+};
+
+class Kernel::KernelAction : public Action {
+public:
+    KernelAction(const Kernel& kernel, const Evaluation& now, KernelArguments arguments)
+        : kernel_(kernel), caller_(now), arguments_(std::move(arguments))
+    {
+        node = now.node;
+        location = now.location;
+    }
+
+    std::unique_ptr<ActionPass> begin(PointSet& points) const override
+    {
+        Column<std::uint8_t> chosen;
+        bool masked = false;
+        if (!kernel_.make_writable(points, group, arguments_, chosen, masked)) return nullptr;
+        return std::make_unique<KernelActionPass>(kernel_, points, caller_,
+                                                  kernel_.layout_of_action(points, arguments_, masked),
+                                                  arguments_.values, std::move(chosen));
+    }
+
+private:
+    const Kernel& kernel_;
+    const Caller caller_;
+    const KernelArguments arguments_;
+};
+
+DynamicPtr Kernel::action(const std::string& group, const Evaluation& now, const KernelArguments& arguments) const
+{
+    auto action = std::make_shared<KernelAction>(*this, now, arguments);
+    action->group = group;
+    return action;
 }
 
 }  // namespace rapid

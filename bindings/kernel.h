@@ -9,6 +9,8 @@
 
 #include "runtime/graph/point_function.h"
 
+struct rapid_chunk;  // lua/chunk.h
+
 namespace rapid {
 
 class ScriptHost;
@@ -34,6 +36,12 @@ public:
     // Runs it over the points of `group` (all when empty), in parallel. Points that it killed are removed afterwards.
     void run(PointSet& points, const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
 
+    // What it does inside Solve, at every sub-step, on the points of `group`.
+    DynamicPtr action(const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
+
+    // The names that it uses as an action, where `force` is that of the sub-step and no attribute.
+    void uses_in_action(Uses& uses) const;
+
     const std::size_t number;         // in each state
     const Location location;          // of the function
     std::string fingerprint;          // of its bytecode, the same in each state
@@ -45,10 +53,16 @@ public:
 private:
     struct Layout;
     struct Pass;
+    class KernelAction;
+    class KernelActionPass;
 
     Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate, bool masked) const;
+    Layout layout_of_action(const PointSet& points, const KernelArguments& arguments, bool masked) const;
+    bool make_writable(PointSet& points, const std::string& group, const KernelArguments& arguments,
+                       Column<std::uint8_t>& chosen, bool& masked) const;
     void run_pass(Pass& pass) const;
     void run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const;
+    void run_chunk(const Pass& pass, rapid_chunk& chunk) const;
     // Leaves the runner for this layout on the state's stack: a list of run, at, set_params and the pass whose
     // parameters it has.
     void push_runner(State& state, const Layout& layout) const;

@@ -237,7 +237,7 @@ void ScriptHost::load_shipped_nodes()
 ScriptHost::Section::Section(ScriptHost& host, std::string what) : host_(host)
 {
     const std::lock_guard lock(host.watch_mutex_);
-    host.watched_ = std::move(what);
+    host.watched_.push_back(std::move(what));
     host.deadline_ = std::chrono::steady_clock::now() +
                      std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                          std::chrono::duration<double>(std::min(host.options_.script_timeout, 1e8)));
@@ -247,7 +247,7 @@ ScriptHost::Section::Section(ScriptHost& host, std::string what) : host_(host)
 ScriptHost::Section::~Section()
 {
     const std::lock_guard lock(host_.watch_mutex_);
-    host_.watched_.clear();
+    host_.watched_.pop_back();  // sections end in the reverse order; which name is taken off matters to none
 }
 
 // Compiled traces can't be interrupted: when a script overruns, the run ends from here.
@@ -263,8 +263,8 @@ void ScriptHost::watch()
         watch_wake_.wait_until(lock, deadline);
         if (stop_watching_ || watched_.empty() || std::chrono::steady_clock::now() < deadline_) continue;
         const std::string message =
-            fmt::format("{}: the script runs for more than {:g} s; --script-timeout sets the limit", watched_,
-                        options_.script_timeout);
+            fmt::format("{}: the script runs for more than {:g} s; --script-timeout sets the limit",
+                        fmt::join(watched_, ", "), options_.script_timeout);
         if (options_.on_timeout) options_.on_timeout(message);
         std::fprintf(stderr, "%s\n", message.c_str());
         std::_Exit(1);

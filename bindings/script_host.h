@@ -81,7 +81,7 @@ private:
 
     std::mutex watch_mutex_;
     std::condition_variable watch_wake_;
-    std::string watched_;  // what runs now; empty where nothing does
+    std::vector<std::string> watched_;  // what runs now
     std::chrono::steady_clock::time_point deadline_;
     bool stop_watching_ = false;
     std::thread watchdog_;

@@ -34,6 +34,25 @@ struct Points {
 };
 RAPID_NODE(Points);
 
+// action: the same inside Solve, at every sub-step (paper §2.3).
+struct ScriptAction {
+    std::string group;
+    std::shared_ptr<const Kernel> kernel;
+
+    static NodeType declare()
+    {
+        return node<ScriptAction>("action", "Edits the points with a Lua function inside Solve, at every sub-step.")
+            .param(&ScriptAction::kernel, "kernel", Value(), any_number(), "", "function(p, step)")
+            .of_type(std::string(PointFunction::param_type))
+            .required()
+            .constant()
+            .varies();
+    }
+    void uses(Uses& uses) const { kernel->uses_in_action(uses); }
+    DynamicPtr dynamic(const Evaluation& now) const { return kernel->action(group, now, {}); }
+};
+RAPID_NODE(ScriptAction);
+
 // A node type that rapid.node defines: its parameters' values by name, its kernel, and the attributes that it makes.
 class ScriptOperator : public Operator {
 public:
@@ -43,21 +62,27 @@ public:
         KernelArguments arguments;
     };
 
-    explicit ScriptOperator(std::vector<AttributeSpec> makes) : makes_(std::move(makes)) {}
+    ScriptOperator(NodeKind kind, std::vector<AttributeSpec> makes) : kind_(kind), makes_(std::move(makes)) {}
 
     void* fields() override { return &fields_; }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
     {
         // Points that come from elsewhere, and those behind Solve, may not have them yet.
         for (const AttributeSpec& spec : makes_) inputs[0].points.add(spec);
-        fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.arguments);
+        if (kind_ == NodeKind::Dynamic)
+            inputs[0].dynamics.push_back(fields_.kernel->action(fields_.group, now, fields_.arguments));
+        else
+            fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.arguments);
         return std::move(inputs[0]);
     }
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
     void uses(Uses& uses) const override
     {
         if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
-        fields_.kernel->uses(uses);
+        if (kind_ == NodeKind::Dynamic)
+            fields_.kernel->uses_in_action(uses);
+        else
+            fields_.kernel->uses(uses);
         const KernelArguments& named = fields_.arguments;
         uses.reads.insert(uses.reads.end(), named.reads.begin(), named.reads.end());
         uses.writes.insert(uses.writes.end(), named.writes.begin(), named.writes.end());
@@ -66,6 +91,7 @@ public:
     void check() const override {}
 
 private:
+    const NodeKind kind_;
     Fields fields_;
     std::vector<AttributeSpec> makes_;
 };
@@ -74,6 +100,9 @@ private:
 constexpr std::string_view group_type = "name of a group", attribute_type = "name of an attribute";
 
 KernelArguments& arguments_of(void* fields) { return static_cast<ScriptOperator::Fields*>(fields)->arguments; }
+
+// The functions that a definition may have; it has one of them.
+constexpr std::string_view roles[] = {"points", "action", "expand"};
 
 template <class T>
 void keep_as(const Param& param, void* fields, const Value& value)
@@ -218,7 +247,7 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     return param;
 }
 
-NodeType read_type(const Table& definition, bool has_points, bool has_expand)
+NodeType read_type(const Table& definition, std::string_view role)
 {
     NodeType type;
     type.name = text_of(definition, "name", "rapid.node");
@@ -226,20 +255,23 @@ NodeType read_type(const Table& definition, bool has_points, bool has_expand)
     const std::string what = fmt::format("rapid.node \"{}\"", type.name);
     type.doc = text_of(definition, "doc", what);
     if (type.doc.empty()) throw Error(what + ": say what it does, doc = \"...\"");
+    std::vector<std::string> known = {"name", "doc", "params", "makes"};
+    known.insert(known.end(), std::begin(roles), std::end(roles));
     for (const auto& [field, value] : definition.named)
-        if (field != "name" && field != "doc" && field != "params" && field != "makes" && field != "points" &&
-            field != "expand")
-            throw Error(fmt::format("{}: unknown field \"{}\"{}", what, field,
-                                    did_you_mean(field, {"name", "doc", "params", "makes", "points", "expand"})));
-    if (has_points == has_expand)
-        throw Error(what + ": give it points = function(p, frame, params), or expand = function(input, params)");
+        if (std::find(known.begin(), known.end(), field) == known.end())
+            throw Error(fmt::format("{}: unknown field \"{}\"{}", what, field, did_you_mean(field, known)));
+    if (role.empty())
+        throw Error(what +
+                    ": give it one of points = function(p, frame, params), action = function(p, step, params) "
+                    "and expand = function(input, params)");
     type.varies = true;
+    if (role == "action") type.kind = NodeKind::Dynamic;
     if (const Value* params = find(definition, "params")) {
         const Table* table = params->table();
         if (!table || !table->list.empty()) throw Error(what + ": params is a table of declarations by name");
         for (const auto& [name, declared] : table->named) type.params.push_back(read_param(name, declared, type.name));
     }
-    if (has_points) {
+    if (role != "expand") {
         Param group;
         group.name = "group";
         group.type = "string";
@@ -261,7 +293,7 @@ NodeType read_type(const Table& definition, bool has_points, bool has_expand)
         type.params.push_back(kernel);
     }
     if (const Value* makes = find(definition, "makes")) {
-        if (!has_points) throw Error(what + ": makes belongs to points = function(p, frame, params)");
+        if (role == "expand") throw Error(what + ": makes belongs to points and action");
         Param param;
         param.name = "makes";
         std::map<std::string, AttributeValue> attributes;
@@ -272,7 +304,7 @@ NodeType read_type(const Table& definition, bool has_points, bool has_expand)
         }
         for (const auto& [name, value] : attributes) type.uses.makes.push_back({name, value});
     }
-    type.make = [made = type.uses.makes] { return std::make_unique<ScriptOperator>(made); };
+    type.make = [kind = type.kind, made = type.uses.makes] { return std::make_unique<ScriptOperator>(kind, made); };
     return type;
 }
 
@@ -283,26 +315,30 @@ int define_node_type(State& state)
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
 
-    lua_getfield(L, 1, "points");
-    lua_getfield(L, 1, "expand");
-    const bool has_points = lua_isfunction(L, -2), has_expand = lua_isfunction(L, -1);
-    lua_pop(L, 1);
+    std::string_view role;  // empty where there is none, or several
+    int functions = 0;
+    for (const std::string_view name : roles) {
+        lua_getfield(L, 1, name.data());
+        if (lua_isfunction(L, -1) && functions++ == 0) role = name;
+        lua_pop(L, 1);
+    }
+    if (functions > 1) role = {};
 
     lua_getfield(L, 1, "name");
     const std::string name = lua_type(L, -1) == LUA_TSTRING ? lua_tostring(L, -1) : "";
     lua_pop(L, 1);
     if (state.is_main()) {
         const Value definition = state.to_value(1);
-        NodeType type = read_type(*definition.table(), has_points, has_expand);
+        NodeType type = read_type(*definition.table(), role);
         type.defined_in = state.where().file;
         host.registry.add(std::move(type));
     }
     // The kernel; a type without one (expand) is known by a mark.
     luaL_newmetatable(L, definitions);
-    if (has_points)
-        lua_pushvalue(L, -2);
-    else
+    if (role.empty() || role == "expand")
         lua_pushboolean(L, 1);
+    else
+        lua_getfield(L, 1, role.data());
     lua_setfield(L, -2, name.c_str());
     return 0;
 }

@@ -16,6 +16,9 @@ typedef struct rapid_chunk {
     uint8_t* members;       // shape [size], the points to visit; null for all
     uint64_t random;        // key of the node's random numbers
     double number, time, dt;  // the frame, seconds
+    double substep;           // of an action, from 0
+    const double* times;      // of an action: each point's own time, s since the start, and sub-step, s; shape [size]
+    const double* steps;
 } rapid_chunk;
 
 typedef double (*rapid_rand)(uint64_t random, int64_t id, double use, double frame);

@@ -50,8 +50,11 @@ local setter_text = {
     c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3] = x1, x2, x3, x4]],
 }
 
+-- As Solve holds P and v within a frame.
+getter_text.vec3d, setter_text.vec3d = getter_text.vec3, setter_text.vec3
+
 local pointer_type = {
-  float = "float*", vec3 = "float*", quat = "float*", int32 = "int32_t*", int64 = "int64_t*",
+  vec3d = "double*", float = "float*", vec3 = "float*", quat = "float*", int32 = "int32_t*", int64 = "int64_t*",
 }
 
 local function describe(value)
@@ -98,7 +101,7 @@ local MAX = 3.4028234663852886e38
 local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that setting it spoils no other load
 cursor.i = -1
 local first, frame, random, params = 0, nil, 0, nil
-local kill, result, members
+local kill, result, members, substep, times, steps, step
 local getters, setters, methods = {}, {}, {}
 local id_column, id_stride
 ]]
@@ -110,7 +113,7 @@ function methods.rand(...)
   local anew = 0
   if frame_or_number ~= nil then
     anew = frame_or_number
-    if istype(frame_type, anew) then anew = anew.number end
+    if istype(frame_type, anew) then anew = anew.number elseif anew == step then anew = times[cursor.i] end
     if type(anew) ~= "number" then wrong_use("the frame, or a number, behind the comma", anew) end
     if anew == 0 then anew = 5e-324 end -- 0 is the number that stays the same in every frame
   end
@@ -157,8 +160,28 @@ view.__index, view.__newindex, view.__metatable = read, write, false
 view.__tostring = function() return "a point" end
 ]]
 
+-- What an action gets in place of the frame: the point's own time.
+local text_step = [[
+local step_getters = {
+  time = function(...) return times[cursor.i] end,
+  dt = function(...) return steps[cursor.i] end,
+  index = function(...) return substep end,
+}
+step = newproxy(true)
+local step_view = getmetatable(step)
+step_view.__metatable = false
+step_view.__tostring = function() return "a step" end
+step_view.__index = function(...)
+  local _, name = ...
+  local get = step_getters[name]
+  if not get then refuse.step(name) end
+  local value = get()
+  return value
+end
+]]
+
 -- layout.columns: { name, type, slot (from 0), writable }; layout.groups: { name, slot, writable };
--- layout.predicate: the kernel's result is kept, and nothing may be written. Returns run(chunk); at(), the place in the
+-- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve. Returns run(chunk); at(), the place in the
 -- set of the point that is being worked on; and set_params(values), for the third argument of a Lua node's kernel.
 local function make_runner(kernel, layout, pointers)
   local text = { text_head }
@@ -226,16 +249,19 @@ function methods.leave(...)
 end
 ]]
   text[#text + 1] = text_methods
+  if layout.action then text[#text + 1] = text_step end
   -- Vararg, so that no trace starts here, nor in run(): the conversion of a pointer is not compiled.
   text[#text + 1] = [[
 local function begin(...)
   local chunk = ...
   first, random = tonumber(chunk.first), chunk.random
   frame = frame_type(chunk.number, chunk.time, chunk.dt)
-  kill, result, members = chunk.kill, chunk.result, chunk.members]]
+  kill, result, members = chunk.kill, chunk.result, chunk.members
+  substep, times, steps = chunk.substep, chunk.times, chunk.steps]]
   text[#text + 1] = table.concat(setup, "\n") .. "\nend\n"
 
-  local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0" or "kernel(p, frame, params)"
+  local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0"
+    or layout.action and "kernel(p, step, params)" or "kernel(p, frame, params)"
   local test = layout.masked and "if members[k] ~= 0 then cursor.i = k " .. body .. " end" or "cursor.i = k " .. body
   text[#text + 1] = [[
 local function run(...)
@@ -282,6 +308,9 @@ return run, at, set_params
   function refuse.group(name, what)
     error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
       :format(what, describe(name), what), 0)
+  end
+  function refuse.step(name)
+    error(("the step has no %q; it has time, dt and index"):format(tostring(name)), 0)
   end
   function refuse.use(wanted, value)
     error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)

@@ -101,7 +101,7 @@ local function make(native, load_node, numeric, shapes)
     end
   end
 
-  local sugar = { points = named_kernel "points" }
+  local sugar = { points = named_kernel "points", action = named_kernel "action" }
 
   function sugar.merge(input, ...)
     local inputs, options = { input }, {}

@@ -50,6 +50,7 @@ struct Solve {
         const SolveResult result = solve(points, flow.dynamics, options);
         now.figures.substeps = std::max(now.figures.substeps, substeps);
         now.figures.collisions += result.collisions;
+        now.figures.died += result.died;
         now.figures.contact_limit += result.contact_limit;
         now.figures.trapped += result.trapped;
         now.figures.penetration_max = std::max(now.figures.penetration_max, result.penetration_max);

@@ -77,7 +77,7 @@ public:
 
 using DynamicPtr = std::shared_ptr<const Dynamic>;
 
-// A force, or an action operator: called once a sub-step for each chunk, from any thread.
+// A force: called once a sub-step for each chunk, from any thread.
 class Force : public Dynamic {
 public:
     virtual void contribute(const Chunk& chunk, Forces& forces) const = 0;
@@ -85,6 +85,25 @@ public:
     // The acceleration where it is the same for all points, at all times within the frame: then contribute() is not
     // called.
     virtual std::optional<Vec3d> uniform_acceleration() const { return std::nullopt; }
+};
+
+// What an action does in one step.
+class ActionPass {
+public:
+    virtual ~ActionPass() = default;
+
+    // Called once a sub-step for each chunk, from any thread, with the points where they are in the middle of it: may
+    // change P and v, add to `force` (N, 0 at first), write columns at chunk.first + i, and mark points as dead, which
+    // ends their way. All of shape [size].
+    virtual void act(const Chunk& chunk, std::span<Vec3d> force, std::span<std::uint8_t> dead) = 0;
+};
+
+// An action operator (paper §2.3): changes points at every sub-step, inside Solve, while they are in cache.
+class Action : public Dynamic {
+public:
+    // Before a step, on one thread: makes the columns that act() writes writable. Limits itself to `group`. Null where
+    // there is nothing to do.
+    virtual std::unique_ptr<ActionPass> begin(PointSet& points) const = 0;
 };
 
 class Collider : public Dynamic {

@@ -28,8 +28,14 @@ struct LocalForce {
     bool all;
 };
 
+struct LocalAction {
+    const Action* action;
+    std::unique_ptr<ActionPass> pass;
+};
+
 // What the dynamics are for this set and frame.
 struct Scene {
+    std::vector<LocalAction> actions;
     Vec3d uniform = Vec3d::Zero();  // acceleration of all points, m/s²
     std::vector<LocalForce> forces;
     std::vector<Obstacle> obstacles;
@@ -37,6 +43,7 @@ struct Scene {
     Strided<float> mass{&unit_mass, 0};
 
     bool is_uniform() const { return forces.empty() && !force; }
+    bool only_falls() const { return is_uniform() && actions.empty() && obstacles.empty(); }
 };
 
 template <class F>
@@ -52,9 +59,16 @@ void at_node(const Dynamic& dynamic, const F& f)
 
 const std::uint8_t nobody = 0;
 
-Scene scene_of(const PointSet& points, std::span<const DynamicPtr> dynamics)
+Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics)
 {
     Scene scene;
+    // First those that make columns writable: what is read below is then at its place.
+    for (const DynamicPtr& dynamic : dynamics)
+        if (const auto* action = dynamic_cast<const Action*>(dynamic.get()))
+            at_node(*dynamic, [&] {
+                if (auto pass = action->begin(set)) scene.actions.push_back({action, std::move(pass)});
+            });
+    const PointSet& points = set;
     for (const DynamicPtr& dynamic : dynamics)
         at_node(*dynamic, [&] {
             if (const auto* collider = dynamic_cast<const Collider*>(dynamic.get())) {
@@ -98,7 +112,8 @@ public:
           options_(options),
           scene_(scene_of(points, dynamics)),
           P_(points.P().write()),
-          v_(points.v().write())
+          v_(points.v().write()),
+          dead_(scene_.actions.empty() ? 0 : points.size())
     {
         if (!options.group.empty()) {
             const Column<std::uint8_t>* group = points.find_group(options.group);
@@ -118,6 +133,7 @@ public:
             }
         });
         if (error_) std::rethrow_exception(error_);
+        bury();
         return result_;
     }
 
@@ -132,7 +148,7 @@ private:
     void advance(std::size_t begin, std::size_t end)
     {
         require_finite(begin, end, "is", "before the step; a node before this one made it so");
-        if (!scene_.obstacles.empty() || !scene_.is_uniform() || members_.data)
+        if (!scene_.only_falls() || members_.data)
             advance_by_substeps(begin, end);
         else if (!own_dt_.data)
             fall(begin, end);
@@ -188,10 +204,21 @@ private:
             if (!scene_.obstacles.empty()) collisions.begin(begin, size);
             for (int substep = 0; substep < options_.substeps; ++substep) {
                 const Strided<Vec3d> a = accelerations(block, substep);
-                if (!scene_.obstacles.empty())
-                    collisions.advance(block.P, block.v, a, block.dt);
-                else
-                    block.drift(a);
+                const auto drift = [&](std::span<const double> dt) {
+                    if (!scene_.obstacles.empty())
+                        collisions.advance(block.P, block.v, a, dt);
+                    else
+                        block.drift(a, dt);
+                };
+                if (scene_.actions.empty()) {
+                    drift(block.dt);
+                } else {
+                    // Half a drift, all actions at once, half a drift: of second order (numerics.md, Motion).
+                    block.halve();
+                    drift(block.half);
+                    act(block, substep);
+                    drift(block.half);
+                }
             }
             const std::span<Vec3f> P = P_.subspan(begin, size), v = v_.subspan(begin, size);
             if (members_.data) block.restore_others(*this);
@@ -212,8 +239,9 @@ private:
     struct Block {
         std::size_t first = 0;
         std::vector<Vec3d> P, v, middle, a;
-        std::vector<double> dt, time;
-        Forces sum, one;
+        std::vector<double> dt, time, half;
+        std::vector<Vec3d> force;
+        Forces one;
 
         void begin(const Step& step, std::size_t at, std::size_t size)
         {
@@ -237,12 +265,26 @@ private:
             }
         }
 
-        void drift(Strided<Vec3d> acceleration)
+        void drift(Strided<Vec3d> acceleration, std::span<const double> t)
         {
             for (std::size_t i = 0; i < P.size(); ++i) {
-                P[i] += dt[i] * (v[i] + 0.5 * dt[i] * acceleration[i]);
-                v[i] += dt[i] * acceleration[i];
+                P[i] += t[i] * (v[i] + 0.5 * t[i] * acceleration[i]);
+                v[i] += t[i] * acceleration[i];
             }
+        }
+
+        void halve()
+        {
+            half.resize(dt.size());
+            for (std::size_t i = 0; i < dt.size(); ++i) half[i] = 0.5 * dt[i];
+        }
+
+        // The middle of each point's sub-step, s since the start.
+        void set_time(const SolveOptions& options, int substep)
+        {
+            time.resize(dt.size());
+            for (std::size_t i = 0; i < dt.size(); ++i)
+                time[i] = options.time - dt[i] * (options.substeps - substep - 0.5);
         }
     };
 
@@ -257,11 +299,8 @@ private:
         if (scene_.forces.empty()) return {block.a.data(), 1};
 
         block.middle.resize(size);
-        block.time.resize(size);
-        for (std::size_t i = 0; i < size; ++i) {
-            block.middle[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
-            block.time[i] = options_.time - block.dt[i] * (options_.substeps - substep - 0.5);
-        }
+        for (std::size_t i = 0; i < size; ++i) block.middle[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
+        block.set_time(options_, substep);
         const Chunk chunk{points_, block.first, block.middle, block.v, block.dt, block.time, substep};
         for (const LocalForce& local : scene_.forces) {
             block.one.reset(size);
@@ -284,19 +323,48 @@ private:
         return {block.a.data(), 1};
     }
 
+    // All actions, in the order of the chain, on the points where they are in the middle of the sub-step. The forces
+    // that they add are kicks over the whole of it. The dead stay where they are.
+    void act(Block& block, int substep)
+    {
+        const std::size_t size = block.P.size();
+        block.set_time(options_, substep);
+        block.force.assign(size, Vec3d::Zero());
+        const std::span<std::uint8_t> dead(dead_.data() + block.first, size);
+        const Chunk chunk{points_, block.first, block.P, block.v, block.dt, block.time, substep};
+        for (const LocalAction& local : scene_.actions)
+            at_node(*local.action, [&] { local.pass->act(chunk, block.force, dead); });
+        for (std::size_t i = 0; i < size; ++i) {
+            block.v[i] += block.dt[i] * acceleration_by(block.force[i], block.first + i);
+            if (dead[i]) block.dt[i] = block.half[i] = 0;
+        }
+    }
+
     void add_force_attribute(Block& block)
     {
-        for (std::size_t i = 0; i < block.P.size(); ++i) {
-            const Vec3d force = (*scene_.force)[block.first + i].cast<double>();
-            if (force.isZero(0)) continue;
-            const float mass = scene_.mass[block.first + i];
-            if (!(mass > 0) || !force.allFinite())
-                throw Error(
-                    fmt::format("{}: a force of {{{:g}, {:g}, {:g}}} on a mass of {:g}; the force must be finite "
-                                "and the mass above 0",
-                                name_of(block.first + i), force.x(), force.y(), force.z(), mass));
-            block.a[i] += force / mass;
-        }
+        for (std::size_t i = 0; i < block.P.size(); ++i)
+            block.a[i] += acceleration_by((*scene_.force)[block.first + i].cast<double>(), block.first + i);
+    }
+
+    Vec3d acceleration_by(const Vec3d& force, std::size_t point) const
+    {
+        if (force.isZero(0)) return force;
+        const float mass = scene_.mass[point];
+        if (!(mass > 0) || !force.allFinite())
+            throw Error(
+                fmt::format("{}: a force of {{{:g}, {:g}, {:g}}} on a mass of {:g}; the force must be finite and the "
+                            "mass above 0",
+                            name_of(point), force.x(), force.y(), force.z(), mass));
+        return force / mass;
+    }
+
+    void bury()
+    {
+        if (std::find(dead_.begin(), dead_.end(), 1) == dead_.end()) return;
+        for (std::uint8_t& dead : dead_) dead = !dead;
+        const std::size_t before = points_.size();
+        points_.keep(dead_);
+        result_.died = before - points_.size();
     }
 
     std::string name_of(std::size_t i) const
@@ -315,12 +383,13 @@ private:
                                             value.y(), value.z(), when));
     }
 
-    const PointSet& points_;
+    PointSet& points_;
     const SolveOptions& options_;
     const Scene scene_;
     std::span<Vec3f> P_, v_;
     Strided<float> own_dt_{nullptr, 0};
     Strided<std::uint8_t> members_{nullptr, 0};  // of the group that is advanced; null for all
+    std::vector<std::uint8_t> dead_;             // 1: killed by an action; empty where there is none
 
     std::mutex mutex_;
     SolveResult result_;

@@ -22,11 +22,12 @@ struct SolveResult {
     std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
     std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     double penetration_max = 0;       // m, the deepest at the end of the frame
+    std::uint64_t died = 0;           // points that actions killed
 };
 
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age
 // at the end of the frame), else h; and where they have a `force` (N), by force / mass besides, which is then cleared.
-// Ages, deaths and ids are the caller's.
+// Points that an action kills are removed. Ages, other deaths and ids are the caller's.
 //
 // Same bits for any number of threads, any chunk, and whichever other points there are. Error: a velocity or position
 // that is not finite before or after, with the point's id, or a force that is not, with its node; a collider or force

@@ -56,8 +56,8 @@ std::filesystem::path lua_folder()
 
 ScriptHost::ScriptHost(SessionOptions options) : options_(std::move(options)), main_thread_(std::this_thread::get_id())
 {
-    watchdog_ = std::thread([this] { watch(); });
     main_ = std::make_unique<State>(*this, true);
+    watchdog_ = std::thread([this] { watch(); });
 }
 
 ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options) : ScriptHost(std::move(options))

@@ -181,8 +181,9 @@ end
 ]]
 
 -- layout.columns: { name, type, slot (from 0), writable }; layout.groups: { name, slot, writable };
--- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve. Returns run(chunk); at(), the place in the
--- set of the point that is being worked on; and set_params(values), for the third argument of a Lua node's kernel.
+-- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve.
+-- Returns run(chunk); at(), the place in the set of the point that is being worked on; and set_params(values), for the
+-- third argument of a Lua node's kernel.
 local function make_runner(kernel, layout, pointers)
   local text = { text_head }
   local function add(line, name, slot)

@@ -48,6 +48,7 @@ struct SceneRun {
     std::optional<std::uint64_t> seed;
     int threads = 0;
     SessionOptions session;
+    bool watch_traces = false;  // the JIT's events are not safe in every run: a test asks for them
 };
 
 // The arguments that lua/testing/rapid.lua gives, checked there: (path, options).
@@ -63,6 +64,9 @@ SceneRun read_run(lua_State* L)
     if (const auto seconds = number_field(L, 2, "script_timeout")) run.session.script_timeout = *seconds;
     run.session.on_timeout = host.options.on_timeout;
     run.session.may_write = false;
+    lua_getfield(L, 2, "watch_traces");
+    run.watch_traces = lua_toboolean(L, -1) != 0;
+    lua_pop(L, 1);
     lua_getfield(L, 2, "set");
     for (lua_pushnil(L); lua_next(L, -2); lua_pop(L, 1)) run.session.set[text_at(L, -2)] = text_at(L, -1);
     lua_pop(L, 1);
@@ -113,10 +117,11 @@ int run(lua_State* L)
         SceneRun scene = read_run(L);
         std::mutex mutex;
         std::vector<std::string> aborts;
-        scene.session.on_trace_abort = [&](const std::string& message) {
-            const std::lock_guard lock(mutex);
-            aborts.push_back(message);
-        };
+        if (scene.watch_traces)
+            scene.session.on_trace_abort = [&](const std::string& message) {
+                const std::lock_guard lock(mutex);
+                aborts.push_back(message);
+            };
         lua_newtable(L);
         const int outputs = lua_gettop(L);
         const std::vector<std::string> warnings = run_scene(scene, [&](FrameResult& result) {

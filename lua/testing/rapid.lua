@@ -4,7 +4,8 @@
 --   result[48]                 the points of a frame: of the output main, or of the only one
 --   result:frames()            iterates: frame, points
 --   result:output "smoke"      the same of another output
---   result.warnings, result.trace_aborts       lists of messages: what the run said, and what LuaJIT did not compile
+--   result.warnings            a list of messages
+--   result.trace_aborts        the same of what LuaJIT did not compile, after { watch_traces = true }
 --   #points, points[1].P, points:by_id(7).heat, points:min "P", points:mean "v", points:group "hot"
 local vector = require "vec3"
 local ffi = require "ffi"
@@ -100,7 +101,8 @@ return function(native)
     error(("set: %s is a %s; it must be a number, a boolean, a string or a vec3"):format(name, type(value)), 3)
   end
 
-  local known_options = { frames = true, set = true, seed = true, threads = true, script_timeout = true }
+  local known_options = { frames = true, set = true, seed = true, threads = true, script_timeout = true,
+    watch_traces = true }
 
   local function whole(name, value, least)
     if type(value) ~= "number" or value % 1 ~= 0 or (least and value < least) then
@@ -117,7 +119,7 @@ return function(native)
     if type(path) ~= "string" then error("rapid.run takes the path of a graph", 2) end
     for name in pairs(options) do
       if not known_options[name] then
-        error(("rapid.run: unknown option %q; it must be frames, set, seed, threads or script_timeout")
+        error(("rapid.run: unknown option %q; it must be frames, set, seed, threads, script_timeout or watch_traces")
           :format(tostring(name)), 2)
       end
     end
@@ -138,10 +140,12 @@ return function(native)
       seed = options.seed and whole("seed", options.seed, 0),
       threads = options.threads and whole("threads", options.threads, 0),
       script_timeout = options.script_timeout,
+      watch_traces = options.watch_traces == true,
       set = set,
     })
     if not ok then error(found, 0) end
-    run.frames, run.warnings, run.trace_aborts = found, warnings, trace_aborts
+    run.frames, run.warnings = found, warnings
+    if options.watch_traces then run.trace_aborts = trace_aborts end
     for name in pairs(found) do table.insert(run.outputs, name) end
     table.sort(run.outputs)
     return result_of(run, found.main and "main" or #run.outputs == 1 and run.outputs[1])

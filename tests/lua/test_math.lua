@@ -58,7 +58,7 @@ return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing 
     local m = rapid.math
     p.v = m.curl_noise(p.P * 0.3, frame.time, 2) * m.smoothstep(0, 5, p.P:length())
     p.P = p.P * (1 + 0.01 * m.noise(p.P) * m.clamp(p.v.x, 0, 1) * m.fit(p.v.y, -1, 1, 0, 1))
-  end) :solve {}]], { frames = {1, 4}, threads = 1 })
+  end) :solve {}]], { frames = {1, 4}, threads = 1, watch_traces = true })
     assert.same({}, result.trace_aborts)
     assert.points(result[4]).finite()
   end)
@@ -90,7 +90,7 @@ describe("a run of a test", function()
     local result = scene.run([[
 return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing = 0.5 } }
   :points("k", function(p) local f = function() return 1 end p.P = p.P * f() end) :solve {}]],
-      { frames = {1, 3}, threads = 1 })
+      { frames = {1, 3}, threads = 1, watch_traces = true })
     assert.truthy(result.trace_aborts[1]:find("scene.lua:2: NYI: bytecode FNEW", 1, true), result.trace_aborts[1])
   end)
 end)

@@ -37,7 +37,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
     p.d = math.min(ball:distance(p.P), block:distance(p.P)) + floor:distance(p.P)
     p.P = p.P + ball:gradient(p.P) * 0.01
   end) :solve {}]]
-    local one = scene.run(text, { frames = {1, 5}, threads = 1 })
+    local one = scene.run(text, { frames = {1, 5}, threads = 1, watch_traces = true })
     assert.same({}, one.trace_aborts)
     for _, threads in ipairs { 2, 7 } do
       assert.same_points(one[5], scene.run(text, { frames = {1, 5}, threads = threads })[5])

@@ -2,13 +2,14 @@
 //
 // Big-endian throughout:
 //
-//   "Bgeo" 'V' | int32: 5, points, primitives 0, point groups 0, primitive groups 0, point attributes, 0, 0, 0
+//   "Bgeo" 'V' | int32: 5, points, primitives 0, point groups, primitive groups 0, point attributes, 0, 0, 0
 //   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 4 text, 5 vector), size defaults
 //   for each point: float x y z 1, then the attributes
+//   for each group: int16 length, name, int32 points, and a bit a point in int32 words, from the lowest bit on
 //   0x00 0xff: the (empty) extra section
 //
-// id and other int64 are int32; one that does not fit is refused. A group is an int attribute group_NAME, 0 or 1:
-// Partio has no groups, and drops those of the format. Houdini turns one into a group with "Group Expression".
+// id and other int64 are int32; one that does not fit is refused. Partio reads no groups. Those of a file that holds
+// primitives are not read: they lie behind them, and their number of bytes is known to Houdini alone.
 #include <fmt/format.h>
 
 #include <bit>
@@ -21,7 +22,11 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view group_prefix = "group_";
+// A first byte of 1, where the length of a group's name is expected, marks an ordered group.
+constexpr unsigned char ordered_mark = 1;
+constexpr std::size_t longest_group_name = 255;
+
+constexpr std::size_t words_of(std::size_t bits) { return (bits + 31) / 32; }
 
 enum HoudiniType : std::int32_t { FloatType = 0, IntType = 1, TextType = 2, IndexType = 4, VectorType = 5 };
 
@@ -79,6 +84,25 @@ std::vector<std::uint32_t> default_words(const AnyColumn& column)
         column);
 }
 
+// All groups, as the file has them.
+std::string group_section(const PointSet& points)
+{
+    BigEndianText section;
+    for (const auto& [name, column] : points.groups()) {
+        if (name.size() > longest_group_name)
+            throw Error(fmt::format("the group \"{}\" can't be written to .bgeo; its name must have at most {} bytes",
+                                    name, longest_group_name));
+        section.string(name);
+        section.int32(points.size());
+        std::vector<std::uint32_t> words(words_of(points.size()));
+        const Strided<std::uint8_t> members = column.read();
+        for (std::size_t i = 0; i < points.size(); ++i)
+            words[i / 32] |= static_cast<std::uint32_t>(members[i] != 0) << i % 32;
+        for (const std::uint32_t word : words) section.int32(word);
+    }
+    return section.text();
+}
+
 void write_bgeo(const std::filesystem::path& path, const PointSet& points, const FrameInfo&)
 {
     if (points.size() > 0x7fffffff)
@@ -87,15 +111,14 @@ void write_bgeo(const std::filesystem::path& path, const PointSet& points, const
     std::vector<std::string> names = further_attributes(points);
     names.insert(names.begin(), {"v", "id"});
 
-    std::vector<std::string> unique = names;
-    for (const auto& [name, members] : points.groups()) unique.push_back(std::string(group_prefix) + name);
-    check_column_names(unique, std::string_view("\0", 1));
+    check_column_names(names, std::string_view("\0", 1));
+    check_column_names(points.group_names(), std::string_view("\0", 1));
+    const std::string groups = group_section(points);
 
     BigEndianText header;
     header.bytes("BgeoV");
-    for (const std::size_t count :
-         {std::size_t{5}, points.size(), std::size_t{0}, std::size_t{0}, std::size_t{0},
-          names.size() + points.groups().size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
+    for (const std::size_t count : {std::size_t{5}, points.size(), std::size_t{0}, points.groups().size(),
+                                    std::size_t{0}, names.size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
         header.int32(count);
 
     RecordWriter records(ByteOrder::Big);
@@ -109,19 +132,12 @@ void write_bgeo(const std::filesystem::path& path, const PointSet& points, const
         header.int32(houdini_type(name, type_of(column)));
         for (const std::uint32_t word : default_words(column)) header.int32(word);
     }
-    for (const auto& [name, members] : points.groups()) {
-        records.add_group(members, ScalarType::Int32);
-        header.string(std::string(group_prefix) + name);
-        header.int16(1);
-        header.int32(IntType);
-        header.int32(0);
-    }
 
     OutputFile file(path);
     file.append(header.text().data(), header.text().size());
     records.write(file, file.appended(), points.size());
-    const unsigned char extra[] = {0x00, 0xff};
-    file.write_at(file.appended() + records.record_bytes() * points.size(), extra, sizeof extra);
+    const std::string end = groups + std::string("\x00\xff", 2);
+    file.write_at(file.appended() + records.record_bytes() * points.size(), end.data(), end.size());
     file.close();
 }
 
@@ -141,9 +157,10 @@ public:
         return value;
     }
     std::span<const unsigned char> rest() const { return bytes_; }
+    void enter(std::string_view section) { section_ = section; }
     std::span<const unsigned char> take(std::size_t size)
     {
-        if (size > bytes_.size()) throw Error("the file ends within its header");
+        if (size > bytes_.size()) throw Error(fmt::format("the file ends within its {}", section_));
         const auto taken = bytes_.first(size);
         bytes_ = bytes_.subspan(size);
         return taken;
@@ -151,35 +168,28 @@ public:
 
 private:
     std::span<const unsigned char> bytes_;
+    std::string_view section_ = "header";
 };
 
-PointSet read_bgeo(const std::filesystem::path& path)
-{
-    const InputFile file(path);
-    BigEndianReader reader(file.bytes());
-    if (file.bytes().size() >= 4 && std::memcmp(file.bytes().data(), "\x7fNSJ", 4) == 0)
-        throw Error("this is the newer bgeo, in JSON; Rapid reads the classic one (in Houdini: .bhclassic)");
-    if (file.bytes().size() < 5 || reader.string(5) != "BgeoV") throw Error("not a classic bgeo file");
-    const std::uint32_t version = reader.integer(4);
-    if (version != 5) throw Error(fmt::format("bgeo version {} can't be read; it must be 5", version));
-    const std::size_t n = reader.integer(4);
-    reader.take(3 * 4);  // primitives and the groups, which come after the points
-    const std::uint32_t count = reader.integer(4);
-    reader.take(3 * 4);  // attributes of vertices, primitives and the whole
+// What the dictionary of attributes says of a record that begins with `before` bytes of its own.
+struct Dictionary {
+    std::vector<RecordAttribute> attributes;
+    std::size_t stride;
+};
 
-    std::size_t stride = 16;
-    std::vector<RecordAttribute> attributes = {{"P", ScalarType::Float, {0, 4, 8}}};
+Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::size_t before)
+{
+    Dictionary dictionary{{}, before};
     for (std::uint32_t a = 0; a < count; ++a) {
         const std::string name = reader.string(reader.integer(2));
         const std::size_t size = reader.integer(2);
         const std::uint32_t type = reader.integer(4);
+        std::size_t& stride = dictionary.stride;
         if (type == FloatType || type == IntType || type == VectorType) {
             reader.take(4 * size);
-            RecordAttribute& attribute = attributes.emplace_back();
+            RecordAttribute& attribute = dictionary.attributes.emplace_back();
             attribute.name = name;
             attribute.type = type == IntType ? ScalarType::Int32 : ScalarType::Float;
-            attribute.group = type == IntType && size == 1 && name.starts_with(group_prefix);
-            if (attribute.group) attribute.name = name.substr(group_prefix.size());
             for (std::size_t c = 0; c < size; ++c) attribute.offsets.push_back(stride + 4 * c);
             stride += 4 * size;
         } else if (type == TextType) {
@@ -192,10 +202,62 @@ PointSet read_bgeo(const std::filesystem::path& path)
             throw Error(fmt::format("attribute \"{}\" has the unknown type {}", name, type));
         }
     }
-    if (n > reader.rest().size() / stride)
+    return dictionary;
+}
+
+void read_group(BigEndianReader& reader, PointSet& points)
+{
+    const bool ordered = !reader.rest().empty() && reader.rest().front() == ordered_mark;
+    if (ordered) reader.take(1);
+    const std::string name = reader.string(reader.integer(2));
+    const std::size_t size = reader.integer(4);
+    if (size != points.size())
+        throw Error(fmt::format("the group \"{}\" is one of {} points; the file has {}", name, size, points.size()));
+    BigEndianReader words(reader.take(4 * words_of(size)));
+    Column<std::uint8_t> column;
+    const std::span<std::uint8_t> members = column.append_for_writing(size);
+    std::uint32_t word = 0;
+    for (std::size_t i = 0; i < size; ++i, word >>= 1) {
+        if (i % 32 == 0) word = words.integer(4);
+        members[i] = word & 1;
+    }
+    points.group(name) = std::move(column);
+    if (!ordered) return;
+    // The members in their order; a negative one is followed by the number of a curve on it.
+    for (std::uint32_t left = reader.integer(4); left > 0; --left)
+        if (static_cast<std::int32_t>(reader.integer(4)) < 0) reader.take(4);
+}
+
+PointSet read_bgeo(const std::filesystem::path& path)
+{
+    const InputFile file(path);
+    BigEndianReader reader(file.bytes());
+    if (file.bytes().size() >= 4 && std::memcmp(file.bytes().data(), "\x7fNSJ", 4) == 0)
+        throw Error("this is the newer bgeo, in JSON; Rapid reads the classic one (in Houdini: .bhclassic)");
+    if (file.bytes().size() < 5 || reader.string(5) != "BgeoV") throw Error("not a classic bgeo file");
+    const std::uint32_t version = reader.integer(4);
+    if (version != 5) throw Error(fmt::format("bgeo version {} can't be read; it must be 5", version));
+    const std::size_t n = reader.integer(4);
+    const std::uint32_t primitives = reader.integer(4), groups = reader.integer(4);
+    reader.take(4);  // groups of primitives
+    const std::uint32_t attributes = reader.integer(4);
+    reader.take(2 * 4);  // attributes of vertices and primitives
+    const std::uint32_t of_the_whole = reader.integer(4);
+
+    constexpr std::size_t position_bytes = 16;
+    Dictionary dictionary = read_dictionary(reader, attributes, position_bytes);
+    dictionary.attributes.insert(dictionary.attributes.begin(), {"P", ScalarType::Float, {0, 4, 8}});
+    if (n > reader.rest().size() / dictionary.stride)
         throw Error(fmt::format("the file ends early: its header promises {} points, it holds {}", n,
-                                reader.rest().size() / stride));
-    return read_records(reader.rest(), n, stride, ByteOrder::Big, attributes);
+                                reader.rest().size() / dictionary.stride));
+    PointSet points =
+        read_records(reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big, dictionary.attributes);
+    if (primitives > 0) return points;
+    reader.enter("attributes of the whole");
+    if (of_the_whole > 0) reader.take(read_dictionary(reader, of_the_whole, 0).stride);
+    reader.enter("groups");
+    for (std::uint32_t g = 0; g < groups; ++g) read_group(reader, points);
+    return points;
 }
 
 RAPID_FORMAT(Format{".bgeo", "classic Houdini geometry, read by Houdini and Partio; id as int32", write_bgeo,

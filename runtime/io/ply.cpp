@@ -51,7 +51,7 @@ void write_ply(const std::filesystem::path& path, const PointSet& points, const 
     for (const char* name : {"P", "v", "id"}) add(name);
     for (const std::string& name : further_attributes(points)) add(name);
     for (const auto& [name, members] : points.groups()) {
-        records.add_group(members, ScalarType::UInt8);
+        records.add_group(members);
         names.push_back(std::string(group_prefix) + name);
         properties += fmt::format("property uchar {}\n", names.back());
     }

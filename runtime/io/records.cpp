@@ -47,13 +47,6 @@ void weave_narrowed(const unsigned char* from, std::size_t stride, unsigned char
     for (std::size_t i = 0; i < n; ++i, from += stride, to += record) store_word<swapped>(to, load_word(from));
 }
 
-template <bool swapped>
-void weave_byte_as_word(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record,
-                        std::size_t n)
-{
-    for (std::size_t i = 0; i < n; ++i, from += stride, to += record) store_word<swapped>(to, *from);
-}
-
 void check_fits_int32(const std::string& name, const Column<std::int64_t>& column)
 {
     const Strided<std::int64_t> values = column.read();
@@ -168,11 +161,10 @@ void RecordWriter::add(const std::string& name, const AnyColumn& column)
         column);
 }
 
-void RecordWriter::add_group(const Column<std::uint8_t>& members, ScalarType type)
+void RecordWriter::add_group(const Column<std::uint8_t>& members)
 {
-    RAPID_ASSERT(type == ScalarType::UInt8 || type == ScalarType::Int32);
     const Strided<std::uint8_t> values = members.read();
-    push(type == ScalarType::UInt8 ? Part::Byte : Part::ByteAsWord, values.data, values.stride, 1, scalar_bytes(type));
+    push(Part::Byte, values.data, values.stride, 1, 1);
 }
 
 void RecordWriter::add_constant(float value)
@@ -194,8 +186,6 @@ void RecordWriter::weave(const Part& part, std::size_t begin, std::size_t end, u
                 return weave_words<swapped, 4>(from, part.stride, to, record_bytes_, n);
             case Part::Narrowed:
                 return weave_narrowed<swapped>(from, part.stride, to, record_bytes_, n);
-            case Part::ByteAsWord:
-                return weave_byte_as_word<swapped>(from, part.stride, to, record_bytes_, n);
             case Part::Byte:
                 break;
         }

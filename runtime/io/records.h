@@ -25,8 +25,8 @@ public:
 
     // Floats and int32 as they are; int64 as int32. Error: one that does not fit, naming .vdb and .csv.
     void add(const std::string& name, const AnyColumn& column);
-    // Membership as a number of that type: UInt8 or Int32.
-    void add_group(const Column<std::uint8_t>& members, ScalarType type);
+    // Membership as a UInt8.
+    void add_group(const Column<std::uint8_t>& members);
     // The same number in every record.
     void add_constant(float value);
 
@@ -35,7 +35,7 @@ public:
 
 private:
     struct Part {
-        enum Kind { Words, Narrowed, Byte, ByteAsWord } kind;
+        enum Kind { Words, Narrowed, Byte } kind;
         const unsigned char* from;
         std::size_t stride;  // bytes from point to point; 0 where all share a value
         std::size_t words;

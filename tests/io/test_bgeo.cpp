@@ -49,7 +49,7 @@ TEST_CASE("a .bgeo has the header, attributes and big-endian records of version 
 
     const std::string text = file_text(folder / "a.bgeo");
     CHECK(text.substr(0, 5) == "BgeoV");
-    const std::vector<std::uint32_t> counts = {5, 2, 0, 0, 0, /*attributes*/ 4, 0, 0, 0};
+    const std::vector<std::uint32_t> counts = {5, 2, 0, /*groups*/ 1, 0, /*attributes*/ 3, 0, 0, 0};
     for (std::size_t i = 0; i < counts.size(); ++i) CHECK(big_endian(text, 5 + 4 * i, 4) == counts[i]);
 
     std::size_t at = 5 + 9 * 4;
@@ -65,16 +65,19 @@ TEST_CASE("a .bgeo has the header, attributes and big-endian records of version 
     attribute("v", 3, 5);
     attribute("id", 1, 1);
     attribute("Cd", 3, 0);
-    attribute("group_hot", 1, 1);
 
-    constexpr std::size_t record = 4 * (4 + 3 + 1 + 3 + 1);
-    REQUIRE(text.size() == at + 2 * record + 2);
+    constexpr std::size_t record = 4 * (4 + 3 + 1 + 3), group = 2 + 3 + 4 + 4;
+    REQUIRE(text.size() == at + 2 * record + group + 2);
     at += record;
     const float expected[] = {1, 2, 3, 1, 4, 5, 6};
     for (std::size_t i = 0; i < 7; ++i) CHECK(big_endian_float(text, at + 4 * i) == expected[i]);
     CHECK(big_endian(text, at + 28, 4) == 258);
-    CHECK(big_endian(text, at + 44, 4) == 1);
-    CHECK(text.substr(text.size() - 2) == std::string("\x00\xff", 2));
+    at += record;
+    CHECK(big_endian(text, at, 2) == 3);
+    CHECK(text.substr(at + 2, 3) == "hot");
+    CHECK(big_endian(text, at + 5, 4) == 2);
+    CHECK(big_endian(text, at + 9, 4) == 0b10);  // the second point
+    CHECK(text.substr(at + group) == std::string("\x00\xff", 2));
 }
 
 TEST_CASE("a .bgeo of another program is read: text is left out, odd sizes become single numbers", "[io][bgeo]")
@@ -114,6 +117,56 @@ TEST_CASE("a .bgeo of another program is read: text is left out, odd sizes becom
     CHECK(points.id()[0] == 0);
 }
 
+TEST_CASE("groups of a .bgeo are read behind attributes of the whole, in words of 32, ordered or not", "[io][bgeo]")
+{
+    const TemporaryFolder folder;
+    std::string text = "BgeoV";
+    const auto put = [&](std::uint32_t value, int size) {
+        for (int shift = 8 * (size - 1); shift >= 0; shift -= 8) text += static_cast<char>(value >> shift & 0xff);
+    };
+    const auto name = [&](const std::string& s) {
+        put(static_cast<std::uint32_t>(s.size()), 2);
+        text += s;
+    };
+    for (const std::uint32_t count : {5, 34, 0, 2, 0, 0, 0, 0, 1}) put(count, 4);
+    for (int i = 0; i < 34; ++i)
+        for (const float number : {float(i), 0.0f, 0.0f, 1.0f}) put(std::bit_cast<std::uint32_t>(number), 4);
+    name("scale");  // of the whole: its declaration, then its value
+    put(1, 2);
+    put(0, 4);
+    put(0, 4);
+    put(std::bit_cast<std::uint32_t>(2.0f), 4);
+    put(1, 1);
+    name("chosen");
+    put(34, 4);
+    put(1u << 31, 4);
+    put(1u << 1, 4);
+    put(2, 4);  // two of them, in this order; the second on a curve
+    put(33, 4);
+    put(static_cast<std::uint32_t>(-31 - 1), 4);
+    put(0, 4);
+    name("none");
+    for (const std::uint32_t word : {34, 0, 0}) put(word, 4);
+    put(0x00ff, 2);
+    const auto read = [&](const std::string& bytes) {
+        std::ofstream(folder / "a.bgeo", std::ios::binary) << bytes;
+        return read_points(folder / "a.bgeo");
+    };
+
+    const PointSet points = read(text);
+
+    CHECK(points.group_names() == std::vector<std::string>{"chosen", "none"});
+    for (std::size_t i = 0; i < 34; ++i) {
+        CHECK(points.find_group("chosen")->read()[i] == (i == 31 || i == 33));
+        CHECK(points.find_group("none")->read()[i] == 0);
+    }
+    CHECK_THAT(error_of([&] { read(text.substr(0, text.size() - 3)); }),
+               Catch::EndsWith("the file ends within its groups"));
+    text[text.size() - 11] = 33;
+    CHECK_THAT(error_of([&] { read(text); }),
+               Catch::EndsWith("the group \"none\" is one of 33 points; the file has 34"));
+}
+
 TEST_CASE("a .bgeo that is cut off, newer or something else is an error that says so", "[io][bgeo]")
 {
     const TemporaryFolder folder;
@@ -123,7 +176,9 @@ TEST_CASE("a .bgeo that is cut off, newer or something else is an error that say
         std::ofstream(folder / "b.bgeo", std::ios::binary) << text;
         return error_of([&] { read_points(folder / "b.bgeo"); });
     };
-    CHECK_THAT(error(whole.substr(0, whole.size() - 20)),
+    // The groups all, hot and nobody: a length, the name, a count and a word each.
+    constexpr std::size_t behind_points = 3 * (2 + 4 + 4) + 3 + 3 + 6 + 2;
+    CHECK_THAT(error(whole.substr(0, whole.size() - behind_points - 20)),
                Catch::EndsWith("the file ends early: its header promises 3 points, it holds 2"));
     CHECK_THAT(error(whole.substr(0, 60)), Catch::EndsWith("the file ends within its header"));
     CHECK_THAT(error("\x7fNSJb..."), Catch::EndsWith("Rapid reads the classic one (in Houdini: .bhclassic)"));

@@ -2,7 +2,7 @@
 //
 // Attributes keep their names and become OpenVDB's float, vec3s, int32, int64 and quats, uncompressed in memory and
 // packed with Blosc in the file; a value that all points share is a uniform array in every leaf; groups are OpenVDB
-// point groups.
+// point groups. A set without points is one empty leaf, which knows the attributes and groups.
 //
 // Positions are exact. OpenVDB holds a position as an offset from its voxel's centre; with a voxel size that is a power
 // of two and no translation, both the division and the offset are exact in float (the offset has no more bits than the
@@ -181,6 +181,14 @@ void check_names(const PointSet& points)
     for (const auto& [name, members] : points.groups()) check(name, "group");
 }
 
+// A leaf without points, as OpenVDB leaves one whose points were all removed: it knows the attributes.
+void add_empty_leaf(PointDataTree& tree)
+{
+    using Position = vdb::points::TypedAttributeArray<vdb::Vec3f>;
+    tree.touchLeaf(vdb::Coord(0))
+        ->initializeAttributes(vdb::points::AttributeSet::Descriptor::create(Position::attributeType()), 0);
+}
+
 PointDataGrid::Ptr make_grid(const PointSet& points)
 {
     check_names(points);
@@ -192,7 +200,7 @@ PointDataGrid::Ptr make_grid(const PointSet& points)
         vdb::points::createPointDataGrid<vdb::points::NullCodec, PointDataGrid>(*indices, positions, *transform);
     PointDataTree& tree = grid->tree();
     grid->setName("points");
-    if (points.empty()) return grid;
+    if (points.empty()) add_empty_leaf(tree);
 
     for (const auto& [name, column] : points.columns()) {
         if (name == "P") continue;
@@ -204,6 +212,7 @@ PointDataGrid::Ptr make_grid(const PointSet& points)
             column);
     }
     vdb::points::appendGroups(tree, points.group_names());
+    if (points.empty()) return grid;
 
     const auto& descriptor = tree.cbeginLeaf()->attributeSet().descriptor();
     LeafManager leaves(tree);
@@ -403,6 +412,7 @@ void read_attribute(PointSet& points, const std::vector<LeafPlace>& places, cons
                     const std::string& column_name, vdb::Index component)
 {
     Column<T>& column = column_for<T>(points, column_name);
+    if (places.empty()) return;
     const auto handle = [&](const Leaf& leaf) {
         return vdb::points::AttributeHandle<Value>(leaf.constAttributeArray(name));
     };
@@ -453,14 +463,16 @@ const std::map<std::string, ReadAttribute>& readers()
 void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, bool& has_id)
 {
     const std::vector<LeafPlace> places = leaf_places(grid, first);
-    if (places.empty()) return;
-    const auto& descriptor = places[0].leaf->attributeSet().descriptor();
+    const auto any = grid.tree().cbeginLeaf();
+    if (!any) return;
+    const Leaf& leaf = places.empty() ? *any : *places[0].leaf;
+    const auto& descriptor = leaf.attributeSet().descriptor();
     if (descriptor.find("P") == vdb::points::AttributeSet::INVALID_POS)
         throw Error(fmt::format("the points of the grid \"{}\" have no P", grid.getName()));
-    read_positions(grid, places, points.P().write());
+    if (!places.empty()) read_positions(grid, places, points.P().write());
 
     for (const auto& [name, position] : descriptor.map()) {
-        const AttributeArray& array = places[0].leaf->constAttributeArray(position);
+        const AttributeArray& array = leaf.constAttributeArray(position);
         if (name == "P" || vdb::points::isGroup(array)) continue;
         const std::string type = descriptor.valueType(position);
         if (name == "id" && array.stride() == 1 && (type == "int32" || type == "int64")) {
@@ -476,10 +488,12 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
                            component);
     }
     for (const auto& [name, offset] : descriptor.groupMap()) {
-        std::span<std::uint8_t> members = points.group(name).write();
-        for_each_leaf(places, [&, group = name](const Leaf& leaf, std::size_t at) {
-            const auto handle = leaf.groupHandle(group);
-            for (vdb::Index k = 0; k < leaf.getLastValue(); ++k) members[at + k] = handle.get(k);
+        Column<std::uint8_t>& column = points.group(name);
+        if (places.empty()) continue;
+        std::span<std::uint8_t> members = column.write();
+        for_each_leaf(places, [&, group = name](const Leaf& part, std::size_t at) {
+            const auto handle = part.groupHandle(group);
+            for (vdb::Index k = 0; k < part.getLastValue(); ++k) members[at + k] = handle.get(k);
         });
     }
 }
@@ -515,11 +529,10 @@ PointSet read_vdb(const std::filesystem::path& path)
             read_grid(*grid, first, points, has_id);
             for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) first += leaf->getLastValue();
         }
+        if (count == 0) return points;
         if (has_id) return reordered(points, id_order(points.id()));
-        if (count > 0) {
-            std::span<std::int64_t> ids = points.id().overwrite();
-            std::iota(ids.begin(), ids.end(), std::int64_t{0});
-        }
+        std::span<std::int64_t> ids = points.id().overwrite();
+        std::iota(ids.begin(), ids.end(), std::int64_t{0});
         return points;
     } catch (const vdb::Exception& error) {
         throw Error(fmt::format("can't be read: {}", error.what()));

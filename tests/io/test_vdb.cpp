@@ -66,7 +66,23 @@ TEST_CASE("all points in one place, and no points at all, are written to .vdb an
     CHECK(differing_columns(heap, read_points(folder / "origin.vdb")) == "");
 
     write_points(folder / "none.vdb", PointSet());
-    CHECK(read_points(folder / "none.vdb").empty());
+    CHECK(differing_columns(PointSet(), read_points(folder / "none.vdb")) == "");
+}
+
+TEST_CASE("a .vdb without points keeps its attributes and groups, for OpenVDB too", "[io][vdb][extreme]")
+{
+    const TemporaryFolder folder;
+    const PointSet points = random_points({.size = 0});
+    REQUIRE(points.has("orient"));
+    write_points(folder / "none.vdb", points);
+    CHECK(differing_columns(points, read_points(folder / "none.vdb")) == "");
+
+    const auto grid = read_grid(folder / "none.vdb", "points");
+    CHECK(openvdb::points::pointCount(grid->tree()) == 0);
+    CHECK(grid->activeVoxelCount() == 0);
+    const auto& descriptor = grid->tree().cbeginLeaf()->attributeSet().descriptor();
+    CHECK(descriptor.valueType(descriptor.find("orient")) == "quats");
+    CHECK(descriptor.groupMap().count("hot") == 1);
 }
 
 TEST_CASE("OpenVDB itself finds the attributes, groups and places that were written", "[io][vdb]")

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "runtime/graph/node.h"
+#include "runtime/operators/aging.h"
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set.h"
 
@@ -79,6 +80,7 @@ private:
     {
         auto* ages = points.find<float>("age");
         if (!ages || points.empty()) return;
+        const Aging aging(now.frame.dt);
         const float h = static_cast<float>(now.frame.dt);
         const Column<float>* own = points.find<float>("dt");
         const Strided<float> dt = own ? own->read() : Strided<float>{&h, 0};
@@ -97,7 +99,7 @@ private:
         const std::span<float> age = ages->write();
         for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
-                if (members[i]) age[i] += dt[i];
+                if (members[i]) age[i] = dt[i] == h ? aging.after_frame(age[i]) : age[i] + dt[i];
                 keep[i] = age[i] < life[i];
             }
         });

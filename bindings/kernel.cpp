@@ -8,6 +8,7 @@
 #include <lua.hpp>
 #include <optional>
 
+#include "bindings/detail.h"
 #include "bindings/script_host.h"
 #include "bindings/state.h"
 #include "runtime/parallel.h"
@@ -94,7 +95,8 @@ void Kernel::analyse()
     lua_State* L = state.lua();
     state.push_entry("analyse");
     state.push_kernel(number);
-    state.call(1, 1);
+    lua_pushboolean(L, !of_the_set);
+    state.call(2, 1);
     reads_ = keys_of(L, "reads");
     writes_ = keys_of(L, "writes");
     may_ = keys_of(L, "may");
@@ -329,12 +331,14 @@ void Kernel::run_chunk(const Pass& pass, rapid_chunk& chunk) const
     lua_rawgeti(L, runner, 4);
     const bool has_values = lua_tonumber(L, -1) == static_cast<double>(pass.serial);
     lua_pop(L, 1);
-    if (!has_values && !pass.values.empty()) {
+    if (!has_values && (!pass.values.empty() || may_.count("detail"))) {
         lua_rawgeti(L, runner, 3);
-        Table table;
+        Table table, details;
         table.named = pass.values;
+        for (const auto& [name, value] : pass.points.details) details.named[name] = value_of(value);
         state.push(Value(std::make_shared<const Table>(std::move(table))));
-        state.call(1, 0);
+        state.push(Value(std::make_shared<const Table>(std::move(details))));
+        state.call(2, 0);
         lua_pushnumber(L, static_cast<double>(pass.serial));
         lua_rawseti(L, runner, 4);
     }

@@ -25,10 +25,14 @@ struct KernelArguments {
 
 class Kernel : public PointFunction {
 public:
-    Kernel(ScriptHost& script_host, std::size_t number_, Location location_)
-        : number(number_), location(std::move(location_)), host_(script_host)
+    // of_the_set: its first parameter is all points, not one (:detail).
+    Kernel(ScriptHost& script_host, std::size_t number_, Location location_, bool of_the_set_)
+        : number(number_), location(std::move(location_)), of_the_set(of_the_set_), host_(script_host)
     {
     }
+
+    // The type of a parameter that takes a function of all points.
+    static constexpr std::string_view set_function_type = "function of the points";
 
     void uses(Uses& uses) const override;
     void test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const override;
@@ -39,11 +43,14 @@ public:
     // What it does inside Solve, at every sub-step, on the points of `group`.
     DynamicPtr action(const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
 
+    ScriptHost& host() const { return host_; }
+
     // The names that it uses as an action, where `force` is that of the sub-step and no attribute.
     void uses_in_action(Uses& uses) const;
 
-    const std::size_t number;         // in each state
-    const Location location;          // of the function
+    const std::size_t number;  // in each state
+    const Location location;   // of the function
+    const bool of_the_set;
     std::string fingerprint;          // of its bytecode, the same in each state
     bool may_compute_groups = false;  // it belongs to a node whose parameters name groups
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <lua.hpp>
 
+#include "bindings/detail.h"
 #include "bindings/maker.h"
 #include "bindings/script_host.h"
 #include "bindings/script_node.h"
@@ -218,7 +219,8 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
     for (const Param& param : type.params) {
-        if (param.type != PointFunction::param_type) continue;
+        const bool of_the_set = param.type == Kernel::set_function_type;
+        if (!of_the_set && param.type != PointFunction::param_type) continue;
         if (param.internal)
             push_script_of(state, type.name);
         else
@@ -233,7 +235,7 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
         const Location location{info.source[0] == '@' ? info.source + 1 : "", info.linedefined};
         const std::size_t number = state.add_kernel();
         if (state.is_main()) {
-            host.kernels.push_back(std::make_shared<Kernel>(host, number, location));
+            host.kernels.push_back(std::make_shared<Kernel>(host, number, location, of_the_set));
             host.kernels.back()->may_compute_groups = param.internal && names_groups(type);
             kernels[param.name] = host.kernels.back();
         } else if (number >= host.kernels.size()) {
@@ -442,6 +444,8 @@ void push_natives(State& state, const std::string& chunk_header)
     }
     lua_pushboolean(L, !state.is_main());
     lua_setfield(L, -2, "is_worker");
+    push_detail_natives(state);
+    lua_setfield(L, -2, "detail");
     lua_pushlstring(L, chunk_header.data(), chunk_header.size());
     lua_setfield(L, -2, "chunk_header");
     const auto push_pointer = [L](const char* name, auto* function) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <lua.hpp>
 
+#include "bindings/detail.h"
 #include "bindings/ramp.h"
 #include "bindings/script_host.h"
 #include "runtime/graph/registry.h"
@@ -53,6 +54,28 @@ struct ScriptAction {
 };
 RAPID_NODE(ScriptAction);
 
+// detail: a function over the whole set, once a frame.
+struct Detail {
+    std::shared_ptr<const Kernel> kernel;
+
+    static NodeType declare()
+    {
+        return node<Detail>("detail", "Runs a Lua function over the whole set of points, once.")
+            .param(&Detail::kernel, "kernel", Value(), any_number(), "", "function(points, frame)")
+            .of_type(std::string(Kernel::set_function_type))
+            .required()
+            .constant()
+            .varies();
+    }
+    void uses(Uses& uses) const { kernel->uses(uses); }
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        run_detail(*kernel, inputs[0], now, {});
+        return std::move(inputs[0]);
+    }
+};
+RAPID_NODE(Detail);
+
 // A node type that rapid.node defines: its parameters' values by name, its kernel, and the attributes that it makes.
 class ScriptOperator : public Operator {
 public:
@@ -69,7 +92,9 @@ public:
     {
         // Points that come from elsewhere, and those behind Solve, may not have them yet.
         for (const AttributeSpec& spec : makes_) inputs[0].points.add(spec);
-        if (kind_ == NodeKind::Dynamic)
+        if (fields_.kernel->of_the_set)
+            run_detail(*fields_.kernel, inputs[0], now, fields_.arguments);
+        else if (kind_ == NodeKind::Dynamic)
             inputs[0].dynamics.push_back(fields_.kernel->action(fields_.group, now, fields_.arguments));
         else
             fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.arguments);
@@ -102,7 +127,7 @@ constexpr std::string_view group_type = "name of a group", attribute_type = "nam
 KernelArguments& arguments_of(void* fields) { return static_cast<ScriptOperator::Fields*>(fields)->arguments; }
 
 // The functions that a definition may have; it has one of them.
-constexpr std::string_view roles[] = {"points", "action", "expand"};
+constexpr std::string_view roles[] = {"points", "action", "detail", "expand"};
 
 template <class T>
 void keep_as(const Param& param, void* fields, const Value& value)
@@ -262,8 +287,8 @@ NodeType read_type(const Table& definition, std::string_view role)
             throw Error(fmt::format("{}: unknown field \"{}\"{}", what, field, did_you_mean(field, known)));
     if (role.empty())
         throw Error(what +
-                    ": give it one of points = function(p, frame, params), action = function(p, step, params) "
-                    "and expand = function(input, params)");
+                    ": give it one of points = function(p, frame, params), action = function(p, step, params), "
+                    "detail = function(points, frame, params) and expand = function(input, params)");
     type.varies = true;
     if (role == "action") type.kind = NodeKind::Dynamic;
     if (const Value* params = find(definition, "params")) {
@@ -271,7 +296,7 @@ NodeType read_type(const Table& definition, std::string_view role)
         if (!table || !table->list.empty()) throw Error(what + ": params is a table of declarations by name");
         for (const auto& [name, declared] : table->named) type.params.push_back(read_param(name, declared, type.name));
     }
-    if (role != "expand") {
+    if (role == "points" || role == "action") {
         Param group;
         group.name = "group";
         group.type = "string";
@@ -281,9 +306,11 @@ NodeType read_type(const Table& definition, std::string_view role)
             read_value(self, value, static_cast<ScriptOperator::Fields*>(fields)->group);
         };
         type.params.push_back(group);
+    }
+    if (role != "expand") {
         Param kernel;
         kernel.name = "kernel";
-        kernel.type = PointFunction::param_type;
+        kernel.type = role == "detail" ? Kernel::set_function_type : PointFunction::param_type;
         kernel.doc = "the node's function";
         kernel.internal = true;
         kernel.of_the_frame = false;
@@ -293,7 +320,7 @@ NodeType read_type(const Table& definition, std::string_view role)
         type.params.push_back(kernel);
     }
     if (const Value* makes = find(definition, "makes")) {
-        if (role == "expand") throw Error(what + ": makes belongs to points and action");
+        if (role == "expand") throw Error(what + ": makes belongs to points, action and detail");
         Param param;
         param.name = "makes";
         std::map<std::string, AttributeValue> attributes;

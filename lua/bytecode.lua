@@ -248,13 +248,13 @@ function analyse_function(f, found, is_kernel, outer)
   end
 end
 
--- env: the environment in which the kernel's globals live.
-local function analyse(kernel, env)
+-- env: the environment in which the kernel's globals live; of_a_point: its first parameter is one.
+local function analyse(kernel, env, of_a_point)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, seen = {},
     env = env,
   }
-  analyse_function(kernel, found, true)
+  analyse_function(kernel, found, of_a_point)
   found.seen, found.env = nil, nil
   return found
 end

@@ -5,6 +5,7 @@
 local native = ...
 
 local bytecode = require "bytecode"
+local detail = require "detail"
 local kernel = require "kernel"
 local sandbox = require "sandbox"
 local language = require "rapid"
@@ -46,6 +47,8 @@ local rapid = language.make(native, load_node, numeric.make(native.noise, native
 loaded.rapid = rapid
 env.vec3, env.quat = vector.make, vector.make_quat
 
+local run_detail = detail.make(native.detail, engine.rand)
+
 local entry = {}
 
 -- Runs the graph and returns what it returned: a node, or a table of nodes by name.
@@ -66,14 +69,20 @@ function entry.load_node(name)
   return load_node(name) ~= nil
 end
 
-function entry.analyse(f)
-  return bytecode.analyse(f, env)
+function entry.analyse(f, of_a_point)
+  return bytecode.analyse(f, env, of_a_point)
 end
 
 entry.fingerprint = bytecode.fingerprint
 
 function entry.runner(f, layout)
   return engine.runner(f, layout)
+end
+
+-- A :detail function; random: points to the key of the node's random numbers.
+function entry.detail(f, number, time, dt, params, size, random, details)
+  local key = ffi.cast("const uint64_t*", random)[0]
+  return run_detail(f, engine.frame(number, time, dt, details), params, size, key, details)
 end
 
 -- Tells the host of each trace that the compiler gives up.

@@ -93,14 +93,14 @@ local function missing(name, getters)
 end
 
 local text_head = [[
-local ffi, vec3, quat, kernel, frame_type, rand, adopt, refuse, layout = ...
+local ffi, vec3, quat, kernel, frame_type, rand, adopt, shown, refuse, layout = ...
 local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
 local MAX = 3.4028234663852886e38
 local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that setting it spoils no other load
 cursor.i = -1
-local first, frame, random, params = 0, nil, 0, nil
+local first, frame, random, params, details = 0, nil, 0, nil, {}
 local kill, result, members, substep, times, steps, step
 local getters, setters, methods = {}, {}, {}
 local id_column, id_stride
@@ -166,6 +166,7 @@ local step_getters = {
   time = function(...) return times[cursor.i] end,
   dt = function(...) return steps[cursor.i] end,
   index = function(...) return substep end,
+  detail = function(...) return shown.view end,
 }
 step = newproxy(true)
 local step_view = getmetatable(step)
@@ -257,6 +258,7 @@ local function begin(...)
   local chunk = ...
   first, random = tonumber(chunk.first), chunk.random
   frame = frame_type(chunk.number, chunk.time, chunk.dt)
+  shown.details = details
   kill, result, members = chunk.kill, chunk.result, chunk.members
   substep, times, steps = chunk.substep, chunk.times, chunk.steps]]
   text[#text + 1] = table.concat(setup, "\n") .. "\nend\n"
@@ -277,7 +279,8 @@ local function at()
   cursor.i = -1
   return place < 0 and -1 or first + place
 end
-local function set_params(values)
+local function set_params(values, detail_values)
+  details = detail_values
   for _, value in next, values do
     if type(value) == "userdata" then adopt(value) end
   end
@@ -311,30 +314,56 @@ return run, at, set_params
       :format(what, describe(name), what), 0)
   end
   function refuse.step(name)
-    error(("the step has no %q; it has time, dt and index"):format(tostring(name)), 0)
+    error(("the step has no %q; it has time, dt, index and detail"):format(tostring(name)), 0)
   end
   function refuse.use(wanted, value)
     error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)
   end
   local chunk = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
-  return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, pointers.adopt, refuse, layout)
+  return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, pointers.adopt, pointers.shown, refuse,
+    layout)
 end
 
 jit.off(make_runner, true) -- once a kernel
 
 -- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua).
 local function prepare(rand, adopt)
+  -- The detail values that frame.detail and step.detail show: those of the pass that runs.
+  local shown = { details = {} }
+  shown.view = setmetatable({}, {
+    __index = function(_, name)
+      local value = shown.details[name]
+      if value == nil then
+        local names = sorted_names(shown.details)
+        error(("no detail value %q; %s"):format(tostring(name), #names > 0 and "there are " .. table.concat(names, ", ")
+          or "a :detail node sets one: points.detail." .. tostring(name) .. " = 0"), 0)
+      end
+      return value
+    end,
+    __newindex = function(_, name)
+      error(("detail.%s can't be assigned in a kernel; points.detail.%s can, in :detail")
+        :format(tostring(name), tostring(name)), 0)
+    end,
+    __metatable = false,
+  })
+
   local frame_type = ffi.typeof "struct { const double number, time, dt; }"
   ffi.metatype(frame_type, {
     __tostring = function(frame) return ("frame %g"):format(frame.number) end,
-    __index = function(_, name)
-      error(("the frame has no %q; it has number, time and dt"):format(tostring(name)), 2)
+    __index = function(...)
+      local _, name = ...
+      if name == "detail" then return shown.view end
+      error(("the frame has no %q; it has number, time, dt and detail"):format(tostring(name)), 2)
     end,
   })
-  local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand), adopt = adopt }
+  local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown }
   return {
-    frame = function(number, time, dt) return frame_type(number, time, dt) end,
+    frame = function(number, time, dt, details)
+      shown.details = details or {}
+      return frame_type(number, time, dt)
+    end,
     runner = function(kernel, layout) return make_runner(kernel, layout, pointers) end,
+    rand = pointers.rand,
   }
 end
 

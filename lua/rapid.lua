@@ -101,7 +101,7 @@ local function make(native, load_node, numeric, shapes)
     end
   end
 
-  local sugar = { points = named_kernel "points", action = named_kernel "action" }
+  local sugar = { points = named_kernel "points", action = named_kernel "action", detail = named_kernel "detail" }
 
   function sugar.merge(input, ...)
     local inputs, options = { input }, {}

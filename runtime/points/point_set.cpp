@@ -194,6 +194,20 @@ void PointSet::keep(std::span<const std::uint8_t> mask)
     size_ = compaction.kept;
 }
 
+void PointSet::reorder(std::span<const std::uint32_t> order)
+{
+    RAPID_ASSERT(order.size() == size_);
+    const auto reordered = [&](auto& column) {
+        if (column.is_uniform()) return;
+        const auto before = column;  // shares its values, which the writing below then leaves alone
+        const auto from = before.read();
+        const auto to = column.overwrite();
+        for (std::size_t i = 0; i < order.size(); ++i) to[i] = from[order[i]];
+    };
+    for (auto& [name, column] : columns_) std::visit(reordered, column);
+    for (auto& [name, members] : groups_) reordered(members);
+}
+
 std::size_t PointSet::bytes() const
 {
     std::size_t total = 0;

@@ -38,6 +38,9 @@ struct AttributeSpec {
 const AttributeSpec* known_attribute(std::string_view name);
 const std::vector<AttributeSpec>& known_attributes();
 
+// One value for the whole set.
+using DetailValue = std::variant<double, Vec3d>;
+
 class PointSet {
 public:
     PointSet();
@@ -114,8 +117,13 @@ public:
     // Removes the points whose mask is 0, shape [size]; the others keep their order. Columns are compacted in parallel.
     void keep(std::span<const std::uint8_t> mask);
 
+    // Puts point order[i] into place i: order is a permutation, shape [size].
+    void reorder(std::span<const std::uint32_t> order);
+
     // Bytes of all columns and groups.
     std::size_t bytes() const;
+
+    std::map<std::string, DetailValue, std::less<>> details;
 
 private:
     [[noreturn]] void no_column(std::string_view name, const AnyColumn& wanted) const;

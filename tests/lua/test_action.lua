@@ -155,8 +155,8 @@ end) :solve {}]], { frames = {1, 2} })
       ["p.v = 1"] = 'attribute "v" takes a vec3, not 1',
       ["p.v = p.v / 0"] = "v became vec3(nan, nan, nan); a float is finite, within 3.4e38 either way",
       ["error 'no'"] = "no",
-      ["local x = step.number"] = 'the step has no "number"; it has time, dt and index',
-      ["local t = step.nothing.x"] = 'the step has no "nothing"; it has time, dt and index',
+      ["local x = step.number"] = 'the step has no "number"; it has time, dt, index and detail',
+      ["local t = step.nothing.x"] = 'the step has no "nothing"; it has time, dt, index and detail',
     } do
       assert.equal('scene.lua:2: node "push": ' .. expected .. " (point id 0, frame 2)", message(body), body)
     end

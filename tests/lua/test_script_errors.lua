@@ -19,7 +19,7 @@ describe("an error in a kernel", function()
       ["local x = p.v.x .. {}"] = "attempt to concatenate a table value",
       ["local x = ('x'):rep(3) + 1"] = "attempt to perform arithmetic on a string value",
       ["wnid(p)"] = "attempt to call global 'wnid' (a nil value)",
-      ["local x = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time and dt',
+      ["local x = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time, dt and detail',
       ["local x = p:rand()"] = "p:rand takes a number, which of the point's random numbers, not nil",
       ["local x = p:rand(1, 'frame')"] = 'p:rand takes the frame, or a number, behind the comma, not "frame"',
     } do

@@ -190,7 +190,8 @@ return rapid.node { name = "%s", doc = "Rises.", points = function(p) p.P = p.P 
     local before = 'local rapid = require "rapid"\n'
     local points = "points = function(p) end"
     local roles = 'rapid.node "odd": give it one of points = function(p, frame, params), ' ..
-      "action = function(p, step, params) and expand = function(input, params)"
+      "action = function(p, step, params), detail = function(points, frame, params) and expand = " ..
+      "function(input, params)"
     for definition, expected in pairs {
       ["5"] = "rapid.node takes a table",
       ["{ doc = 'x', " .. points .. " }"] = "rapid.node: the name is missing",

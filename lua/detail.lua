@@ -1,0 +1,295 @@
+-- What a :detail function sees: the whole set of points, in one state, in order.
+--
+--   #points, points[i].P, points[i].heat = 1, points[i]:join "hot", :leave, :within, :kill(), :rand(k)
+--   points:add { P = vec3(0, 1, 0), heat = 3 }      appended when the function ends
+--   points:kill(i)                                  removed when the function ends
+--   points:neighbours(i, radius)                    places of the points within the radius, in order, without i
+--   points:sum "heat", :mean, :min, :max, :bounds() two corners
+--   points:sort "heat", points:sort(function(p) return p.P.y end)
+--   points.detail.total = 3                         a value that kernels read as frame.detail.total
+--
+-- A column's memory is asked of the host when it is first read, and again when it is first written: until then other
+-- sets may share it.
+local ffi = require "ffi"
+local vector = require "vec3"
+
+local vec3, quat, istype = vector.type, vector.quat, ffi.istype
+local floor, huge = math.floor, math.huge
+local MAX = 3.4028234663852886e38
+
+local function describe(value)
+  if type(value) == "string" then return ("%q"):format(value) end
+  if type(value) == "number" or type(value) == "cdata" or type(value) == "boolean" then return tostring(value) end
+  return value == nil and "nil" or "a " .. type(value)
+end
+
+local function wrong_type(name, wanted, value)
+  error(("attribute %q takes %s, not %s"):format(name, wanted, describe(value)), 0)
+end
+
+local function within_float(x)
+  return x >= -MAX and x <= MAX
+end
+
+local function check_whole(limit)
+  return function(name, x)
+    if type(x) ~= "number" then wrong_type(name, "a whole number", x) end
+    if not (x >= -limit and x <= limit and floor(x) == x) then
+      error(("attribute %q takes a whole number, not %s"):format(name, describe(x)), 0)
+    end
+  end
+end
+
+local function not_finite(name, x)
+  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe(x)), 0)
+end
+
+local function load_number(data, k) return tonumber(data[k]) end
+local function store_number(data, k, x) data[k] = x end
+
+-- By type: the pointer, how a value is checked, and how it is read and written at k scalars from the first.
+local types = {
+  float = {
+    pointer = "float*", scalars = 1, load = load_number, store = store_number,
+    check = function(name, x)
+      if type(x) ~= "number" then wrong_type(name, "a number", x) end
+      if not within_float(x) then not_finite(name, x) end
+    end,
+  },
+  int32 = {
+    pointer = "int32_t*", scalars = 1, load = load_number, store = store_number, check = check_whole(2147483647),
+  },
+  int64 = {
+    pointer = "int64_t*", scalars = 1, load = load_number, store = store_number,
+    check = check_whole(9007199254740992),
+  },
+  vec3 = {
+    pointer = "float*", scalars = 3,
+    load = function(data, k) return vec3(data[k], data[k + 1], data[k + 2]) end,
+    store = function(data, k, x) data[k], data[k + 1], data[k + 2] = x.x, x.y, x.z end,
+    check = function(name, x)
+      if not istype(vec3, x) then wrong_type(name, "a vec3", x) end
+      if not (within_float(x.x) and within_float(x.y) and within_float(x.z)) then not_finite(name, x) end
+    end,
+  },
+  quat = {
+    pointer = "float*", scalars = 4,
+    load = function(data, k) return quat(data[k], data[k + 1], data[k + 2], data[k + 3]) end,
+    store = function(data, k, x) data[k], data[k + 1], data[k + 2], data[k + 3] = x.x, x.y, x.z, x.w end,
+    check = function(name, x)
+      if not istype(quat, x) then wrong_type(name, "a quat", x) end
+      if not (within_float(x.x) and within_float(x.y) and within_float(x.z) and within_float(x.w)) then
+        not_finite(name, x)
+      end
+    end,
+  },
+}
+
+local read_only = { id = true, dt = true, index = true }
+
+-- native: the host's functions, all about the set that the function runs on; rand: as kernels draw.
+-- Returns run(f, frame, params, size, random, details): the places (from 0) of the killed, those added, and details.
+local function make(native, rand)
+  local function run(f, frame, params, size, random, details)
+    local columns, groups, killed, added = {}, {}, {}, {}
+
+    local function column_of(name, writable)
+      local column = columns[name]
+      if column and (column.writable or not writable) then return column end
+      local data, stride, kind = native.column(name, writable) -- says which attributes there are
+      local about = types[kind]
+      column = {
+        data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
+        load = about.load, store = about.store, check = about.check, kind = kind,
+      }
+      columns[name] = column
+      return column
+    end
+    local function group_of(name, writable)
+      if type(name) ~= "string" then error(("a group has a name, not %s"):format(describe(name)), 0) end
+      local group = groups[name]
+      if group and (group.writable or not writable) then return group end
+      local data, stride = native.group(name, writable)
+      if not data then return nil end -- nobody is in it yet
+      group = { data = ffi.cast("uint8_t*", data), stride = stride, writable = writable }
+      groups[name] = group
+      return group
+    end
+
+    local function load(name, i)
+      if name == "dt" and not native.has "dt" then return frame.dt end -- nobody is newborn
+      local column = column_of(name, false)
+      return column.load(column.data, i * column.stride)
+    end
+
+    local view = ffi.typeof "struct { const int32_t place; }" -- a type of its own each time
+    local methods = {}
+    function methods.within(p, name)
+      local group = group_of(name, false)
+      return group ~= nil and group.data[p.place * group.stride] ~= 0
+    end
+    function methods.join(p, name)
+      group_of(name, true).data[p.place] = 1
+    end
+    function methods.leave(p, name)
+      group_of(name, true).data[p.place] = 0
+    end
+    function methods.kill(p)
+      killed[p.place] = true
+    end
+    function methods.rand(p, use, anew)
+      if anew == frame then anew = frame.number end
+      if type(use) ~= "number" or (anew ~= nil and type(anew) ~= "number") then
+        error("p:rand takes a number, which of the point's random numbers, and the frame where they are to be new", 0)
+      end
+      return rand(random, load("id", p.place), use, anew == 0 and 5e-324 or anew or 0)
+    end
+    ffi.metatype(view, {
+      __index = function(p, name)
+        if name == "index" then return p.place + 1 end
+        return methods[name] or load(name, p.place)
+      end,
+      __newindex = function(p, name, x)
+        if read_only[name] then error(("%s is read only"):format(name), 0) end
+        local column = column_of(name, true)
+        column.check(name, x)
+        column.store(column.data, p.place * column.stride, x)
+      end,
+      __tostring = function(p) return ("point %d"):format(p.place + 1) end,
+    })
+
+    local function place_of(what, i)
+      if type(i) ~= "number" or floor(i) ~= i or i < 1 or i > size then
+        error(("%s: there is no point %s; the set has 1 to %d"):format(what, describe(i), size), 0)
+      end
+      return i - 1
+    end
+
+    -- Folds a column's values, in order.
+    local function fold(name, empty, start, step)
+      local column = column_of(name, false)
+      if column.kind == "quat" then error(("attribute %q is a quat, which has no order and no sum"):format(name), 0) end
+      if size == 0 then return empty end
+      if column.kind ~= "vec3" then
+        local total = start
+        for i = 0, size - 1 do total = step(total, column.load(column.data, i * column.stride)) end
+        return total
+      end
+      local x, y, z = start, start, start
+      for i = 0, size - 1 do
+        local value = column.load(column.data, i * column.stride)
+        x, y, z = step(x, value.x), step(y, value.y), step(z, value.z)
+      end
+      return vec3(x, y, z)
+    end
+    local function smaller(a, b) return b < a and b or a end
+    local function larger(a, b) return b > a and b or a end
+
+    local set = {}
+    function set.sum(_, name)
+      return fold(name, 0, 0, function(a, b) return a + b end)
+    end
+    function set.mean(_, name)
+      local total = set.sum(nil, name)
+      return size > 0 and total / size or nil
+    end
+    function set.min(_, name) return fold(name, nil, huge, smaller) end
+    function set.max(_, name) return fold(name, nil, -huge, larger) end
+    function set.bounds(_)
+      return set.min(nil, "P"), set.max(nil, "P")
+    end
+    function set.kill(_, i)
+      killed[place_of("points:kill", i)] = true
+    end
+    function set.add(_, values)
+      if type(values) ~= "table" then error("points:add takes the new point's values: { P = vec3(x, y, z) }", 0) end
+      local copy = {}
+      for name, value in pairs(values) do
+        if read_only[name] then error(("%s is read only"):format(name), 0) end
+        column_of(name, false).check(name, value)
+        copy[name] = value
+      end
+      added[#added + 1] = copy
+    end
+    function set.neighbours(_, i, radius)
+      if type(radius) ~= "number" then
+        error(("points:neighbours takes a place and a radius, not %s"):format(describe(radius)), 0)
+      end
+      return native.neighbours(place_of("points:neighbours", i), radius)
+    end
+    function set.sort(_, key)
+      local of = key
+      if type(key) == "string" then
+        of = function(p) return p[key] end
+      elseif type(key) ~= "function" then
+        error(("points:sort takes the name of an attribute or a function of a point, not %s"):format(describe(key)), 0)
+      end
+      local keys, order = {}, {}
+      for i = 1, size do
+        keys[i], order[i] = of(view(i - 1)), i
+        if type(keys[i]) ~= "number" or keys[i] ~= keys[i] then
+          error(("points:sort: the key of point %d is %s; it must be a number"):format(i, describe(keys[i])), 0)
+        end
+      end
+      table.sort(order, function(a, b)
+        if keys[a] ~= keys[b] then return keys[a] < keys[b] end
+        return a < b
+      end)
+      native.reorder(order)
+      local before = killed
+      columns, groups, killed = {}, {}, {}
+      for i = 1, size do killed[i - 1] = before[order[i] - 1] end
+    end
+    set.detail = setmetatable({}, {
+      __index = details,
+      __newindex = function(_, name, value)
+        local finite = type(value) == "number" and value > -huge and value < huge or istype(vec3, value)
+        if type(name) ~= "string" or not finite then
+          error(("points.detail.%s = %s; a detail value is a finite number or a vec3")
+            :format(tostring(name), describe(value)), 0)
+        end
+        details[name] = value
+      end,
+      __metatable = false,
+    })
+
+    local points = newproxy(true)
+    local metatable = getmetatable(points)
+    metatable.__metatable = false
+    metatable.__len = function() return size end
+    metatable.__tostring = function() return ("%d points"):format(size) end
+    metatable.__index = function(_, key)
+      if type(key) == "number" then return view(place_of("points", key)) end
+      local known = set[key]
+      if known == nil then
+        error(("points have no %s; they have add, bounds, detail, kill, max, mean, min, neighbours, sort and sum")
+          :format(describe(key)), 0)
+      end
+      return known
+    end
+    metatable.__newindex = function(_, key)
+      error(("points[%s] can't be assigned; assign its attributes"):format(describe(key)), 0)
+    end
+
+    f(points, frame, params)
+
+    if #added > 0 then
+      native.append(#added)
+      columns = {}
+      for k, values in ipairs(added) do
+        for name, value in pairs(values) do
+          local column = column_of(name, true)
+          column.store(column.data, (size + k - 1) * column.stride, value)
+        end
+      end
+    end
+    local places = {}
+    for i = 0, size - 1 do
+      if killed[i] then places[#places + 1] = i end
+    end
+    return places, details
+  end
+  return run
+end
+
+return { make = make }

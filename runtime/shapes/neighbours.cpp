@@ -1,0 +1,67 @@
+#include "runtime/shapes/neighbours.h"
+
+#include <fmt/format.h>
+#include <openvdb/tools/PointIndexGrid.h>
+
+#include <algorithm>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+// What OpenVDB asks of a list of points.
+struct PointList {
+    using PosType = openvdb::Vec3d;
+
+    std::vector<Vec3f> P;
+
+    std::size_t size() const { return P.size(); }
+    void getPos(std::size_t i, PosType& x) const { x = PosType(P[i].x(), P[i].y(), P[i].z()); }
+};
+
+using openvdb::tools::PointIndexGrid;
+
+}  // namespace
+
+struct Neighbours::Grid {
+    PointList points;
+    double radius;
+    PointIndexGrid::Ptr index;
+};
+
+Neighbours::Neighbours(std::span<const Vec3f> P, double radius)
+{
+    float largest = 0;
+    for (const Vec3f& x : P) largest = std::max(largest, x.cwiseAbs().maxCoeff());
+    if (!(radius > 0) || !(largest / radius < 0x1p30))
+        throw Error(
+            fmt::format("neighbours within {:g} m of points up to {:g} m from the origin; the radius must be "
+                        "above 0, and above {:g} m there",
+                        radius, largest, largest * 0x1p-30));
+    auto grid = std::make_unique<Grid>();
+    grid->points.P.assign(P.begin(), P.end());
+    grid->radius = radius;
+    grid->index = openvdb::tools::createPointIndexGrid<PointIndexGrid>(grid->points, radius);
+    grid_ = std::move(grid);
+}
+
+Neighbours::~Neighbours() = default;
+
+void Neighbours::find(const Vec3d& X, std::vector<std::uint32_t>& places) const
+{
+    places.clear();
+    auto accessor = grid_->index->getConstAccessor();
+    const openvdb::Vec3d at(X.x(), X.y(), X.z());
+    const auto& transform = grid_->index->transform();
+    const openvdb::Vec3d reach(grid_->radius * (1 + 0x1p-20));
+    openvdb::tools::PointIndexIterator<> near(openvdb::CoordBBox(transform.worldToIndexCellCentered(at - reach),
+                                                                 transform.worldToIndexCellCentered(at + reach)),
+                                              accessor);
+    for (; near; ++near)
+        if ((grid_->points.P[*near].cast<double>() - X).squaredNorm() <= grid_->radius * grid_->radius)
+            places.push_back(*near);
+    std::sort(places.begin(), places.end());
+}
+
+}  // namespace rapid

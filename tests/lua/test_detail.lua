@@ -1,0 +1,185 @@
+-- :detail: a function over the whole set, and the values that it leaves for kernels.
+local scene = require "testing.scene"
+
+local function run(body, frames, after)
+  return scene.run(([[
+return rapid.create { fps = 24, seed = 5,
+  points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 3, 0}}, heat = {1, 2, 3, 4} } }
+  :attribute { n = 0, Cd = {1, 1, 1} }
+  :detail("d", function(points, frame)
+  %s
+end)%s :solve {}]]):format(body, after or ""), { frames = frames or {1, 2} })
+end
+
+local function values(points, name)
+  local list = {}
+  for i = 1, #points do list[i] = points[i][name] end
+  return list
+end
+
+describe("a detail function", function()
+  it("reads and writes the points by place", function()
+    local points = run([[
+for i = 1, #points do local p = points[i] p.heat = p.heat * 10 + p.index p.v = vec3(0, i, 0) end]])[2]
+    assert.same({ 11, 22, 33, 44 }, values(points, "heat"))
+    assert.near({0, 3, 0}, points[3].v, 0)
+  end)
+
+  it("leaves alone what other sets share", function()
+    local result = run("points[1].heat = points[1].heat + 1", {1, 4})
+    assert.same({ 1, 2, 3, 4 }, values(result[1], "heat"))
+    assert.same({ 2, 2, 3, 4 }, values(result[2], "heat"))
+    assert.same({ 4, 2, 3, 4 }, values(result[4], "heat"))
+  end)
+
+  it("sums, averages and bounds", function()
+    local points = run [[
+points[1].n = points:sum "heat"
+points[2].n = points:mean("P").y
+points[3].n = points:min "heat" + points:max "heat"
+local lo, hi = points:bounds()
+points[4].n = lo.x + hi.x + hi.y]][2]
+    assert.same({ 10, 0.75, 5, 5 }, values(points, "n"))
+  end)
+
+  it("finds the neighbours within a radius, in order, as counting all pairs does", function()
+    local text = [[
+return rapid.create { fps = 24 }
+  :emit { source = rapid.shape.box { size = {1, 1, 1} }, from = "volume", impulse = { [2] = 600 } }
+  :attribute { n = 0, order = 0, direct = 0 }
+  :detail("d", function(points)
+    for i = 1, #points do
+      local near, last = points:neighbours(i, 0.15), 0
+      points[i].n = #near
+      for _, j in ipairs(near) do
+        if j <= last or j == i then points[i].order = 1 end
+        last = j
+      end
+      local direct = 0
+      for j = 1, #points do
+        if j ~= i and (points[j].P - points[i].P):length() <= 0.15 then direct = direct + 1 end
+      end
+      points[i].direct = direct
+    end
+  end) :solve {}]]
+    local points, most = scene.run(text, { frames = {2, 2} })[2], 0
+    for i = 1, #points do
+      assert.equal(points[i].direct, points[i].n)
+      assert.equal(0, points[i].order)
+      most = math.max(most, points[i].n)
+    end
+    assert.truthy(most > 8)
+  end)
+
+  it("adds points, which get ids of their own and the values that it gives", function()
+    local result = run("if frame.number == 2 then points:add { P = vec3(7, 8, 9), heat = 5 } end", {1, 4})
+    for _, frame in ipairs { 2, 4 } do
+      local points = result[frame]
+      assert.equal(5, #points)
+      assert.equal(4, points[5].id)
+      assert.near({7, 8, 9}, points[5].P, 0)
+      assert.equal(5, points[5].heat)
+      assert.near({1, 1, 1}, points[5].Cd, 0)
+    end
+  end)
+
+  it("kills points when it ends", function()
+    local points = run("points:kill(2) points[4]:kill() points[1].n = #points")[2]
+    assert.same({ 0, 2 }, values(points, "id"))
+    assert.equal(4, points[1].n)
+  end)
+
+  it("sorts by an attribute or by a function, and points keep their ids", function()
+    assert.same({ 3, 2, 1, 0 }, values(run("points:sort(function(p) return -p.heat end)")[2], "id"))
+    assert.same({ 1, 0, 2, 3 }, values(run("points[1].heat = 3 points:sort 'heat'")[2], "id"))
+    assert.same({ 2, 1, 0 }, values(run("points:kill(4) points:sort(function(p) return -p.heat end)")[2], "id"))
+  end)
+
+  it("joins and leaves groups, and draws random numbers", function()
+    local points = run([[
+for i = 1, #points do if points[i].heat > 2 then points[i]:join "hot" end end
+points[3]:leave "hot"
+points[1].n = points[1]:rand(1)]], {1, 2}, ':points("k", function(p) if p:within "hot" then p.n = 7 end end)')[2]
+    assert.equal(7, points[4].n)
+    assert.equal(0, points[3].n)
+    assert.truthy(points[1].n > 0 and points[1].n < 1)
+  end)
+end)
+
+describe("a detail value", function()
+  it("is read by the kernels after it, and by those of later frames", function()
+    local result = run([[
+points.detail.total = (points.detail.total or 0) + points:sum "heat" points.detail.at = points:mean "P"]], {1, 3}, [[
+
+  :points("k", function(p, frame) p.n = frame.detail.total p.Cd = frame.detail.at end)
+  :action("a", function(p, step) p.heat = p.heat + step.detail.total end)]])
+    assert.equal(10, result[2][1].n)
+    assert.near({0.75, 0.75, 0}, result[2][1].Cd, 1e-6)
+    assert.equal(11, result[2][1].heat)
+    assert.equal(10 + 50, result[3][1].n)
+  end)
+
+  it("that is not there, or can't be one, is an error", function()
+    local function message(body, kernel)
+      return scene.error(([[
+return rapid.create { points = two } :detail("d", function(points) %s end)
+  :points("k", function(p, frame) %s end) :solve {}]]):format(body, kernel or ""), { frames = {1, 2} })
+    end
+    assert.equal('scene.lua:2: node "k": no detail value "totl"; there are lo, total (point id 0, frame 2)',
+      message("points.detail.total = 1 points.detail.lo = 2", "local _ = frame.detail.totl"))
+    assert.equal('scene.lua:2: node "k": no detail value "n"; a :detail node sets one: points.detail.n = 0 ' ..
+      "(point id 0, frame 2)", message("", "local _ = frame.detail.n"))
+    assert.equal('scene.lua:1: node "d": points.detail.x = nan; a detail value is a finite number or a vec3 (frame 2)',
+      (message("points.detail.x = 0/0"):gsub("-nan", "nan")))
+    assert.match("detail.n can't be assigned in a kernel", message("points.detail.n = 1", "frame.detail.n = 2"))
+  end)
+end)
+
+describe("an error in a detail function", function()
+  it("names the node, the line and the frame", function()
+    for body, expected in pairs {
+      ["points[5].heat = 1"] = "points: there is no point 5; the set has 1 to 4",
+      ["points[0].heat = 1"] = "points: there is no point 0; the set has 1 to 4",
+      ["points[1].hat = 1"] = 'no attribute "hat"; did you mean "heat"?',
+      ["points[1].heat = vec3(0, 0, 0)"] = 'attribute "heat" takes a number, not vec3(0, 0, 0)',
+      ["points[1].P = vec3(1 / 0, 0, 0)"] = "P became vec3(inf, 0, 0); a float is finite, within 3.4e38 either way",
+      ["points[1].id = 3"] = "id is read only",
+      ["points:add { id = 3 }"] = "id is read only",
+      ["points:add { heta = 3 }"] = 'no attribute "heta"; did you mean "heat"?',
+      ["points:neighbours(1, 0)"] = "neighbours within 0 m of points up to 3 m from the origin; the radius must be " ..
+        "above 0, and above 2.79397e-09 m there",
+      ["points:average 'heat'"] = 'points have no "average"; they have add, bounds, detail, kill, max, mean, min, ' ..
+        "neighbours, sort and sum",
+      ["points:sort(function(p) return p.P end)"] =
+        "points:sort: the key of point 1 is vec3(0, 0, 0); it must be a number",
+      ["error {}"] = "error raised with a table instead of a message",
+    } do
+      local ok, message = pcall(run, body)
+      assert.falsy(ok, body)
+      assert.equal('scene.lua:5: node "d": ' .. expected .. " (frame 2)",
+        (message:gsub(scene.folder.path:gsub("%W", "%%%0") .. "/", "")), body)
+    end
+  end)
+
+  it("that is a store into what other functions share is found before the first frame", function()
+    assert.match('node "d": the kernel assigns the global "n"', select(2, pcall(run, "n = #points")))
+  end)
+end)
+
+describe("a node that Lua defines with detail", function()
+  it("gets its parameters, and is checked as others are", function()
+    scene.folder:write("count.lua", [[
+return require "rapid".node {
+  name = "count", doc = "Counts neighbours.",
+  params = { radius = { "float", default = 1, min = 0, unit = "m", doc = "how near" } },
+  detail = function(points, frame, params)
+    for i = 1, #points do points[i].n = #points:neighbours(i, params.radius) end
+  end,
+}]])
+    local text = [[
+return rapid.create { points = two } :attribute { n = 0 } :count { radius = %s } :solve {}]]
+    assert.equal(1, scene.run(text:format "1.5", { frames = {1, 2} })[2][1].n)
+    assert.equal(0, scene.run(text:format "0.5", { frames = {1, 2} })[2][1].n)
+    assert.match('node "count1": radius = %-1 is out of range', scene.error(text:format "-1"))
+  end)
+end)

@@ -24,12 +24,20 @@ end
 local env, loaded, load_text = sandbox.make(native.read_module, native.is_worker, run)
 string.dump = nil -- it is reached through no copy, and through no method of strings
 
+local loading = {} -- nodes whose files run now
+
 local function load_node(name)
   local text, where = native.read_node(name)
   if not text then return nil end
+  if loading[name] then
+    error(("%s uses the node %q instead of defining it; rename it: it hides the node of its name")
+      :format(where:gsub("^@", ""), name), 0)
+  end
   local chunk, message = load_text(text, where)
   if not chunk then error(message, 0) end
+  loading[name] = true
   local definition = run(chunk, where)
+  loading[name] = nil
   if type(definition) ~= "table" or definition.name ~= name then
     error(("%s does not return rapid.node{ name = %q, ... }"):format(where:gsub("^@", ""), name), 0)
   end
@@ -118,5 +126,9 @@ function entry.make_vec3(x, y, z)
 end
 
 entry.make_ramp = ramp.make
+
+-- Called once a pass or a frame, not worth a trace; and with jit.attach an event at a function that C calls directly
+-- ends the process (LuaJIT 2.1 of 2022).
+for _, f in pairs(entry) do jit.off(f) end
 
 return entry

@@ -9,13 +9,15 @@ local vector = require "vec3"
 
 local vec3, quat = vector.type, vector.quat
 
+jit.off(true, true) -- all of this file, but not the runners' text
+
 -- One attribute's getter and setter by type. $N is its column's number, $S its name.
 local getter_text = {
-  float = "return tonumber(c$N[cursor.i * s$N])",
-  int32 = "return tonumber(c$N[cursor.i * s$N])",
-  int64 = "return tonumber(c$N[cursor.i * s$N])",
-  vec3 = "local k = cursor.i * s$N return vec3(c$N[k], c$N[k + 1], c$N[k + 2])",
-  quat = "local k = cursor.i * s$N return quat(c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3])",
+  float = "return (tonumber(c$N[cursor.i * s$N]))",
+  int32 = "return (tonumber(c$N[cursor.i * s$N]))",
+  int64 = "return (tonumber(c$N[cursor.i * s$N]))",
+  vec3 = "local k = cursor.i * s$N return (vec3(c$N[k], c$N[k + 1], c$N[k + 2]))",
+  quat = "local k = cursor.i * s$N return (quat(c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3]))",
 }
 
 local setter_text = {
@@ -323,8 +325,6 @@ return run, at, set_params
   return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, pointers.adopt, pointers.shown, refuse,
     layout)
 end
-
-jit.off(make_runner, true) -- once a kernel
 
 -- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua).
 local function prepare(rand, adopt)

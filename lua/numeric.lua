@@ -76,7 +76,7 @@ function numeric.rotation(...)
   if type(degrees) ~= "number" then need_numbers("rotation(axis, degrees)", degrees) end
   local half = degrees * (pi / 360)
   local s = sin(half) / length
-  return quat(axis.x * s, axis.y * s, axis.z * s, cos(half))
+  return (quat(axis.x * s, axis.y * s, axis.z * s, cos(half)))
 end
 
 function numeric.rotation_between(...)
@@ -90,10 +90,10 @@ function numeric.rotation_between(...)
   if w <= 1e-12 * lengths then
     local side = abs(from.x) < abs(from.y) and vec3(0, -from.z, from.y) or vec3(-from.z, 0, from.x)
     local length = side:length()
-    return quat(side.x / length, side.y / length, side.z / length, 0)
+    return (quat(side.x / length, side.y / length, side.z / length, 0))
   end
   local cross = from:cross(to)
-  return quat(cross.x, cross.y, cross.z, w):normalized()
+  return (quat(cross.x, cross.y, cross.z, w):normalized())
 end
 
 local function refuse_noise(name, P, time, octaves, seed)
@@ -132,7 +132,7 @@ local function make(noise_function, curl_function)
     time, octaves, seed = time or 0, octaves or 1, seed or 0
     if not is_legal(P, time, octaves, seed) then refuse_noise("curl_noise", P, time, octaves, seed) end
     curl_noise(P.x, P.y, P.z, time, octaves, seed, curl)
-    return vec3(curl[0], curl[1], curl[2])
+    return (vec3(curl[0], curl[1], curl[2]))
   end
 
   return numeric

@@ -50,7 +50,7 @@ local function make(native)
     local pointer = type(shape) == "userdata" and pointer_of(shape)
     if not pointer or not istype(vec3, P) then refuse("gradient", shape, P) end
     ask(pointer, P.x, P.y, P.z, gradient)
-    return vec3(gradient[0], gradient[1], gradient[2])
+    return (vec3(gradient[0], gradient[1], gradient[2]))
   end
 
   return { pointer_of = pointer_of, queries = queries }

@@ -3,7 +3,7 @@
 -- They are const structs: assigning a component is an error of the language, and compiled traces keep them in
 -- registers, so arithmetic on them allocates nothing. The functions are vararg because the trace compiler starts no
 -- trace at such a function: they are called so often that it would, in vain, and then refuse the loops that they are
--- called from.
+-- called from. And none ends in a tail call, hence the parentheses: the compiler gives up after fifteen of them.
 local ffi = require "ffi"
 
 local sqrt, sin, acos = math.sqrt, math.sin, math.acos
@@ -52,13 +52,13 @@ end
 function methods.cross(...)
   local a, b = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:cross(w)", a, b) end
-  return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+  return (vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x))
 end
 
 function methods.length(...)
   local a = ...
   if not istype(vec3, a) then need_vec3("v:length()", a) end
-  return sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
+  return (sqrt(a.x * a.x + a.y * a.y + a.z * a.z))
 end
 
 -- Of length 1; the zero vector stays zero.
@@ -67,7 +67,7 @@ function methods.normalized(...)
   if not istype(vec3, a) then need_vec3("v:normalized()", a) end
   local length = sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
   if length == 0 then return a end
-  return vec3(a.x / length, a.y / length, a.z / length)
+  return (vec3(a.x / length, a.y / length, a.z / length))
 end
 
 -- a at t = 0, b at t = 1.
@@ -75,7 +75,7 @@ function methods.lerp(...)
   local a, b, t = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:lerp(w, t)", a, b) end
   if type(t) ~= "number" then error(("v:lerp(w, t) takes a number t, not %s"):format(show(t)), 2) end
-  return vec3(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, a.z + (b.z - a.z) * t)
+  return (vec3(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, a.z + (b.z - a.z) * t))
 end
 
 local function no_order()
@@ -86,29 +86,29 @@ ffi.metatype(vec3, {
   __add = function(...)
     local a, b = ...
     if not (istype(vec3, a) and istype(vec3, b)) then wrong_operand("+", a, b) end
-    return vec3(a.x + b.x, a.y + b.y, a.z + b.z)
+    return (vec3(a.x + b.x, a.y + b.y, a.z + b.z))
   end,
   __sub = function(...)
     local a, b = ...
     if not (istype(vec3, a) and istype(vec3, b)) then wrong_operand("-", a, b) end
-    return vec3(a.x - b.x, a.y - b.y, a.z - b.z)
+    return (vec3(a.x - b.x, a.y - b.y, a.z - b.z))
   end,
   __mul = function(...)
     local a, b = ...
-    if type(a) == "number" then return vec3(a * b.x, a * b.y, a * b.z) end
-    if type(b) == "number" then return vec3(a.x * b, a.y * b, a.z * b) end
+    if type(a) == "number" then return (vec3(a * b.x, a * b.y, a * b.z)) end
+    if type(b) == "number" then return (vec3(a.x * b, a.y * b, a.z * b)) end
     if not (istype(vec3, a) and istype(vec3, b)) then wrong_operand("*", a, b) end
-    return vec3(a.x * b.x, a.y * b.y, a.z * b.z)
+    return (vec3(a.x * b.x, a.y * b.y, a.z * b.z))
   end,
   __div = function(...)
     local a, b = ...
-    if type(b) == "number" then return vec3(a.x / b, a.y / b, a.z / b) end
+    if type(b) == "number" then return (vec3(a.x / b, a.y / b, a.z / b)) end
     if not (istype(vec3, a) and istype(vec3, b)) then wrong_operand("/", a, b) end
-    return vec3(a.x / b.x, a.y / b.y, a.z / b.z)
+    return (vec3(a.x / b.x, a.y / b.y, a.z / b.z))
   end,
   __unm = function(...)
     local a = ...
-    return vec3(-a.x, -a.y, -a.z)
+    return (vec3(-a.x, -a.y, -a.z))
   end,
   __eq = function(a, b)
     return istype(vec3, a) and istype(vec3, b) and a.x == b.x and a.y == b.y and a.z == b.z
@@ -148,21 +148,21 @@ function rotations.rotate(...)
   if not istype(vec3, v) then need_vec3("q:rotate(v)", v) end
   local x, y, z = q.y * v.z - q.z * v.y, q.z * v.x - q.x * v.z, q.x * v.y - q.y * v.x
   local w = q.w
-  return vec3(v.x + 2 * (w * x + q.y * z - q.z * y), v.y + 2 * (w * y + q.z * x - q.x * z),
-    v.z + 2 * (w * z + q.x * y - q.y * x))
+  return (vec3(v.x + 2 * (w * x + q.y * z - q.z * y), v.y + 2 * (w * y + q.z * x - q.x * z),
+    v.z + 2 * (w * z + q.x * y - q.y * x)))
 end
 
 -- The turn back, for a quaternion of length 1.
 function rotations.inverse(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:inverse()", q) end
-  return quat(-q.x, -q.y, -q.z, q.w)
+  return (quat(-q.x, -q.y, -q.z, q.w))
 end
 
 function rotations.length(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:length()", q) end
-  return sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+  return (sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w))
 end
 
 -- Of length 1; zero becomes no turn.
@@ -170,8 +170,8 @@ function rotations.normalized(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:normalized()", q) end
   local length = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
-  if length == 0 then return quat(0, 0, 0, 1) end
-  return quat(q.x / length, q.y / length, q.z / length, q.w / length)
+  if length == 0 then return (quat(0, 0, 0, 1)) end
+  return (quat(q.x / length, q.y / length, q.z / length, q.w / length))
 end
 
 -- The shortest turn from q (t = 0) to r (t = 1), at even speed; both of length 1.
@@ -189,7 +189,7 @@ function rotations.slerp(...)
     local s = sin(angle)
     a, b = sin((1 - t) * angle) / s, sin(t * angle) / s * sign
   end
-  return quat(a * q.x + b * r.x, a * q.y + b * r.y, a * q.z + b * r.z, a * q.w + b * r.w)
+  return (quat(a * q.x + b * r.x, a * q.y + b * r.y, a * q.z + b * r.z, a * q.w + b * r.w))
 end
 
 ffi.metatype(quat, {
@@ -200,8 +200,8 @@ ffi.metatype(quat, {
       error(("can't compute %s * %s; both must be a quat, and a vec3 is turned by q:rotate(v)"):format(show(q),
         show(r)), 2)
     end
-    return quat(q.w * r.x + q.x * r.w + q.y * r.z - q.z * r.y, q.w * r.y - q.x * r.z + q.y * r.w + q.z * r.x,
-      q.w * r.z + q.x * r.y - q.y * r.x + q.z * r.w, q.w * r.w - q.x * r.x - q.y * r.y - q.z * r.z)
+    return (quat(q.w * r.x + q.x * r.w + q.y * r.z - q.z * r.y, q.w * r.y - q.x * r.z + q.y * r.w + q.z * r.x,
+      q.w * r.z + q.x * r.y - q.y * r.x + q.z * r.w, q.w * r.w - q.x * r.x - q.y * r.y - q.z * r.z))
   end,
   __eq = function(a, b)
     return istype(quat, a) and istype(quat, b) and a.x == b.x and a.y == b.y and a.z == b.z and a.w == b.w
@@ -228,7 +228,7 @@ local function make_quat(...)
   if not (type(x) == "number" and type(y) == "number" and type(z) == "number" and type(w) == "number") then
     error("quat takes four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis", 2)
   end
-  return quat(x, y, z, w)
+  return (quat(x, y, z, w))
 end
 
 -- From three numbers, or a list of three.
@@ -241,7 +241,7 @@ local function make_vec3(...)
     if type(wrong) == "number" then wrong = z end
     error(("vec3 takes three numbers, vec3(0, 1, 0); one is %s"):format(show(wrong)), 2)
   end
-  return vec3(x, y, z)
+  return (vec3(x, y, z))
 end
 
 return { type = vec3, quat = quat, make = make_vec3, make_quat = make_quat }

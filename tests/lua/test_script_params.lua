@@ -26,7 +26,8 @@ end
 
 describe("a parameter of a node in Lua", function()
   it("may be a list", function()
-    define([[a = { "floats", default = {1, 2}, min = 0, doc = "x" }, b = { "vec3s", default = {{0, 0, 1}}, doc = "x" }]],
+    define([[a = { "floats", default = {1, 2}, min = 0, doc = "x" },
+      b = { "vec3s", default = {{0, 0, 1}}, doc = "x" }]],
       "p.P = params.b[#params.b] * params.a[1] + vec3(#params.a, #params.b, 0)")
     assert.near({2, 1, 1}, run("")[2][1].P, 0)
     assert.near({1, 2, 5}, run("a = {5}, b = {{9, 9, 9}, {0, 0, 1}}")[2][1].P, 0)
@@ -115,5 +116,13 @@ describe("a node in Lua that makes attributes", function()
     assert.truthy(fault(""):find('rapid.node "mine": makes = 3', 1, true), fault "")
     define("", "", "maeks = {},")
     assert.truthy(fault(""):find('unknown field "maeks"; did you mean "makes"?', 1, true), fault "")
+  end)
+end)
+
+describe("a file beside the scene with the name of a node", function()
+  it("that is a scene is told apart", function()
+    scene.folder:write("hider.lua", 'return require "rapid".create {} :hider {}')
+    assert.equal('scene.lua:1: hider.lua uses the node "hider" instead of defining it; rename it: it hides the node of ' ..
+      "its name", scene.error("return rapid.create {} :hider {}"):gsub("^hider%.lua:1: ", "scene.lua:1: "))
   end)
 end)

@@ -1,0 +1,26 @@
+-- align_to_velocity: what is drawn at a point looks where the point goes: its z axis along v, its y axis towards `up`.
+--
+-- First the shortest turn of z into the direction of v, then the turn about that direction by which y comes nearest to
+-- `up`. A point that is slower than `least` keeps its orientation.
+local rapid = require "rapid"
+
+local y, z = vec3(0, 1, 0), vec3(0, 0, 1)
+
+return rapid.node {
+  name = "align_to_velocity",
+  doc  = "Turns orient so that its z axis points along the velocity.",
+  params = {
+    up    = { "vec3", default = {0, 1, 0}, doc = "where the y axis points as far as it can" },
+    least = { "float", default = 1e-6, min = 0, unit = "m/s", doc = "slower points keep their orientation" },
+  },
+  makes = { orient = {0, 0, 0, 1} },
+  points = function(p, _, params)
+    local speed = p.v:length()
+    if speed < params.least or speed == 0 then return end
+    local forward = p.v / speed
+    local turn = rapid.math.rotation_between(z, forward)
+    local side = turn:rotate(y)
+    local angle = math.atan2(side:cross(params.up):dot(forward), side:dot(params.up))
+    p.orient = rapid.math.rotation(forward, math.deg(angle)) * turn
+  end,
+}

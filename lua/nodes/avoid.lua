@@ -1,0 +1,23 @@
+-- avoid: points near a shape are pushed away from it, the more the nearer.
+--
+--   v' = strength (1 - d / distance) n            d: from the surface, where 0 < d < distance;  n: out of the shape
+--
+-- Inside the full strength acts. A level set knows d within its band alone: make its half_width reach that far.
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "avoid",
+  doc  = "Pushes points away from a shape that they come near.",
+  params = {
+    shape    = { "shape", required = true, doc = "a shape or a level set" },
+    distance = { "float", default = 0.5, min = 1e-6, unit = "m", doc = "where it begins to act" },
+    strength = { "float", default = 10, unit = "m/s²", doc = "acceleration at the surface" },
+  },
+  points = function(p, _, params)
+    local near = 1 - params.shape:distance(p.P) / params.distance
+    if near > 0 then
+      local n = params.shape:gradient(p.P):normalized()
+      p.v = p.v + n * (params.strength * math.min(near, 1) * p.dt)
+    end
+  end,
+}

@@ -1,0 +1,20 @@
+-- group_by_bounds: who is in a box is in a group, in each frame anew.
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "group_by_bounds",
+  doc  = "Puts the points in a box into a group, and takes the others out of it.",
+  params = {
+    into = { "group", required = true, doc = "the group" },
+    min  = { "vec3", default = {-1, -1, -1}, unit = "m", doc = "least corner of the box; on its faces is in it" },
+    max  = { "vec3", default = {1, 1, 1}, unit = "m", doc = "greatest corner of the box" },
+  },
+  points = function(p, _, params)
+    local P, min, max = p.P, params.min, params.max
+    if P.x >= min.x and P.x <= max.x and P.y >= min.y and P.y <= max.y and P.z >= min.z and P.z <= max.z then
+      p:join(params.into)
+    else
+      p:leave(params.into)
+    end
+  end,
+}

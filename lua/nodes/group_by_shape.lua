@@ -1,0 +1,17 @@
+-- group_by_shape: who is in a shape, or near it, is in a group, in each frame anew.
+--
+-- A level set knows distances within its band alone: `distance` beyond it means as far as the band goes.
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "group_by_shape",
+  doc  = "Puts the points in or near a shape into a group, and takes the others out of it.",
+  params = {
+    into     = { "group", required = true, doc = "the group" },
+    shape    = { "shape", required = true, doc = "a shape or a level set" },
+    distance = { "float", default = 0, unit = "m", doc = "how far from the surface is in; negative is deep inside" },
+  },
+  points = function(p, _, params)
+    if params.shape:distance(p.P) <= params.distance then p:join(params.into) else p:leave(params.into) end
+  end,
+}

@@ -1,0 +1,16 @@
+-- kill_slow: what has come to rest goes, so that a heap of debris costs nothing.
+--
+-- Tested before the frame's motion: the speed is the one with which the point left the frame before.
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "kill_slow",
+  doc  = "Removes points that move too slowly.",
+  params = {
+    speed = { "float", default = 0.05, min = 0, unit = "m/s", doc = "slower points go" },
+    age   = { "float", default = 0, min = 0, unit = "s", doc = "younger points stay" },
+  },
+  points = function(p, _, params)
+    if p.age >= params.age and p.v:length() < params.speed then p:kill() end
+  end,
+}

@@ -1,0 +1,17 @@
+-- limit_speed: keeps directions, and holds speeds between two bounds.
+--
+--   v = v / |v| clamp(|v|, min, max)            a point at rest has no direction, and stays at rest
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "limit_speed",
+  doc  = "Holds the speed of points between two bounds.",
+  params = {
+    min = { "float", default = 0, min = 0, unit = "m/s", doc = "least speed of a moving point" },
+    max = { "float", default = math.huge, min = 0, max = math.huge, unit = "m/s", doc = "greatest speed" },
+  },
+  points = function(p, _, params)
+    local speed = p.v:length()
+    if speed > 0 then p.v = p.v * (rapid.math.clamp(speed, params.min, params.max) / speed) end
+  end,
+}

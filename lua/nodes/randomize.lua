@@ -1,0 +1,18 @@
+-- randomize: each point has its own number, the same in every frame.
+--
+--   a = min + (max - min) r^bias            r: uniform in [0, 1);  bias above 1 makes small numbers more frequent
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "randomize",
+  doc  = "Gives each point its own random value of an attribute.",
+  params = {
+    attribute = { "write", default = "pscale", doc = "a float" },
+    min       = { "float", default = 0, doc = "least value" },
+    max       = { "float", default = 1, doc = "greatest value" },
+    bias      = { "float", default = 1, min = 1e-3, doc = "1: all values alike" },
+  },
+  points = function(p, _, params)
+    p[params.attribute] = params.min + (params.max - params.min) * p:rand(1) ^ params.bias
+  end,
+}

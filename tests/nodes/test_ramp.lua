@@ -1,0 +1,29 @@
+-- :ramp against numbers worked out by hand.
+local scene = require "testing.scene"
+
+local function points(columns, arguments)
+  return scene.run(([[
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {3, 4, 0}}, %s } } :ramp { %s } :solve {}]])
+    :format(columns, arguments), { frames = {2, 2} })[2]
+end
+
+describe("ramp", function()
+  it("carries a float to a colour, linear between keys", function()
+    local found = points("heat = {0.25, 2}, Cd = {{0, 0, 0}, {0, 0, 0}}",
+      "from = 'heat', keys = {{0, {1, 0, 0}}, {1, {0, 1, 0}}, {3, {0, 0, 1}}}")
+    assert.near({0.75, 0.25, 0}, found[1].Cd, 1e-7)
+    assert.near({0, 0.5, 0.5}, found[2].Cd, 1e-7)
+  end)
+
+  it("carries a vec3's length to a float", function()
+    local found = points("heat = {9, 9}", "from = 'P', to = 'heat', keys = {{1, 10}, {9, 18}}")
+    assert.near(10, found[1].heat, 0)
+    assert.near(14, found[2].heat, 1e-6)
+  end)
+
+  it("refuses keys of another type than the attribute", function()
+    local message = scene.error [[
+return rapid.create { points = two } :attribute { heat = 0 } :ramp { from = "age", to = "heat" } :solve {}]]
+    assert.truthy(message:find('attribute "heat" takes a number, not vec3(1, 1, 1)', 1, true), message)
+  end)
+end)

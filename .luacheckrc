@@ -3,6 +3,7 @@ std = "luajit"
 max_line_length = 120
 cache = false
 color = false
+exclude_files = { "lua/rapid.d.lua" } -- declarations without bodies
 
 local graph_code = { read_globals = { "vec3", "quat" } }
 files["graphs"] = graph_code
@@ -15,3 +16,7 @@ files["tests"] = {
   std = "luajit+busted",
   read_globals = { "rapid", "vec3", "quat", assert = { fields = { "near", "points", "same_points" } } },
 }
+
+-- What `rapid new` writes.
+files["lua/new"] = graph_code
+files["lua/new/test.lua"] = files["tests"]

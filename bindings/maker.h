@@ -22,11 +22,15 @@ namespace rapid {
 struct MakeContext {
     std::filesystem::path folder;  // of the graph file: relative paths start there
     std::vector<std::string>& warnings;
-    bool may_write = false;  // false in check, explain and test: nothing is written
+    bool may_write;  // false in check, explain and test: nothing is written
+    std::function<void(const std::filesystem::path& file)> on_read;  // may be empty
 
+    // The path of a file that will be read.
     std::filesystem::path resolve(const std::string& path) const
     {
-        return std::filesystem::path(path).is_absolute() ? std::filesystem::path(path) : folder / path;
+        const std::filesystem::path file = folder / path;  // an absolute path stays itself
+        if (on_read) on_read(file);
+        return file;
     }
 };
 
@@ -74,6 +78,9 @@ MakerDeclaration<T> maker(std::string name, std::string doc)
 
 // Error: no such maker (a bug of Rapid's own Lua files).
 const Maker& find_maker(std::string_view name);
+
+// All of them, in order of name.
+std::vector<const Maker*> all_makers();
 
 struct MakerRegistration {
     explicit MakerRegistration(Maker (*declare)());

@@ -122,7 +122,7 @@ int make_object(State& state)
     return construct(state, [&] {
         const Maker& maker = find_maker(text_at(state, 1));
         ScriptHost& host = state.host();
-        MakeContext context{host.folder(), host.warnings, host.options().may_write};
+        MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read};
         try {
             const auto options = table_at(state, 2);
             check_named(*options);

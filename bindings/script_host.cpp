@@ -63,6 +63,7 @@ ScriptHost::ScriptHost(SessionOptions options) : options_(std::move(options)), m
 ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options) : ScriptHost(std::move(options))
 {
     file_ = file;
+    if (options_.on_read) options_.on_read(file);
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))
         throw Error("this is a folder; give a graph file").at({file.string(), 0});
@@ -209,6 +210,7 @@ std::optional<ScriptHost::Source> ScriptHost::find_module(std::string_view name,
         const std::filesystem::path path = where / (relative + ".lua");
         if (std::error_code ignored; file_.empty() ? false : std::filesystem::equivalent(path, file_, ignored))
             continue;
+        if (options_.on_read) options_.on_read(path);
         if (std::optional<std::string> text = read_text(path)) return Source{std::move(*text), shown(path)};
         looked_in += (looked_in.empty() ? "" : ", ") + shown(path);
     }

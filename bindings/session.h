@@ -24,6 +24,8 @@ struct SessionOptions {
     bool may_write = false;                            // levelset:write acts in a run alone
     // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
     std::function<void(const std::string& message)> on_timeout;
+    // Where given, told of each file before it is read, and of each where a module or node was looked for.
+    std::function<void(const std::filesystem::path& file)> on_read;
     // Where given, told of everything that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
     std::function<void(const std::string& message)> on_trace_abort;
 };

@@ -35,12 +35,13 @@ void GraphOptions::declare(CLI::App& app)
         ->type_name("BYTES");
 }
 
-std::unique_ptr<Session> GraphOptions::load(bool may_write,
-                                            std::function<void(const std::string& message)> on_timeout) const
+std::unique_ptr<Session> GraphOptions::load(bool may_write, std::function<void(const std::string& message)> on_timeout,
+                                            std::function<void(const std::filesystem::path& file)> on_read) const
 {
     SessionOptions options = session_;
     options.may_write = may_write;
     options.on_timeout = std::move(on_timeout);
+    options.on_read = std::move(on_read);
     return std::make_unique<Session>(file_, std::move(options));
 }
 

@@ -1,6 +1,7 @@
 // The options of all commands that load a graph, and the loading.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -18,8 +19,9 @@ public:
     const std::string& file() const { return file_; }
     const std::optional<std::uint64_t>& seed() const { return seed_; }
 
-    // Error: what is wrong with the file or with --set. may_write, on_timeout: see SessionOptions.
-    std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout) const;
+    // Error: what is wrong with the file or with --set. may_write, on_timeout, on_read: see SessionOptions.
+    std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,
+                                  std::function<void(const std::filesystem::path& file)> on_read = {}) const;
 
 private:
     std::string file_;

@@ -9,6 +9,7 @@
 #include "bindings/commands/graph_options.h"
 #include "bindings/commands/run_report.h"
 #include "bindings/commands/signals.h"
+#include "bindings/commands/watch.h"
 #include "bindings/threads.h"
 #include "runtime/graph/evaluate.h"
 
@@ -73,10 +74,13 @@ public:
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
         app.add_flag("--quiet", quiet_, "no progress and no summary");
+        app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
+        app.add_flag(Watch::tell_option, tell_)->group("");  // our own: a run of --watch
     }
 
     int run(const CommonOptions& common) override
     {
+        if (watch_) return Watch(graph_.file(), quiet_).run();
         std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
         std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
         Threads threads(common.threads);
@@ -85,8 +89,9 @@ public:
         const SignalThread signals([&](int signal) { report.abandon(128 + signal, "interrupted"); });
 
         return threads.run([&] {
-            const std::unique_ptr<Session> session =
-                graph_.load(true, [&](const std::string& message) { report.abandon(status_failed, message); });
+            const std::unique_ptr<Session> session = graph_.load(
+                true, [&](const std::string& message) { report.abandon(status_failed, message); },
+                tell_ ? Watch::tell : nullptr);
             for (const std::string& warning : session->warnings()) report.warning(warning);
             const Plan plan(session->graph(), {graph_.seed(), files_.attributes()});
             for (const std::string& warning : plan.warnings) report.warning(warning);
@@ -149,7 +154,7 @@ private:
     FrameFiles files_;
     std::optional<FrameRange> frames_;
     std::string stats_;
-    bool quiet_ = false;
+    bool quiet_ = false, watch_ = false, tell_ = false;
 };
 RAPID_COMMAND(Run);
 

@@ -122,7 +122,7 @@ end)
 describe("a file beside the scene with the name of a node", function()
   it("that is a scene is told apart", function()
     scene.folder:write("hider.lua", 'return require "rapid".create {} :hider {}')
-    assert.equal('scene.lua:1: hider.lua uses the node "hider" instead of defining it; rename it: it hides the node of ' ..
-      "its name", scene.error("return rapid.create {} :hider {}"):gsub("^hider%.lua:1: ", "scene.lua:1: "))
+    assert.equal('scene.lua:1: hider.lua uses the node "hider" instead of defining it; rename it: it hides the node ' ..
+      "of its name", scene.error("return rapid.create {} :hider {}"):gsub("^hider%.lua:1: ", "scene.lua:1: "))
   end)
 end)

@@ -67,8 +67,8 @@ ScatterPtr scatter_in_volume(std::shared_ptr<const BakedGrid> grid)
     std::uint64_t negative = 0;  // voxels
     for (std::uint32_t block = 0; block < grid->index.size(); ++block) {
         const std::int32_t code = grid->index[block];
-        if (code == BakedGrid::outside) continue;
-        if (code == BakedGrid::inside) {
+        if (code < 0) {
+            if (BakedGrid::is_outside(code)) continue;
             cells.cells.push_back(block);
             negative += 512;
             continue;

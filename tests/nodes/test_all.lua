@@ -28,7 +28,7 @@ describe("every node in lua/nodes", function()
     end)
 
     it(name .. " is compiled, stays finite, and is the same on 1, 2 and 7 threads", function()
-      local one = rapid.run(scene, { frames = {1, 24}, threads = 1 })
+      local one = rapid.run(scene, { frames = {1, 24}, threads = 1, watch_traces = true })
       assert.same({}, one.trace_aborts)
       for _, points in one:frames() do assert.points(points).finite() end
       assert.is_true(#one[24] > 4096) -- more than one chunk

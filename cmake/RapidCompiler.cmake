@@ -6,6 +6,10 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
+# Sanitizers double what there is to optimise: at -O1 OpenVDB's templates compile in two thirds of the time.
+if(RAPID_SANITIZE)
+  set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1 -DNDEBUG")
+endif()
 
 add_library(rapid_public INTERFACE)
 target_compile_features(rapid_public INTERFACE cxx_std_20)

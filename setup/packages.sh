@@ -5,7 +5,7 @@
 build_packages=(
     ccache cmake g++ ninja-build
     libassimp-dev libboost-dev libcli11-dev libeigen3-dev libfmt-dev libluajit-5.1-dev libopenvdb-dev libpng-dev
-    librandom123-dev libtbb-dev nlohmann-json3-dev
+    librandom123-dev libseccomp-dev libtbb-dev nlohmann-json3-dev
     lua-busted
 )
 

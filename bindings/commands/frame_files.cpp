@@ -110,6 +110,20 @@ void FrameFiles::declare(CLI::App& app)
         ->type_name("WIDTHxHEIGHT");
 }
 
+std::vector<std::filesystem::path> FrameFiles::folders() const
+{
+    std::vector<std::filesystem::path> folders;
+    for (const Target& target : targets_) {
+        std::filesystem::path folder = target.to.pattern.substr(0, target.to.pattern.find_first_of("#{$"));
+        folder = folder.has_parent_path() ? folder.parent_path() : std::filesystem::path(".");
+        std::error_code error;
+        std::filesystem::create_directories(folder, error);
+        if (error) throw Error(fmt::format("-o {}: can't make {}: {}", target.text, folder.string(), error.message()));
+        folders.push_back(folder);
+    }
+    return folders;
+}
+
 std::vector<std::string> FrameFiles::attributes() const
 {
     std::vector<std::string> names;

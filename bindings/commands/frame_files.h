@@ -1,6 +1,7 @@
 // What a run writes: the files of -o and those of `:write` nodes, each pattern by a writer of its own.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -19,6 +20,10 @@ class FrameFiles {
 public:
     // -o, --camera, --size.
     void declare(CLI::App& app);
+
+    // The folders that -o writes to, which are made where they are missing; of a pattern with a part that changes from
+    // output to output, the one above. Error: one can't be made.
+    std::vector<std::filesystem::path> folders() const;
 
     // Attributes that some -o asks for by name: they must be kept alive.
     std::vector<std::string> attributes() const;

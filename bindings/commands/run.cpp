@@ -9,6 +9,7 @@
 #include "bindings/commands/graph_options.h"
 #include "bindings/commands/run_report.h"
 #include "bindings/commands/signals.h"
+#include "bindings/commands/walls.h"
 #include "bindings/commands/watch.h"
 #include "bindings/threads.h"
 #include "runtime/graph/evaluate.h"
@@ -74,13 +75,26 @@ public:
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
         app.add_flag("--quiet", quiet_, "no progress and no summary");
+        app.add_flag(
+            "--untrusted", untrusted_,
+            "keeps the process from all files but the graph's folder, --allow-read and the outputs' folders, from "
+            "sockets and from other processes");
+        app.add_flag(within_walls, within_walls_)->group("");  // our own: the run itself
+        app.add_option("--allow-read", allowed_, "a file or folder that an --untrusted graph may read, too")
+            ->type_name("PATH")
+            ->allow_extra_args(false);
         app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
         app.add_flag(Watch::tell_option, tell_)->group("");  // our own: a run of --watch
     }
 
     int run(const CommonOptions& common) override
     {
+        if (!allowed_.empty() && !untrusted_)
+            throw Error("--allow-read is for --untrusted; a graph reads what it names");
+        if (watch_ && untrusted_) throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (watch_) return Watch(graph_.file(), quiet_).run();
+        if (untrusted_ && !within_walls_) enter_walls(openings());
+        if (untrusted_) close_walls();
         std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
         std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
         Threads threads(common.threads);
@@ -104,6 +118,23 @@ public:
     }
 
 private:
+    // What the run itself needs, besides what is allowed.
+    Openings openings() const
+    {
+        const auto folder_of = [](const std::filesystem::path& file) {
+            return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+        };
+        Openings openings;
+        openings.readable = {folder_of(graph_.file())};
+        openings.readable.insert(openings.readable.end(), allowed_.begin(), allowed_.end());
+        openings.writable = files_.folders();
+        if (!stats_.empty()) {
+            openings.writable.push_back(folder_of(stats_));
+            std::filesystem::create_directories(openings.writable.back());
+        }
+        return openings;
+    }
+
     FrameRange range_of(const Plan& plan) const
     {
         const std::int64_t start = plan.first_frame();
@@ -154,7 +185,8 @@ private:
     FrameFiles files_;
     std::optional<FrameRange> frames_;
     std::string stats_;
-    bool quiet_ = false, watch_ = false, tell_ = false;
+    bool quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, within_walls_ = false;
+    std::vector<std::string> allowed_;
 };
 RAPID_COMMAND(Run);
 

@@ -1,0 +1,107 @@
+-- rapid run --untrusted: the walls that the system puts around a run.
+local command = require "testing.command"
+
+local triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+local function graph(body)
+  return "local rapid = require 'rapid'\nlocal two = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} }\n" .. body
+end
+
+-- A folder with a graph, and beside it another one that the graph has no business in.
+local function new_folder(body)
+  local root = command.folder()
+  command.shell("mkdir inside outside out", { cwd = root.path })
+  root:write("outside/mesh.obj", triangle)
+  root:write("inside/mesh.obj", triangle)
+  root:write("inside/scene.lua", graph(body))
+  function root:run(arguments)
+    return command.rapid("run inside/scene.lua -f 1-3 --quiet --untrusted " .. (arguments or ""), { cwd = self.path })
+  end
+  return root
+end
+
+local plain = "return rapid.create { points = two } :gravity {} :solve {}"
+
+describe("rapid run --untrusted", function()
+  it("computes what a run without it does, to the bit", function()
+    local folder = new_folder(plain)
+    assert.equal(0, folder:run("-o out/a.####.csv").status)
+    assert.equal(0, command.rapid("run inside/scene.lua -f 1-3 --quiet -o out/b.####.csv", { cwd = folder.path }).status)
+    assert.truthy(folder:read "out/a.0003.csv")
+    assert.equal(folder:read "out/b.0003.csv", folder:read "out/a.0003.csv")
+  end)
+
+  it("makes the outputs' folders, and writes figures", function()
+    local folder = new_folder(plain)
+    local result = folder:run("-o new/deep/a.####.vdb --stats figures/run.json")
+    assert.equal("", result.stderr)
+    assert.truthy(folder:read "new/deep/a.0001.vdb")
+  end)
+
+  it("reads the graph's folder, and no other", function()
+    local read = "local m = rapid.mesh.read '%s' return rapid.create {} :emit { source = m, count = 5 } :solve {}"
+    assert.equal(0, new_folder(read:format "mesh.obj"):run().status)
+    local folder = new_folder(read:format "../outside/mesh.obj")
+    local refused = folder:run()
+    assert.equal(2, refused.status)
+    assert.match("inside/scene.lua:3: rapid.mesh.read: .*outside/mesh.obj", refused.stderr)
+    assert.equal(0, folder:run("--allow-read outside").status)
+    assert.equal(0, folder:run("--allow-read outside/mesh.obj").status)
+  end)
+
+  it("follows no link out of the folder", function()
+    local folder = new_folder("return rapid.create { points = rapid.points.read 'link.csv' } :solve {}")
+    folder:write("outside/secret.csv", "Px,Py,Pz\n1,2,3\n")
+    command.shell("ln -s ../outside/secret.csv inside/link.csv", { cwd = folder.path })
+    assert.equal(2, folder:run().status)
+  end)
+
+  it("writes to the outputs' folders, and nowhere else", function()
+    local write = "return rapid.create { points = two } :solve {} :write { file = '%s' }"
+    local folder = new_folder(write:format "outside/a.####.csv")
+    local refused = folder:run("-o out/b.####.csv")
+    assert.equal(1, refused.status)
+    assert.match("outside/a.0001.csv: .*can't be written: Permission denied", refused.stderr)
+    assert.is_nil(folder:read "outside/a.0001.csv")
+    folder = new_folder(write:format "out/a.####.csv")
+    assert.equal(0, folder:run("-o out/b.####.csv").status)
+    assert.truthy(folder:read "out/a.0003.csv")
+    folder = new_folder(write:format "inside/scene.lua")
+    assert.not_equal(0, folder:run("-o out/b.####.csv").status)
+    assert.match("two = rapid.points", folder:read "inside/scene.lua")
+  end)
+
+  it("has the system's filter around every thread, and no privileges to gain", function()
+    local folder = new_folder("local n = 0 for i = 1, 3e8 do n = n + i % 7 end " .. plain)
+    local seen = command.shell([[
+"$RAPID" run inside/scene.lua --untrusted --quiet -f 1 & pid=$!
+for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
+  grep -qs 'Seccomp:.2' /proc/$pid/status && break
+  sleep 0.05
+done
+grep -h -E '^(Seccomp|NoNewPrivs):' /proc/$pid/task/*/status
+kill -9 $pid]], { cwd = folder.path }).stdout
+    local threads = 0
+    for name, value in seen:gmatch "(%w+):%s*(%d+)" do
+      assert.equal(name == "Seccomp" and "2" or "1", value, name)
+      threads = threads + (name == "Seccomp" and 1 or 0)
+    end
+    assert.truthy(threads >= 2)
+  end)
+
+  it("is refused where it would promise what it can't keep", function()
+    local folder = new_folder(plain)
+    local watched = folder:run("--watch")
+    assert.equal(2, watched.status)
+    assert.match("%-%-watch starts processes, which %-%-untrusted forbids", watched.stderr)
+    local missing = folder:run("--allow-read nowhere")
+    assert.equal(2, missing.status)
+    assert.match("can't open nowhere", missing.stderr)
+    local alone = command.rapid("run inside/scene.lua --allow-read outside", { cwd = folder.path })
+    assert.equal(2, alone.status)
+    assert.match("%-%-allow%-read is for %-%-untrusted", alone.stderr)
+    local feigned = folder:run("--within-walls")
+    assert.equal(2, feigned.status)
+    assert.match("not inside of Landlock", feigned.stderr)
+  end)
+end)

@@ -110,19 +110,48 @@ void Collisions::begin(std::size_t first, std::size_t size)
     }
 }
 
-void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt)
+void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt,
+                         std::span<const Damped> damped)
 {
     P_ = P;
     v_ = v;
     a_ = a;
-    fly(a, dt);
-    while (!going_.empty()) round_of_travellers(a, dt);
+    damped_ = damped;
+    if (!damped.empty()) {
+        mean_a_.resize(size_);
+        path_v_.resize(size_);
+        path_a_.resize(size_);
+        for (std::size_t i = 0; i < size_; ++i) {
+            mean_a_[i] = dt[i] > 0 ? Vec3d((damped[i].v - v[i]) / dt[i]) : damped[i].G;
+            path_v_[i] = damped[i].path_v;
+            path_a_[i] = damped[i].path_a;
+        }
+        a_ = {mean_a_.data(), 1};
+    }
+    fly(a_, dt);
+    while (!going_.empty()) round_of_travellers(a_, dt);
+}
+
+Path Collisions::free_path(std::size_t i, double dt) const
+{
+    if (damped_.empty()) return {P_[i], v_[i], a_[i], dt, 0};
+    return {P_[i], path_v_[i], path_a_[i], dt, 0};
+}
+
+// On the free path. A drag's velocity falls from the first to the last; between, it is on a straight line.
+Vec3d Collisions::velocity_after(std::size_t i, double s, double dt) const
+{
+    if (damped_.empty()) return v_[i] + s * a_[i];
+    return dt > 0 ? Vec3d(v_[i] + s / dt * (damped_[i].v - v_[i])) : v_[i];
 }
 
 // All points on their free paths. Those that meet nothing are at the end of the sub-step.
 void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
 {
-    flight_.begin(P_, v_, a, dt);
+    if (damped_.empty())
+        flight_.begin(P_, v_, a, dt);
+    else
+        flight_.begin(P_, path_v_, {path_a_.data(), 1}, dt);
     std::fill_n(obstacle_.begin(), size_, -1);
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
         const Obstacle& obstacle = obstacles_[o];
@@ -133,8 +162,8 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
             if (!obstacle.members[first_ + i]) continue;
             asked_.push_back(i);
             // Of a further shape, only an earlier contact is of interest.
-            const double duration = obstacle_[i] < 0 ? dt[i] : contact_[i].time;
-            asked_paths_.push_back({P_[i], v_[i], a[i], duration, obstacle.radius[first_ + i]});
+            asked_paths_.push_back(free_path(i, obstacle_[i] < 0 ? dt[i] : contact_[i].time));
+            asked_paths_.back().radius = obstacle.radius[first_ + i];
         }
         ask_first_contacts(static_cast<int>(o));
     }
@@ -143,7 +172,7 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
     for (std::size_t i = 0; i < size_; ++i) {
         if (obstacle_[i] < 0) {
             P_[i] = flight_.P(i);
-            v_[i] = flight_.v(i);
+            v_[i] = damped_.empty() ? flight_.v(i) : damped_[i].v;
             continue;
         }
         if (!met_[i]) touched_.push_back(static_cast<std::uint32_t>(i));
@@ -151,7 +180,8 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
         if (slides_on_plane(i, a[i], dt[i])) continue;
         Traveller& t = travellers_[i];
         t.begin(static_cast<std::uint32_t>(i), dt[i]);
-        meet_on_path(t, {P_[i], v_[i], a[i], dt[i], 0}, dt[i]);
+        const double s = contact_[i].time;
+        meet(t, place(free_path(i, dt[i]), s), velocity_after(i, s, dt[i]), a[i], contact_[i], obstacle_[i], dt[i]);
         if (goes_on(t, a[i], dt[i])) going_.push_back(t.i);
     }
 }
@@ -237,6 +267,7 @@ bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
     Vec3d& v = v_[t.i];
     while (true) {
         if (!(t.left > 0)) return false;
+        if (!damped_.empty()) mean_a_[t.i] = damped_[t.i].mean_acceleration(v, t.left);
         path = {P_[t.i], v, a, t.left, 0};
         t.way = Traveller::Free;
         t.stops = false;

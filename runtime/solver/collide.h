@@ -16,6 +16,7 @@
 
 #include "runtime/points/column.h"
 #include "runtime/shapes/shape.h"
+#include "runtime/solver/damped_motion.h"
 #include "runtime/solver/dynamics.h"
 #include "runtime/solver/flight.h"
 #include "runtime/solver/slide.h"
@@ -45,8 +46,10 @@ public:
     // A new block: the points [first, first + size) of the set.
     void begin(std::size_t first, std::size_t size);
 
-    // Advances them by a sub-step: P and v by dt under the accelerations a, which are constant within it.
-    void advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt);
+    // Advances them by a sub-step: P and v by dt under the accelerations a, which are constant within it; where
+    // `damped` is not empty, by that in place of a.
+    void advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt,
+                 std::span<const Damped> damped);
 
     // Rounds the positions to single precision; `rounded` holds those at the beginning of the frame. What is on a
     // surface stays on its outer side. Returns the deepest that a point which has met a shape since begin() is in one
@@ -101,6 +104,8 @@ private:
     inline static const Surface no_surface{-1, Vec3d::Zero()};
 
     void fly(Strided<Vec3d> a, std::span<const double> dt);
+    Path free_path(std::size_t i, double dt) const;
+    Vec3d velocity_after(std::size_t i, double s, double dt) const;
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
     bool slides_on_plane(std::size_t i, const Vec3d& a, double dt);
     bool goes_on(Traveller& t, const Vec3d& a, double dt);
@@ -131,6 +136,11 @@ private:
 
     std::span<Vec3d> P_, v_;
     Strided<Vec3d> a_{nullptr, 0};  // of the sub-step, without the forces of surfaces
+
+    // Empty where no force has a linear part; else, by point, its way, and the mean acceleration of what is left of it,
+    // to which a_ then points.
+    std::span<const Damped> damped_;
+    std::vector<Vec3d> path_v_, path_a_, mean_a_;
 
     Flight flight_;
 

@@ -38,6 +38,25 @@ struct Chunk {
     }
 };
 
+// What depends linearly on a point's velocity and place, and drag by the square of its speed:
+//
+//   x'' = ... + ku - k x' + w2q - w2 x - c |x'| x'
+//
+// The integrator solves it with the constant accelerations together, exactly or without ever blowing up.
+struct Linear {
+    double k = 0, w2 = 0, c = 0;  // 1/s, 1/s², 1/m
+    Vec3d ku = Vec3d::Zero(), w2q = Vec3d::Zero();
+
+    void add(const Linear& other)
+    {
+        k += other.k;
+        w2 += other.w2;
+        c += other.c;
+        ku += other.ku;
+        w2q += other.w2q;
+    }
+};
+
 // What the forces of one chunk add up to in one sub-step. Accelerations in m/s²; shape [size] once a force needs one a
 // point.
 class Forces {
@@ -47,7 +66,27 @@ public:
         size_ = size;
         uniform_.setZero();
         per_point_.clear();
+        linear_.clear();
     }
+
+    // Towards the velocity u (m/s) at a rate k (1/s).
+    void add_drag(std::size_t i, double k, const Vec3d& u)
+    {
+        Linear& linear = linear_at(i);
+        linear.k += k;
+        linear.ku += k * u;
+    }
+    // -c |v| v
+    void add_quadratic_drag(std::size_t i, double c) { linear_at(i).c += c; }
+    // Towards the place q (m), w2 (1/s²) a metre.
+    void add_spring(std::size_t i, double w2, const Vec3d& q)
+    {
+        Linear& linear = linear_at(i);
+        linear.w2 += w2;
+        linear.w2q += w2 * q;
+    }
+    bool has_linear() const { return !linear_.empty(); }
+    const Linear& linear(std::size_t i) const { return linear_[i]; }
 
     void add_uniform(const Vec3d& a) { uniform_ += a; }
     void add(std::size_t i, const Vec3d& a)
@@ -61,9 +100,16 @@ public:
     Vec3d acceleration(std::size_t i) const { return is_uniform() ? uniform_ : Vec3d(uniform_ + per_point_[i]); }
 
 private:
+    Linear& linear_at(std::size_t i)
+    {
+        if (linear_.empty()) linear_.resize(size_);
+        return linear_[i];
+    }
+
     std::size_t size_ = 0;
     Vec3d uniform_ = Vec3d::Zero();
     std::vector<Vec3d> per_point_;
+    std::vector<Linear> linear_;
 };
 
 class Dynamic {

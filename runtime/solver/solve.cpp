@@ -10,6 +10,7 @@
 
 #include "runtime/parallel.h"
 #include "runtime/solver/collide.h"
+#include "runtime/solver/damped_motion.h"
 
 namespace rapid {
 namespace {
@@ -205,8 +206,11 @@ private:
             for (int substep = 0; substep < options_.substeps; ++substep) {
                 const Strided<Vec3d> a = accelerations(block, substep);
                 const auto drift = [&](std::span<const double> dt) {
+                    if (!block.linear.empty()) block.drag(a, dt);
                     if (!scene_.obstacles.empty())
-                        collisions.advance(block.P, block.v, a, dt);
+                        collisions.advance(block.P, block.v, a, dt, block.damped);
+                    else if (!block.linear.empty())
+                        block.drift_damped();
                     else
                         block.drift(a, dt);
                 };
@@ -241,6 +245,8 @@ private:
         std::vector<Vec3d> P, v, middle, a;
         std::vector<double> dt, time, half;
         std::vector<Vec3d> force;
+        std::vector<Linear> linear;  // empty where no force has such a part
+        std::vector<Damped> damped;  // the way of each point with it
         Forces one;
 
         void begin(const Step& step, std::size_t at, std::size_t size)
@@ -273,6 +279,21 @@ private:
             }
         }
 
+        void drag(Strided<Vec3d> acceleration, std::span<const double> t)
+        {
+            damped.resize(P.size());
+            for (std::size_t i = 0; i < P.size(); ++i)
+                damped[i] = Damped::from(P[i], v[i], acceleration[i], linear[i], t[i]);
+        }
+
+        void drift_damped()
+        {
+            for (std::size_t i = 0; i < P.size(); ++i) {
+                P[i] += damped[i].travel;
+                v[i] = damped[i].v;
+            }
+        }
+
         void halve()
         {
             half.resize(dt.size());
@@ -292,8 +313,10 @@ private:
     // drift on, which makes them right to second order.
     Strided<Vec3d> accelerations(Block& block, int substep)
     {
-        if (scene_.is_uniform()) return {&scene_.uniform, 0};
+        if (scene_.is_uniform()) return {&scene_.uniform, 0};  // no linear parts, then
         const std::size_t size = block.P.size();
+        block.linear.clear();
+        block.damped.clear();
         block.a.assign(size, scene_.uniform);
         if (scene_.force) add_force_attribute(block);
         if (scene_.forces.empty()) return {block.a.data(), 1};
@@ -319,6 +342,10 @@ private:
                         .at(local.force->location);
                 block.a[i] += a;
             }
+            if (!block.one.has_linear()) continue;
+            if (block.linear.empty()) block.linear.resize(size);
+            for (std::size_t i = 0; i < size; ++i)
+                if (local.all || local.members[block.first + i]) block.linear[i].add(block.one.linear(i));
         }
         return {block.a.data(), 1};
     }

@@ -1,0 +1,54 @@
+// attract: towards a point, or the surface of a shape.
+//
+//   a = strength d / (|d|² + core²)^((falloff + 1) / 2),   d = center - P        0 at d = 0
+//
+// falloff 2 is the inverse square, 0 a constant acceleration; a negative strength drives away.
+#include <cmath>
+
+#include "runtime/graph/node.h"
+
+namespace rapid {
+namespace {
+
+struct Attract {
+    PerPoint<Vec3f> center;
+    ShapePtr shape;
+    PerPoint<float> strength;
+    double falloff, core;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Attract>("attract", "Draws points to a place, or to the surface of a shape.")
+            .param(&Attract::center, "center", Vec3d(0, 0, 0), any_number(), "m", "where to")
+            .param(&Attract::shape, "shape", Value(), any_number(), "", "to its surface, in place of center")
+            .param(&Attract::strength, "strength", 1.0, any_number(), "m/s² at 1 m", "acceleration; negative: away")
+            .param(&Attract::falloff, "falloff", 2.0, any_number(), "", "power of the distance by which it falls")
+            .param(&Attract::core, "core", 0.0, at_least(0), "m", "within about this distance it grows no more");
+    }
+
+    void contribute(const Chunk& chunk, Forces& forces) const
+    {
+        std::vector<Vec3d> towards(chunk.size());
+        if (shape) {
+            std::vector<double> phi(chunk.size());
+            shape->distance(chunk.P, phi, towards);
+            for (std::size_t i = 0; i < chunk.size(); ++i) {
+                const double slope = towards[i].norm();
+                if (slope > 0) towards[i] *= -phi[i] / slope;
+            }
+        } else {
+            const Strided<Vec3f> to = chunk.read(center);
+            for (std::size_t i = 0; i < chunk.size(); ++i) towards[i] = to[i].cast<double>() - chunk.P[i];
+        }
+        const Strided<float> size = chunk.read(strength);
+        for (std::size_t i = 0; i < chunk.size(); ++i) {
+            const double d2 = towards[i].squaredNorm();
+            if (d2 > 0) forces.add(i, size[i] / std::pow(d2 + core * core, 0.5 * (falloff + 1)) * towards[i]);
+        }
+    }
+};
+RAPID_NODE(Attract);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,34 @@
+// drag: still air.
+//
+//   a = -linear v - quadratic |v| v        the first is exact at any step; the second never turns a velocity round, and
+//                                          keeps its terminal speed √(g/quadratic)
+#include "runtime/graph/node.h"
+
+namespace rapid {
+namespace {
+
+struct Drag {
+    PerPoint<float> linear, quadratic;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Drag>("drag", "Slows points down.")
+            .param(&Drag::linear, "linear", 0.0, at_least(0), "1/s", "rate of the drag that grows with the speed")
+            .param(&Drag::quadratic, "quadratic", 0.0, at_least(0), "1/m",
+                   "of the drag that grows with the square of the speed");
+    }
+
+    void contribute(const Chunk& chunk, Forces& forces) const
+    {
+        const Strided<float> k = chunk.read(linear), c = chunk.read(quadratic);
+        for (std::size_t i = 0; i < chunk.size(); ++i) {
+            forces.add_drag(i, k[i], Vec3d::Zero());
+            forces.add_quadratic_drag(i, c[i]);
+        }
+    }
+};
+RAPID_NODE(Drag);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,69 @@
+// spring: to a place, to each point's own, or to the surface of a shape.
+//
+//   F = -stiffness (P - target) - damping v        with the mass of each point; both parts exact at any step
+//
+// A shape's nearest place is looked for in the middle of the step: of second order in where that is.
+#include "runtime/graph/node.h"
+
+namespace rapid {
+namespace {
+
+struct SpringTarget {
+    static constexpr std::string_view param_type = "vec3, attribute or shape";
+
+    PerPoint<Vec3f> place;
+    ShapePtr shape;
+};
+
+void read_value(const Param& param, const Value& value, SpringTarget& target)
+{
+    target = {};
+    if (auto shape = value.object<Shape>())
+        target.shape = std::move(shape);
+    else
+        rapid::read_value(param, value, target.place);
+}
+
+struct Spring {
+    SpringTarget target;
+    PerPoint<float> stiffness, damping;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Spring>("spring", "Holds points with a spring to a place or to a shape.")
+            .param(&Spring::target, "target", Vec3d(0, 0, 0), any_number(), "m",
+                   "a place, rapid.attr \"NAME\" for each point's own, or a shape")
+            .param(&Spring::stiffness, "stiffness", 1.0, at_least(0), "N/m", "force a metre")
+            .param(&Spring::damping, "damping", 0.0, at_least(0), "N s/m", "force by speed");
+    }
+
+    void contribute(const Chunk& chunk, Forces& forces) const
+    {
+        std::vector<Vec3d> place(chunk.size());
+        if (target.shape) {
+            std::vector<double> phi(chunk.size());
+            target.shape->distance(chunk.P, phi, place);
+            for (std::size_t i = 0; i < chunk.size(); ++i) {
+                const double slope2 = place[i].squaredNorm();
+                place[i] = chunk.P[i] - (slope2 > 0 ? Vec3d(phi[i] / slope2 * place[i]) : Vec3d(Vec3d::Zero()));
+            }
+        } else {
+            const Strided<Vec3f> own = chunk.read(target.place);
+            for (std::size_t i = 0; i < chunk.size(); ++i) place[i] = own[i].cast<double>();
+        }
+        const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
+        const float unit = 1;
+        const auto* masses = chunk.points.find<float>("mass");
+        const Strided<float> mass = masses ? masses->read() : Strided<float>{&unit, 0};
+        for (std::size_t i = 0; i < chunk.size(); ++i) {
+            const double m = mass[chunk.first + i];
+            forces.add_spring(i, k[i] / m, place[i]);
+            forces.add_drag(i, d[i] / m, Vec3d::Zero());
+        }
+    }
+};
+RAPID_NODE(Spring);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,70 @@
+// turbulence: an acceleration that swirls and neither gathers nor spreads points.
+//
+//   a = amplitude curl_noise(P / size, speed time)        (noise.h; Bridson et al. 2007)
+#include "runtime/graph/node.h"
+#include "runtime/noise.h"
+
+namespace rapid {
+namespace {
+
+class TurbulentForce : public Force {
+public:
+    PerPoint<float> amplitude;
+    double size = 1, speed = 0;
+    NoiseOptions noise;
+
+    void contribute(const Chunk& chunk, Forces& forces) const override
+    {
+        const Strided<float> strength = chunk.read(amplitude);
+        std::vector<Vec3d> places(chunk.size()), curl(chunk.size());
+        for (std::size_t i = 0; i < chunk.size(); ++i) places[i] = chunk.P[i] / size;
+        // Points of one age have one time, so they are asked for together; newborn ones have their own.
+        for (std::size_t begin = 0; begin < chunk.size();) {
+            std::size_t end = begin + 1;
+            while (end < chunk.size() && chunk.time[end] == chunk.time[begin]) ++end;
+            NoiseOptions now = noise;
+            now.time = speed * chunk.time[begin];
+            curl_noise(std::span<const Vec3d>(places).subspan(begin, end - begin), now,
+                       std::span(curl).subspan(begin, end - begin));
+            begin = end;
+        }
+        for (std::size_t i = 0; i < chunk.size(); ++i) forces.add(i, strength[i] * curl[i]);
+    }
+};
+
+struct Turbulence {
+    PerPoint<float> amplitude;
+    double size, speed;
+    int octaves, seed;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Turbulence>("turbulence", "Pushes points along the swirls of a random field.")
+            .param(&Turbulence::amplitude, "amplitude", 1.0, any_number(), "m/s²", "root mean square acceleration")
+            .param(&Turbulence::size, "size", 1.0, above(0), "m", "of the largest swirls")
+            .param(&Turbulence::speed, "speed", 0.0, at_least(0), "1/s", "how fast the field changes")
+            .param(&Turbulence::octaves, "octaves", 3.0, between(1, NoiseOptions::most_octaves), "",
+                   "each with swirls half as large and half as strong")
+            .param(&Turbulence::seed, "seed", 0.0, at_least(0), "", "of the field")
+            .varies();
+    }
+
+    DynamicPtr dynamic(const Evaluation& now) const
+    {
+        auto force = std::make_shared<TurbulentForce>();
+        force->node = now.node;
+        force->location = now.location;
+        force->group = group;
+        force->amplitude = amplitude;
+        force->size = size;
+        force->speed = speed;
+        force->noise.octaves = octaves;
+        force->noise.seed = static_cast<std::uint32_t>(seed);
+        return force;
+    }
+};
+RAPID_NODE(Turbulence);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,31 @@
+// wind: air that moves, and takes points along.
+//
+//   a = -drag (v - velocity)        treated exactly, at any step: no drag is too stiff
+#include "runtime/graph/node.h"
+
+namespace rapid {
+namespace {
+
+struct Wind {
+    PerPoint<Vec3f> velocity;
+    PerPoint<float> drag;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Wind>("wind", "Takes points along with the air.")
+            .param(&Wind::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "of the air")
+            .param(&Wind::drag, "drag", 1.0, at_least(0), "1/s", "the rate at which points come to its velocity");
+    }
+
+    void contribute(const Chunk& chunk, Forces& forces) const
+    {
+        const Strided<Vec3f> u = chunk.read(velocity);
+        const Strided<float> k = chunk.read(drag);
+        for (std::size_t i = 0; i < chunk.size(); ++i) forces.add_drag(i, k[i], u[i].cast<double>());
+    }
+};
+RAPID_NODE(Wind);
+
+}  // namespace
+}  // namespace rapid

@@ -91,7 +91,8 @@ describe("a spring", function()
       local k, d = case[1] / 2, case[2] / 2 -- a mass of 2
       local p = after_a_second((":spring { target = {1, 0, 0}, stiffness = %.17g, damping = %.17g }")
         :format(case[1], case[2]), "3, 0, 0", "0, 1, 0")
-      local half, x, y = d / 2, nil, nil
+      local half = d / 2
+      local x, y
       local square = k - half * half
       if square > 0 then
         local w = math.sqrt(square)

@@ -5,11 +5,30 @@
 // at the time of impact on the point's path, where its distance from the shape is its radius.
 #include "runtime/graph/node.h"
 
+#include "runtime/solver/hits.h"
+
 namespace rapid {
 namespace {
 
+// record: false, true (every contact), or the least impact speed.
+struct LeastSpeed {
+    static constexpr std::string_view param_type = "false or number";
+
+    std::optional<double> speed;
+};
+
+void read_value(const Param& param, const Value& value, LeastSpeed& least)
+{
+    if (const bool* flag = value.get<bool>())
+        least.speed = *flag ? std::optional<double>(0) : std::nullopt;
+    else
+        rapid::read_value(param, value, least.speed);
+}
+
 struct Collide {
     ShapePtr shape;
+    std::string method, response;
+    LeastSpeed record;
     PerPoint<float> bounce, friction;
     std::optional<PerPoint<float>> radius;
     std::string group;
@@ -23,7 +42,23 @@ struct Collide {
                    "restitution: the part of the speed that is kept")
             .param(&Collide::friction, "friction", 0.0, at_least(0), "", "Coulomb's coefficient")
             .param(&Collide::radius, "radius", Value(), at_least(0), "m",
-                   "of the points; the attribute pscale where they have it, else 0");
+                   "of the points; the attribute pscale where they have it, else 0")
+            .param(&Collide::method, "method", "continuous", any_number(), "",
+                   "on the path, at the time of impact; or after the step, by going back or out along the gradient")
+            .choices({"continuous", "backtrack", "project"})
+            .param(&Collide::response, "response", "bounce", any_number(), "",
+                   "slide: without bounce; stick: held by the shape; die: killed")
+            .choices({"bounce", "slide", "stick", "die"})
+            .param(&Collide::record, "record", false, at_least(0), "m/s",
+                   "writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, "
+                   "hittime, hitimpulse, hitpath");
+    }
+
+    void uses(Uses& uses) const
+    {
+        if (!record.speed) return;
+        uses.reads.insert(uses.reads.end(), std::begin(Hits::names), std::end(Hits::names));
+        uses.writes.insert(uses.writes.end(), std::begin(Hits::names), std::end(Hits::names));
     }
 
     DynamicPtr dynamic(const Evaluation& now) const
@@ -36,6 +71,14 @@ struct Collide {
         collider->bounce = bounce;
         collider->friction = friction;
         collider->radius = radius;
+        collider->method = method == "project"     ? Method::Project
+                           : method == "backtrack" ? Method::Backtrack
+                                                   : Method::Continuous;
+        collider->response = response == "slide"   ? Response::Slide
+                             : response == "stick" ? Response::Stick
+                             : response == "die"   ? Response::Die
+                                                   : Response::Bounce;
+        collider->record = record.speed;
         return collider;
     }
 };

@@ -34,6 +34,9 @@ constexpr double valley = 1e-6;
 // chatter at 1e-10 m/s between facets that each would let it slide. Real impacts move a point farther than that.
 constexpr int chatter = 1024;
 
+// A point that sticks has the surface's velocity, to single precision, m/s.
+constexpr double held = 1e-6;
+
 // The shortest pieces of a slide, as parts of the sub-step: where friction turns, and where a surface without a
 // smallest feature does.
 constexpr double least_turning = 1.0 / 256, least_bending = 1.0 / 4096;
@@ -73,6 +76,9 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points)
     : shape(collider.shape.get()),
       bounds(shape->bounds()),
       feature(shape->smallest_feature()),
+      method(collider.method),
+      response(collider.response),
+      record(collider.record),
       bounce(collider.bounce.read(points)),
       friction(collider.friction.read(points)),
       radius{&no_radius, 0},
@@ -93,6 +99,7 @@ void Collisions::begin(std::size_t first, std::size_t size)
     first_ = first;
     size_ = size;
     met_.assign(size, 0);
+    stuck_.assign(size, 0);
     touched_.clear();
     travellers_.resize(size);
     paths_.resize(size);
@@ -110,26 +117,70 @@ void Collisions::begin(std::size_t first, std::size_t size)
     }
 }
 
-void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt,
-                         std::span<const Damped> damped)
+void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& drift)
 {
     P_ = P;
     v_ = v;
-    a_ = a;
-    damped_ = damped;
-    if (!damped.empty()) {
+    a_ = drift.a;
+    after_ = drift.after;
+    damped_ = drift.damped;
+    const std::span<const double> dt = drift.dt;
+    if (!damped_.empty()) {
         mean_a_.resize(size_);
         path_v_.resize(size_);
         path_a_.resize(size_);
         for (std::size_t i = 0; i < size_; ++i) {
-            mean_a_[i] = dt[i] > 0 ? Vec3d((damped[i].v - v[i]) / dt[i]) : damped[i].G;
-            path_v_[i] = damped[i].path_v;
-            path_a_[i] = damped[i].path_a;
+            mean_a_[i] = dt[i] > 0 ? Vec3d((damped_[i].v - v[i]) / dt[i]) : damped_[i].G;
+            path_v_[i] = damped_[i].path_v;
+            path_a_[i] = damped_[i].path_a;
         }
         a_ = {mean_a_.data(), 1};
     }
+    const bool steps_back = std::any_of(obstacles_.begin(), obstacles_.end(),
+                                        [](const Obstacle& o) { return o.method != Method::Continuous; });
+    if (steps_back) start_.assign(P.begin(), P.end());
+    hold_stuck();
     fly(a_, dt);
     while (!going_.empty()) round_of_travellers(a_, dt);
+    if (!steps_back) return;
+    for (std::size_t o = 0; o < obstacles_.size(); ++o)
+        if (obstacles_[o].method != Method::Continuous) correct(static_cast<int>(o), dt);
+}
+
+void Collisions::touch(std::size_t i)
+{
+    if (met_[i]) return;
+    met_[i] = 1;
+    touched_.push_back(static_cast<std::uint32_t>(i));
+    surfaces_[i] = {no_surface, no_surface};
+}
+
+// Points that have come to rest on a shape that they stick to stay, whatever pulls: they are flush with it, and have
+// its velocity.
+void Collisions::hold_stuck()
+{
+    for (const Obstacle& obstacle : obstacles_) {
+        if (obstacle.response != Response::Stick) continue;
+        asked_.clear();
+        asked_P_.clear();
+        for (std::size_t i = 0; i < size_; ++i) {
+            stuck_[i] = 0;
+            if (!obstacle.members[first_ + i] || !(v_[i].norm() <= held)) continue;
+            asked_.push_back(i);
+            asked_P_.push_back(P_[i]);
+        }
+        if (asked_.empty()) continue;
+        phi_.resize(asked_.size());
+        obstacle.shape->distance(asked_P_, phi_, {});
+        for (std::size_t j = 0; j < asked_.size(); ++j) {
+            const std::size_t i = asked_[j];
+            const double radius = obstacle.radius[first_ + i];
+            if (std::abs(phi_[j] - radius) > flush_within(P_[i], radius, obstacle.feature * 0x1p-21)) continue;
+            stuck_[i] = 1;
+            v_[i].setZero();
+            touch(i);
+        }
+    }
 }
 
 Path Collisions::free_path(std::size_t i, double dt) const
@@ -155,11 +206,12 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
     std::fill_n(obstacle_.begin(), size_, -1);
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
         const Obstacle& obstacle = obstacles_[o];
+        if (obstacle.method != Method::Continuous) continue;
         flight_.find_near(obstacle.bounds, widest_[o], near_);
         asked_.clear();
         asked_paths_.clear();
         for (const std::uint32_t i : near_) {
-            if (!obstacle.members[first_ + i]) continue;
+            if (!obstacle.members[first_ + i] || stuck_[i]) continue;
             asked_.push_back(i);
             // Of a further shape, only an earlier contact is of interest.
             asked_paths_.push_back(free_path(i, obstacle_[i] < 0 ? dt[i] : contact_[i].time));
@@ -170,13 +222,13 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
 
     going_.clear();
     for (std::size_t i = 0; i < size_; ++i) {
+        if (stuck_[i]) continue;
         if (obstacle_[i] < 0) {
             P_[i] = flight_.P(i);
             v_[i] = damped_.empty() ? flight_.v(i) : damped_[i].v;
             continue;
         }
-        if (!met_[i]) touched_.push_back(static_cast<std::uint32_t>(i));
-        met_[i] = 1;
+        touch(i);
         if (slides_on_plane(i, a[i], dt[i])) continue;
         Traveller& t = travellers_[i];
         t.begin(static_cast<std::uint32_t>(i), dt[i]);
@@ -195,6 +247,7 @@ bool Collisions::slides_on_plane(std::size_t i, const Vec3d& a, double dt)
     if (!contact.flat || contact.time > 0 || contact.depth > 0) return false;
     const int o = obstacle_[i];
     const Obstacle& obstacle = obstacles_[o];
+    if (obstacle.response == Response::Stick || obstacle.response == Response::Die) return false;
     const double g = -a.dot(contact.n), vn = (v_[i] - contact.vc).dot(contact.n);
     const double flush = flush_within(P_[i], obstacle.radius[first_ + i], obstacle.feature * 0x1p-21);
     if (!(g > 0) || vn * vn > 2 * g * flush) return false;
@@ -480,6 +533,7 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
 bool Collisions::may_reach_shape(std::size_t i, const Path& path, int o) const
 {
     const Obstacle& obstacle = obstacles_[o];
+    if (obstacle.method != Method::Continuous) return false;
     return obstacle.members[first_ + i] && may_reach(path.P, place(path, path.duration), path.a, path.duration,
                                                      obstacle.radius[first_ + i], obstacle.bounds);
 }
@@ -542,9 +596,11 @@ void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d&
         ++limited;
         t.left = 0;
     }
+    if (takes(t, contact, o)) return;
     if (contact.depth > 0) return leave_shape(t, contact, o, a);
 
-    const double bounce = obstacle.bounce[first_ + t.i], friction = obstacle.friction[first_ + t.i];
+    const double bounce = obstacle.response == Response::Slide ? 0.0 : double(obstacle.bounce[first_ + t.i]);
+    const double friction = obstacle.friction[first_ + t.i];
     const Vec3d& n = contact.n;
     const Vec3d relative = v - contact.vc;
     const double vn = relative.dot(n);
@@ -552,7 +608,8 @@ void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d&
     const double u = vn < 0 ? -bounce * vn : vn;
     const double flush = flush_within(P, obstacle.radius[first_ + t.i], obstacle.feature * 0x1p-21);
     const double rising2 = g > 0 ? 2 * g * flush : 0;  // of a speed that lifts by less than rounding
-    if (vn < 0 && vn * vn > rising2) ++contacts;
+    const bool hits = vn < 0 && vn * vn > rising2;
+    const double when = consequences_.time - after_[t.i] - t.left;
 
     const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature};
     if (g < 0 && vn >= -tangential * relative.norm()) {
@@ -572,6 +629,106 @@ void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d&
         if (t.supports == 2 && leaves(t.on[1])) t.supports = 1;
         if (t.supports >= 1 && leaves(t.on[0])) t.on[0] = t.on[1], --t.supports;
         if (t.left == 0 && t.supports == 0) t.on[0] = support, t.supports = 1;
+    }
+    if (hits) count(t.i, P, n, contact.vc, -vn, v_[t.i] - v, when, o);
+}
+
+// Whether the shape keeps the point, or ends its life: its way is then over.
+bool Collisions::takes(Traveller& t, const Contact& contact, int o)
+{
+    const Obstacle& obstacle = obstacles_[o];
+    if (obstacle.response != Response::Stick && obstacle.response != Response::Die) return false;
+    const std::size_t i = t.i;
+    const Vec3d P = P_[i], v = v_[i];
+    const double when = consequences_.time - after_[i] - t.left;
+    if (contact.depth > 0) P_[i] += contact.depth * contact.n;
+    v_[i] = contact.vc;
+    count(i, P, contact.n, contact.vc, -(v - contact.vc).dot(contact.n), contact.vc - v, when, o);
+    if (obstacle.response == Response::Die)
+        consequences_.dead[first_ + i] = 1;
+    else
+        P_[i] += t.left * contact.vc;
+    t.left = 0;
+    t.supports = 1;
+    t.on[0] = {o, contact.n, contact.vc, contact.curvature, 0, contact.flat, obstacle.feature};
+    return true;
+}
+
+// A contact at this speed (m/s), which has changed the velocity.
+void Collisions::count(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double speed,
+                       const Vec3d& change, double time, int o)
+{
+    ++contacts;
+    const std::optional<double>& record = obstacles_[o].record;
+    if (record && speed >= *record)
+        consequences_.hits->record(first_ + i, P, n, vc, time, consequences_.mass[first_ + i] * change.norm(), o);
+}
+
+// The paper's methods: points that are in the shape at the end of the step are moved out of it (numerics.md,
+// Collision). Where the field has no gradient they go back to where the step began.
+void Collisions::correct(int o, std::span<const double> dt)
+{
+    const Obstacle& obstacle = obstacles_[o];
+    asked_.clear();
+    asked_P_.clear();
+    for (std::size_t i = 0; i < size_; ++i) {
+        const double radius = obstacle.radius[first_ + i];
+        if (!obstacle.members[first_ + i] || stuck_[i]) continue;
+        if (((P_[i] - obstacle.bounds.max()).array() > radius).any()) continue;
+        if (((obstacle.bounds.min() - P_[i]).array() > radius).any()) continue;
+        asked_.push_back(i);
+        asked_P_.push_back(P_[i]);
+    }
+    if (asked_.empty()) return;
+    const auto ask = [&] {
+        phi_.resize(asked_.size());
+        gradients_.resize(asked_.size());
+        obstacle.shape->distance(asked_P_, phi_, gradients_);
+    };
+    ask();
+
+    std::size_t again = 0;
+    for (std::size_t j = 0; j < asked_.size(); ++j) {
+        const std::size_t i = asked_[j];
+        const double slope = gradients_[j].norm();
+        const double d = (obstacle.radius[first_ + i] - phi_[j]) / (slope > 0 ? slope : 1);
+        if (!(d > 0)) continue;
+        touch(i);
+        const Vec3d at = P_[i], v = v_[i], vc = Vec3d::Zero();
+        const Vec3d n = detail::unit_normal(gradients_[j], v);
+        const double vn = v.dot(n);
+        const double bounce = obstacle.response == Response::Slide ? 0.0 : double(obstacle.bounce[first_ + i]);
+        const double friction = obstacle.friction[first_ + i];
+        if (obstacle.response == Response::Die || obstacle.response == Response::Stick) {
+            v_[i] = vc;
+            P_[i] = slope > 0 ? Vec3d(at + d * n) : start_[i];
+            if (obstacle.response == Response::Die) consequences_.dead[first_ + i] = 1;
+        } else if (!(slope > 0)) {
+            P_[i] = start_[i];
+            v_[i] = contact_response(v, vc, n, bounce, friction);
+        } else if (obstacle.method == Method::Project || !(vn < 0)) {
+            P_[i] += d * n;
+            v_[i] = contact_response(v, vc, n, bounce, friction);
+        } else {
+            const double back = std::min(d / -vn, dt[i]);
+            const Vec3d& a = a_[i];
+            const Vec3d after = contact_response(v - back * a, vc, n, bounce, friction);
+            P_[i] += back * (after - v + back * a);
+            v_[i] = after + back * a;
+            asked_[again] = i;
+            asked_P_[again++] = P_[i];
+        }
+        if (vn < 0) count(i, at, n, vc, -vn, v_[i] - v, consequences_.time - after_[i], o);
+    }
+
+    // Taken back by a time that the shape's curve makes inexact, a point may still be below the surface.
+    asked_.resize(again);
+    asked_P_.resize(again);
+    if (again == 0) return;
+    ask();
+    for (std::size_t j = 0; j < again; ++j) {
+        const double slope2 = gradients_[j].squaredNorm(), d = obstacle.radius[first_ + asked_[j]] - phi_[j];
+        if (d > 0 && slope2 > 0) P_[asked_[j]] += d / slope2 * gradients_[j];
     }
 }
 

@@ -19,6 +19,7 @@
 #include "runtime/solver/damped_motion.h"
 #include "runtime/solver/dynamics.h"
 #include "runtime/solver/flight.h"
+#include "runtime/solver/hits.h"
 #include "runtime/solver/slide.h"
 
 namespace rapid {
@@ -31,6 +32,9 @@ struct Obstacle {
     const Shape* shape;
     Box3d bounds;
     double feature;  // m, the shape's smallest
+    Method method;
+    Response response;
+    std::optional<double> record;  // m/s
     Strided<float> bounce, friction, radius;
     Strided<std::uint8_t> members;  // of its group; 1 for all where it has none
 };
@@ -39,17 +43,33 @@ struct Obstacle {
 // along a curved surface.
 constexpr int most_contacts = 100000;
 
+// One sub-step, or a part of it, of all points of a block.
+struct Drift {
+    Strided<Vec3d> a;                // m/s², constant within it
+    std::span<const double> dt;      // s
+    std::span<const double> after;   // s, from its end to the end of the frame
+    std::span<const Damped> damped;  // where it is not empty, in place of a
+};
+
+// What a contact does besides, to points of the whole set.
+struct Consequences {
+    Hits* hits = nullptr;          // null where no collider records
+    std::span<std::uint8_t> dead;  // set to 1 by a collider that kills; empty where none does
+    Strided<float> mass;           // kg
+    double time = 0;               // s since the start, at the end of the frame
+};
+
 class Collisions {
 public:
-    explicit Collisions(std::span<const Obstacle> obstacles) : obstacles_(obstacles) {}
+    Collisions(std::span<const Obstacle> obstacles, const Consequences& consequences)
+        : obstacles_(obstacles), consequences_(consequences)
+    {
+    }
 
     // A new block: the points [first, first + size) of the set.
     void begin(std::size_t first, std::size_t size);
 
-    // Advances them by a sub-step: P and v by dt under the accelerations a, which are constant within it; where
-    // `damped` is not empty, by that in place of a.
-    void advance(std::span<Vec3d> P, std::span<Vec3d> v, Strided<Vec3d> a, std::span<const double> dt,
-                 std::span<const Damped> damped);
+    void advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& drift);
 
     // Rounds the positions to single precision; `rounded` holds those at the beginning of the frame. What is on a
     // surface stays on its outer side. Returns the deepest that a point which has met a shape since begin() is in one
@@ -124,6 +144,12 @@ private:
     void meet_on_path(Traveller& t, const Path& path, double dt);
     void leave_shape(Traveller& t, const Contact& contact, int obstacle, const Vec3d& a);
     void settle(Traveller& t, const Support& support, const Vec3d& v);
+    void touch(std::size_t i);
+    void hold_stuck();
+    bool takes(Traveller& t, const Contact& contact, int obstacle);
+    void count(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double speed, const Vec3d& change,
+               double time, int obstacle);
+    void correct(int obstacle, std::span<const double> dt);
     void proceed(Traveller& t, const Path& path, const Bend& bend);
     void finish(const Traveller& t);
     template <class Place, class Use>
@@ -131,6 +157,7 @@ private:
     double deepest(std::span<const Vec3f> P);
 
     std::span<const Obstacle> obstacles_;
+    const Consequences consequences_;
     std::size_t first_ = 0, size_ = 0;
     std::vector<double> widest_;  // of each obstacle, the largest radius in the block, m
 
@@ -145,6 +172,9 @@ private:
     Flight flight_;
 
     // By point of the block.
+    std::span<const double> after_;      // s, to the end of the frame
+    std::vector<std::uint8_t> stuck_;    // whether it is held by a shape that it sticks to
+    std::vector<Vec3d> start_;           // where it was at the beginning of the sub-step
     std::vector<std::uint8_t> met_;      // whether it has met a shape since begin()
     std::vector<int> obstacle_;          // the first that the path meets, or -1
     std::vector<Contact> contact_;       // with it

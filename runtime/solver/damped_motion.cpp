@@ -8,7 +8,7 @@ namespace {
 
 // Taylor series of the impulse response h(t), h'' + k h' + w2 h = 0, h(0) = 0, h'(0) = 1; of its integral and its
 // derivative. For k t and w2 t² up to 1 the terms fall as 1/n!.
-Response by_series(double k, double w2, double t)
+Propagator by_series(double k, double w2, double t)
 {
     const double kt = k * t, w2t2 = w2 * t * t;
     double before = 0, term = 1;  // c_n t^(n-1), from n = 0 and 1
@@ -29,7 +29,7 @@ double e1(double x) { return x == 0 ? 1 : std::expm1(x) / x; }
 
 }  // namespace
 
-Response respond(double k, double w2, double t)
+Propagator respond(double k, double w2, double t)
 {
     if (k * t <= 1 && w2 * t * t <= 1) return by_series(k, w2, t);
     const double half = 0.5 * k, discriminant = (half - std::sqrt(w2)) * (half + std::sqrt(w2));
@@ -81,7 +81,7 @@ Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear
     damped.w2 = linear.w2;
     damped.G = a + linear.ku + (linear.w2q - linear.w2 * P);
     damped.k = linear.k;
-    Response r;
+    Propagator r;
     if (linear.c > 0) {
         // The direction of the way is not known before the rate is: a second time with that of the first.
         Vec3d direction = v.squaredNorm() > 0 ? v : damped.G;
@@ -105,7 +105,7 @@ Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear
 Vec3d Damped::mean_acceleration(const Vec3d& from, double t) const
 {
     if (!(t > 0)) return G - k * from;
-    const Response r = respond(k, w2, t);
+    const Propagator r = respond(k, w2, t);
     return (from * (r.v_of_v - 1) + G * r.v_of_G) / t;
 }
 

@@ -11,12 +11,12 @@
 namespace rapid {
 
 // After the time t from x0, with the velocity v: x = x0 + v x_of_v + G x_of_G, x' = v v_of_v + G v_of_G.
-struct Response {
+struct Propagator {
     double x_of_v, x_of_G, v_of_v, v_of_G;
 };
 
 // k: 1/s, at least 0; w2: 1/s², at least 0; t: s, at least 0.
-Response respond(double k, double w2, double t);
+Propagator respond(double k, double w2, double t);
 
 // The mean, over a time t, of the speed of a point that starts with `speed` (m/s), is accelerated along its way by a
 // (m/s²) and dragged by c speed² (c: 1/m, above 0): by its closed form. A drag of rate c times this over the step never

@@ -152,9 +152,20 @@ public:
     virtual std::unique_ptr<ActionPass> begin(PointSet& points) const = 0;
 };
 
+// When a contact is found (numerics.md, Collision), and what becomes of the point.
+enum class Method {
+    Continuous,  // on its path, at the time of impact
+    Backtrack,   // at the end of the step, taken back along its velocity (paper §4.2)
+    Project,     // at the end of the step, moved out along the gradient (paper §4.1)
+};
+enum class Response { Bounce, Slide, Stick, Die };
+
 class Collider : public Dynamic {
 public:
     ShapePtr shape;
+    Method method = Method::Continuous;
+    Response response = Response::Bounce;
+    std::optional<double> record;    // m/s: contacts at least as fast are written to the hit attributes
     PerPoint<float> bounce{0.5f};    // restitution ε in [0, 1]
     PerPoint<float> friction{0.0f};  // Coulomb μ >= 0
     // The attribute pscale where the points have it, unless the node says otherwise.

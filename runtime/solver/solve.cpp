@@ -40,6 +40,7 @@ struct Scene {
     Vec3d uniform = Vec3d::Zero();  // acceleration of all points, m/s²
     std::vector<LocalForce> forces;
     std::vector<Obstacle> obstacles;
+    bool kills = false, records = false;  // one of them does
     const Column<Vec3f>* force = nullptr;
     Strided<float> mass{&unit_mass, 0};
 
@@ -74,6 +75,8 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics)
         at_node(*dynamic, [&] {
             if (const auto* collider = dynamic_cast<const Collider*>(dynamic.get())) {
                 scene.obstacles.emplace_back(*collider, points);
+                scene.kills |= collider->response == Response::Die;
+                scene.records |= collider->record.has_value();
             } else if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
                 const std::optional<Vec3d> uniform = force->uniform_acceleration();
                 if (uniform && !uniform->allFinite())
@@ -114,8 +117,9 @@ public:
           scene_(scene_of(points, dynamics)),
           P_(points.P().write()),
           v_(points.v().write()),
-          dead_(scene_.actions.empty() ? 0 : points.size())
+          dead_(scene_.actions.empty() && !scene_.kills ? 0 : points.size())
     {
+        if (scene_.records) hits_.emplace(points);
         if (!options.group.empty()) {
             const Column<std::uint8_t>* group = points.find_group(options.group);
             members_ = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};
@@ -196,7 +200,7 @@ private:
 
     void advance_by_substeps(std::size_t begin, std::size_t end)
     {
-        Collisions collisions(scene_.obstacles);
+        Collisions collisions(scene_.obstacles, {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time});
         Block block;
         double deepest = 0;
         for (; begin < end; begin += block_size) {
@@ -205,23 +209,25 @@ private:
             if (!scene_.obstacles.empty()) collisions.begin(begin, size);
             for (int substep = 0; substep < options_.substeps; ++substep) {
                 const Strided<Vec3d> a = accelerations(block, substep);
-                const auto drift = [&](std::span<const double> dt) {
+                const auto drift = [&](std::span<const double> dt, double halves_after) {
                     if (!block.linear.empty()) block.drag(a, dt);
                     if (!scene_.obstacles.empty())
-                        collisions.advance(block.P, block.v, a, dt, block.damped);
+                        collisions.advance(block.P, block.v, {a, dt, block.until_end(halves_after), block.damped});
                     else if (!block.linear.empty())
                         block.drift_damped();
                     else
                         block.drift(a, dt);
                 };
+                if (scene_.kills) stop_dead(block);
+                const double halves_after = 2.0 * (options_.substeps - substep - 1);
                 if (scene_.actions.empty()) {
-                    drift(block.dt);
+                    drift(block.dt, halves_after);
                 } else {
                     // Half a drift, all actions at once, half a drift: of second order (numerics.md, Motion).
                     block.halve();
-                    drift(block.half);
+                    drift(block.half, halves_after + 1);
                     act(block, substep);
-                    drift(block.half);
+                    drift(block.half, halves_after);
                 }
             }
             const std::span<Vec3f> P = P_.subspan(begin, size), v = v_.subspan(begin, size);
@@ -243,7 +249,7 @@ private:
     struct Block {
         std::size_t first = 0;
         std::vector<Vec3d> P, v, middle, a;
-        std::vector<double> dt, time, half;
+        std::vector<double> dt, time, half, after;
         std::vector<Vec3d> force;
         std::vector<Linear> linear;  // empty where no force has such a part
         std::vector<Damped> damped;  // the way of each point with it
@@ -300,6 +306,14 @@ private:
             for (std::size_t i = 0; i < dt.size(); ++i) half[i] = 0.5 * dt[i];
         }
 
+        // s from the end of a drift to that of the frame, so many half sub-steps later.
+        std::span<const double> until_end(double halves)
+        {
+            after.resize(dt.size());
+            for (std::size_t i = 0; i < dt.size(); ++i) after[i] = 0.5 * halves * dt[i];
+            return after;
+        }
+
         // The middle of each point's sub-step, s since the start.
         void set_time(const SolveOptions& options, int substep)
         {
@@ -348,6 +362,13 @@ private:
                 if (local.all || local.members[block.first + i]) block.linear[i].add(block.one.linear(i));
         }
         return {block.a.data(), 1};
+    }
+
+    // Those that a collider has killed stay where they are.
+    void stop_dead(Block& block) const
+    {
+        for (std::size_t i = 0; i < block.dt.size(); ++i)
+            if (dead_[block.first + i]) block.dt[i] = 0;
     }
 
     // All actions, in the order of the chain, on the points where they are in the middle of the sub-step. The forces
@@ -416,7 +437,8 @@ private:
     std::span<Vec3f> P_, v_;
     Strided<float> own_dt_{nullptr, 0};
     Strided<std::uint8_t> members_{nullptr, 0};  // of the group that is advanced; null for all
-    std::vector<std::uint8_t> dead_;             // 1: killed by an action; empty where there is none
+    std::vector<std::uint8_t> dead_;             // 1: killed by an action or a collider; empty where none does
+    std::optional<Hits> hits_;
 
     std::mutex mutex_;
     SolveResult result_;

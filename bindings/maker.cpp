@@ -24,4 +24,12 @@ const Maker& find_maker(std::string_view name)
     return *found;
 }
 
+std::vector<const Maker*> all_makers()
+{
+    std::vector<const Maker*> all;
+    for (const Maker& maker : makers()) all.push_back(&maker);
+    std::sort(all.begin(), all.end(), [](const Maker* a, const Maker* b) { return a->name < b->name; });
+    return all;
+}
+
 }  // namespace rapid

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "bindings/commands/annotations.h"
 #include "bindings/commands/command.h"
+#include "bindings/commands/param_facts.h"
 #include "bindings/session.h"
 
 namespace rapid {
@@ -41,7 +43,8 @@ ordered_json json_of(const Param& param)
 ordered_json json_of(const NodeType& type)
 {
     ordered_json params = ordered_json::array();
-    for (const Param& param : type.params) params.push_back(json_of(param));
+    for (const Param& param : type.params)
+        if (!param.internal) params.push_back(json_of(param));
     ordered_json makes = ordered_json::array();
     for (const AttributeSpec& spec : type.uses.makes) makes.push_back(spec.name);
     return {{"name", type.name},
@@ -62,21 +65,6 @@ std::string list_of(const std::vector<const NodeType*>& types)
     return text;
 }
 
-// What stands behind a parameter's documentation: [m/s, at least 0, default 0.5].
-std::string facts_of(const Param& param)
-{
-    std::vector<std::string> facts = {param.type};
-    if (!param.unit.empty()) facts.push_back(param.unit);
-    if (param.range.bounded()) facts.push_back(param.range.text());
-    if (!param.choices.empty()) facts.push_back(fmt::format("one of {}", fmt::join(param.choices, ", ")));
-    if (param.required)
-        facts.push_back("required");
-    else if (!param.fallback.is_nil())
-        facts.push_back("default " + describe(param.fallback));
-    if (param.per_point) facts.push_back("takes rapid.attr");
-    return fmt::format("[{}]", fmt::join(facts, ", "));
-}
-
 std::string page_of(const NodeType& type)
 {
     const std::string call = type.kind == NodeKind::Source ? "rapid." + type.name : ":" + type.name;
@@ -84,8 +72,10 @@ std::string page_of(const NodeType& type)
     std::size_t width = std::string_view("name").size();
     for (const Param& param : type.params) width = std::max(width, param.name.size());
     text += '\n';
-    for (const Param& param : type.params)
+    for (const Param& param : type.params) {
+        if (param.internal) continue;
         text += fmt::format("  {:{}}  {} {}\n", param.name, width, param.doc, facts_of(param));
+    }
     if (!type.find("name"))
         text += fmt::format("  {:{}}  what the node is called in messages [string]\n", "name", width);
     if (type.rest) text += fmt::format("  {:{}}  {} [{}]\n", "...", width, type.rest->doc, type.rest->type);
@@ -110,13 +100,19 @@ public:
     void declare(CLI::App& app) override
     {
         app.add_option("NAME", name_, "tells of this node alone")->type_name("");
-        app.add_flag("--json", json_, "as JSON");
+        auto* json = app.add_flag("--json", json_, "as JSON");
+        app.add_flag("--annotations", annotations_,
+                     "as the Lua language server reads them: the text of lua/rapid.d.lua")
+            ->excludes(json);
     }
 
     int run(const CommonOptions&) override
     {
         const Registry registry = Session::all_node_types();
-        if (!name_.empty()) {
+        if (annotations_) {
+            if (!name_.empty()) throw Error("rapid nodes: --annotations is of all nodes; leave out " + name_);
+            print(annotations_of(registry));
+        } else if (!name_.empty()) {
             const NodeType& type = registry.at(name_);
             print(json_ ? json_of(type).dump(2) + '\n' : page_of(type));
         } else if (json_) {
@@ -131,7 +127,7 @@ public:
 
 private:
     std::string name_;
-    bool json_ = false;
+    bool json_ = false, annotations_ = false;
 };
 RAPID_COMMAND(Nodes);
 

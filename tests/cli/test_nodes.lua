@@ -65,4 +65,32 @@ describe("rapid nodes", function()
     assert.equal(2, result.status)
     assert.equal('unknown node "gravty"; did you mean "gravity"?\n', result.stderr)
   end)
+
+  it("writes annotations for editors: those that are there, in Lua, of every node and parameter", function()
+    local written = command.rapid "nodes --annotations"
+    assert.equal(0, written.status)
+    local file = assert(io.open("lua/rapid.d.lua"))
+    local committed = file:read "*a"
+    file:close()
+    assert.is_true(committed == written.stdout,
+      "lua/rapid.d.lua is old; write it anew: rapid nodes --annotations >lua/rapid.d.lua")
+    assert(loadstring(committed))
+    assert.equal("---@meta rapid\n", committed:match "^[^\n]*\n")
+    for _, node in ipairs(all) do
+      local class = committed:match("%-%-%-@class rapid%.params%." .. node.name .. "\n(.-)\n\n")
+      assert.truthy(class, node.name)
+      for _, param in ipairs(node.params) do
+        local line = class:match("%-%-%-@field " .. param.name .. "%?? [^\n]*")
+        assert.truthy(line and line:find(param.doc, 1, true), node.name .. " " .. param.name)
+        assert.is_nil(line:find(" any ", 1, true), line)
+      end
+      assert.truthy(committed:find("\nfunction [%w_]+[.:]" .. node.name .. "%("), node.name)
+    end
+  end)
+
+  it("refuses the annotations of one node", function()
+    local result = command.rapid "nodes gravity --annotations"
+    assert.equal(2, result.status)
+    assert.equal("rapid nodes: --annotations is of all nodes; leave out gravity\n", result.stderr)
+  end)
 end)

@@ -1,0 +1,13 @@
+// What stands behind a parameter's documentation, on its page and in an editor.
+#pragma once
+
+#include <string>
+
+#include "runtime/graph/param.h"
+
+namespace rapid {
+
+// "[number, m/s, at least 0, default 0.5, takes rapid.attr]"
+std::string facts_of(const Param& param);
+
+}  // namespace rapid

@@ -1,0 +1,736 @@
+---@meta rapid
+-- The graph language, for editors with the Lua language server. Written by `rapid nodes --annotations`; do not edit.
+
+---Three numbers that do not change.
+---@class rapid.Vec3
+---@field x number
+---@field y number
+---@field z number
+---@operator add(rapid.Vec3): rapid.Vec3
+---@operator sub(rapid.Vec3): rapid.Vec3
+---@operator mul(number|rapid.Vec3): rapid.Vec3
+---@operator div(number|rapid.Vec3): rapid.Vec3
+---@operator unm: rapid.Vec3
+local Vec3 = {}
+---@param w rapid.Vec3
+---@return number
+function Vec3:dot(w) end
+---@param w rapid.Vec3
+---@return rapid.Vec3
+function Vec3:cross(w) end
+---@return number
+function Vec3:length() end
+---Of length 1; zero stays zero.
+---@return rapid.Vec3
+function Vec3:normalized() end
+---This at t = 0, w at t = 1.
+---@param w rapid.Vec3
+---@param t number
+---@return rapid.Vec3
+function Vec3:lerp(w, t) end
+
+---A rotation that does not change: q * r turns by r, and then by q.
+---@class rapid.Quat
+---@field x number
+---@field y number
+---@field z number
+---@field w number
+---@operator mul(rapid.Quat): rapid.Quat
+local Quat = {}
+---@param v rapid.Vec3
+---@return rapid.Vec3
+function Quat:rotate(v) end
+---@return rapid.Quat
+function Quat:inverse() end
+---@return number
+function Quat:length() end
+---@return rapid.Quat
+function Quat:normalized() end
+---The shortest way from this (t = 0) to r (t = 1).
+---@param r rapid.Quat
+---@param t number
+---@return rapid.Quat
+function Quat:slerp(r, t) end
+
+---@overload fun(list: number[]): rapid.Vec3
+---@param x number
+---@param y number
+---@param z number
+---@return rapid.Vec3
+function vec3(x, y, z) end
+
+---@param x number
+---@param y number
+---@param z number
+---@param w number
+---@return rapid.Quat
+function quat(x, y, z, w) end
+
+---@alias rapid.Place rapid.Vec3|number[]
+
+---@class rapid.Frame
+---@field number number  counted from the scene's start
+---@field time number    seconds since the start
+---@field dt number      seconds to the next frame
+
+---@class rapid.Attribute  each point's own value, from rapid.attr
+---@class rapid.Points
+
+---@class rapid.Motion  a * b moves by b, and then by a
+---@operator mul(rapid.Motion): rapid.Motion
+
+---@class rapid.Mesh
+local Mesh = {}
+---@param motion rapid.Motion
+---@return rapid.Mesh
+function Mesh:transform(motion) end
+
+---@class rapid.Shape
+local Shape = {}
+---Metres, negative inside.
+---@param P rapid.Vec3
+---@return number
+function Shape:distance(P) end
+---Out of the shape.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Shape:gradient(P) end
+
+---@class rapid.LevelSet: rapid.Shape
+local LevelSet = {}
+---Writes a .vdb file, in a run.
+---@param path string  relative to the current folder
+---@param options? { grid?: string }
+---@return rapid.LevelSet
+function LevelSet:write(path, options) end
+
+---@class rapid
+local rapid = {}
+rapid.mesh, rapid.levelset, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}
+
+---A value that --set can replace.
+---@generic T
+---@param name string
+---@param default T  a number, a boolean, a string or a vec3
+---@param doc? string
+---@return T
+function rapid.param(name, default, doc) end
+
+---Each point's own value of an attribute, for parameters that take it.
+---@param name string
+---@return rapid.Attribute
+function rapid.attr(name) end
+
+---@class rapid.NodeParameter
+---@field [1] "bool"|"float"|"floats"|"group"|"int"|"ramp"|"read"|"shape"|"string"|"vec3"|"vec3s"|"write"
+---@field default? any
+---@field required? boolean
+---@field min? number
+---@field max? number
+---@field unit? string
+---@field choices? string[]
+---@field doc string
+
+---@class rapid.NodeDefinition
+---@field name string  of its file, too
+---@field doc string
+---@field params? table<string, rapid.NodeParameter>
+---@field makes? table<string, number|number[]>  attributes that it brings into being, with their value
+---@field points? fun(p: rapid.Point, frame: rapid.Frame, params: table)
+---@field expand? fun(input: rapid.Node, params: table): rapid.Node
+
+---A node written in Lua; its file returns it.
+---@param definition rapid.NodeDefinition
+---@return rapid.NodeDefinition
+function rapid.node(definition) end
+
+---@param x number
+---@param y number
+---@param z number
+---@return rapid.Motion
+function rapid.translate(x, y, z) end
+
+---@param columns table<string, any[]>  { P = {{x, y, z}, ...}, ANY = {...} }
+---@return rapid.Points
+function rapid.points.from(columns) end
+
+---@param x number
+---@param lo number
+---@param hi number
+---@return number
+function rapid.math.clamp(x, lo, hi) end
+
+---x carried from [lo, hi] to [from, to], and held at its ends.
+---@param x number
+---@param lo number
+---@param hi number
+---@param from number
+---@param to number
+---@return number
+function rapid.math.fit(x, lo, hi, from, to) end
+
+---0 up to lo, 1 from hi on, smooth between.
+---@param lo number
+---@param hi number
+---@param x number
+---@return number
+function rapid.math.smoothstep(lo, hi, x) end
+
+---A number in [-1, 1] that changes smoothly in place and time.
+---@param P rapid.Vec3
+---@param time? number
+---@param octaves? integer
+---@param seed? integer
+---@return number
+function rapid.math.noise(P, time, octaves, seed) end
+
+---A flow, about 1 long, that neither gathers nor spreads points.
+---@param P rapid.Vec3
+---@param time? number
+---@param octaves? integer
+---@param seed? integer
+---@return rapid.Vec3
+function rapid.math.curl_noise(P, time, octaves, seed) end
+
+---@param axis rapid.Vec3
+---@param degrees number
+---@return rapid.Quat
+function rapid.math.rotation(axis, degrees) end
+
+---@param from rapid.Vec3
+---@param to rapid.Vec3
+---@return rapid.Quat
+function rapid.math.rotation_between(from, to) end
+
+---@class rapid.options.levelset_box
+---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
+
+---A box.
+---@param options? rapid.options.levelset_box
+---@return rapid.LevelSet
+function rapid.levelset.box(options) end
+
+---@class rapid.options.levelset_from_mesh
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
+
+---The distance to a closed mesh.
+---@param mesh rapid.Mesh  closed [mesh, required]
+---@param options? rapid.options.levelset_from_mesh
+---@return rapid.LevelSet
+function rapid.levelset.from_mesh(mesh, options) end
+
+---@class rapid.options.levelset_read
+---@field grid? string  its name; the only level set, when not given [string]
+
+---Reads a level set from a .vdb file.
+---@param path string  relative to the graph file [string, required]
+---@param options? rapid.options.levelset_read
+---@return rapid.LevelSet
+function rapid.levelset.read(path, options) end
+
+---@class rapid.options.levelset_sphere
+---@field radius? number  of the sphere [number, m, above 0, default 1]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
+
+---A sphere.
+---@param options? rapid.options.levelset_sphere
+---@return rapid.LevelSet
+function rapid.levelset.sphere(options) end
+
+---@class rapid.options.levelset_torus
+---@field radius? number  from the axis to the middle of the tube [number, m, above 0, default 1]
+---@field tube? number  radius of the tube [number, m, above 0, default 0.25]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
+
+---A torus about the y axis.
+---@param options? rapid.options.levelset_torus
+---@return rapid.LevelSet
+function rapid.levelset.torus(options) end
+
+---@class rapid.options.mesh_box
+---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---A box.
+---@param options? rapid.options.mesh_box
+---@return rapid.Mesh
+function rapid.mesh.box(options) end
+
+---@class rapid.options.mesh_from
+---@field points any[]  {{x, y, z}, ...} [list, m, required]
+---@field faces any[]  {{1, 2, 3}, ...}: places in `points`, from 1 [list, required]
+
+---A mesh from a list of places and a list of faces.
+---@param options? rapid.options.mesh_from
+---@return rapid.Mesh
+function rapid.mesh.from(options) end
+
+---@class rapid.options.mesh_grid
+---@field size? any[]  edge lengths {x, z} (1, 1) [list, m]
+---@field divisions? integer  cells along each edge [integer, from 1 to 4096, default 10]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---A flat grid, facing up.
+---@param options? rapid.options.mesh_grid
+---@return rapid.Mesh
+function rapid.mesh.grid(options) end
+
+---Reads OBJ, PLY, STL or glTF.
+---@param path string  relative to the graph file [string, required]
+---@return rapid.Mesh
+function rapid.mesh.read(path) end
+
+---@class rapid.options.mesh_sphere
+---@field radius? number  of the sphere [number, m, above 0, default 1]
+---@field divisions? integer  around the equator [integer, from 3 to 4096, default 24]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---A sphere.
+---@param options? rapid.options.mesh_sphere
+---@return rapid.Mesh
+function rapid.mesh.sphere(options) end
+
+---@class rapid.options.mesh_torus
+---@field radius? number  from the axis to the middle of the tube [number, m, above 0, default 1]
+---@field tube? number  radius of the tube [number, m, above 0, default 0.25]
+---@field divisions? integer  around the axis; around the tube as many as make edges of that length [integer, from 3 to 4096, default 24]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---A torus about the y axis.
+---@param options? rapid.options.mesh_torus
+---@return rapid.Mesh
+function rapid.mesh.torus(options) end
+
+---Turns about an axis through the origin.
+---@param axis rapid.Place  any length but zero [vec3, required]
+---@param degrees number  the angle, by the right-hand rule [number, deg, required]
+---@return rapid.Motion
+function rapid.rotate(axis, degrees) end
+
+---Scales about the origin.
+---@param factor number  of all lengths [number, above 0, required]
+---@return rapid.Motion
+function rapid.scale(factor) end
+
+---@class rapid.options.points_grid
+---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
+---@field spacing? number  edge of a cell [number, m, above 0, default 0.1]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---Points at the centres of the cells of a box.
+---@param options? rapid.options.points_grid
+---@return rapid.Points
+function rapid.points.grid(options) end
+
+---Reads points from a file that Rapid can write.
+---@param path string  relative to the graph file [string, required]
+---@return rapid.Points
+function rapid.points.read(path) end
+
+---@class rapid.options.shape_box
+---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---A box.
+---@param options? rapid.options.shape_box
+---@return rapid.Shape
+function rapid.shape.box(options) end
+
+---@class rapid.options.shape_plane
+---@field normal? rapid.Place  out of the plane; any length but zero [vec3, default {0, 1, 0}]
+---@field offset? number  along the normal [number, m, default 0]
+
+---The points with normal · x = offset; outside is where the normal points.
+---@param options? rapid.options.shape_plane
+---@return rapid.Shape
+function rapid.shape.plane(options) end
+
+---@class rapid.options.shape_sphere
+---@field radius? number  of the sphere [number, m, above 0, default 1]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+
+---A sphere.
+---@param options? rapid.options.shape_sphere
+---@return rapid.Shape
+function rapid.shape.sphere(options) end
+
+---The point that a kernel sees. Other attributes are those that the scene makes.
+---@class rapid.Point
+---@field P rapid.Vec3  m
+---@field v rapid.Vec3  m/s
+---@field id integer  read only
+---@field dt number  read only: seconds that this point is advanced in this frame
+---@field index integer  read only: place in the set, from 1
+---@field age number
+---@field airresist number
+---@field birthtime number
+---@field force rapid.Vec3
+---@field hitimpulse number
+---@field hitnml rapid.Vec3
+---@field hitnum integer
+---@field hitpath integer
+---@field hitpos rapid.Vec3
+---@field hittime number
+---@field hittotal integer
+---@field hitv rapid.Vec3
+---@field life number
+---@field mass number
+---@field pscale number
+---@field targetv rapid.Vec3
+---@field [string] any
+local Point = {}
+---@param group string
+function Point:join(group) end
+---@param group string
+function Point:leave(group) end
+---@param group string
+---@return boolean
+function Point:within(group) end
+---Removes the point when its node ends.
+function Point:kill() end
+---In [0, 1): the point's own number k, the same in every frame, or with the frame anew in each.
+---@param k number
+---@param frame? rapid.Frame|number
+---@return number
+function Point:rand(k, frame) end
+
+---@class rapid.Node
+local Node = {}
+
+---@class rapid.params.align_to_velocity
+---@field least? number|fun(frame: rapid.Frame): number  slower points keep their orientation [number, m/s, at least 0, default 1e-06]
+---@field up? rapid.Place|fun(frame: rapid.Frame): rapid.Place  where the y axis points as far as it can [vec3, default {0, 1, 0}]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Turns orient so that its z axis points along the velocity.
+---@param params? rapid.params.align_to_velocity
+---@return rapid.Node
+function Node:align_to_velocity(params) end
+
+---@class rapid.params.attribute
+---@field name? string  what the node is called in messages [string]
+---@field [string] number|number[]|rapid.Vec3  value of points that have none: a number is a float, {x, y, z} a vec3
+
+---Gives attributes to points that do not have them; never overwrites.
+---@param params? rapid.params.attribute
+---@return rapid.Node
+function Node:attribute(params) end
+
+---@class rapid.params.avoid
+---@field distance? number|fun(frame: rapid.Frame): number  where it begins to act [number, m, at least 1e-06, default 0.5]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape, required]
+---@field strength? number|fun(frame: rapid.Frame): number  acceleration at the surface [number, m/s², default 10]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Pushes points away from a shape that they come near.
+---@param params rapid.params.avoid
+---@return rapid.Node
+function Node:avoid(params) end
+
+---@class rapid.params.collide
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  what the points collide with [shape, required]
+---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution: the part of the speed that is kept [number, from 0 to 1, default 0.5, takes rapid.attr]
+---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient [number, at least 0, default 0, takes rapid.attr]
+---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Keeps points out of a shape: they bounce, slide and come to rest on it.
+---@param params rapid.params.collide
+---@return rapid.Node
+function Node:collide(params) end
+
+---@class rapid.params.color_by_speed
+---@field fast? rapid.Place|fun(frame: rapid.Frame): rapid.Place  colour at high and above, linear RGB [vec3, at least 0, default {1, 0.9, 0.6}]
+---@field high? number|fun(frame: rapid.Frame): number  another speed [number, m/s, at least 0, default 5]
+---@field low? number|fun(frame: rapid.Frame): number  a speed [number, m/s, at least 0, default 0]
+---@field slow? rapid.Place|fun(frame: rapid.Frame): rapid.Place  colour at low and below, linear RGB [vec3, at least 0, default {0.1, 0.2, 0.9}]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Colours points by their speed.
+---@param params? rapid.params.color_by_speed
+---@return rapid.Node
+function Node:color_by_speed(params) end
+
+---@class rapid.params.create
+---@field fps? number  frames a second [number, 1/s, above 0, default 24]
+---@field start? integer  first frame: the initial state, at time 0 [integer, default 1]
+---@field seed? integer  of all random numbers of this simulation [integer, at least 0, default 0]
+---@field points? rapid.Points  initial points; their ids count from 0 [points]
+---@field name? string  what the node is called in messages [string]
+
+---Starts a simulation; yields its points as Solve left them at the frame before.
+---@param params? rapid.params.create
+---@return rapid.Node
+function rapid.create(params) end
+
+---@class rapid.params.delete
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field where? fun(p: rapid.Point, frame: rapid.Frame): any  says of a point whether it is removed [function of a point]
+---@field name? string  what the node is called in messages [string]
+
+---Removes the points of a group, or those for which `where` is true.
+---@param params? rapid.params.delete
+---@return rapid.Node
+function Node:delete(params) end
+
+---@class rapid.params.emit
+---@field source rapid.Mesh|rapid.Shape|rapid.Points|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points  what points are born from [mesh, level set, shape or points, required]
+---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  where on the source; without it "points" of points, else "surface". A mesh's points are its vertices. With count or impulse points are taken in order, so that as many births as points take each once; with rate at random [string, one of surface, volume, points]
+---@field rate? number|fun(frame: rapid.Frame): number  points born a second [number, 1/s, at least 0]
+---@field count? integer|fun(frame: rapid.Frame): integer  points born a frame [integer, at least 0]
+---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
+---@field birth? "random"|"begin"|"end"|"even"|fun(frame: rapid.Frame): "random"|"begin"|"end"|"even"  when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time [string, one of random, begin, end, even, default "random"]
+---@field age? number|number[]|fun(frame: rapid.Frame): number|number[]  age at the end of the frame of birth, instead of `birth`; a number or {min, max} [number or {min, max}, s, at least 0]
+---@field inherit? number|fun(frame: rapid.Frame): number  fraction of the source's velocity that is added [number, default 1]
+---@field velocity? rapid.Place|fun(frame: rapid.Frame): rapid.Place  mean direction and size [vec3, m/s, default {0, 0, 0}]
+---@field speed? number|fun(frame: rapid.Frame): number  along the source's normal N, added to velocity [number, m/s, default 0]
+---@field spread? number|fun(frame: rapid.Frame): number  turns velocity and speed together, uniformly in a cone of this half angle [number, deg, from 0 to 180, default 0]
+---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it they live for ever [number or {min, max}, s, at least 0]
+---@field group? string  the newborn join this group [string]
+---@field attributes? table<string, number|number[]|rapid.Vec3>|fun(frame: rapid.Frame): table<string, number|number[]|rapid.Vec3>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; they go before the source's own [attributes]
+---@field name? string  what the node is called in messages [string]
+
+---Bears points from a surface, in a volume or at points.
+---@param params rapid.params.emit
+---@return rapid.Node
+function Node:emit(params) end
+
+---@class rapid.params.fade_by_age
+---@field attribute? string  a float [name of an attribute, default "pscale"]
+---@field first? number|fun(frame: rapid.Frame): number  its value at birth [number, default 1]
+---@field hold? number|fun(frame: rapid.Frame): number  part of the life before the fade begins [number, from 0 to 0.999, default 0]
+---@field last? number|fun(frame: rapid.Frame): number  its value at death [number, default 0]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Fades an attribute over the life of each point.
+---@param params? rapid.params.fade_by_age
+---@return rapid.Node
+function Node:fade_by_age(params) end
+
+---@class rapid.params.follow_curve
+---@field duration? number|fun(frame: rapid.Frame): number  from the first to the last, each span alike [number, s, at least 1e-06, default 1]
+---@field points rapid.Place[]|fun(frame: rapid.Frame): rapid.Place[]  the curve goes through them, at least two [list of vec3, m, required]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Moves points along a curve.
+---@param params rapid.params.follow_curve
+---@return rapid.Node
+function Node:follow_curve(params) end
+
+---@class rapid.params.gravity
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field g? rapid.Place|fun(frame: rapid.Frame): rapid.Place  acceleration [vec3, m/s², default {0, -9.81, 0}]
+---@field name? string  what the node is called in messages [string]
+
+---Accelerates all points alike.
+---@param params? rapid.params.gravity
+---@return rapid.Node
+function Node:gravity(params) end
+
+---@class rapid.params.group
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field name string  name of the group that is made [string, required]
+---@field where? fun(p: rapid.Point, frame: rapid.Frame): any  says of a point whether it is in the group; without it all points are [function of a point]
+
+---Puts the points for which `where` is true into a group, anew at each frame.
+---@param params rapid.params.group
+---@return rapid.Node
+function Node:group(params) end
+
+---@class rapid.params.group_by_bounds
+---@field into string  the group [name of a group, required]
+---@field max? rapid.Place|fun(frame: rapid.Frame): rapid.Place  greatest corner of the box [vec3, m, default {1, 1, 1}]
+---@field min? rapid.Place|fun(frame: rapid.Frame): rapid.Place  least corner of the box; on its faces is in it [vec3, m, default {-1, -1, -1}]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Puts the points in a box into a group, and takes the others out of it.
+---@param params rapid.params.group_by_bounds
+---@return rapid.Node
+function Node:group_by_bounds(params) end
+
+---@class rapid.params.group_by_shape
+---@field distance? number|fun(frame: rapid.Frame): number  how far from the surface is in; negative is deep inside [number, m, default 0]
+---@field into string  the group [name of a group, required]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape, required]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Puts the points in or near a shape into a group, and takes the others out of it.
+---@param params rapid.params.group_by_shape
+---@return rapid.Node
+function Node:group_by_shape(params) end
+
+---@class rapid.params.jitter
+---@field strength? number|fun(frame: rapid.Frame): number  root mean square speed gained in a second [number, m/s, at least 0, default 1]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Kicks points in random directions.
+---@param params? rapid.params.jitter
+---@return rapid.Node
+function Node:jitter(params) end
+
+---@class rapid.params.kill_slow
+---@field age? number|fun(frame: rapid.Frame): number  younger points stay [number, s, at least 0, default 0]
+---@field speed? number|fun(frame: rapid.Frame): number  slower points go [number, m/s, at least 0, default 0.05]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Removes points that move too slowly.
+---@param params? rapid.params.kill_slow
+---@return rapid.Node
+function Node:kill_slow(params) end
+
+---@class rapid.params.lift
+---@field cooling? number|fun(frame: rapid.Frame): number  time in which heat falls to 1/e [number, s, at least 0.001, default 0.5]
+---@field strength? number|fun(frame: rapid.Frame): number  acceleration at a heat of 1 [number, m/s², at least 0, default 1]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Raises points by their heat, and cools them.
+---@param params? rapid.params.lift
+---@return rapid.Node
+function Node:lift(params) end
+
+---@class rapid.params.limit_speed
+---@field max? number|fun(frame: rapid.Frame): number  greatest speed [number, m/s, at least 0, default inf]
+---@field min? number|fun(frame: rapid.Frame): number  least speed of a moving point [number, m/s, at least 0, default 0]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Holds the speed of points between two bounds.
+---@param params? rapid.params.limit_speed
+---@return rapid.Node
+function Node:limit_speed(params) end
+
+---@class rapid.params.merge
+---@field name? string  what the node is called in messages [string]
+
+---Joins the points of several chains; what comes by several is taken once.
+---@param ... rapid.Node|rapid.params.merge
+---@return rapid.Node
+function Node:merge(...) end
+
+---@class rapid.params.points
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field kernel fun(p: rapid.Point, frame: rapid.Frame): any  function(p, frame) [function of a point, required]
+---@field name? string  what the node is called in messages [string]
+
+---Edits the points with a Lua function, one by one, in parallel.
+---@overload fun(self: rapid.Node, name: string, kernel: fun(p: rapid.Point, frame: rapid.Frame)): rapid.Node
+---@param params rapid.params.points
+---@return rapid.Node
+function Node:points(params) end
+
+---@class rapid.params.ramp
+---@field from? string  the attribute that is looked up [name of an attribute, default "age"]
+---@field keys? any[]|fun(frame: rapid.Frame): any[]  {value of from, value of to}, rising [ramp, default {{0, {1, 1, 1}}, {1, {0, 0, 0}}}]
+---@field to? string  the attribute that is written [name of an attribute, default "Cd"]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Draws an attribute from another by way of keys.
+---@param params? rapid.params.ramp
+---@return rapid.Node
+function Node:ramp(params) end
+
+---@class rapid.params.randomize
+---@field attribute? string  a float [name of an attribute, default "pscale"]
+---@field bias? number|fun(frame: rapid.Frame): number  1: all values alike [number, at least 0.001, default 1]
+---@field max? number|fun(frame: rapid.Frame): number  greatest value [number, default 1]
+---@field min? number|fun(frame: rapid.Frame): number  least value [number, default 0]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Gives each point its own random value of an attribute.
+---@param params? rapid.params.randomize
+---@return rapid.Node
+function Node:randomize(params) end
+
+---@class rapid.params.solve
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, at least 1, default 1]
+---@field name? string  what the node is called in messages [string]
+
+---Advances the points by one frame: forces, motion, collision.
+---@param params? rapid.params.solve
+---@return rapid.Node
+function Node:solve(params) end
+
+---@class rapid.params.spin
+---@field axis? rapid.Place|fun(frame: rapid.Frame): rapid.Place  of the world, any length but zero [vec3, default {0, 1, 0}]
+---@field rate? number|fun(frame: rapid.Frame): number  how fast [number, deg/s, default 360]
+---@field variation? number|fun(frame: rapid.Frame): number  part of the rate by which points differ from it [number, at least 0, default 0]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Turns orient about an axis.
+---@param params? rapid.params.spin
+---@return rapid.Node
+function Node:spin(params) end
+
+---@class rapid.params.swirl
+---@field axis? rapid.Place|fun(frame: rapid.Frame): rapid.Place  axis of rotation, any length but zero [vec3, default {0, 1, 0}]
+---@field center? rapid.Place|fun(frame: rapid.Frame): rapid.Place  a place on the axis [vec3, m, default {0, 0, 0}]
+---@field strength? number|fun(frame: rapid.Frame): number  acceleration at 1 m from the axis [number, 1/s², default 1]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Turns points about an axis.
+---@param params? rapid.params.swirl
+---@return rapid.Node
+function Node:swirl(params) end
+
+---@class rapid.params.wander
+---@field change? number|fun(frame: rapid.Frame): number  how often in a second it becomes another [number, 1/s, at least 0, default 0.5]
+---@field octaves? integer|fun(frame: rapid.Frame): integer  sizes of eddies, each half the one before [integer, from 1 to 16, default 2]
+---@field response? number|fun(frame: rapid.Frame): number  time in which the difference falls to 1/e [number, s, at least 1e-06, default 0.2]
+---@field seed? integer|fun(frame: rapid.Frame): integer  chooses the flow [integer, at least 0, default 0]
+---@field size? number|fun(frame: rapid.Frame): number  of its largest eddies [number, m, at least 1e-06, default 1]
+---@field speed? number|fun(frame: rapid.Frame): number  root mean square speed of the flow [number, m/s, at least 0, default 1]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Carries points along a turbulent flow.
+---@param params? rapid.params.wander
+---@return rapid.Node
+function Node:wander(params) end
+
+---@class rapid.params.wrap
+---@field max? rapid.Place|fun(frame: rapid.Frame): rapid.Place  greatest corner of the box, above min on each axis [vec3, m, default {1, 1, 1}]
+---@field min? rapid.Place|fun(frame: rapid.Frame): rapid.Place  least corner of the box [vec3, m, default {-1, -1, -1}]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Brings points that leave a box back on its other side.
+---@param params? rapid.params.wrap
+---@return rapid.Node
+function Node:wrap(params) end
+
+---@class rapid.params.write
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field file string|fun(frame: rapid.Frame): string  pattern of the file: #### is the frame [string, required]
+---@field attributes? string|string[]  those that are written besides P, v and id; without it all are [names]
+---@field name? string  what the node is called in messages [string]
+
+---Writes the points as they are here, and passes them on.
+---@param params rapid.params.write
+---@return rapid.Node
+function Node:write(params) end
+
+return rapid

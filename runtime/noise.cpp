@@ -1,6 +1,9 @@
 #include "runtime/noise.h"
 
+#pragma GCC diagnostic ignored "-Wpsabi"  // vectors are passed within this file alone
+
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -12,23 +15,19 @@ namespace {
 struct One {
     static constexpr std::size_t size = 1;
     using Real = double;
-    using Int = std::int32_t;
     using Bits = std::uint32_t;
     using Words = std::uint64_t;
 
     static Bits low(Words words) { return static_cast<Bits>(words); }
-    static Real real(Int whole) { return whole; }
 };
 
 struct Eight {
     static constexpr std::size_t size = 8;
     typedef double Real __attribute__((vector_size(64)));
-    typedef std::int32_t Int __attribute__((vector_size(32)));
     typedef std::uint32_t Bits __attribute__((vector_size(32)));
     typedef std::uint64_t Words __attribute__((vector_size(64)));
 
     static Bits low(const Words& words) { return __builtin_convertvector(words, Bits); }
-    static Real real(const Int& whole) { return __builtin_convertvector(whole, Real); }
 };
 
 // Wellons' lowbias32: each bit of x changes each bit of the result in close to half of all cases.
@@ -66,13 +65,27 @@ struct Axis {
 
 // A lattice corner's gradient in place and time: three of its four components are 1 or -1, one is 0. Six bits choose
 // it. (In a plane of time that leaves the middles of a cube's edges, as Perlin has them, and its corners.)
-template <class Lane, int axis>
-inline typename Lane::Real component(const typename Lane::Bits& bits)
+inline void gradient_of(const Eight::Bits& bits, Eight::Real (&g)[4])
 {
-    using Int = typename Lane::Int;
-    const Int sign = std::bit_cast<Int>((bits >> (2 + axis)) & 1) * 2 - 1;
-    const Int absent = std::bit_cast<Int>((bits & 3) ^ axis);  // 0 where this is the component that is 0
-    return Lane::real(absent == 0 ? sign * 0 : sign);
+    constexpr std::uint64_t one = 0x3ff0000000000000, sign = 0x8000000000000000;  // of a double
+    const Eight::Words wide = __builtin_convertvector(bits, Eight::Words);
+    for (std::uint64_t axis = 0; axis < 4; ++axis) {
+        const Eight::Words value = ((wide << (61 - axis)) & sign) ^ (sign | one);
+        g[axis] = std::bit_cast<Eight::Real>((wide & 3) == axis ? value ^ value : value);
+    }
+}
+
+// The same; one point looks it up.
+inline void gradient_of(std::uint32_t bits, double (&g)[4])
+{
+    static constexpr auto table = [] {
+        std::array<std::array<double, 4>, 64> all{};
+        for (std::uint32_t k = 0; k < 64; ++k)
+            for (std::uint32_t axis = 0; axis < 4; ++axis)
+                all[k][axis] = (k & 3) == axis ? 0 : (k >> (2 + axis) & 1) != 0 ? 1 : -1;
+        return all;
+    }();
+    std::copy_n(table[bits & 63].begin(), 4, g);
 }
 
 // Values and gradients of `fields` independent noises on one lattice, at x, w; added to what is there.
@@ -106,10 +119,9 @@ inline void add_octave(const typename Lane::Real (&x)[3], double w, std::uint32_
                                             weight_x * slope_y * weight_z * weight_w,
                                             weight_x * weight_y * slope_z * weight_w};
                     for (int k = 0; k < fields; ++k, bits >>= 6) {
-                        const Real g[3] = {component<Lane, 0>(bits), component<Lane, 1>(bits),
-                                           component<Lane, 2>(bits)};
-                        const Real along =
-                            g[0] * to[0] + g[1] * to[1] + g[2] * to[2] + component<Lane, 3>(bits) * (time.f - dw);
+                        Real g[4];
+                        gradient_of(bits, g);
+                        const Real along = g[0] * to[0] + g[1] * to[1] + g[2] * to[2] + g[3] * (time.f - dw);
                         value[k] += weight * along;
                         for (int axis = 0; axis < 3; ++axis)
                             gradient[k][axis] += slopes[axis] * along + weight * g[axis];

@@ -135,7 +135,8 @@ end)
 describe("a collide node", function()
   it("refuses what it does not know", function()
     local function message(options)
-      return scene.error(("return rapid.create {} :collide { shape = rapid.shape.plane {}, %s } :solve {}"):format(options))
+      local text = "return rapid.create {} :collide { shape = rapid.shape.plane {}, %s } :solve {}"
+      return scene.error(text:format(options))
     end
     assert.match('method = "continous" is unknown; did you mean "continuous"', message "method = 'continous'")
     assert.match('response = "bouncy"', message "response = 'bouncy'")

@@ -405,6 +405,16 @@ function Point:rand(k, frame) end
 ---@class rapid.Node
 local Node = {}
 
+---@class rapid.params.action
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field kernel fun(p: rapid.Point, frame: rapid.Frame): any  function(p, step) [function of a point, required]
+---@field name? string  what the node is called in messages [string]
+
+---Edits the points with a Lua function inside Solve, at every sub-step.
+---@param params rapid.params.action
+---@return rapid.Node
+function Node:action(params) end
+
 ---@class rapid.params.align_to_velocity
 ---@field least? number|fun(frame: rapid.Frame): number  slower points keep their orientation [number, m/s, at least 0, default 1e-06]
 ---@field up? rapid.Place|fun(frame: rapid.Frame): rapid.Place  where the y axis points as far as it can [vec3, default {0, 1, 0}]
@@ -415,6 +425,20 @@ local Node = {}
 ---@param params? rapid.params.align_to_velocity
 ---@return rapid.Node
 function Node:align_to_velocity(params) end
+
+---@class rapid.params.attract
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field center? rapid.Place|rapid.Attribute|fun(frame: rapid.Frame): rapid.Place  where to [vec3, m, default {0, 0, 0}, takes rapid.attr]
+---@field shape? rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  to its surface, in place of center [shape]
+---@field strength? number|rapid.Attribute|fun(frame: rapid.Frame): number  acceleration; negative: away [number, m/s² at 1 m, default 1, takes rapid.attr]
+---@field falloff? number|fun(frame: rapid.Frame): number  power of the distance by which it falls [number, default 2]
+---@field core? number|fun(frame: rapid.Frame): number  within about this distance it grows no more [number, m, at least 0, default 0]
+---@field name? string  what the node is called in messages [string]
+
+---Draws points to a place, or to the surface of a shape.
+---@param params? rapid.params.attract
+---@return rapid.Node
+function Node:attract(params) end
 
 ---@class rapid.params.attribute
 ---@field name? string  what the node is called in messages [string]
@@ -443,6 +467,9 @@ function Node:avoid(params) end
 ---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution: the part of the speed that is kept [number, from 0 to 1, default 0.5, takes rapid.attr]
 ---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient [number, at least 0, default 0, takes rapid.attr]
 ---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
+---@field method? "continuous"|"backtrack"|"project"|fun(frame: rapid.Frame): "continuous"|"backtrack"|"project"  on the path, at the time of impact; or after the step, by going back or out along the gradient [string, one of continuous, backtrack, project, default "continuous"]
+---@field response? "bounce"|"slide"|"stick"|"die"|fun(frame: rapid.Frame): "bounce"|"slide"|"stick"|"die"  slide: without bounce; stick: held by the shape; die: killed [string, one of bounce, slide, stick, die, default "bounce"]
+---@field record? any  writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, hittime, hitimpulse, hitpath [false or number, m/s, at least 0, default false]
 ---@field name? string  what the node is called in messages [string]
 
 ---Keeps points out of a shape: they bounce, slide and come to rest on it.
@@ -484,6 +511,26 @@ function rapid.create(params) end
 ---@param params? rapid.params.delete
 ---@return rapid.Node
 function Node:delete(params) end
+
+---@class rapid.params.detail
+---@field kernel any  function(points, frame) [function of the points, required]
+---@field name? string  what the node is called in messages [string]
+
+---Runs a Lua function over the whole set of points, once.
+---@param params rapid.params.detail
+---@return rapid.Node
+function Node:detail(params) end
+
+---@class rapid.params.drag
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field linear? number|rapid.Attribute|fun(frame: rapid.Frame): number  rate of the drag that grows with the speed [number, 1/s, at least 0, default 0, takes rapid.attr]
+---@field quadratic? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the drag that grows with the square of the speed [number, 1/m, at least 0, default 0, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Slows points down.
+---@param params? rapid.params.drag
+---@return rapid.Node
+function Node:drag(params) end
 
 ---@class rapid.params.emit
 ---@field source rapid.Mesh|rapid.Shape|rapid.Points|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points  what points are born from [mesh, level set, shape or points, required]
@@ -684,6 +731,18 @@ function Node:solve(params) end
 ---@return rapid.Node
 function Node:spin(params) end
 
+---@class rapid.params.spring
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field target? any  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape, m, default {0, 0, 0}]
+---@field stiffness? number|rapid.Attribute|fun(frame: rapid.Frame): number  force a metre [number, N/m, at least 0, default 1, takes rapid.attr]
+---@field damping? number|rapid.Attribute|fun(frame: rapid.Frame): number  force by speed [number, N s/m, at least 0, default 0, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Holds points with a spring to a place or to a shape.
+---@param params? rapid.params.spring
+---@return rapid.Node
+function Node:spring(params) end
+
 ---@class rapid.params.swirl
 ---@field axis? rapid.Place|fun(frame: rapid.Frame): rapid.Place  axis of rotation, any length but zero [vec3, default {0, 1, 0}]
 ---@field center? rapid.Place|fun(frame: rapid.Frame): rapid.Place  a place on the axis [vec3, m, default {0, 0, 0}]
@@ -695,6 +754,32 @@ function Node:spin(params) end
 ---@param params? rapid.params.swirl
 ---@return rapid.Node
 function Node:swirl(params) end
+
+---@class rapid.params.turbulence
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field amplitude? number|rapid.Attribute|fun(frame: rapid.Frame): number  root mean square acceleration [number, m/s², default 1, takes rapid.attr]
+---@field size? number|fun(frame: rapid.Frame): number  of the largest swirls [number, m, above 0, default 1]
+---@field speed? number|fun(frame: rapid.Frame): number  how fast the field changes [number, 1/s, at least 0, default 0]
+---@field octaves? integer|fun(frame: rapid.Frame): integer  each with swirls half as large and half as strong [integer, from 1 to 16, default 3]
+---@field seed? integer|fun(frame: rapid.Frame): integer  of the field [integer, at least 0, default 0]
+---@field name? string  what the node is called in messages [string]
+
+---Pushes points along the swirls of a random field.
+---@param params? rapid.params.turbulence
+---@return rapid.Node
+function Node:turbulence(params) end
+
+---@class rapid.params.vortex
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field center? rapid.Place|rapid.Attribute|fun(frame: rapid.Frame): rapid.Place  a place on the axis [vec3, m, default {0, 0, 0}, takes rapid.attr]
+---@field axis? rapid.Place|fun(frame: rapid.Frame): rapid.Place  its direction, any length but zero [vec3, default {0, 1, 0}]
+---@field strength? number|rapid.Attribute|fun(frame: rapid.Frame): number  acceleration, counterclockwise [number, m/s², default 1, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Drives points around an axis.
+---@param params? rapid.params.vortex
+---@return rapid.Node
+function Node:vortex(params) end
 
 ---@class rapid.params.wander
 ---@field change? number|fun(frame: rapid.Frame): number  how often in a second it becomes another [number, 1/s, at least 0, default 0.5]
@@ -710,6 +795,17 @@ function Node:swirl(params) end
 ---@param params? rapid.params.wander
 ---@return rapid.Node
 function Node:wander(params) end
+
+---@class rapid.params.wind
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field velocity? rapid.Place|rapid.Attribute|fun(frame: rapid.Frame): rapid.Place  of the air [vec3, m/s, default {0, 0, 0}, takes rapid.attr]
+---@field drag? number|rapid.Attribute|fun(frame: rapid.Frame): number  the rate at which points come to its velocity [number, 1/s, at least 0, default 1, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Takes points along with the air.
+---@param params? rapid.params.wind
+---@return rapid.Node
+function Node:wind(params) end
 
 ---@class rapid.params.wrap
 ---@field max? rapid.Place|fun(frame: rapid.Frame): rapid.Place  greatest corner of the box, above min on each axis [vec3, m, default {1, 1, 1}]

@@ -73,10 +73,12 @@ struct Flow {
 // Counted while a frame runs (see `--stats`).
 struct FrameFigures {
     std::uint64_t born = 0, died = 0, collisions = 0;
-    std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
-    std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
+    std::uint64_t contact_limit = 0;     // points that ran into the limit of contacts in a step
+    std::uint64_t beyond_tolerance = 0;  // points that would need more than max_substeps
+    std::uint64_t trapped = 0;           // points deep in a shape, with no way out known
     int substeps = 0;
     double penetration_max = 0;
+    std::vector<double> errors;  // estimated, of the positions of a sample of the points, m
     double script_seconds = 0, solve_seconds = 0;
 };
 

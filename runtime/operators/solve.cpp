@@ -1,6 +1,6 @@
 // solve: advances the points by one frame under all that is upstream, lets them age and die, and hands them to the next
 // frame's Create (paper §2.1).
-#include "runtime/solver/solve.h"
+#include "runtime/solver/error_control.h"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,8 @@ namespace rapid {
 namespace {
 
 struct Solve {
-    int substeps = 1;
+    int substeps = 1, max_substeps = 64;
+    std::optional<double> tolerance;
     std::string group;
 
     static NodeType declare()
@@ -23,6 +24,9 @@ struct Solve {
         return node<Solve>("solve", "Advances the points by one frame: forces, motion, collision.")
             .kind(NodeKind::Solve)
             .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
+            .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
+                   "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")
+            .param(&Solve::max_substeps, "max_substeps", 64.0, at_least(1), "", "the most, with a tolerance")
             .writes("P")
             .writes("v");
     }
@@ -48,8 +52,16 @@ struct Solve {
         options.h = now.frame.dt;
         options.frame = static_cast<std::int64_t>(now.frame.number);
         options.group = group;
-        const SolveResult result = solve(points, flow.dynamics, options);
-        now.figures.substeps = std::max(now.figures.substeps, substeps);
+        const PointSet sample = sample_of(points);
+        Tolerated done;
+        if (tolerance)
+            done = solve_within(points, flow.dynamics, options, *tolerance, max_substeps);
+        else
+            done = {solve(points, flow.dynamics, options), substeps, 0,
+                    estimate_errors(sample, flow.dynamics, options)};
+        const SolveResult& result = done.result;
+        now.figures.substeps = std::max(now.figures.substeps, done.substeps);
+        now.figures.errors.insert(now.figures.errors.end(), done.errors.begin(), done.errors.end());
         now.figures.collisions += result.collisions;
         now.figures.died += result.died;
         now.figures.contact_limit += result.contact_limit;
@@ -66,6 +78,13 @@ struct Solve {
                 fmt::format("node \"{}\": points are deep in a shape, where its field shows no way out; a level set of "
                             "a larger half_width shows it farther",
                             now.node));
+
+        if (done.beyond > 0)
+            now.warnings.push_back(
+                fmt::format("node \"{}\": points need more than {} sub-steps for an error of {:g} m a frame; raise "
+                            "max_substeps or the tolerance",
+                            now.node, done.substeps, *tolerance));
+        now.figures.beyond_tolerance += done.beyond;
 
         age(points, now);
         points.remove("dt");

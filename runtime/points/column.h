@@ -129,6 +129,17 @@ public:
         return {mutable_data() + (size_ - n), n};
     }
 
+    // The values at these places, in this order.
+    Column select(std::span<const std::uint32_t> places) const
+    {
+        if (!values_) return Column(places.size(), shared_, fallback_);
+        Column result(0, fallback_);
+        const T* from = data();
+        const std::span<T> to = result.append_for_writing(places.size());
+        for (std::size_t i = 0; i < places.size(); ++i) to[i] = from[places[i]];
+        return result;
+    }
+
     // Removes all points that are in no run; the others keep their order.
     void keep(const Compaction& compaction)
     {

@@ -194,6 +194,39 @@ void PointSet::keep(std::span<const std::uint8_t> mask)
     size_ = compaction.kept;
 }
 
+PointSet PointSet::select(std::span<const std::uint32_t> places) const
+{
+    PointSet set;
+    set.size_ = places.size();
+    set.columns_.clear();
+    for (const auto& [name, column] : columns_)
+        set.columns_.emplace(name, std::visit([&](const auto& c) { return AnyColumn(c.select(places)); }, column));
+    for (const auto& [name, members] : groups_) set.groups_.emplace(name, members.select(places));
+    set.details = details;
+    return set;
+}
+
+void PointSet::put(std::span<const std::uint32_t> places, const PointSet& from)
+{
+    RAPID_ASSERT(places.size() == from.size());
+    const auto put_into = [&]<class T>(Column<T>& column, const Column<T>& other) {
+        if (places.empty()) return;
+        if (column.is_uniform() && other.is_uniform() && column[0] == other[0]) return;
+        const std::span<T> to = column.write();
+        const Strided<T> values = other.read();
+        for (std::size_t i = 0; i < places.size(); ++i) to[places[i]] = values[i];
+    };
+    for (auto& [name, column] : columns_)
+        if (const AnyColumn* other = from.find(name))
+            std::visit(
+                [&]<class T>(Column<T>& c) {
+                    if (const auto* same = std::get_if<Column<T>>(other)) put_into(c, *same);
+                },
+                column);
+    for (auto& [name, members] : groups_)
+        if (const Column<std::uint8_t>* other = from.find_group(name)) put_into(members, *other);
+}
+
 void PointSet::reorder(std::span<const std::uint32_t> order)
 {
     RAPID_ASSERT(order.size() == size_);

@@ -117,6 +117,11 @@ public:
     // Removes the points whose mask is 0, shape [size]; the others keep their order. Columns are compacted in parallel.
     void keep(std::span<const std::uint8_t> mask);
 
+    // The points at these places, in this order, as a set of their own.
+    PointSet select(std::span<const std::uint32_t> places) const;
+    // Gives the points at these places all values of `from`, a set of the same columns and groups; shape [from.size()].
+    void put(std::span<const std::uint32_t> places, const PointSet& from);
+
     // Puts point order[i] into place i: order is a permutation, shape [size].
     void reorder(std::span<const std::uint32_t> order);
 

@@ -18,6 +18,17 @@ StageSeconds& StageSeconds::operator+=(const StageSeconds& other)
     return *this;
 }
 
+std::optional<FrameStatistics::Error> error_of(std::vector<double> errors)
+{
+    if (errors.empty()) return std::nullopt;
+    const auto quantile = [&](double part) {
+        const auto place = errors.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(errors.size() - 1));
+        std::nth_element(errors.begin(), place, errors.end());
+        return *place;
+    };
+    return FrameStatistics::Error{quantile(0.5), quantile(0.95), quantile(1)};
+}
+
 FrameStatistics statistics_of(const FrameResult& result)
 {
     FrameStatistics frame;
@@ -28,6 +39,8 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.collisions = result.figures.collisions;
     frame.contact_limit = result.figures.contact_limit;
     frame.trapped = result.figures.trapped;
+    frame.beyond_tolerance = result.figures.beyond_tolerance;
+    frame.error = error_of(result.figures.errors);
     frame.substeps = result.figures.substeps;
     frame.penetration_max = result.figures.penetration_max;
     frame.seconds.script = result.figures.script_seconds;
@@ -56,6 +69,12 @@ namespace {
 ordered_json to_json(const FrameStatistics& frame)
 {
     const StageSeconds& s = frame.seconds;
+    ordered_json error;
+    if (frame.error)
+        error = {{"position_p50", frame.error->p50},
+                 {"position_p95", frame.error->p95},
+                 {"position_max", frame.error->max},
+                 {"local", true}};
     return {{"frame", frame.frame},
             {"points", frame.points},
             {"born", frame.born},
@@ -63,11 +82,13 @@ ordered_json to_json(const FrameStatistics& frame)
             {"substeps", frame.substeps},
             {"seconds",
              {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}},
+            {"error", error},
             {"penetration_max", frame.penetration_max},
             {"constraint_residual_max", frame.constraint_residual_max},
             {"collisions", frame.collisions},
             {"contact_limit", frame.contact_limit},
-            {"trapped", frame.trapped}};
+            {"trapped", frame.trapped},
+            {"beyond_tolerance", frame.beyond_tolerance}};
 }
 
 // "warning  points did so 5 times, in 3 frames from 7 to 48"; nothing where no frame counted any.
@@ -123,8 +144,21 @@ std::string summary(const RunStatistics& run)
     text += fmt::format("\nseconds  graph {:.3f}, script {:.3f}, solve {:.3f}, write {:.3f}\n", s.graph, s.script,
                         s.solve, s.write);
     text += fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes));
+    const auto worst = std::max_element(run.frames.begin(), run.frames.end(), [](const auto& a, const auto& b) {
+        return (a.error ? a.error->max : -1) < (b.error ? b.error->max : -1);
+    });
+    if (worst != run.frames.end() && worst->error) {
+        const FrameStatistics::Error& error = *worst->error;
+        text += "error    in a frame, estimated: ";
+        text += error.max > 0 ? fmt::format(
+                                    "half of the points below {:.1e} m, 95 % below {:.1e}, the worst {:.1e} "
+                                    "(frame {})\n",
+                                    error.p50, error.p95, error.max, worst->frame)
+                              : "none above rounding\n";
+    }
     text += doubtful_frames(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");
     text += doubtful_frames(run, &FrameStatistics::trapped, "points were deep in a shape");
+    text += doubtful_frames(run, &FrameStatistics::beyond_tolerance, "points needed more than max_substeps");
     return text;
 }
 

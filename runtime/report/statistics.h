@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,12 @@ struct FrameStatistics {
     std::uint64_t born = 0, died = 0, collisions = 0;
     std::uint64_t contact_limit = 0, trapped = 0;  // points that Solve warned of (FrameFigures)
     int substeps = 0;
+    // Estimated errors of the positions in this frame, m, of a sample of the points; nothing where none was solved.
+    struct Error {
+        double p50, p95, max;
+    };
+    std::optional<Error> error;
+    std::uint64_t beyond_tolerance = 0;
     double penetration_max = 0;          // m
     double constraint_residual_max = 0;  // m; 0 where nothing is constrained
     StageSeconds seconds;

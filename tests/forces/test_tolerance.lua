@@ -1,0 +1,96 @@
+-- solve{ tolerance }: sub-steps by each point's own estimated error; and the error that every run reports.
+local scene = require "testing.scene"
+local command = require "testing.command"
+local json = require "dkjson"
+
+-- Points on ellipses about an attractor: far ones are easy, near ones stiff.
+local orbits = [[
+return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} } }
+  :attract { strength = 5 } :solve { %s }]]
+
+local places = { "{4, 0, 0}", "{2, 0, 0}", "{0.5, 0, 0}", "{0.1, 0, 0}" }
+local velocities = { "{0, 0, 1}", "{0, 0, 1.5}", "{0, 0, 3}", "{0, 0, 7}" }
+
+local function frame_two(options, first, last)
+  local P, v = table.concat(places, ", ", first or 1, last), table.concat(velocities, ", ", first or 1, last)
+  return scene.run(orbits:format(P, v, options), { frames = {2, 2} })[2]
+end
+
+describe("a tolerance", function()
+  it("bounds the error of a frame for each point", function()
+    local exact = frame_two "substeps = 4096"
+    for _, tolerance in ipairs { 1e-2, 1e-3, 1e-4 } do
+      local points = frame_two(("tolerance = %g, max_substeps = 1024"):format(tolerance))
+      for i = 1, #points do
+        local off = (points[i].P - exact[i].P):length()
+        assert.truthy(off <= tolerance, ("point %d is off by %g m"):format(i, off))
+      end
+    end
+  end)
+
+  it("takes the steps that a point needs, whatever other points there are", function()
+    local options = "tolerance = 1e-4, max_substeps = 1024"
+    local all = frame_two(options)
+    for i = 1, #all do
+      local alone = frame_two(options, i, i)
+      assert.equal(all[i].P, alone[1].P)
+      assert.equal(all[i].v, alone[1].v)
+    end
+    assert.equal(frame_two("substeps = 1", 1, 1)[1].P, all[1].P)
+    assert.not_equal(frame_two("substeps = 1", 4, 4)[1].P, all[4].P)
+  end)
+
+  it("works with actions, deaths and births, the same bits on 1, 2 and 7 threads", function()
+    local text = [[
+return rapid.create { fps = 24, seed = 2 }
+  :emit { source = rapid.mesh.sphere { radius = 0.5 }, rate = 30000, speed = 2, life = 0.5, attributes = { n = 0 } }
+  :attract { strength = 5, core = 0.01 }
+  :action("count", function(p, step) p.n = p.n + 1 if p.P.y > 0.6 then p:kill() end end)
+  :collide { shape = rapid.shape.sphere { radius = 0.2 }, response = "die" }
+  :solve { tolerance = 1e-4 }]]
+    local one = scene.run(text, { frames = {12, 12}, threads = 1 })[12]
+    assert.points(one).finite()
+    assert.truthy(#one > 1000)
+    local least, most = one:min "n", one:max "n"
+    assert.truthy(least >= 1 and most > 2 * least, ("%g %g"):format(least, most))
+    for i = 1, #one, 11 do assert.truthy(one[i].P.y < 0.7 and one[i].P:length() > 0.19) end
+    for _, threads in ipairs { 2, 7 } do
+      assert.same_points(one, scene.run(text, { frames = {12, 12}, threads = threads })[12])
+    end
+  end)
+
+  it("says which points it could not keep to it", function()
+    local result = scene.run(orbits:format("{0.01, 0, 0}", "{0, 0, 20}", "tolerance = 1e-9, max_substeps = 4"),
+      { frames = {2, 2} })
+    assert.match("points need more than 4 sub%-steps for an error of 1e%-09 m a frame", result.warnings[1])
+  end)
+end)
+
+describe("the error of a run", function()
+  local function reported(options)
+    local folder = command.folder()
+    folder:write("scene.lua", "local rapid = require 'rapid'\n" .. orbits:format(table.concat(places, ", "),
+      table.concat(velocities, ", "), options))
+    local ran = command.rapid("run scene.lua -f 2 --stats stats.json", { cwd = folder.path })
+    assert.equal(0, ran.status)
+    return json.decode(folder:read "stats.json").frames[2].error, ran.stdout
+  end
+
+  it("is within a factor of four of the true one", function()
+    local exact = frame_two "substeps = 4096"
+    for _, substeps in ipairs { 4, 16, 64 } do
+      local points, largest = frame_two("substeps = " .. substeps), 0
+      for i = 1, #points do largest = math.max(largest, (points[i].P - exact[i].P):length()) end
+      local error = reported("substeps = " .. substeps)
+      assert.truthy(error.position_max < 4 * largest and error.position_max > largest / 4,
+        ("%g for %g"):format(error.position_max, largest))
+      assert.truthy(error.position_p50 <= error.position_p95 and error.position_p95 <= error.position_max)
+      assert.is_true(error["local"])
+    end
+  end)
+
+  it("is told in the summary", function()
+    local _, summary = reported "substeps = 4"
+    assert.match("error    in a frame, estimated: half of the points below [%d.e-]+ m, 95 %% below", summary)
+  end)
+end)

@@ -87,6 +87,12 @@ function quat(x, y, z, w) end
 ---@field time number    seconds since the start
 ---@field dt number      seconds to the next frame
 
+---A point's own time, in an action.
+---@class rapid.Step
+---@field time number    seconds since the start
+---@field dt number      seconds of this sub-step
+---@field index integer  of the sub-step
+
 ---@class rapid.Attribute  each point's own value, from rapid.attr
 ---@class rapid.Points
 
@@ -151,6 +157,7 @@ function rapid.attr(name) end
 ---@field params? table<string, rapid.NodeParameter>
 ---@field makes? table<string, number|number[]>  attributes that it brings into being, with their value
 ---@field points? fun(p: rapid.Point, frame: rapid.Frame, params: table)
+---@field action? fun(p: rapid.Point, step: rapid.Step, params: table)  inside Solve, at every sub-step
 ---@field expand? fun(input: rapid.Node, params: table): rapid.Node
 
 ---A node written in Lua; its file returns it.
@@ -271,12 +278,26 @@ std::string lua_type(const Param& param)
     return type;
 }
 
-std::string fields_of(const std::vector<Param>& params, bool functions)
+// :points and :action take a name and a kernel, too.
+bool takes_kernel(const NodeType& type)
+{
+    const Param* kernel = type.find("kernel");
+    return kernel && !kernel->internal;
+}
+
+// function(p, frame), as the documentation of the parameter says, or function(p, step).
+std::string kernel_of(const NodeType& type)
+{
+    const bool action = type.kind == NodeKind::Dynamic;
+    return fmt::format("fun(p: rapid.Point, {})", action ? "step: rapid.Step" : "frame: rapid.Frame");
+}
+
+std::string fields_of(const std::vector<Param>& params, bool functions, const std::string& kernel = "")
 {
     std::string text;
     for (const Param& param : params) {
         if (param.internal) continue;
-        std::string type = lua_type(param);
+        std::string type = param.name == "kernel" ? kernel : lua_type(param);
         const bool is_function = type.find("fun(") != std::string::npos;
         if (param.per_point) type += "|rapid.Attribute";
         if (functions && param.of_the_frame && !is_function && type != "any")
@@ -321,16 +342,16 @@ std::string point_class()
 std::string node_of(const NodeType& type)
 {
     const bool source = type.kind == NodeKind::Source;
-    std::string text = fmt::format("\n---@class rapid.params.{}\n{}", type.name, fields_of(type.params, true));
+    std::string text =
+        fmt::format("\n---@class rapid.params.{}\n{}", type.name, fields_of(type.params, true, kernel_of(type)));
     if (!type.find("name")) text += "---@field name? string  what the node is called in messages [string]\n";
     if (type.rest) text += fmt::format("---@field [string] {}  {}\n", lua_type(*type.rest), type.rest->doc);
     text += fmt::format("\n---{}\n", type.doc);
     const bool required =
         std::any_of(type.params.begin(), type.params.end(), [](const Param& p) { return p.required; });
-    if (type.name == "points")
+    if (takes_kernel(type))
         text +=
-            "---@overload fun(self: rapid.Node, name: string, kernel: fun(p: rapid.Point, frame: rapid.Frame)): "
-            "rapid.Node\n";
+            fmt::format("---@overload fun(self: rapid.Node, name: string, kernel: {}): rapid.Node\n", kernel_of(type));
     if (type.kind == NodeKind::Merge)
         return text + fmt::format(
                           "---@param ... rapid.Node|rapid.params.{0}\n"

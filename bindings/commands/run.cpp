@@ -92,7 +92,7 @@ public:
         if (!allowed_.empty() && !untrusted_)
             throw Error("--allow-read is for --untrusted; a graph reads what it names");
         if (watch_ && untrusted_) throw Error("--watch starts processes, which --untrusted forbids; give one of them");
-        if (watch_) return Watch(graph_.file(), quiet_).run();
+        if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
         if (untrusted_ && !within_walls_) enter_walls(openings());
         if (untrusted_) close_walls();
         std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it

@@ -40,13 +40,13 @@ int checked(int descriptor, const char* what)
     return descriptor;
 }
 
-// The words of this process's command line, with tell_option for --watch.
-std::vector<std::string> own_arguments()
+// This process's command line, with tell_option: a run that has it does not watch.
+std::vector<std::string> arguments_of_run()
 {
     std::ifstream file("/proc/self/cmdline", std::ios::binary);
     std::vector<std::string> words;
-    for (std::string word; std::getline(file, word, '\0');)
-        words.push_back(word == "--watch" ? Watch::tell_option : word);
+    for (std::string word; std::getline(file, word, '\0');) words.push_back(word);
+    words.insert(words.begin() + 1, Watch::tell_option);
     return words;
 }
 
@@ -135,7 +135,7 @@ void Watch::start()
     checked(pipe2(ends, O_CLOEXEC), "pipe");
     told_ = ends[0];
     fcntl(told_, F_SETFL, O_NONBLOCK);
-    std::vector<std::string> words = own_arguments();
+    std::vector<std::string> words = arguments_of_run();
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);

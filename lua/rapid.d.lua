@@ -73,6 +73,12 @@ function quat(x, y, z, w) end
 ---@field time number    seconds since the start
 ---@field dt number      seconds to the next frame
 
+---A point's own time, in an action.
+---@class rapid.Step
+---@field time number    seconds since the start
+---@field dt number      seconds of this sub-step
+---@field index integer  of the sub-step
+
 ---@class rapid.Attribute  each point's own value, from rapid.attr
 ---@class rapid.Points
 
@@ -137,6 +143,7 @@ function rapid.attr(name) end
 ---@field params? table<string, rapid.NodeParameter>
 ---@field makes? table<string, number|number[]>  attributes that it brings into being, with their value
 ---@field points? fun(p: rapid.Point, frame: rapid.Frame, params: table)
+---@field action? fun(p: rapid.Point, step: rapid.Step, params: table)  inside Solve, at every sub-step
 ---@field expand? fun(input: rapid.Node, params: table): rapid.Node
 
 ---A node written in Lua; its file returns it.
@@ -407,10 +414,11 @@ local Node = {}
 
 ---@class rapid.params.action
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field kernel fun(p: rapid.Point, frame: rapid.Frame): any  function(p, step) [function of a point, required]
+---@field kernel fun(p: rapid.Point, step: rapid.Step)  function(p, step) [function of a point, required]
 ---@field name? string  what the node is called in messages [string]
 
 ---Edits the points with a Lua function inside Solve, at every sub-step.
+---@overload fun(self: rapid.Node, name: string, kernel: fun(p: rapid.Point, step: rapid.Step)): rapid.Node
 ---@param params rapid.params.action
 ---@return rapid.Node
 function Node:action(params) end
@@ -513,10 +521,11 @@ function rapid.create(params) end
 function Node:delete(params) end
 
 ---@class rapid.params.detail
----@field kernel any  function(points, frame) [function of the points, required]
+---@field kernel fun(p: rapid.Point, frame: rapid.Frame)  function(points, frame) [function of the points, required]
 ---@field name? string  what the node is called in messages [string]
 
 ---Runs a Lua function over the whole set of points, once.
+---@overload fun(self: rapid.Node, name: string, kernel: fun(p: rapid.Point, frame: rapid.Frame)): rapid.Node
 ---@param params rapid.params.detail
 ---@return rapid.Node
 function Node:detail(params) end
@@ -675,7 +684,7 @@ function Node:merge(...) end
 
 ---@class rapid.params.points
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field kernel fun(p: rapid.Point, frame: rapid.Frame): any  function(p, frame) [function of a point, required]
+---@field kernel fun(p: rapid.Point, frame: rapid.Frame)  function(p, frame) [function of a point, required]
 ---@field name? string  what the node is called in messages [string]
 
 ---Edits the points with a Lua function, one by one, in parallel.
@@ -712,6 +721,8 @@ function Node:randomize(params) end
 ---@class rapid.params.solve
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, at least 1, default 1]
+---@field tolerance? number|fun(frame: rapid.Frame): number  each point takes as many sub-steps, twice as many and so on, as its own estimated error needs [number, m a frame, above 0]
+---@field max_substeps? integer|fun(frame: rapid.Frame): integer  the most, with a tolerance [integer, at least 1, default 64]
 ---@field name? string  what the node is called in messages [string]
 
 ---Advances the points by one frame: forces, motion, collision.

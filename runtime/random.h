@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace rapid {
@@ -37,5 +38,8 @@ inline std::array<double, 4> uniform4(RandomKey key, std::uint64_t item, std::ui
     constexpr double unit = 1.0 / 4294967296.0;
     return {bits[0] * unit, bits[1] * unit, bits[2] * unit, bits[3] * unit};
 }
+
+// The same for the items first, first + 1, ..., faster: out[i] is uniform4(key, first + i, use) to the bit.
+void uniform4(RandomKey key, std::uint64_t first, std::uint64_t use, std::span<std::array<double, 4>> out);
 
 }  // namespace rapid

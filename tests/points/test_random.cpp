@@ -84,4 +84,13 @@ TEST_CASE("a scene drawn today is drawn the same by the next version", "[random]
     CHECK(RandomKey(0, "").value == (mixed[0] | std::uint64_t{mixed[1]} << 32));
 }
 
+TEST_CASE("numbers drawn side by side are those drawn one by one, to the bit", "[random]")
+{
+    const RandomKey key(7, "emit1");
+    const std::uint64_t first = 0xFFFFFFF0, use = GENERATE(std::uint64_t{0}, std::uint64_t{5} << 32 | 16);
+    std::vector<std::array<double, 4>> together(41);
+    uniform4(key, first, use, together);
+    for (std::size_t i = 0; i < together.size(); ++i) CHECK(together[i] == uniform4(key, first + i, use));
+}
+
 }  // namespace rapid

@@ -83,12 +83,16 @@ void check_named(const Table& options)
     if (value) throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}", describe(*value)));
 }
 
-// A maker as graph code calls it: rapid.mesh.box, rapid.rotate, :transform.
-std::string shown_name(const Maker& maker)
+// A maker as graph code calls it: rapid.mesh.box, rapid.rotate, :transform, :offset.
+std::string shown_name(const Maker& maker, const Table& options)
 {
     const std::size_t dot = maker.name.find('.');
     if (dot == std::string::npos) return ":" + maker.name;
-    if (maker.name == "levelset.write") return ":write";
+    // What a level set is asked to do is its method.
+    if (maker.params.front().name == "levelset") {
+        const auto how = options.named.find("how");
+        return ":" + (how == options.named.end() ? maker.name.substr(dot + 1) : *how->second.get<std::string>());
+    }
     return "rapid." + (maker.name.rfind("motion.", 0) == 0 ? maker.name.substr(dot + 1) : maker.name);
 }
 
@@ -97,6 +101,10 @@ template <class F>
 int construct(State& state, const F& make)
 {
     ScriptHost& host = state.host();
+    if (state.is_main() && host.authored) {
+        state.push_object(make());
+        return 1;
+    }
     const std::size_t call = state.next_made++;
     if (state.is_main()) {
         host.made.emplace_back(ObjectPtr());
@@ -123,12 +131,13 @@ int make_object(State& state)
         const Maker& maker = find_maker(text_at(state, 1));
         ScriptHost& host = state.host();
         MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read};
+        const auto options = table_at(state, 2);
         try {
-            const auto options = table_at(state, 2);
             check_named(*options);
             return maker.make(maker, *options, context);
         } catch (const Error& error) {
-            throw Error(fmt::format("{}: {}", shown_name(maker), error.what()));  // with the file that it names
+            throw Error(
+                fmt::format("{}: {}", shown_name(maker, *options), error.what()));  // with the file that it names
         }
     });
 }

@@ -74,6 +74,7 @@ ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options
 
     run_file(*main_);
     collect_outputs(*main_);
+    authored = true;
 
     std::vector<std::string> names;
     for (const Session::Parameter& parameter : parameters) names.push_back(parameter.name);

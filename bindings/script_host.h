@@ -45,6 +45,8 @@ public:
     // left its message.
     using Made = std::variant<ObjectPtr, std::string>;
     std::deque<Made> made;
+    // Once the main state has run the file, what functions of the frame make there is no worker's to ask for.
+    bool authored = false;
 
     std::vector<std::shared_ptr<Kernel>> kernels;
 

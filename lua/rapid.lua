@@ -51,6 +51,7 @@ local function make(native, load_node, numeric, shapes)
   }
   rapid.levelset = {
     from_mesh = maker("levelset.from_mesh", "mesh"),
+    from_points = maker("levelset.from_points", "points"),
     read = maker("levelset.read", "path"),
     sphere = maker "levelset.sphere",
     box = maker "levelset.box",
@@ -167,11 +168,29 @@ local function make(native, load_node, numeric, shapes)
   local function transformed(object, motion)
     return native.make("transform", { object = object, motion = motion })
   end
+  local function combine_by(how)
+    return function(object, other)
+      return native.make("levelset.combine", { levelset = object, other = other, how = how })
+    end
+  end
+  -- A tool with one argument of its own, or with options.
+  local function tool(name, argument)
+    return function(object, value)
+      local options = argument and { [argument] = value } or options_of("levelset:" .. name, value)
+      options.levelset = object
+      return native.make("levelset." .. name, options)
+    end
+  end
   local value_methods = {
-    mesh = { transform = transformed },
     ["level set"] = {
       distance = shapes.queries.distance,
       gradient = shapes.queries.gradient,
+      union = combine_by "union",
+      intersect = combine_by "intersect",
+      subtract = combine_by "subtract",
+      offset = tool("offset", "metres"),
+      smooth = tool "smooth",
+      resample = tool("resample", "voxel"),
       write = function(object, path, options)
         local named = options_of("levelset:write", options)
         named.levelset, named.path = object, path
@@ -181,6 +200,14 @@ local function make(native, load_node, numeric, shapes)
     },
     motion = {},
   }
+  for _, kind in ipairs { "shape", "plane", "sphere", "box" } do
+    value_methods[kind] = {}
+    for name, query in pairs(shapes.queries) do value_methods[kind][name] = query end
+  end
+  for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape" } do
+    value_methods[kind] = value_methods[kind] or {}
+    value_methods[kind].transform = transformed
+  end
 
   native.set_index(function(...)
     local object, name = ...

@@ -14,6 +14,9 @@ public:
 
     // What it is called in messages: "mesh", "level set", "shape", "points", "motion", "function".
     virtual std::string_view kind() const = 0;
+
+    // Whether it is another at each time: a motion that is not constant, and what such a motion moves.
+    virtual bool varies() const { return false; }
 };
 
 using ObjectPtr = std::shared_ptr<const Object>;

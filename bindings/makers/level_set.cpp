@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include "bindings/maker.h"
+#include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set_tools.h"
 
 namespace rapid {
 namespace {
@@ -90,6 +92,108 @@ struct TorusLevelSet : Grid {
     ObjectPtr make(MakeContext&) const { return level_set_torus(radius, tube, center, options()); }
 };
 RAPID_MAKER(TorusLevelSet);
+
+struct FromPoints : Grid {
+    std::shared_ptr<const PointsObject> points;
+    std::optional<PerPoint<float>> radius;
+
+    static Maker declare()
+    {
+        auto declaration = maker<FromPoints>("levelset.from_points", "The balls around points.");
+        declaration.param(&FromPoints::points, "points", Value(), any_number(), "", "their middles").required();
+        declaration.param(&FromPoints::radius, "radius", Value(), above(0), "m",
+                          "of the balls; the attribute pscale where the points have it");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        const PointSet& set = points->points;
+        if (!radius && !set.has("pscale"))
+            throw Error("nothing says how large the balls are; give radius, or the points the attribute pscale");
+        const PerPoint<float> given = radius ? *radius : PerPoint<float>::of("pscale");
+        const Strided<Vec3f> P = set.P().read();
+        const Strided<float> r = given.read(set);
+        const std::size_t n = set.size();
+        std::vector<Vec3f> places;
+        for (std::size_t i = 0; i < n; ++i) places.push_back(P[i]);
+        return level_set_from_points(places, std::span(r.data, r.stride ? n : 1), options());
+    }
+};
+RAPID_MAKER(FromPoints);
+
+struct CombineLevelSets {
+    LevelSetPtr levelset, other;
+    std::string how;
+
+    static Maker declare()
+    {
+        return maker<CombineLevelSets>("levelset.combine", "The union, intersection or difference of two level sets.")
+            .param(&CombineLevelSets::levelset, "levelset", Value(), any_number(), "", "whose voxels the result has")
+            .required()
+            .param(&CombineLevelSets::other, "other", Value(), any_number(), "", "the second")
+            .required()
+            .param(&CombineLevelSets::how, "how", Value(), any_number(), "", "which")
+            .required();
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        return combined(levelset, other,
+                        how == "union"       ? Combine::Union
+                        : how == "intersect" ? Combine::Intersect
+                                             : Combine::Subtract,
+                        context.warnings);
+    }
+};
+RAPID_MAKER(CombineLevelSets);
+
+struct OffsetLevelSet {
+    LevelSetPtr levelset;
+    double metres;
+
+    static Maker declare()
+    {
+        return maker<OffsetLevelSet>("levelset.offset", "The surface moved along its normal.")
+            .param(&OffsetLevelSet::levelset, "levelset", Value(), any_number(), "", "what to grow")
+            .required()
+            .param(&OffsetLevelSet::metres, "metres", Value(), any_number(), "m", "outwards; inwards where below 0")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return offset(levelset, metres); }
+};
+RAPID_MAKER(OffsetLevelSet);
+
+struct SmoothLevelSet {
+    LevelSetPtr levelset;
+    int width, iterations;
+
+    static Maker declare()
+    {
+        return maker<SmoothLevelSet>("levelset.smooth", "Rounds edges and fills creases.")
+            .param(&SmoothLevelSet::levelset, "levelset", Value(), any_number(), "", "what to smooth")
+            .required()
+            .param(&SmoothLevelSet::width, "width", 1.0, between(1, 64), "voxels", "of the filter")
+            .param(&SmoothLevelSet::iterations, "iterations", 1.0, between(1, 1000), "", "times that it is applied");
+    }
+    ObjectPtr make(MakeContext&) const { return smoothed(levelset, width, iterations); }
+};
+RAPID_MAKER(SmoothLevelSet);
+
+struct ResampleLevelSet {
+    LevelSetPtr levelset;
+    double voxel;
+
+    static Maker declare()
+    {
+        return maker<ResampleLevelSet>("levelset.resample", "The same surface on voxels of another size.")
+            .param(&ResampleLevelSet::levelset, "levelset", Value(), any_number(), "", "what to resample")
+            .required()
+            .param(&ResampleLevelSet::voxel, "voxel", Value(), above(0), "m", "edge of a voxel")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return resampled(levelset, voxel); }
+};
+RAPID_MAKER(ResampleLevelSet);
 
 struct ReadLevelSet {
     std::string path, grid;

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include "bindings/maker.h"
+#include "runtime/io/frame_pattern.h"
+#include "runtime/shapes/animated.h"
 
 namespace rapid {
 namespace {
@@ -13,11 +15,21 @@ struct ReadMesh {
 
     static Maker declare()
     {
-        return maker<ReadMesh>("mesh.read", "Reads OBJ, PLY, STL or glTF.")
-            .param(&ReadMesh::path, "path", Value(), any_number(), "", "relative to the graph file")
+        return maker<ReadMesh>("mesh.read", "Reads OBJ, PLY, STL or glTF, or a sequence of such files.")
+            .param(&ReadMesh::path, "path", Value(), any_number(), "",
+                   "relative to the graph file; with #### or $F4 in it a deforming mesh, a file for each frame")
             .required();
     }
-    ObjectPtr make(MakeContext& context) const { return read_mesh(context.resolve(path)); }
+    ObjectPtr make(MakeContext& context) const
+    {
+        const FramePattern pattern((context.folder / path).string());  // an absolute path stays itself
+        if (!pattern.has_frame()) return read_mesh(context.resolve(path));
+        const auto files = pattern.existing();
+        if (context.on_read)
+            for (const auto& [frame, file] : files) context.on_read(file);
+        auto sequence = std::make_shared<MeshSequence>(files, pattern.text());
+        return std::make_shared<AnimatedMesh>(std::move(sequence), constant_motion({}));
+    }
 };
 RAPID_MAKER(ReadMesh);
 

@@ -1,8 +1,12 @@
 // rapid.translate, rapid.rotate, rapid.scale, their products, and what they move.
 #include "runtime/shapes/motion.h"
 
+#include <fmt/format.h>
+
 #include "bindings/maker.h"
-#include "runtime/shapes/mesh.h"
+#include "runtime/shapes/animated.h"
+#include "runtime/shapes/level_set_tools.h"
+#include "runtime/shapes/placed.h"
 
 namespace rapid {
 namespace {
@@ -16,7 +20,7 @@ struct Translate {
             .param(&Translate::by, "by", Value(), any_number(), "m", "the way")
             .required();
     }
-    ObjectPtr make(MakeContext&) const { return std::make_shared<Motion>(Eigen::Affine3d(Eigen::Translation3d(by))); }
+    ObjectPtr make(MakeContext&) const { return constant_motion({by}); }
 };
 RAPID_MAKER(Translate);
 
@@ -35,7 +39,7 @@ struct Rotate {
     ObjectPtr make(MakeContext&) const
     {
         if (axis.norm() == 0) throw Error("the axis has length 0; it needs a direction");
-        return std::make_shared<Motion>(Eigen::Affine3d(Eigen::AngleAxisd(angle, axis.normalized())));
+        return constant_motion({Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()))});
     }
 };
 RAPID_MAKER(Rotate);
@@ -49,7 +53,7 @@ struct Scale {
             .param(&Scale::by, "factor", Value(), above(0), "", "of all lengths")
             .required();
     }
-    ObjectPtr make(MakeContext&) const { return std::make_shared<Motion>(Eigen::Affine3d(Eigen::Scaling(by))); }
+    ObjectPtr make(MakeContext&) const { return constant_motion({Vec3d::Zero(), Eigen::Quaterniond::Identity(), by}); }
 };
 RAPID_MAKER(Scale);
 
@@ -64,24 +68,42 @@ struct Product {
             .param(&Product::second, "second", Value(), any_number(), "", "done first")
             .required();
     }
-    ObjectPtr make(MakeContext&) const { return std::make_shared<Motion>(first->map * second->map); }
+    ObjectPtr make(MakeContext&) const { return product(first, second); }
 };
 RAPID_MAKER(Product);
 
 struct Transform {
-    MeshPtr object;
+    ObjectPtr object;
     MotionPtr motion;
 
     static Maker declare()
     {
-        return maker<Transform>("transform", "A mesh, moved.")
-            .param(&Transform::object, "object", Value(), any_number(), "", "the mesh")
+        return maker<Transform>("transform", "A mesh or a shape, moved.")
+            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh or a shape")
             .required()
             .param(&Transform::motion, "motion", Value(), any_number(), "",
-                   "rapid.translate, .rotate, .scale, or a product")
+                   "rapid.translate, .rotate, .scale, or a product; a function of the frame that returns one; keys")
             .required();
     }
-    ObjectPtr make(MakeContext&) const { return transformed(object, motion->map); }
+
+    ObjectPtr make(MakeContext&) const
+    {
+        if (const auto moving = std::dynamic_pointer_cast<const AnimatedMesh>(object))
+            return moving->transformed(motion);
+        if (const auto moving = std::dynamic_pointer_cast<const AnimatedShape>(object))
+            return std::make_shared<AnimatedShape>(moving->rest(), product(motion, moving->motion()));
+        if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) {
+            if (motion->varies()) return std::make_shared<AnimatedMesh>(mesh, motion);
+            return transformed(mesh, motion->at({}).affine());
+        }
+        if (const auto shape = std::dynamic_pointer_cast<const Shape>(object)) {
+            if (motion->varies()) return std::make_shared<AnimatedShape>(shape, motion);
+            if (const auto level_set = std::dynamic_pointer_cast<const LevelSet>(shape))
+                return transformed(level_set, motion->at({}));
+            return placed(shape, motion->at({}));
+        }
+        throw Error(fmt::format("{} can't be moved; it must be a mesh or a shape", describe(object)));
+    }
 };
 RAPID_MAKER(Transform);
 

@@ -57,10 +57,8 @@ struct Simulation {
     PointSet state;                                   // as Solve left it at the frame before
     std::map<const Simulation*, AdoptedIds> adopted;  // the ids here of points that came from other simulations
 
-    Frame frame(std::int64_t number) const
-    {
-        return {static_cast<double>(number), static_cast<double>(number - start) / fps, 1 / fps};
-    }
+    FrameClock clock() const { return {fps, start}; }
+    Frame frame(std::int64_t number) const { return clock().at(static_cast<double>(number)); }
 };
 
 // What travels along an edge of the graph.

@@ -22,6 +22,10 @@ std::string right_type(const Param& param)
 {
     std::string words = with_article(param.type);
     if (param.type == "vec3") words += " or {x, y, z}";
+    if (param.type == "motion")
+        words +=
+            " (rapid.translate, rapid.rotate, rapid.scale, or a product), a function of the frame that returns one, "
+            "or keys {[1] = ..., [24] = ...}";
     if (param.per_point) words += ", or rapid.attr \"name\"";
     return words;
 }

@@ -15,6 +15,7 @@
 #include "runtime/error.h"
 #include "runtime/graph/value.h"
 #include "runtime/points/per_point.h"
+#include "runtime/shapes/motion.h"
 
 namespace rapid {
 
@@ -42,9 +43,10 @@ struct Param {
     Range range;
     std::vector<std::string> choices;
     bool required = false;
-    bool per_point = false;    // takes rapid.attr
-    bool of_the_frame = true;  // takes a function of the frame
-    bool internal = false;     // given by the host of the scripting language, not by users; not shown
+    bool per_point = false;       // takes rapid.attr
+    bool of_the_frame = true;     // takes a function of the frame
+    bool keeps_function = false;  // a function is itself the value: a motion asks it between frames too
+    bool internal = false;        // given by the host of the scripting language, not by users; not shown
 
     // Puts a value, which is no function, into the node's field. Error: wrong type, out of range; says what was found.
     std::function<void(const Param& self, void* fields, const Value& value)> assign;
@@ -62,6 +64,8 @@ void read_value(const Param& param, const Value& value, Vec3f& field);
 void read_value(const Param& param, const Value& value, PerPoint<float>& field);
 void read_value(const Param& param, const Value& value, PerPoint<Vec3f>& field);
 void read_value(const Param& param, const Value& value, ObjectPtr& field);
+// A motion: an object, a function of the frame that returns one, or keys {[1] = m1, [24] = m2}, which are constants.
+void read_value(const Param& param, const Value& value, MotionPtr& field);
 // An attribute's value; the parameter's name is the attribute's. A known name has its own type, any other the value's:
 // a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion. Error: a name that is Rapid's own (P, v, id, dt).
 void read_value(const Param& param, const Value& value, AttributeValue& field);
@@ -159,6 +163,7 @@ Param param_of(F T::*field, std::string name, Value fallback, Range range, std::
     p.doc = std::move(doc);
     p.per_point = std::is_same_v<F, PerPoint<float>> || std::is_same_v<F, PerPoint<Vec3f>> ||
                   std::is_same_v<F, std::optional<PerPoint<float>>>;
+    p.keeps_function = std::is_same_v<F, MotionPtr>;
     p.assign = [field](const Param& param, void* fields, const Value& value) {
         F& read = static_cast<T*>(fields)->*field;
         read_value(param, value, read);

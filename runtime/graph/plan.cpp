@@ -41,10 +41,23 @@ Uses uses_of(const PlannedNode& planned)
     return uses;
 }
 
-bool has_function_argument(const Node& node)
+// Whether a value is another at each frame: a function, a motion, what is moved, or a table that holds one.
+bool varies(const Value& value)
+{
+    if (value.function()) return true;
+    if (const ObjectPtr* object = value.get<ObjectPtr>()) return *object && (*object)->varies();
+    const Table* table = value.table();
+    if (!table) return false;
+    const auto entry_varies = [](const auto& entry) { return varies(entry.second); };
+    return std::any_of(table->list.begin(), table->list.end(), [](const Value& entry) { return varies(entry); }) ||
+           std::any_of(table->numbered.begin(), table->numbered.end(), entry_varies) ||
+           std::any_of(table->named.begin(), table->named.end(), entry_varies);
+}
+
+bool has_varying_argument(const Node& node)
 {
     return std::any_of(node.arguments.begin(), node.arguments.end(),
-                       [](const auto& argument) { return argument.second.function() != nullptr; });
+                       [](const auto& argument) { return varies(argument.second); });
 }
 
 // Asks a function of the frame. An Error of it tells the frame.
@@ -77,7 +90,7 @@ void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool onl
             any.name = name;
             param = &any;
         }
-        if (const FrameFunction* function = value.function()) {
+        if (const FrameFunction* function = value.function(); function && !param->keeps_function) {
             if (!param->of_the_frame)
                 throw Error(fmt::format("{} can't be a function of the frame; it must be a constant", name));
             assign_at(*param, op, *function, frame);
@@ -149,7 +162,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         });
 
     for (PlannedNode& planned : nodes) {
-        planned.once = !planned.in_loop && !planned.node->type->varies && !has_function_argument(*planned.node) &&
+        planned.once = !planned.in_loop && !planned.node->type->varies && !has_varying_argument(*planned.node) &&
                        std::all_of(planned.inputs.begin(), planned.inputs.end(),
                                    [&](std::size_t input) { return nodes[input].once; });
     }

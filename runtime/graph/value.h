@@ -9,18 +9,11 @@
 #include <variant>
 #include <vector>
 
+#include "runtime/frame.h"
 #include "runtime/object.h"
 #include "runtime/vec.h"
 
 namespace rapid {
-
-// The instant that a parameter, kernel or node is asked for. time = (number - start) / fps, dt = 1 / fps, from
-// integers, never from a sum.
-struct Frame {
-    double number = 1;  // whole except where a motion is asked between frames
-    double time = 0;    // s
-    double dt = 0;      // s
-};
 
 struct Value;
 

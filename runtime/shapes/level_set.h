@@ -21,6 +21,7 @@ struct LevelSetOptions {
 
 class LevelSet : public Shape {
 public:
+    static constexpr std::string_view param_type = "level set";
     std::string_view kind() const override { return "level set"; }
 
     virtual double voxel() const = 0;  // m

@@ -1,8 +1,6 @@
 // Level sets in .vdb files, by the names of their grids.
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
-#include <openvdb/tools/Composite.h>
-#include <openvdb/tools/LevelSetRebuild.h>
 
 #include <algorithm>
 
@@ -67,23 +65,6 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
     }
 }
 
-// A grid without a known origin is widened from its own surface: new voxels get their distance to it as a mesh, and
-// those that the file had keep their values to the bit.
-FloatGrid::Ptr widen(const FloatGrid& grid, double half_width)
-{
-    const double voxel = grid.voxelSize()[0];
-    const LevelSetOptions options{voxel, half_width / voxel};
-    const double area = double(grid.activeVoxelCount()) * std::pow(voxel, 3) / (2 * grid.background());
-    const auto index = grid.evalActiveVoxelBoundingBox();
-    const auto low = grid.indexToWorld(index.min()), high = grid.indexToWorld(index.max());
-    require_buildable(fmt::format("grid \"{}\"", grid.getName()), area,
-                      Box3d(Vec3d(low[0], low[1], low[2]), Vec3d(high[0], high[1], high[2])), options);
-    auto wide = openvdb::tools::levelSetRebuild(grid, 0.0f, static_cast<float>(half_width / voxel));
-    openvdb::tools::compReplace(*wide, grid);
-    wide->setName(grid.getName());
-    return wide;
-}
-
 }  // namespace
 
 LevelSetPtr read_level_set(const std::filesystem::path& path, const std::string& name)
@@ -107,7 +88,7 @@ LevelSetPtr read_level_set(const std::filesystem::path& path, const std::string&
     if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles();
 
     auto level_set =
-        std::make_shared<GridLevelSet>(grid, [grid](double half_width) { return widen(*grid, half_width); });
+        std::make_shared<GridLevelSet>(grid, [grid](double half_width) { return widened(*grid, half_width); });
     if (!level_set->has_surface())
         throw Error(fmt::format("grid \"{}\" of \"{}\" has {} active voxels and no surface; a level set changes sign",
                                 grid->getName(), path.string(), grid->activeVoxelCount()));

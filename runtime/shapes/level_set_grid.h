@@ -30,6 +30,7 @@ public:
     BakedSampler sampler() const { return BakedSampler(*baked_); }
     Box3d bounds() const override { return sampler().bounds(); }
     double band() const override { return baked_->background; }
+    double slope_bound() const override { return baked_->slope; }
 
     double voxel() const override { return baked_->voxel; }
     std::uint64_t active_voxels() const override { return grid_->activeVoxelCount(); }
@@ -41,6 +42,7 @@ public:
     ScatterPtr volume_scatter() const override;
 
     const openvdb::FloatGrid& grid() const { return *grid_; }
+    const openvdb::FloatGrid::ConstPtr& shared_grid() const { return grid_; }
     const BakedGrid& baked() const { return *baked_; }
     bool has_surface() const { return baked_->crossings > 0; }
 
@@ -58,6 +60,14 @@ private:
 // no winding number: then outside is what can be reached from far away without crossing a face, in steps of a voxel.
 openvdb::FloatGrid::Ptr signed_distance(const Mesh& mesh, bool balanced, const openvdb::math::Transform& transform,
                                         double half_width);
+
+// A grid without a known origin, widened from its own surface: new voxels get their distance to it as a mesh, and those
+// that there are keep their values to the bit.
+openvdb::FloatGrid::Ptr widened(const openvdb::FloatGrid& grid, double half_width);
+
+// The surface of any level set on other voxels, from it as a mesh.
+openvdb::FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Transform& transform,
+                                     double half_width);
 
 // Registers OpenVDB's types; call it before the first grid is made or read.
 void initialize_openvdb();

@@ -16,21 +16,12 @@
 #include <unordered_map>
 
 #include "runtime/error.h"
-#include "runtime/shapes/mesh.h"
+#include "runtime/shapes/mesh_file.h"
 
 namespace rapid {
 namespace {
 
-// What a file says, before vertices are joined: importers split them at seams of normals and texture coordinates, and
-// STL never shares any. A deforming sequence has the same corners in each file, and so can be joined as its first is.
-struct Corners {
-    std::vector<Vec3f> positions;
-    std::vector<Vec3f> colours;  // empty, or shape [positions]
-    std::vector<float> alphas;   // empty, or shape [positions]
-    std::vector<Mesh::Triangle> triangles;
-};
-
-void append(const aiMesh& part, const aiMatrix4x4& to_world, Corners& corners)
+void append(const aiMesh& part, const aiMatrix4x4& to_world, MeshFile& corners)
 {
     const auto first = corners.positions.size();
     const bool moved = !to_world.IsIdentity();
@@ -58,21 +49,21 @@ void append(const aiMesh& part, const aiMatrix4x4& to_world, Corners& corners)
     }
 }
 
-void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, Corners& corners)
+void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, MeshFile& corners)
 {
     const aiMatrix4x4 to_world = to_parent * node.mTransformation;
     for (unsigned i = 0; i < node.mNumMeshes; ++i) append(*scene.mMeshes[node.mMeshes[i]], to_world, corners);
     for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, corners);
 }
 
-Corners read_corners(const std::filesystem::path& path)
+MeshFile import(const std::filesystem::path& path)
 {
     Assimp::Importer importer;
     const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
     if (!scene)
         throw Error(fmt::format("cannot read the mesh \"{}\": {}; it must be an OBJ, PLY, STL or glTF file",
                                 path.string(), importer.GetErrorString()));
-    Corners corners;
+    MeshFile corners;
     if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), corners);
     if (!corners.colours.empty()) {
         corners.colours.resize(corners.positions.size(), Vec3f::Ones());
@@ -81,7 +72,32 @@ Corners read_corners(const std::filesystem::path& path)
     return corners;
 }
 
-// For each corner the vertex that it becomes: corners at one place are one vertex, numbered in the order of the file.
+std::string lower_case(std::string text)
+{
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+}  // namespace
+
+MeshFile read_mesh_file(const std::filesystem::path& path)
+{
+    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
+    static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
+    const std::string extension = lower_case(path.extension().string());
+    if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
+        throw Error(fmt::format(
+            "\"{}\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
+
+    MeshFile file = import(path);
+    for (std::size_t i = 0; i < file.positions.size(); ++i)
+        if (!file.positions[i].allFinite())
+            throw Error(fmt::format("vertex {} of the mesh \"{}\" is at ({}, {}, {}); coordinates must be finite", i,
+                                    path.string(), file.positions[i].x(), file.positions[i].y(),
+                                    file.positions[i].z()));
+    return file;
+}
+
 std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
 {
     struct Hash {
@@ -104,44 +120,21 @@ std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
     return vertex_of;
 }
 
-std::string lower_case(std::string text)
+MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of, std::string name)
 {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
-}  // namespace
-
-MeshPtr read_mesh(const std::filesystem::path& path)
-{
-    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
-    static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
-    const std::string extension = lower_case(path.extension().string());
-    if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
-        throw Error(fmt::format(
-            "\"{}\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
-
-    const Corners corners = read_corners(path);
-    for (std::size_t i = 0; i < corners.positions.size(); ++i)
-        if (!corners.positions[i].allFinite())
-            throw Error(fmt::format("vertex {} of the mesh \"{}\" is at ({}, {}, {}); coordinates must be finite", i,
-                                    path.string(), corners.positions[i].x(), corners.positions[i].y(),
-                                    corners.positions[i].z()));
-
-    const std::vector<std::int32_t> vertex_of = join_by_place(corners.positions);
     auto mesh = std::make_shared<Mesh>();
-    mesh->name = path.string();
+    mesh->name = std::move(name);
     std::vector<Vec3f> colours;
     std::vector<float> alphas;
-    for (std::size_t i = 0; i < corners.positions.size(); ++i) {
+    for (std::size_t i = 0; i < file.positions.size(); ++i) {
         if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its place
-        mesh->positions.push_back(corners.positions[i]);
-        if (!corners.colours.empty()) {
-            colours.push_back(corners.colours[i]);
-            alphas.push_back(corners.alphas[i]);
+        mesh->positions.push_back(file.positions[i]);
+        if (!file.colours.empty()) {
+            colours.push_back(file.colours[i]);
+            alphas.push_back(file.alphas[i]);
         }
     }
-    for (const Mesh::Triangle& t : corners.triangles) {
+    for (const Mesh::Triangle& t : file.triangles) {
         const Mesh::Triangle joined(vertex_of[t[0]], vertex_of[t[1]], vertex_of[t[2]]);
         // A face whose corners fell together is a line, and its edges cancel: what it bounded is closed without it.
         if (joined[0] != joined[1] && joined[1] != joined[2] && joined[2] != joined[0])
@@ -149,12 +142,18 @@ MeshPtr read_mesh(const std::filesystem::path& path)
     }
     if (mesh->triangles.empty())
         throw Error(fmt::format("the mesh \"{}\" has {} vertices and no faces; a mesh needs at least one triangle",
-                                path.string(), mesh->positions.size()));
+                                mesh->name, mesh->positions.size()));
 
     if (std::any_of(alphas.begin(), alphas.end(), [](float alpha) { return alpha != 1.0f; }))
         mesh->values.emplace("Alpha", std::move(alphas));
     if (!colours.empty()) mesh->values.emplace("Cd", std::move(colours));
     return mesh;
+}
+
+MeshPtr read_mesh(const std::filesystem::path& path)
+{
+    const MeshFile file = read_mesh_file(path);
+    return joined(file, join_by_place(file.positions), path.string());
 }
 
 }  // namespace rapid

@@ -18,7 +18,8 @@ namespace rapid {
 struct Path {
     Vec3d P, v, a;
     double duration;
-    double radius;  // m; contact is where distance = radius
+    double radius;     // m; contact is where distance = radius
+    double begin = 0;  // s since the beginning of the frame, for shapes that move in it
 };
 
 // Where a path first meets the shape from outside. A point that starts flush with the surface (within rounding) is
@@ -56,11 +57,28 @@ public:
     // sign.
     virtual void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const = 0;
 
+    // The same of a shape that moves, each point at its own time, s since the beginning of the frame.
+    virtual void distance_at(std::span<const Vec3d> P, std::span<const double> time, std::span<double> phi,
+                             std::span<Vec3d> gradient) const
+    {
+        static_cast<void>(time);
+        distance(P, phi, gradient);
+    }
+    // The velocity of the body at a place, m/s.
+    virtual Vec3d velocity_at(const Vec3d& P, double time) const
+    {
+        static_cast<void>(P), static_cast<void>(time);
+        return Vec3d::Zero();
+    }
+
     // The first contact of each path; shapes [n], [n].
     virtual void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const = 0;
 
     // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow band.
     virtual double band() const { return std::numeric_limits<double>::infinity(); }
+
+    // The largest slope of the distance: 1 but for fields that are no exact distances.
+    virtual double slope_bound() const { return 1; }
 
     // A wall thinner than this may be missed, and a crease of a smaller radius is a kink, m: one voxel of a level set.
     virtual double smallest_feature() const { return 0; }

@@ -55,20 +55,58 @@ BirthSource::BirthSource(ObjectPtr object, std::string from) : object_(std::move
         if (!from_.empty() && from_ != "points")
             throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of points take \"points\"", from_));
         take_points(points->points);
+    } else if ((moving_mesh_ = std::dynamic_pointer_cast<const AnimatedMesh>(object_))) {
+        take_mesh(moving_mesh_->rest());
     } else if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object_)) {
         take_mesh(mesh);
+    } else if ((moving_shape_ = std::dynamic_pointer_cast<const AnimatedShape>(object_))) {
+        take_shape(moving_shape_->rest());
     } else if (const auto shape = std::dynamic_pointer_cast<const Shape>(object_)) {
-        if (from_ == "points")
-            throw Error(
-                fmt::format("from = \"points\" needs points or a mesh, and source is {}; take \"surface\" or "
-                            "\"volume\"",
-                            describe(object_)));
-        has_normals_ = from_ != "volume";
-        scatter_ = from_ == "volume" ? scatter_in_volume(shape) : scatter_on_surface(shape);
+        take_shape(shape);
     } else {
         throw Error(fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape or points",
                                 describe(object_)));
     }
+}
+
+void BirthSource::take_shape(const ShapePtr& shape)
+{
+    if (from_ == "points")
+        throw Error(
+            fmt::format("from = \"points\" needs points or a mesh, and source is {}; take \"surface\" or "
+                        "\"volume\"",
+                        describe(object_)));
+    has_normals_ = from_ != "volume";
+    scatter_ = from_ == "volume" ? scatter_in_volume(shape) : scatter_on_surface(shape);
+}
+
+FramePath BirthSource::path_at(const FrameClock& clock, std::int64_t frame, const PathOptions& options) const
+{
+    return moving_mesh_ ? path_of(*moving_mesh_, clock, frame, options)
+                        : path_of(*moving_shape_, clock, frame, options);
+}
+
+BirthSource::Moved BirthSource::go_to(const FrameClock& clock, std::int64_t frame, const PathOptions& options)
+{
+    if (!moving_mesh_ && !moving_shape_) return {std::nullopt, false};
+    // At the start there is no interval yet: what happens there is the beginning of the next one, unless that jumps.
+    bool at_beginning = frame <= clock.start;
+    FramePath path = path_at(clock, at_beginning ? frame + 1 : frame, options);
+    if (at_beginning && (path.kind == FramePath::Still || path.kind == FramePath::AfterCut)) {
+        at_beginning = false;
+        path = FramePath();
+    }
+    const std::int64_t end = at_beginning ? frame + 1 : frame;
+    if (!moving_mesh_ || !moving_mesh_->deforms()) {
+        path_ = rigid_path(moving_mesh_ ? *moving_mesh_->motion() : *moving_shape_->motion(), clock, end, path);
+    } else {
+        const PlacesOn on = from_ == "volume"   ? PlacesOn::Volume
+                            : from_ == "points" ? PlacesOn::Vertices
+                                                : PlacesOn::Faces;
+        take_mesh(moving_mesh_->at(clock, end));
+        path_ = deforming_path(*moving_mesh_, clock, end, path, on);
+    }
+    return {at_beginning ? std::nullopt : path.jump, at_beginning};
 }
 
 void BirthSource::take_mesh(const MeshPtr& mesh)

@@ -1,4 +1,4 @@
-// What an emitter bears points from: a mesh, a level set, an analytic shape, or points.
+// What an emitter bears points from: a mesh, a level set, an analytic shape, or points; at rest, moving or deforming.
 //
 // It says where a birth takes place, which way the surface faces there, and which values the newborn take over from it.
 // All of that depends on the random key and the birth's number alone.
@@ -10,6 +10,7 @@
 
 #include "runtime/object.h"
 #include "runtime/points/point_set.h"
+#include "runtime/shapes/body_path.h"
 #include "runtime/shapes/mesh.h"
 #include "runtime/shapes/scatter.h"
 
@@ -23,6 +24,17 @@ public:
     BirthSource(ObjectPtr object, std::string from);
 
     bool is(const ObjectPtr& object, const std::string& from) const { return object_ == object && from_ == from; }
+
+    // Makes it what it is in the interval that ends with a frame; at the simulation's start, what it is there. Once a
+    // frame, before births are placed, and on one thread.
+    struct Moved {
+        std::optional<Jump> jump;  // found in this interval
+        bool at_beginning;         // births are at t = 0 of an interval: of the one that begins at the start
+    };
+    Moved go_to(const FrameClock& clock, std::int64_t frame, const PathOptions& options);
+    // Whether births have ways to go along: places are then to be carried.
+    bool moves() const { return path_ != nullptr; }
+    const BodyPath& path() const { return *path_; }
 
     bool empty() const { return !scatter_ && values_.empty(); }  // a set of no points
     bool has_normals() const { return has_normals_; }
@@ -53,10 +65,15 @@ public:
 
 private:
     void take_mesh(const MeshPtr& mesh);
+    void take_shape(const ShapePtr& shape);
     void take_points(PointSet points);
+    FramePath path_at(const FrameClock& clock, std::int64_t frame, const PathOptions& options) const;
 
     ObjectPtr object_;
     std::string from_;
+    std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, where it is one
+    std::shared_ptr<const AnimatedShape> moving_shape_;  // the same
+    BodyPathPtr path_;
     ScatterPtr scatter_;  // null: births are at the points of values_
     MeshPtr mesh_;        // whose triangles the birthplaces name
     PointSet values_;

@@ -1,4 +1,4 @@
-// emit: bears points from a surface, in a volume or at points (paper §3.1).
+// emit: bears points from a surface, in a volume or at points, at rest, moving or deforming (paper §3).
 //
 // A point born in the frame's interval has the age L at the frame's end, 0 <= L <= h: h for birth = "begin", 0 for
 // "end", uniform between for "random", h less its exact time for "even". It is appended where and as it is born; its
@@ -8,13 +8,18 @@
 //   velocity = C(velocity + speed N) + inherit v_source      C turns a vector uniformly in a cone of half angle
 //   `spread`
 //
+// A moving source bears each point where its place is at the time of birth, t = 1 - L / h of the way from the frame
+// before (shapes/body_path.h), and v_source is the derivative of that way, with the source's own attribute v added.
+//
 // A birth's random numbers depend on the seed, this node's name and the birth's number within this emitter; each
 // question has a number of its own, so that a parameter more changes no answer to another.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include "runtime/graph/node.h"
 #include "runtime/operators/birth_source.h"
@@ -74,6 +79,40 @@ void read_value(const Param& param, const Value& value, Interval& field)
         throw Error(fmt::format("{} = {} has no mean; both must be finite", param.name, describe(value)));
 }
 
+// An age at the frame's end: an interval, or the source's own attribute.
+struct Age {
+    static constexpr std::string_view param_type = "number, {min, max} or rapid.attr";
+    Interval interval;
+    std::string attribute;
+
+    bool is_single() const { return attribute.empty() && interval.is_single(); }
+};
+
+void read_value(const Param& param, const Value& value, Age& field)
+{
+    if (const auto* reference = value.get<AttributeRef>())
+        field = {{}, reference->name};
+    else
+        read_value(param, value, field.interval), field.attribute.clear();
+}
+
+struct FrameSet {
+    static constexpr std::string_view param_type = "list of frames";
+    std::set<std::int64_t> frames;
+};
+
+void read_value(const Param& param, const Value& value, FrameSet& field)
+{
+    std::vector<double> numbers;
+    read_value(param, value, numbers);
+    field.frames.clear();
+    for (const double number : numbers) {
+        if (number != std::floor(number))
+            throw Error(fmt::format("{} has the frame {}; frames are whole", param.name, number));
+        field.frames.insert(static_cast<std::int64_t>(number));
+    }
+}
+
 // The vectors that `turn` needs of a cone of the half angle θ: 1 - cos α is uniform in [0, 1 - cos θ] where directions
 // are uniform over the cone's solid angle.
 class Cone {
@@ -128,7 +167,11 @@ struct Emit {
     std::optional<double> rate;
     std::optional<int> count;
     std::optional<std::map<std::int64_t, double>> impulse;
-    std::optional<Interval> age, life;
+    std::optional<Age> age;
+    std::optional<Interval> life;
+    std::string motion;
+    double alpha = 0.5;
+    std::optional<FrameSet> cut;
     double inherit = 1, speed = 0, spread = 0;
     Vec3d velocity = Vec3d::Zero();
     std::map<std::string, AttributeValue> attributes;
@@ -155,8 +198,21 @@ struct Emit {
             .param(&Emit::birth, "birth", "random", any_number(), "",
                    "when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time")
             .choices({"random", "begin", "end", "even"})
-            .param(&Emit::age, "age", Value(), at_least(0), "s",
-                   "age at the end of the frame of birth, instead of `birth`; a number or {min, max}")
+            .param(
+                &Emit::age, "age", Value(), at_least(0), "s",
+                "age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own "
+                "attribute, rapid.attr")
+            .param(&Emit::motion, "motion", "spline", any_number(), "",
+                   "the way of a moving source within a frame: a cubic through the frames around it, a straight line, "
+                   "or none, as if it were where it is at the frame's end, at rest")
+            .choices({"spline", "linear", "none"})
+            .param(
+                &Emit::alpha, "alpha", 0.5, any_number(), "",
+                "tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform")
+            .param(
+                &Emit::cut, "cut", Value(), between(-most_births, most_births), "",
+                "frames to which the source jumps from the frame before: nothing is born on the way. Where it is not "
+                "given, a step of 8 times those around it and half the source's size is a jump, and reported")
             .param(&Emit::inherit, "inherit", 1.0, any_number(), "", "fraction of the source's velocity that is added")
             .param(&Emit::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean direction and size")
             .param(&Emit::speed, "speed", 0.0, any_number(), "m/s", "along the source's normal N, added to velocity")
@@ -207,6 +263,7 @@ struct Emit {
                 throw Error(fmt::format("the source has \"{}\" as {}; it must be {}", name, type_name(type),
                                         type_name(type_of(known->fallback))));
         }
+        check_age();
     }
 
     Flow start(std::span<Flow> inputs, const Evaluation& now)
@@ -217,6 +274,7 @@ struct Emit {
             throw Error(fmt::format("impulse[{}] is before the first frame; frames begin at {}",
                                     impulse->begin()->first, simulation.start));
         clock_ = BirthClock(simulation.start);
+        move(simulation, now);
         bear(flow, clock_.at_once(impulse ? impulse_at(simulation.start) : 0, simulation.fps), now);
         return flow;
     }
@@ -225,6 +283,7 @@ struct Emit {
     {
         if (now.at_start) return start(inputs, now);
         Flow flow = std::move(inputs[0]);
+        move(*flow.simulation, now);
         bear(flow, births(static_cast<std::int64_t>(now.frame.number), flow.simulation->fps), now);
         return flow;
     }
@@ -266,22 +325,25 @@ private:
     // The age at the frame's end where it is the same for all births.
     std::optional<double> same_age(const Evaluation& now) const
     {
-        if (age) return age->is_single() ? std::optional(age->min) : std::nullopt;
+        if (age) return age->is_single() ? std::optional(age->interval.min) : std::nullopt;
         if (now.at_start || birth == "end") return 0.0;
         if (birth == "begin") return now.frame.dt;
         return std::nullopt;
     }
 
     // Whether newborn differ in the velocity that they take from the source; where not, all take the same.
-    bool inherits_each() const { return inherit != 0 && !source_.values().v().is_uniform(); }
+    bool source_v_varies() const { return inherit != 0 && !source_.values().v().is_uniform(); }
+    bool inherits_each() const { return source_v_varies() || (inherit != 0 && source_.moves()); }
     Vec3d inherited_by_all() const
     {
-        if (inherit == 0 || inherits_each()) return Vec3d::Zero();
+        if (inherit == 0 || source_v_varies()) return Vec3d::Zero();
         return inherit * source_.values().v()[0].cast<double>();
     }
     bool turns() const { return spread > 0 && (speed != 0 || velocity != Vec3d::Zero()); }
     bool own_velocity() const { return turns() || speed != 0 || inherits_each(); }
 
+    void check_age() const;
+    void move(const Simulation& simulation, const Evaluation& now);
     void bear(Flow& flow, const Births& births, const Evaluation& now);
     void make_columns(PointSet& points, const Evaluation& now) const;
     void append(PointSet& points, std::size_t n, const Evaluation& now) const;
@@ -289,13 +351,57 @@ private:
     void fill(const Newborn& newborn, const Births& births, std::size_t begin, std::span<Birthplace> places,
               const Evaluation& now) const;
 
+    struct Block;
+    void draw_ages(Block& block, const Births& births, std::size_t begin, const Evaluation& now) const;
+    void write_velocities(const Block& block, std::span<Vec3f> v) const;
+
     BirthClock clock_;
+    bool at_beginning_ = false;   // of an interval: see BirthSource::Moved
     mutable BirthSource source_;  // made from `source` and `from` when they change
 };
 RAPID_NODE(Emit);
 
 // The time for which a newborn is advanced in its first frame; the initial state is not.
 double frame_length(const Evaluation& now) { return now.at_start ? 0 : now.frame.dt; }
+
+// The source's own ages.
+void Emit::check_age() const
+{
+    if (!age || age->attribute.empty()) return;
+    const AnyColumn* column = source_.values().find(age->attribute);
+    const auto* ages = column ? std::get_if<Column<float>>(column) : nullptr;
+    if (!ages) {
+        const std::string near = did_you_mean(age->attribute, source_.values().column_names());
+        throw Error(fmt::format("age = rapid.attr \"{}\": the source has no float of that name{}", age->attribute,
+                                near.empty() ? "; give the source one, or a number" : near));
+    }
+    for (std::size_t i = 0; i < ages->size(); ++i)
+        if (!((*ages)[i] >= 0) || std::isinf((*ages)[i]))
+            throw Error(fmt::format("age = rapid.attr \"{}\": the source's point {} has {}; ages are at least 0",
+                                    age->attribute, i, (*ages)[i]));
+}
+
+void Emit::move(const Simulation& simulation, const Evaluation& now)
+{
+    PathOptions options;
+    options.kind = motion == "spline"   ? PathOptions::Spline
+                   : motion == "linear" ? PathOptions::Linear
+                                        : PathOptions::None;
+    options.alpha = alpha;
+    if (cut) options.cuts = cut->frames;
+    const auto frame = static_cast<std::int64_t>(now.frame.number);
+    const BirthSource::Moved moved = source_.go_to(simulation.clock(), frame, options);
+    at_beginning_ = moved.at_beginning;
+    if (moved.jump)
+        now.warnings.push_back(fmt::format(
+            "{}:{}: node \"{}\": the source jumps by {:.3g} m to frame {}, {}; nothing is born on the way "
+            "(cut = {{{}}} says so, cut = {{}} that it is no jump)",
+            now.location.file, now.location.line, now.node, moved.jump->way, frame,
+            moved.jump->usual > 0
+                ? fmt::format("{:.3g} times as far as in the frames around", moved.jump->way / moved.jump->usual)
+                : std::string("and is at rest in the frames around"),
+            frame));
+}
 
 void Emit::bear(Flow& flow, const Births& births, const Evaluation& now)
 {
@@ -384,40 +490,85 @@ Newborn Emit::newborn_of(PointSet& points, std::size_t n, const Evaluation& now)
     return newborn;
 }
 
+// Some births, column by column.
+struct Emit::Block {
+    std::span<Birthplace> places;
+    std::array<std::array<double, 4>, block_size> u;  // their numbers, where any are drawn
+    std::array<double, block_size> L;                 // s, age at the frame's end
+    std::array<Vec3d, block_size> carried;            // m/s, velocity of their places on a moving source
+
+    std::size_t size() const { return places.size(); }
+};
+
 void Emit::fill(const Newborn& newborn, const Births& births, std::size_t begin, std::span<Birthplace> places,
                 const Evaluation& now) const
 {
+    Block block;
+    block.places = places;
+    const bool own_age = !same_age(now);
+    if (own_age || turns() || !newborn.life.empty())
+        uniform4(now.random, births.first + begin, draw_use, std::span(block.u).first(block.size()));
     source_.place(now.random, births.first + begin, /*in_order=*/!rate, places);
     for (const auto& carry : newborn.carry) carry(begin, places);
 
+    if (own_age || source_.moves()) draw_ages(block, births, begin, now);
+    if (own_age) {
+        const double h = frame_length(now);
+        for (std::size_t j = 0; j < block.size(); ++j) {
+            const double gamma = std::min(block.L[j], h);
+            if (!newborn.dt.empty()) newborn.dt[begin + j] = static_cast<float>(gamma);
+            if (!newborn.age.empty()) newborn.age[begin + j] = static_cast<float>(block.L[j] - gamma);
+            if (!newborn.birthtime.empty())
+                newborn.birthtime[begin + j] = static_cast<float>(now.frame.time - block.L[j]);
+        }
+    }
+    if (source_.moves()) {
+        std::array<double, block_size> t;
+        for (std::size_t j = 0; j < block.size(); ++j)
+            t[j] = at_beginning_ ? 0 : std::max(0.0, 1 - block.L[j] / now.frame.dt);
+        source_.path().carry(std::span(t).first(block.size()), speed != 0, places,
+                             std::span(block.carried).first(block.size()));
+        for (std::size_t j = 0; j < block.size(); ++j) block.carried[j] /= now.frame.dt;
+    }
+    for (std::size_t j = 0; j < block.size(); ++j) newborn.P[begin + j] = places[j].P;
+    if (!newborn.life.empty())
+        for (std::size_t j = 0; j < block.size(); ++j)
+            newborn.life[begin + j] = static_cast<float>(life->at(block.u[j][life_draw]));
+    if (!newborn.v.empty()) write_velocities(block, newborn.v.subspan(begin, block.size()));
+}
+
+void Emit::draw_ages(Block& block, const Births& births, std::size_t begin, const Evaluation& now) const
+{
     const double h = frame_length(now);
-    const bool own_age = !same_age(now);
-    const bool even = !age && birth == "even";
-    const bool own_velocities = !newborn.v.empty(), inherits = inherits_each(), turned = turns();
+    const std::optional<double> same = same_age(now);
+    const AnyColumn* own = age && !age->attribute.empty() ? source_.values().find(age->attribute) : nullptr;
+    for (std::size_t j = 0; j < block.size(); ++j) {
+        double& L = block.L[j];
+        if (same)
+            L = *same;
+        else if (own)
+            L = static_cast<double>(source_.value(std::get<Column<float>>(*own).read(), block.places[j]));
+        else if (age)
+            L = age->interval.at(block.u[j][age_draw]);
+        else
+            L = birth == "even" ? births.even_age(begin + j) : h * block.u[j][age_draw];
+    }
+}
+
+void Emit::write_velocities(const Block& block, std::span<Vec3f> v) const
+{
+    const bool turned = turns(), source_v_differs = source_v_varies(), carried = inherit != 0 && source_.moves();
     const Cone cone(spread);
     const Strided<Vec3f> source_v = source_.values().v().read();
-    const Vec3d inherited = inherited_by_all();
-    const bool draws = own_age || turned || !newborn.life.empty();
-
-    for (std::size_t j = 0; j < places.size(); ++j) {
-        const std::size_t i = begin + j;
-        const Birthplace& place = places[j];
-        const auto u = draws ? uniform4(now.random, births.first + i, draw_use) : std::array<double, 4>();
-        newborn.P[i] = place.P;
-        if (own_age) {
-            const double L = age ? age->at(u[age_draw]) : even ? births.even_age(i) : h * u[age_draw];
-            const double gamma = std::min(L, h);
-            if (!newborn.dt.empty()) newborn.dt[i] = static_cast<float>(gamma);
-            if (!newborn.age.empty()) newborn.age[i] = static_cast<float>(L - gamma);
-            if (!newborn.birthtime.empty()) newborn.birthtime[i] = static_cast<float>(now.frame.time - L);
-        }
-        if (!newborn.life.empty()) newborn.life[i] = static_cast<float>(life->at(u[life_draw]));
-        if (own_velocities) {
-            const Vec3d mean = velocity + speed * place.N.cast<double>();
-            const Vec3d own = turned ? cone.turn(mean, u[cone_draw], u[turn_draw]) : mean;
-            const Vec3d taken = inherits ? Vec3d(inherit * source_.value(source_v, place).cast<double>()) : inherited;
-            newborn.v[i] = (own + taken).cast<float>();
-        }
+    const Vec3d common = inherited_by_all();
+    for (std::size_t j = 0; j < block.size(); ++j) {
+        const Birthplace& place = block.places[j];
+        const Vec3d mean = velocity + speed * place.N.cast<double>();
+        const auto& u = block.u[j];
+        Vec3d sum = common + (turned ? cone.turn(mean, u[cone_draw], u[turn_draw]) : mean);
+        if (source_v_differs) sum += inherit * source_.value(source_v, place).cast<double>();
+        if (carried) sum += inherit * block.carried[j];
+        v[j] = sum.cast<float>();
     }
 }
 

@@ -86,7 +86,7 @@ void RayCrossings::along_x(double y, double z, std::vector<Crossing>& crossings)
         const double x = a.x() - (normal.y() * (y - a.y()) + normal.z() * (z - a.z())) / normal.x();
         // A triangle seen from its edge leaves x to rounding; it is at least between its corners.
         const double lowest = std::min({a.x(), b.x(), c.x()}), highest = std::max({a.x(), b.x(), c.x()});
-        crossings.push_back({x >= lowest ? std::min(x, highest) : lowest, normal.x() > 0 ? 1 : -1});
+        crossings.push_back({x >= lowest ? std::min(x, highest) : lowest, normal.x() > 0 ? 1 : -1, triangles_[i]});
     }
     std::sort(crossings.begin(), crossings.end(),
               [](const Crossing& one, const Crossing& two) { return one.x < two.x; });

@@ -25,6 +25,7 @@ public:
     struct Crossing {
         double x;
         int turn;  // 1 out of a face, -1 into it
+        std::int32_t triangle;
     };
     void along_x(double y, double z, std::vector<Crossing>& crossings) const;
 

@@ -2,11 +2,16 @@
 //
 // The numbers are births a second of wall time; the threads are those that the arena has.
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 #include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
 
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
-#include "runtime/shapes/mesh.h"
+#include "runtime/shapes/animated.h"
 
 namespace rapid {
 namespace {
@@ -26,6 +31,37 @@ std::map<std::string, Value> sparks()
     arguments["speed"] = 5.0;
     arguments["spread"] = 20.0;
     arguments["life"] = std::shared_ptr<const Table>(life);
+    return arguments;
+}
+
+// A torus of 5,000 faces that turns, and as files of its frames, so that each birth has the spline of its face.
+std::map<std::string, Value> moving(bool deforming)
+{
+    const MeshPtr torus = make_torus(1, 0.25, 100, Vec3d::Zero());
+    const auto turned = [](double angle) {
+        return Pose{Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3d::UnitX()))};
+    };
+    const MotionPtr motion = keyed_motion({{0, turned(0)}, {1000, turned(2)}});
+    auto arguments = plain("random");
+    if (!deforming) {
+        arguments["source"] = ObjectPtr(std::make_shared<AnimatedMesh>(torus, motion));
+        return arguments;
+    }
+    const auto folder = std::filesystem::temp_directory_path() / fmt::format("rapid_bench_{}", getpid());
+    std::filesystem::create_directories(folder);
+    std::map<int, std::filesystem::path> files;
+    for (int frame = 1; frame <= 3; ++frame) {
+        std::string text;
+        for (const Vec3f& P : torus->positions) text += fmt::format("v {} {} {}\n", P.x(), P.y() * float(frame), P.z());
+        for (const Mesh::Triangle& t : torus->triangles)
+            text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+        files[frame] = folder / fmt::format("{}.obj", frame);
+        std::ofstream(files[frame]) << text;
+    }
+    const auto sequence = std::make_shared<MeshSequence>(files, "#.obj");
+    for (int frame = 1; frame <= 3; ++frame) sequence->at(frame);
+    std::filesystem::remove_all(folder);
+    arguments["source"] = ObjectPtr(std::make_shared<AnimatedMesh>(sequence, motion));
     return arguments;
 }
 
@@ -55,6 +91,9 @@ void emit(benchmark::State& state, std::map<std::string, Value> arguments)
 BENCHMARK_CAPTURE(emit, begin, plain("begin"))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(emit, random, plain("random"))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(emit, sparks, sparks())->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+BENCHMARK_CAPTURE(emit, moving, moving(false))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(emit, deforming, moving(true))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace rapid

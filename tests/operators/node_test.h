@@ -141,6 +141,7 @@ public:
 
     Simulation& simulation_state() { return *simulation_; }
     FrameFigures figures;
+    std::vector<std::string> warnings;
     std::function<void(const std::string&, const PointSet&)> write;
 
 private:
@@ -156,7 +157,7 @@ private:
                              node_.location,
                              RandomKey(simulation_->seed, node_.name),
                              figures,
-                             warnings_,
+                             warnings,
                              write};
         return f(now);
     }
@@ -165,7 +166,6 @@ private:
     std::shared_ptr<Simulation> simulation_;
     Node node_;
     std::unique_ptr<Operator> op_;
-    std::vector<std::string> warnings_;
 };
 
 }  // namespace rapid::test

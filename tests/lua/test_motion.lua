@@ -1,0 +1,106 @@
+-- Motions as graphs write them: constants, products, functions of the frame, keys; and what they move.
+local scene = require "testing.scene"
+
+local speck = "rapid.mesh.from { points = {{0, 0, 0}, {1e-6, 0, 0}, {0, 0, 1e-6}}, faces = {{1, 2, 3}} }"
+
+local function births_of(source, options)
+  return scene.run(("return rapid.create {} :emit { source = %s, count = 4, birth = 'even', inherit = 0, %s }")
+    :format(source, options or ""), { frames = {1, 14} })
+end
+
+local function error_of(text)
+  return scene.error("local m = " .. text .. " return rapid.create {} :emit { source = m, rate = 1 } :solve {}")
+end
+
+local function close(wanted, found, tolerance)
+  assert.near(0, (found - wanted):length(), tolerance or 4e-6)
+end
+
+describe("a motion", function()
+  it("by keys is linear between them, and holds outside", function()
+    local result = births_of(speck .. ":transform { [3] = rapid.translate(0, 0, 0), [7] = rapid.translate(8, 4, 0) }")
+    for k = 0, 3 do
+      close(vec3(2 * (1 + (k + 1) / 4), 1 + (k + 1) / 4, 0), result[5]:by_id(12 + k).P)
+      close(vec3(0, 0, 0), result[3]:by_id(4 + k).P)
+      close(vec3(8, 4, 0), result[12]:by_id(40 + k).P)
+    end
+  end)
+
+  it("may be a function of the frame, which is asked between frames and for the frames around", function()
+    local result = births_of(speck .. [[:transform(function(frame)
+      return rapid.translate(frame.time * 24, 0, 0) * rapid.rotate({0, 0, 1}, 30 * frame.number)
+        * rapid.translate(0, 2, 0)
+    end)]])
+    local angle = math.rad(30 * 9.5)
+    close(vec3(8.5 - 2 * math.sin(angle), 2 * math.cos(angle), 0), result[10]:by_id(33).P, 2 * math.rad(30) ^ 4 / 50)
+  end)
+
+  it("moves what is moved already", function()
+    local result = births_of(speck .. ":transform { [1] = rapid.translate(0, 0, 0), [11] = rapid.translate(10, 0, 0) }"
+      .. ":transform(rapid.translate(0, 7, 0) * rapid.scale(2))")
+    close(vec3(2 * 4, 7, 0), result[5]:by_id(15).P)
+  end)
+
+  it("that is constant moves the thing itself, which stays what it is", function()
+    local result = births_of("rapid.shape.sphere {}:transform(rapid.translate(5, 0, 0) * rapid.scale(0.5))")
+    for k = 0, 3 do assert.near(0.5, (result[5]:by_id(12 + k).P - vec3(5, 0, 0)):length(), 1e-6) end
+  end)
+
+  it("that is no motion is refused with what it may be", function()
+    assert.truthy(error_of("rapid.mesh.box {}:transform(3)"):find(
+      ":transform: motion = 3 has the wrong type; it must be a motion (rapid.translate, rapid.rotate, rapid.scale, "
+        .. "or a product), a function of the frame that returns one, or keys {[1] = ..., [24] = ...}", 1, true))
+    local message = error_of("rapid.mesh.box {}:transform(function(frame) return 3 end)")
+    assert.truthy(message:find("motion is a function that returned 3; it must return a motion", 1, true), message)
+    assert.truthy(message:find("(frame ", 1, true), message)
+  end)
+
+  it("by keys takes constants alone", function()
+    assert.truthy(error_of("rapid.mesh.box {}:transform { [1] = rapid.scale(1), [9] = 'up' }"):find(
+      'motion[9] = "up" is no place to be at a frame; keys are constant motions', 1, true))
+    local moving_key = "{ [1] = rapid.scale(1) * function() end, [2] = rapid.scale(2) }"
+    assert.truthy(error_of("rapid.mesh.box {}:transform " .. moving_key)
+      :find("motion[1] = a motion that varies is no place to be at a frame", 1, true))
+    assert.truthy(error_of("rapid.mesh.box {}:transform {}"):find("a motion by keys has none", 1, true))
+  end)
+
+  it("moves meshes and shapes, and nothing else", function()
+    assert.truthy(error_of("rapid.scale(2):transform(rapid.scale(2))"):find('a motion has no "transform"', 1, true))
+  end)
+end)
+
+describe("a mesh sequence", function()
+  local function tetrahedron(size)
+    return ("v 0 0 0\nv %g 0 0\nv 0 0 %g\nv 0 %g 0\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n"):format(size, size, size)
+  end
+  for frame = 1, 14 do
+    scene.folder:write(("grows.%04d.obj"):format(frame), tetrahedron(frame))
+    scene.folder:write(("breaks.%04d.obj"):format(frame),
+      frame == 4 and "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" or tetrahedron(frame))
+  end
+
+  it("is an emitter that deforms", function()
+    local result = scene.run([[return rapid.create {}
+      :emit { source = rapid.mesh.read "grows.####.obj", count = 100, birth = "even" }]], { frames = {1, 8} })
+    for k = 0, 99 do
+      local point = result[8]:by_id(600 + k)
+      local P, size = point.P, 7 + (k + 1) / 100
+      assert.near(0, (point.v - P * (24 / size)):length(), 1e-3)
+      assert.is_true(P.x + P.y + P.z <= size * (1 + 1e-6))
+    end
+  end)
+
+  it("whose faces change ends the run at that frame, with both counts", function()
+    local message = scene.error([[return rapid.create {}
+      :emit { source = rapid.mesh.read "breaks.$F4.obj", rate = 10 } :solve {}]], { frames = {1, 8} })
+    assert.truthy(message:find("changes at frame 4: it has 3 corners and 1 faces there, and 12 corners and 4 faces at "
+      .. "frame 1", 1, true), message)
+  end)
+
+  it("without a file is refused before the first frame", function()
+    local result = scene.command("check",
+      'return rapid.create {} :emit { source = rapid.mesh.read "none.####.obj", rate = 1 }')
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find("there is no mesh file", 1, true), result.stderr)
+  end)
+end)

@@ -1,0 +1,294 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include "runtime/shapes/analytic.h"
+#include "runtime/shapes/animated.h"
+#include "tests/operators/node_test.h"
+
+namespace rapid {
+
+using namespace test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+constexpr double fps = 24;
+
+class Formula final : public Motion {
+public:
+    explicit Formula(std::function<Pose(const Frame&)> pose) : pose_(std::move(pose)) {}
+    Pose at(const Frame& frame) const override { return pose_(frame); }
+    FrameRange range() const override { return {-INFINITY, INFINITY}; }
+
+private:
+    std::function<Pose(const Frame&)> pose_;
+};
+
+MotionPtr places(std::function<Vec3d(const Frame&)> place)
+{
+    return std::make_shared<Formula>([place = std::move(place)](const Frame& frame) { return Pose{place(frame)}; });
+}
+
+// A mesh as good as a point.
+MeshPtr speck() { return make_mesh({{0, 0, 0}, {1e-6f, 0, 0}, {0, 0, 1e-6f}}, {{0, 1, 2}}); }
+constexpr double speck_size = 2e-6;
+
+Value moved(const MeshPtr& mesh, const MotionPtr& motion)
+{
+    return ObjectPtr(std::make_shared<AnimatedMesh>(mesh, motion));
+}
+
+// A mesh whose files are written for it: its vertices are those of `rest` times the factor of the frame.
+struct GrowingMesh {
+    std::filesystem::path folder;
+    std::shared_ptr<const AnimatedMesh> mesh;
+
+    GrowingMesh(const Mesh& rest, int first, int last, const std::function<double(int)>& factor)
+    {
+        folder = std::filesystem::temp_directory_path() / ("rapid_emit_" + std::to_string(std::random_device()()));
+        std::filesystem::create_directories(folder);
+        std::map<int, std::filesystem::path> files;
+        for (int frame = first; frame <= last; ++frame) {
+            std::string text;
+            for (const Vec3f& P : rest.positions) {
+                const Vec3d Q = factor(frame) * P.cast<double>();
+                text += fmt::format("v {:.9} {:.9} {:.9}\n", Q.x(), Q.y(), Q.z());
+            }
+            for (const Mesh::Triangle& t : rest.triangles)
+                text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+            files[frame] = folder / fmt::format("{}.obj", frame);
+            std::ofstream(files[frame]) << text;
+        }
+        mesh = std::make_shared<AnimatedMesh>(std::make_shared<MeshSequence>(files, "#.obj"), constant_motion({}));
+    }
+    ~GrowingMesh() { std::filesystem::remove_all(folder); }
+};
+
+}  // namespace
+
+TEST_CASE("an emitter on a circle bears an even stream without a seam between frames", "[emit]")
+{
+    const double radius = 2, turn = 0.3, rate = 977;  // rad a frame
+    const auto circle = [=](double time) {
+        const double at = turn * time * fps;
+        return Vec3d(radius * std::cos(at), radius * std::sin(at), 0);
+    };
+    NodeTest emit("emit", {{"source", moved(speck(), places([&](const Frame& f) { return circle(f.time); }))},
+                           {"rate", rate},
+                           {"birth", "even"}});
+    // The first interval has a one-sided beginning, with a larger error.
+    double off = 0, slip = 0, shortest = 1e9, longest = 0;
+    Vec3d last = Vec3d::Zero();
+    std::int64_t k = 0;
+    for (std::int64_t frame = 2; frame <= 60; ++frame) {
+        const PointSet born = emit(frame);
+        for (std::size_t i = 0; i < born.size(); ++i, ++k) {
+            const Vec3d P = born.P()[i].cast<double>(), there = circle(double(k + 1) / rate);
+            const Vec3d tangent = turn * fps * Vec3d(-there.y(), there.x(), 0);
+            if (frame > 2) {
+                off = std::max(off, (P - there).norm());
+                slip = std::max(slip, (born.v()[i].cast<double>() - tangent).norm());
+                shortest = std::min(shortest, (P - last).norm());
+                longest = std::max(longest, (P - last).norm());
+            }
+            last = P;
+        }
+    }
+    const double even = 2 * radius * std::sin(turn * fps / rate / 2);
+    CHECK(k == static_cast<std::int64_t>(rate * 59 / 24));
+    CHECK(off < radius * std::pow(turn, 3) / 40);
+    CHECK(slip < radius * turn * fps * turn * turn / 5);
+    CHECK(longest < even * (1 + turn * turn / 4));
+    CHECK(shortest > even * (1 - turn * turn / 4));
+    CHECK(emit.warnings.empty());
+}
+
+TEST_CASE(
+    "a uniform or accelerated emitter bears points exactly where it is, with its velocity, from the first frame on",
+    "[emit]")
+{
+    const Vec3d P0(1, 2, 3), v(30, -4, 0), a = GENERATE(Vec3d(0, 0, 0), Vec3d(10, 300, -7));
+    const auto way = [=](double t) -> Vec3d { return P0 + t * v + 0.5 * t * t * a; };
+    NodeTest emit("emit", {{"source", moved(speck(), places([&](const Frame& f) { return way(f.time); }))},
+                           {"rate", 500.0},
+                           {"birth", "even"},
+                           {"inherit", 0.5}});
+    double off = 0, slip = 0;
+    for (std::int64_t k = 0, frame = 2; frame <= 10; ++frame) {
+        const PointSet born = emit(frame);
+        for (std::size_t i = 0; i < born.size(); ++i, ++k) {
+            const double t = double(k + 1) / 500;
+            off = std::max(off, (born.P()[i].cast<double>() - way(t)).norm());
+            slip = std::max(slip, (born.v()[i].cast<double>() - 0.5 * (v + t * a)).norm());
+        }
+    }
+    CHECK(off < speck_size + 4e-6);  // of single precision at 30 m
+    CHECK(slip < 1e-5);
+}
+
+TEST_CASE("an impulse at the first frame is where the emitter begins, with the velocity that it begins with", "[emit]")
+{
+    NodeTest emit("emit",
+                  {{"source", moved(speck(), places([](const Frame& f) { return Vec3d(1 + 6 * f.time, 0, 0); }))},
+                   {"impulse", list({4.0})}});
+    const PointSet born = emit.at_start();
+    REQUIRE(born.size() == 4);
+    CHECK_THAT(born.P()[2], close_to({1, 0, 0}, 2 * speck_size));
+    CHECK_THAT(born.v()[2], close_to({6, 0, 0}, 1e-5));
+}
+
+TEST_CASE("motion = \"linear\" is the straight line between two frames, \"none\" the place at the end, at rest",
+          "[emit]")
+{
+    const auto at = [](double frame) { return Vec3d(frame * frame, 0, 0); };
+    const auto born_by = [&](const char* motion) {
+        return NodeTest("emit", {{"source", moved(speck(), places([&](const Frame& f) { return at(f.number); }))},
+                                 {"count", 4.0},
+                                 {"birth", "even"},
+                                 {"motion", motion}})(5);
+    };
+    const PointSet linear = born_by("linear"), none = born_by("none");
+    for (int i = 0; i < 4; ++i) {
+        const double t = (i + 1) / 4.0;
+        CHECK_THAT(linear.P()[i], close_to(Vec3f(static_cast<float>(16 + 9 * t), 0, 0), 2 * speck_size));
+        CHECK_THAT(linear.v()[i], close_to({216, 0, 0}, 1e-4));
+        CHECK_THAT(none.P()[i], close_to({25, 0, 0}, 2 * speck_size));
+        CHECK(none.v()[i] == Vec3f::Zero());
+    }
+}
+
+TEST_CASE("nothing is born along a jump, which is reported; cut says so, or that there is none", "[emit]")
+{
+    const auto jumps_at_9 = [](const Frame& f) { return Vec3d(0.1 * f.number + (f.number >= 9 ? 50 : 0), 0, 0); };
+    const Arguments arguments{{"source", moved(speck(), places(jumps_at_9))}, {"count", 10.0}, {"birth", "even"}};
+    const auto run = [&](std::optional<Value> cut) {
+        Arguments with_cut = arguments;
+        if (cut) with_cut["cut"] = *cut;
+        NodeTest emit("emit", with_cut);
+        std::vector<double> x;
+        for (std::int64_t frame = 2; frame <= 20; ++frame) {
+            const PointSet born = emit(frame);
+            for (std::size_t i = 0; i < born.size(); ++i) x.push_back(double(born.P()[i].x()));
+        }
+        return std::pair(x, emit.warnings);
+    };
+    const auto between = [](const std::vector<double>& x) {
+        return std::count_if(x.begin(), x.end(), [](double at) { return at > 1.2 && at < 50; });
+    };
+    const auto found = run(std::nullopt), said = run(list({9.0})), denied = run(list({}));
+    CHECK(between(found.first) == 0);
+    CHECK(between(said.first) == 0);
+    CHECK(between(denied.first) > 5);
+    CHECK(said.second.empty());
+    CHECK(denied.second.empty());
+    REQUIRE(found.second.size() == 1);
+    CHECK_THAT(found.second[0],
+               Contains("the source jumps by 50.1 m to frame 9, 501 times as far as in the frames around"));
+
+    // The stream itself has no gap: 1/100 m from birth to birth, but for the jump.
+    double widest = 0;
+    for (std::size_t i = 1; i < found.first.size(); ++i)
+        if (found.first[i] - found.first[i - 1] < 40)
+            widest = std::max(widest, std::abs(found.first[i] - found.first[i - 1] - 0.01));
+    CHECK(widest < 5e-6);
+}
+
+TEST_CASE("a deforming mesh carries births along the ways of its faces, with their velocity and normals", "[emit]")
+{
+    // Grows by a tenth of its size at frame 0 each frame.
+    const MeshPtr ball = make_sphere(1, 12, Vec3d::Zero());
+    const GrowingMesh growing(*ball, 1, 12, [](int frame) { return 1 + 0.1 * frame; });
+    const std::string from = GENERATE("surface", "points", "volume");
+    CAPTURE(from);
+    NodeTest emit("emit", {{"source", ObjectPtr(growing.mesh)}, {"count", 400.0}, {"birth", "even"}, {"from", from}});
+    const PointSet born = emit(6);
+    double slip = 0, outside = 0, inside = 1e9;
+    for (std::size_t i = 0; i < born.size(); ++i) {
+        const Vec3d P = born.P()[i].cast<double>();
+        const double size = 1 + 0.1 * (5 + double(i + 1) / 400);
+        // Each place of a body that grows evenly moves at its own part of the way.
+        slip = std::max(slip, (born.v()[i].cast<double>() - P * (0.1 / size) * fps).norm());
+        outside = std::max(outside, P.norm() / size);
+        inside = std::min(inside, P.norm() / size);
+    }
+    CHECK(slip < 2e-5);
+    CHECK(outside < 1 + 1e-6);
+    if (from != "volume") CHECK(inside > 0.9);  // of a sphere of 12 divisions
+    if (from == "volume") CHECK(inside < 0.5);
+
+    // After its last file it rests.
+    const PointSet later = emit(20);
+    CHECK(later.v()[7] == Vec3f::Zero());
+}
+
+TEST_CASE("speed goes along the normal that a turning source has at the time of birth", "[emit]")
+{
+    const double turn = 0.2;
+    const auto motion = std::make_shared<Formula>([&](const Frame& f) {
+        return Pose{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(turn * f.number, Vec3d::UnitZ()))};
+    });
+    const MeshPtr facing_x = make_mesh({{1, 0, 0}, {1, 1e-3f, 0}, {1, 0, 1e-3f}}, {{0, 1, 2}});
+    NodeTest emit(
+        "emit",
+        {{"source", moved(facing_x, motion)}, {"count", 4.0}, {"birth", "even"}, {"speed", 3.0}, {"inherit", 0.0}});
+    const PointSet born = emit(9);
+    for (int i = 0; i < 4; ++i) {
+        const double at = turn * (8 + (i + 1) / 4.0);
+        CHECK_THAT(born.v()[i],
+                   close_to(Vec3f(3 * float(std::cos(at)), 3 * float(std::sin(at)), 0), 3 * turn * turn / 20));
+    }
+}
+
+TEST_CASE("a moving sphere bears points on it wherever it is", "[emit]")
+{
+    const MotionPtr motion = keyed_motion({{1, {{0, 0, 0}}}, {11, {{20, 0, 0}}}});
+    const ObjectPtr sphere = std::make_shared<AnimatedShape>(make_sphere_shape(0.5, {0, 1, 0}), motion);
+    NodeTest emit("emit", {{"source", sphere}, {"count", 100.0}, {"birth", "even"}});
+    const PointSet born = emit(5);
+    for (std::size_t i = 0; i < born.size(); ++i) {
+        const Vec3d center(2 * (3 + double(i + 1) / 100), 1, 0);
+        CHECK((born.P()[i].cast<double>() - center).norm() == Approx(0.5).margin(1e-5));
+        CHECK_THAT(born.v()[i], close_to({48, 0, 0}, 1e-4));
+    }
+}
+
+TEST_CASE("age can be the source's own attribute", "[emit]")
+{
+    PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
+    from.set("delay", Column<float>(std::span<const float>(std::vector<float>{0.01f, 0.5f})));
+    PointSet asked;
+    asked.add(*known_attribute("age"));
+    NodeTest emit("emit",
+                  {{"source", ObjectPtr(source_of(from))}, {"count", 2.0}, {"age", Value(AttributeRef{"delay"})}});
+    const PointSet born = emit(2, asked);
+    CHECK(values_of<float>(born, "dt") == std::vector<float>{0.01f, static_cast<float>(1 / fps)});
+    CHECK(values_of<float>(born, "age")[1] == Approx(0.5 - 1 / fps));
+
+    const auto refusal = [&](const PointSet& points) {
+        return error_of([&] {
+            NodeTest("emit",
+                     {{"source", ObjectPtr(source_of(points))}, {"count", 2.0}, {"age", Value(AttributeRef{"delya"})}});
+        });
+    };
+    CHECK(refusal(from) == "age = rapid.attr \"delya\": the source has no float of that name; did you mean \"delay\"?");
+    from.set("delya", Column<float>(2, -1.0f));
+    CHECK(refusal(from) == "age = rapid.attr \"delya\": the source's point 0 has -1; ages are at least 0");
+}
+
+TEST_CASE("an animated mesh's births are the same bits on any number of threads, and whatever came before", "[emit]")
+{
+    const auto source = moved(make_torus(1, 0.2, 20, Vec3d::Zero()),
+                              places([](const Frame& f) { return Vec3d(std::sin(f.time), f.time, 0); }));
+    const Arguments arguments{{"source", source}, {"rate", 2e5}};
+    NodeTest one("emit", arguments), other("emit", arguments);
+    for (std::int64_t frame = 2; frame < 6; ++frame) one(frame);
+    for (std::int64_t frame = 2; frame < 6; ++frame) other(frame);
+    CHECK(values_of<Vec3f>(one(6), "P") == values_of<Vec3f>(other(6), "P"));
+}
+
+}  // namespace rapid

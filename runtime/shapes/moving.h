@@ -1,0 +1,18 @@
+// A shape that moves during an interval of time (paper §4.4): the rest shape, asked in its own frame at each point's
+// own time, with the velocity of the surface where it is hit. It is never built again.
+#pragma once
+
+#include "runtime/shapes/motion.h"
+#include "runtime/shapes/shape.h"
+
+namespace rapid {
+
+// Between two frames, whole or not; times (Path::begin, distance_at) are in seconds since `from`. distance() is that at
+// the end. On one thread, as the motion is asked here, ahead; the result is asked from any.
+//
+// Contacts are those of the motion's track (MotionTrack) with the path: to rounding, at any speed. Where the shape only
+// moves along, the path is a parabola in its frame too, and the rest shape finds the contact; where it turns or grows,
+// a walk does that goes by a bound on the acceleration in that frame, and passes no wall of two features.
+ShapePtr moving(const ShapePtr& rest, const Motion& motion, const FrameClock& clock, double from, double to);
+
+}  // namespace rapid

@@ -177,6 +177,10 @@ void Kernel::uses(Uses& uses) const
     attributes(writes_, uses.writes);
     attributes(may_, uses.may);
     uses.makes_groups.insert(uses.makes_groups.end(), joins_.begin(), joins_.end());
+    uses.joins_groups.insert(uses.joins_groups.end(), joins_.begin(), joins_.end());
+    uses.takes_groups.insert(uses.takes_groups.end(), asks_.begin(), asks_.end());
+    // What a function of all points asks for by a method's argument is in no bytecode of its own.
+    if (of_the_set || asks_any_) uses.reads_all = true;
 }
 
 Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate,

@@ -134,7 +134,8 @@ int make_object(State& state)
         const auto options = table_at(state, 2);
         try {
             check_named(*options);
-            return maker.make(maker, *options, context);
+            const auto make = [&] { return maker.make(maker, *options, context); };
+            return host.made_before ? host.made_before->get(maker, options, make) : make();
         } catch (const Error& error) {
             throw Error(
                 fmt::format("{}: {}", shown_name(maker, *options), error.what()));  // with the file that it names

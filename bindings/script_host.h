@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bindings/kernel.h"
+#include "bindings/made_before.h"
 #include "bindings/session.h"
 #include "bindings/state.h"
 
@@ -47,6 +48,8 @@ public:
     std::deque<Made> made;
     // Once the main state has run the file, what functions of the frame make there is no worker's to ask for.
     bool authored = false;
+    // While a function of the frame runs: what it has made before.
+    MadeBefore* made_before = nullptr;
 
     std::vector<std::shared_ptr<Kernel>> kernels;
 

@@ -91,7 +91,8 @@ public:
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
     {
         // Points that come from elsewhere, and those behind Solve, may not have them yet.
-        for (const AttributeSpec& spec : makes_) inputs[0].points.add(spec);
+        for (const AttributeSpec& spec : makes_)
+            if (now.keeps(spec.name)) inputs[0].points.add(spec);
         if (fields_.kernel->of_the_set)
             run_detail(*fields_.kernel, inputs[0], now, fields_.arguments);
         else if (kind_ == NodeKind::Dynamic)
@@ -112,6 +113,7 @@ public:
         uses.reads.insert(uses.reads.end(), named.reads.begin(), named.reads.end());
         uses.writes.insert(uses.writes.end(), named.writes.begin(), named.writes.end());
         uses.makes_groups.insert(uses.makes_groups.end(), named.joins.begin(), named.joins.end());
+        uses.joins_groups.insert(uses.joins_groups.end(), named.joins.begin(), named.joins.end());
     }
     void check() const override {}
 

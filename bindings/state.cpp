@@ -145,6 +145,12 @@ public:
         lua_State* L = state_.lua();
         const ScriptHost::Section section(state_.host(),
                                           fmt::format("{}:{}: a parameter's function", location_.file, location_.line));
+        made_.begin_call();
+        struct Remembering {
+            MadeBefore*& place;
+            MadeBefore* before;
+            ~Remembering() { place = before; }
+        } const remembering{state_.host().made_before, std::exchange(state_.host().made_before, &made_)};
         state_.push_entry("call");
         lua_rawgeti(L, LUA_REGISTRYINDEX, reference_);
         lua_pushnumber(L, frame.number);
@@ -165,6 +171,7 @@ private:
     State& state_;
     Location location_;
     int reference_ = 0;
+    mutable MadeBefore made_;  // asked on one thread
 };
 
 }  // namespace

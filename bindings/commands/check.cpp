@@ -30,7 +30,7 @@ public:
                 _exit(status_failed);
             });
             for (const std::string& warning : session->warnings()) print_warning(warning);
-            const Plan plan(session->graph(), {graph_.seed(), files_.attributes()});
+            const Plan plan(session->graph(), files_.plan_options(graph_.seed()));
             for (const std::string& warning : plan.warnings) print_warning(warning);
             files_.resolve(plan, true);
             print(text_of(*session, plan));

@@ -53,29 +53,6 @@ void read_size(const std::string& text, PictureOptions& picture)
         throw Error(fmt::format("--size = \"{}\"; it must be WIDTHxHEIGHT, each from 1 to {}", text, most));
 }
 
-Uses uses_of(const PlannedNode& planned)
-{
-    Uses uses = planned.node->type->uses;
-    planned.op->uses(uses);
-    for (const auto& [name, value] : planned.node->arguments)
-        if (const auto* reference = value.get<AttributeRef>()) uses.reads.push_back(reference->name);
-    return uses;
-}
-
-// The attributes and groups that the scene has without anybody asking for them.
-std::set<std::string> names_of(const Plan& plan)
-{
-    std::set<std::string> names = {"P", "v", "id"};
-    for (const PlannedNode& planned : plan.nodes) {
-        const Uses uses = uses_of(planned);
-        for (const auto* list : {&uses.reads, &uses.writes, &uses.makes_groups})
-            names.insert(list->begin(), list->end());
-        for (const AttributeSpec& spec : uses.makes) names.insert(spec.name);
-    }
-    names.erase("dt");
-    return names;
-}
-
 int frame_number(std::int64_t number)
 {
     if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
@@ -95,7 +72,7 @@ void FrameFiles::declare(CLI::App& app)
     app.add_option_function<std::vector<std::string>>(
            "-o,--output",
            [this](const std::vector<std::string>& texts) {
-               for (const std::string& text : texts) targets_.push_back({parse_output_target(text), text, {}, {}});
+               for (const std::string& text : texts) targets_.push_back({parse_output_target(text), text, {}});
            },
            "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .ply .csv .png); "
            "attributes behind a colon are written besides P, v and id, without them all are")
@@ -124,17 +101,34 @@ std::vector<std::filesystem::path> FrameFiles::folders() const
     return folders;
 }
 
-std::vector<std::string> FrameFiles::attributes() const
+PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
+{
+    PlanOptions options;
+    options.seed = seed;
+    options.all_made = false;
+    for (const Target& target : targets_) {
+        if (const auto& names = target.to.attributes)
+            options.attributes.insert(options.attributes.end(), names->begin(), names->end());
+        else
+            options.all_made = true;
+    }
+    return options;
+}
+
+std::vector<std::string> FrameFiles::names() const
 {
     std::vector<std::string> names;
-    for (const Target& target : targets_)
-        if (target.to.attributes) names.insert(names.end(), target.to.attributes->begin(), target.to.attributes->end());
+    for (const Target& target : targets_) names.push_back(target.text);
     return names;
 }
 
 void FrameFiles::resolve(const Plan& plan, bool several_frames)
 {
     scene_ = std::make_unique<SceneOfPlan>(plan);
+    const std::set<std::string> of_scene = plan.names_of_scene();
+    for (const PlannedSimulation& simulation : plan.simulations)
+        for (const PlannedAttribute& attribute : simulation.attributes)
+            if (attribute.kept && !attribute.group && !of_scene.count(attribute.name)) unasked_.insert(attribute.name);
     std::set<std::string> patterns;
     const auto check = [&](const std::string& pattern) {
         format_of(pattern);
@@ -178,14 +172,16 @@ void FrameFiles::resolve(Target& target, const Plan& plan) const
                         "pattern",
                         fmt::join(outputs, ", ")));
 
-    const std::set<std::string> in_scene = names_of(plan);
+    const std::set<std::string> in_scene = plan.names_of_scene();
     const std::vector<std::string> known(in_scene.begin(), in_scene.end());
     for (const std::string& name : target.to.attributes.value_or(std::vector<std::string>()))
         if (!in_scene.count(name) && !known_attribute(name))
             throw Error(fmt::format("no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
-    if (target.to.attributes) return;
-    for (const std::string& name : attributes())
-        if (!in_scene.count(name)) target.unasked.insert(name);
+}
+
+void FrameFiles::remove_unasked(PointSet& points) const
+{
+    for (const std::string& name : unasked_) points.remove(name);
 }
 
 FrameInfo FrameFiles::info_of(std::int64_t number, double time, double fps, const OutputTarget& to)
@@ -219,7 +215,7 @@ void FrameFiles::write(const FrameResult& result)
     for (const Target& target : targets_)
         for (const std::string& output : target.outputs) {
             PointSet points = result.outputs.at(output);
-            for (const std::string& name : target.unasked) points.remove(name);
+            if (!target.to.attributes) remove_unasked(points);
             submit(target.to, std::move(points),
                    info_of(result.frame, result.time.at(output), result.fps.at(output), target.to), output);
         }
@@ -228,7 +224,9 @@ void FrameFiles::write(const FrameResult& result)
 void FrameFiles::write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)
 {
     const OutputTarget to{pattern, std::nullopt};
-    submit(to, points, info_of(std::llround(frame.number), frame.time, fps, to), "main");
+    PointSet written = points;
+    remove_unasked(written);
+    submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main");
 }
 
 void FrameFiles::finish()

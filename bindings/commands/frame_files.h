@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -25,8 +26,11 @@ public:
     // output to output, the one above. Error: one can't be made.
     std::vector<std::filesystem::path> folders() const;
 
-    // Attributes that some -o asks for by name: they must be kept alive.
-    std::vector<std::string> attributes() const;
+    // What the plan must keep alive for what -o asks for.
+    PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
+
+    // The -o as the user gave them.
+    std::vector<std::string> names() const;
 
     // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames,
     // or for no output of the graph; two that write the same files.
@@ -51,13 +55,14 @@ private:
         OutputTarget to;
         std::string text;                  // as the user gave it
         std::vector<std::string> outputs;  // whose points it takes
-        std::set<std::string> unasked;     // columns that are there only because another -o asked for them
     };
     void resolve(Target& target, const Plan& plan) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
+    void remove_unasked(PointSet& points) const;
     void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output);
 
     std::vector<Target> targets_;
+    std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
     std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
     std::unique_ptr<SceneOfPlan> scene_;
 

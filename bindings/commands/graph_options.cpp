@@ -45,4 +45,13 @@ std::unique_ptr<Session> GraphOptions::load(bool may_write, std::function<void(c
     return std::make_unique<Session>(file_, std::move(options));
 }
 
+std::unique_ptr<Session> GraphOptions::load_other(const std::string& file,
+                                                  std::function<void(const std::string& message)> on_timeout) const
+{
+    SessionOptions options = session_;
+    options.set.clear();
+    options.on_timeout = std::move(on_timeout);
+    return std::make_unique<Session>(file, std::move(options));
+}
+
 }  // namespace rapid

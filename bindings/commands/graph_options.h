@@ -22,6 +22,9 @@ public:
     // Error: what is wrong with the file or with --set. may_write, on_timeout, on_read: see SessionOptions.
     std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,
                                   std::function<void(const std::filesystem::path& file)> on_read = {}) const;
+    // Another graph, with the same limits; --set is of the first one only.
+    std::unique_ptr<Session> load_other(const std::string& file,
+                                        std::function<void(const std::string& message)> on_timeout) const;
 
 private:
     std::string file_;

@@ -74,6 +74,9 @@ public:
             ->type_name("FRAMES");
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
+        app.add_flag("--keep-all", keep_all_,
+                     "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
+                     "the same");
         app.add_flag("--quiet", quiet_, "no progress and no summary");
         app.add_flag(
             "--untrusted", untrusted_,
@@ -107,7 +110,9 @@ public:
                 true, [&](const std::string& message) { report.abandon(status_failed, message); },
                 tell_ ? Watch::tell : nullptr);
             for (const std::string& warning : session->warnings()) report.warning(warning);
-            const Plan plan(session->graph(), {graph_.seed(), files_.attributes()});
+            PlanOptions options = files_.plan_options(graph_.seed());
+            options.keep_all = keep_all_;
+            const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) report.warning(warning);
 
             const FrameRange frames = range_of(plan);
@@ -185,7 +190,7 @@ private:
     FrameFiles files_;
     std::optional<FrameRange> frames_;
     std::string stats_;
-    bool quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, within_walls_ = false;
+    bool keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, within_walls_ = false;
     std::vector<std::string> allowed_;
 };
 RAPID_COMMAND(Run);

@@ -94,7 +94,8 @@ Flow Evaluator::evaluate(std::size_t i, std::vector<Flow>& results, std::vector<
                                 RandomKey(simulation.seed, node.name),
                                 frame.figures,
                                 frame.warnings,
-                                write};
+                                write,
+                                &plan_.simulations[planned.simulation].left_out};
     try {
         const auto begin = std::chrono::steady_clock::now();
         Flow result = planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source

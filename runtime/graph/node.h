@@ -34,6 +34,7 @@
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -68,6 +69,9 @@ struct Flow {
     std::shared_ptr<Simulation> simulation;
 };
 
+// What goes before a group's name where attributes and groups are listed together, as in a .csv file's header.
+inline const std::string group_prefix = "group:";
+
 // Counted while a frame runs (see `--stats`).
 struct FrameFigures {
     std::uint64_t born = 0, died = 0, collisions = 0;
@@ -92,6 +96,12 @@ struct Evaluation {
     std::vector<std::string>& warnings;
     // Hands a set to be written; empty where nothing may be written (check, explain, test).
     const std::function<void(const std::string& pattern, const PointSet& points)>& write;
+    // What the plan has left out of this simulation (see PlannedAttribute); null: nothing.
+    const std::set<std::string>* left_out = nullptr;
+
+    // Whether the node that makes this attribute or group should.
+    bool keeps(const std::string& name) const { return !left_out || !left_out->count(name); }
+    bool keeps_group(const std::string& name) const { return keeps(group_prefix + name); }
 };
 
 // Attributes and groups that a node reads, writes, or brings into being.
@@ -100,7 +110,14 @@ struct Uses {
     std::vector<std::string> may;  // names that may be attributes: known ones among them are brought into being
     std::vector<AttributeSpec> makes;
     std::vector<AttributeSpec> defaults;  // what points without a value of their own get, whoever makes the attribute
-    std::vector<std::string> reads_groups, makes_groups;
+    std::vector<std::string> takes;       // read where another node brings them into being, and not missed elsewhere
+    std::vector<std::string> gives;       // written where something reads them, and not brought into being
+    std::vector<std::string> reads_groups, takes_groups, makes_groups;
+    std::vector<std::string> joins_groups;  // of makes_groups, those that the node writes point by point
+    bool reads_all = false;                 // may read everything that is made: under names that are not known before
+
+    // Given to Operator::uses: the parameters that are functions of the frame. Their values now are not all that come.
+    std::set<std::string> functions;
 };
 
 // What a node does; one object a node and run.
@@ -112,6 +129,19 @@ public:
     virtual Flow start(std::span<Flow> inputs, const Evaluation& now) = 0;
     virtual void uses(Uses& uses) const = 0;
     virtual void check() const = 0;
+};
+
+// The parts of a frame's work that a scene may have or lack.
+enum class Stage {
+    Emission,
+    Script,  // of every node with a function: no node declares it
+    Forces,
+    Integration,
+    Collision,
+    ContactGrid,
+    Constraints,
+    ErrorEstimate,
+    Writing,
 };
 
 enum class NodeKind {
@@ -129,6 +159,7 @@ struct NodeType {
     std::vector<Param> params;
     std::optional<Param> rest;  // takes arguments of any other name; its `name` is then that name
     Uses uses;                  // of every node of this type; a node's own come from Operator::uses
+    std::vector<Stage> stages;  // that nodes of this type need
     bool varies = false;        // its result changes from frame to frame although inputs and arguments do not
     std::function<std::unique_ptr<Operator>()> make;
 
@@ -251,6 +282,7 @@ public:
         type_.name = std::move(name);
         type_.doc = std::move(doc);
         if constexpr (detail::is_force<T> || detail::has_dynamic<T>) type_.kind = NodeKind::Dynamic;
+        if constexpr (detail::is_force<T>) type_.stages = {Stage::Forces};
         type_.make = [] { return std::make_unique<detail::OperatorOf<T>>(); };
         if constexpr (requires(T t) { t.group; })
             param(&T::group, "group", Value(), any_number(), "", "acts on this group only");
@@ -288,6 +320,8 @@ public:
     Declaration& kind(NodeKind kind) { return type_.kind = kind, *this; }
     Declaration& reads(std::string name) { return type_.uses.reads.push_back(std::move(name)), *this; }
     Declaration& writes(std::string name) { return type_.uses.writes.push_back(std::move(name)), *this; }
+    Declaration& takes(std::string name) { return type_.uses.takes.push_back(std::move(name)), *this; }
+    Declaration& stage(Stage stage) { return type_.stages.push_back(stage), *this; }
     Declaration& makes(AttributeSpec spec) { return type_.uses.makes.push_back(std::move(spec)), *this; }
     Declaration& varies() { return type_.varies = true, *this; }
 

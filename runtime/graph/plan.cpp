@@ -31,16 +31,6 @@ double constant_argument(const Node& node, std::string_view param)
     return number ? *number : 0;
 }
 
-// Uses of a node: those of its type and those of its arguments.
-Uses uses_of(const PlannedNode& planned)
-{
-    Uses uses = planned.node->type->uses;
-    planned.op->uses(uses);
-    for (const auto& [name, value] : planned.node->arguments)
-        if (const auto* reference = value.get<AttributeRef>()) uses.reads.push_back(reference->name);
-    return uses;
-}
-
 // Whether a value is another at each frame: a function, a motion, what is moved, or a table that holds one.
 bool varies(const Value& value)
 {
@@ -54,10 +44,12 @@ bool varies(const Value& value)
            std::any_of(table->named.begin(), table->named.end(), entry_varies);
 }
 
-bool has_varying_argument(const Node& node)
+// The name of one; empty where none is another at each frame.
+std::string varying_argument(const Node& node)
 {
-    return std::any_of(node.arguments.begin(), node.arguments.end(),
-                       [](const auto& argument) { return varies(argument.second); });
+    const auto found = std::find_if(node.arguments.begin(), node.arguments.end(),
+                                    [](const auto& argument) { return varies(argument.second); });
+    return found == node.arguments.end() ? std::string() : found->first;
 }
 
 // Asks a function of the frame. An Error of it tells the frame.
@@ -75,7 +67,39 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
     }
 }
 
+// A column that every point has, or that Solve and the emitters have among themselves.
+bool is_own(std::string_view name) { return name == "P" || name == "v" || name == "id" || name == "dt"; }
+
+void add(std::vector<std::size_t>& places, std::size_t place)
+{
+    if (places.empty() || places.back() != place) places.push_back(place);
+}
+
 }  // namespace
+
+Uses uses_of(const PlannedNode& planned)
+{
+    Uses uses = planned.node->type->uses;
+    for (const auto& [name, value] : planned.node->arguments)
+        if (value.function()) uses.functions.insert(name);
+    planned.op->uses(uses);
+    for (const auto& [name, value] : planned.node->arguments)
+        if (const auto* reference = value.get<AttributeRef>()) uses.reads.push_back(reference->name);
+    return uses;
+}
+
+std::size_t PlannedAttribute::bytes_per_point() const
+{
+    if (group) return 1;
+    return std::visit([](const auto& value) { return sizeof(value); }, spec.fallback);
+}
+
+const PlannedAttribute* PlannedSimulation::find(std::string_view name) const
+{
+    const auto found =
+        std::find_if(attributes.begin(), attributes.end(), [&](const PlannedAttribute& a) { return a.name == name; });
+    return found == attributes.end() ? nullptr : &*found;
+}
 
 void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions)
 {
@@ -130,7 +154,9 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
                 throw Error(fmt::format("the name is taken by the node at line {}; give each its own",
                                         other->second->location.line));
         });
-        PlannedNode planned{node, node->type->make(), {}, 0, 0, false, false};
+        PlannedNode planned;
+        planned.node = node;
+        planned.op = node->type->make();
         for (const NodePtr& input : node->inputs) {
             planned.inputs.push_back(place.at(input->serial));
             ++nodes[planned.inputs.back()].consumers;
@@ -141,10 +167,16 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     for (const auto& [name, node] : graph.outputs) {
         outputs[name] = place.at(node->serial);
         ++nodes[place.at(node->serial)].consumers;
+        nodes[place.at(node->serial)].reached_from.insert(name);
     }
+    for (std::size_t i = nodes.size(); i-- > 0;)
+        for (const std::size_t input : nodes[i].inputs)
+            nodes[input].reached_from.insert(nodes[i].reached_from.begin(), nodes[i].reached_from.end());
 
     for (const NodePtr& node : graph.nodes)
-        if (!reached.count(node->serial) && node->type->name == "write")
+        if (!reached.count(node->serial)) left_out.push_back(node);
+    for (const NodePtr& node : left_out)
+        if (node->type->name == "write")
             warnings.push_back(
                 fmt::format("{}:{}: node \"{}\": writes nothing: no output comes from it; return it, or go on from it",
                             node->location.file, node->location.line, node->name));
@@ -161,18 +193,34 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
             planned.op->check();
         });
 
+    keeps_all = options.keep_all;
+    find_changes();
+    check_names();
+    for (std::size_t s = 0; s < simulations.size(); ++s) find_attributes(s, options);
+}
+
+void Plan::find_changes()
+{
     for (PlannedNode& planned : nodes) {
-        planned.once = !planned.in_loop && !planned.node->type->varies && !has_varying_argument(*planned.node) &&
-                       std::all_of(planned.inputs.begin(), planned.inputs.end(),
-                                   [&](std::size_t input) { return nodes[input].once; });
+        const std::string argument = varying_argument(*planned.node);
+        if (planned.in_loop)
+            planned.changes = "its points are fed back from frame to frame";
+        else if (!argument.empty())
+            planned.changes = fmt::format("its {} changes with the frame", argument);
+        else if (planned.node->type->varies)
+            planned.changes = "its result may be another one in each frame";
+        else
+            for (const std::size_t input : planned.inputs)
+                if (planned.changes.empty() && !nodes[input].once)
+                    planned.changes = fmt::format("\"{}\" before it is evaluated anew", nodes[input].node->name);
+        if (keeps_all && planned.changes.empty()) planned.changes = "nothing is left out";
+        planned.once = planned.changes.empty();
     }
-    check_names(options);
 }
 
 // A node belongs to the simulation of its first input. Each Create starts one; the Solve that it reaches feeds it back.
 void Plan::find_simulations()
 {
-    std::vector<std::set<std::size_t>> creates(nodes.size());  // simulations upstream of each node
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         PlannedNode& planned = nodes[i];
         const Node& node = *planned.node;
@@ -184,14 +232,15 @@ void Plan::find_simulations()
             simulation.start = static_cast<std::int64_t>(constant_argument(node, "start"));
             simulation.seed = static_cast<std::uint64_t>(constant_argument(node, "seed"));
             planned.simulation = simulations.size();
-            creates[i].insert(simulations.size());
+            planned.carries.insert(simulations.size());
             simulations.push_back(simulation);
             continue;
         }
         planned.simulation = nodes[planned.inputs.front()].simulation;
-        for (const std::size_t input : planned.inputs) creates[i].insert(creates[input].begin(), creates[input].end());
+        for (const std::size_t input : planned.inputs)
+            planned.carries.insert(nodes[input].carries.begin(), nodes[input].carries.end());
         if (node.type->kind == NodeKind::Solve) {
-            for (const std::size_t s : creates[i]) {
+            for (const std::size_t s : planned.carries) {
                 if (simulations[s].solve) {
                     const Node& other = *simulations[s].solve;
                     throw Error(
@@ -216,9 +265,8 @@ void Plan::find_simulations()
     }
 }
 
-void Plan::check_names(const PlanOptions& options)
+void Plan::check_names() const
 {
-    known_names_.assign(simulations.size(), {});
     struct Maker {
         AttributeSpec spec;
         std::size_t node;
@@ -245,7 +293,6 @@ void Plan::check_names(const PlanOptions& options)
             });
         }
 
-        std::set<std::string> asked(options.attributes.begin(), options.attributes.end());
         std::vector<std::string> names = always;
         for (const auto& [name, maker] : makers) names.push_back(name);
         for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
@@ -255,17 +302,12 @@ void Plan::check_names(const PlanOptions& options)
             // A merge's other inputs carry names of their own simulations: only the points of this one are checked
             // here.
             if (planned.simulation != s) continue;
+            const bool brings_others = planned.carries.size() > 1;
             at_node(*planned.node, [&] {
                 const Uses uses = uses_of(planned);
                 for (const auto* list : {&uses.reads, &uses.writes}) {
                     for (const std::string& name : *list) {
-                        if (std::find(always.begin(), always.end(), name) != always.end() || makers.count(name))
-                            continue;
-                        if (known_attribute(name)) {
-                            asked.insert(name);
-                            continue;
-                        }
-                        if (planned.node->type->kind == NodeKind::Merge || brings_other_points(planned)) continue;
+                        if (is_own(name) || makers.count(name) || known_attribute(name) || brings_others) continue;
                         const std::string near = nearest_name(name, names);
                         throw Error(
                             near.empty()
@@ -275,27 +317,128 @@ void Plan::check_names(const PlanOptions& options)
                                               name, near));
                     }
                 }
-                for (const std::string& name : uses.may)
-                    if (known_attribute(name)) asked.insert(name);
                 for (const std::string& name : uses.reads_groups)
-                    if (!groups.count(name) && !brings_other_points(planned))
+                    if (!groups.count(name) && !brings_others)
                         throw Error(
                             fmt::format("no node makes a group \"{}\"{}", name, did_you_mean(name, group_names)));
             });
         }
-        if (makers.count("life") || asked.count("life")) asked.insert("age");  // Solve compares them
-        for (const std::string& name : asked)
-            if (known_attribute(name) && !makers.count(name)) known_names_[s].push_back(name);
     }
 }
 
-// Whether points of another simulation flow into this node: their columns are not known here.
-bool Plan::brings_other_points(const PlannedNode& planned) const
+// Who makes, writes and reads each name that the points of a simulation may have; and, from that, what is kept. A node
+// that makes a name makes it for the points of its simulation, which take it along where they are merged into another;
+// a node reads it of all simulations whose points come by.
+void Plan::find_attributes(std::size_t s, const PlanOptions& options)
 {
-    for (const std::size_t input : planned.inputs) {
-        if (nodes[input].simulation != planned.simulation || brings_other_points(nodes[input])) return true;
+    std::set<std::size_t> sources = {s};
+    for (const PlannedNode& planned : nodes)
+        if (planned.simulation == s) sources.insert(planned.carries.begin(), planned.carries.end());
+
+    std::map<std::string, PlannedAttribute> found;
+    const auto entry = [&](const AttributeSpec& spec) -> PlannedAttribute& {
+        PlannedAttribute& attribute = found[spec.name];
+        if (attribute.name.empty()) attribute.name = spec.name, attribute.spec = spec;
+        return attribute;
+    };
+    const auto group_entry = [&](const std::string& name) -> PlannedAttribute& {
+        PlannedAttribute& attribute = found[group_prefix + name];
+        attribute.name = group_prefix + name;
+        attribute.group = true;
+        return attribute;
+    };
+    entry({"P", Vec3f(Vec3f::Zero())}).always = true;
+    entry({"v", Vec3f(Vec3f::Zero())}).always = true;
+    entry({"id", std::int64_t{0}}).always = true;
+    entry({"dt", 0.0f});
+    for (const AttributeSpec& known : known_attributes()) entry(known);
+
+    // Read where something else makes them; given where something else reads them.
+    std::map<std::string, std::vector<std::size_t>> takers, givers;
+    std::vector<std::size_t> readers_of_all;
+    std::vector<std::pair<std::size_t, Uses>> users;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const PlannedNode& planned = nodes[i];
+        if (!planned.carries.count(s) && !sources.count(planned.simulation)) continue;
+        const Uses& uses = users.emplace_back(i, uses_of(planned)).second;
+        for (const AttributeSpec& spec : uses.makes) add(entry(spec).made_by, i);
+        for (const std::string& name : uses.makes_groups) add(group_entry(name).made_by, i);
+        for (const std::string& name : uses.joins_groups) add(group_entry(name).written_by, i);
     }
-    return false;
+    for (const auto& [i, uses] : users) {
+        for (const std::string& name : uses.writes)
+            if (const auto at = found.find(name); at != found.end()) add(at->second.written_by, i);
+        for (const std::string& name : uses.gives) add(givers[name], i);
+        if (!nodes[i].carries.count(s)) continue;
+        for (const auto* list : {&uses.reads, &uses.may})
+            for (const std::string& name : *list)
+                if (const auto at = found.find(name); at != found.end()) add(at->second.read_by, i);
+        for (const auto* list : {&uses.reads_groups, &uses.takes_groups})
+            for (const std::string& name : *list) add(takers[group_prefix + name], i);
+        for (const std::string& name : uses.takes) add(takers[name], i);
+        if (uses.reads_all) readers_of_all.push_back(i);
+    }
+    for (auto& [name, attribute] : found) {
+        const bool given = givers.count(name) && takers.count(name);
+        if (given) attribute.written_by.insert(attribute.written_by.end(), givers[name].begin(), givers[name].end());
+        if (!attribute.is_of_scene()) continue;
+        for (const std::size_t taker : takers[name]) add(attribute.read_by, taker);
+        if (!attribute.made_by.empty())
+            attribute.read_by.insert(attribute.read_by.end(), readers_of_all.begin(), readers_of_all.end());
+    }
+    // Solve compares them, where somebody's life may end.
+    const PlannedAttribute& life = found.at("life");
+    if (!life.made_by.empty() || !life.written_by.empty())
+        for (const std::size_t reader : life.read_by) add(found.at("age").read_by, reader);
+
+    PlannedSimulation& simulation = simulations[s];
+    const std::set<std::string> asked(options.attributes.begin(), options.attributes.end());
+    for (auto& [name, attribute] : found) {
+        for (auto* places : {&attribute.made_by, &attribute.written_by, &attribute.read_by}) {
+            std::sort(places->begin(), places->end());
+            places->erase(std::unique(places->begin(), places->end()), places->end());
+        }
+        const std::string plain = attribute.group ? name.substr(group_prefix.size()) : name;
+        attribute.asked_by_name = asked.count(plain) > 0 && name != "dt";
+        attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
+        attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
+                         attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
+        if (!attribute.kept && name != "dt") simulation.left_out.insert(name);
+        simulation.attributes.push_back(attribute);
+    }
+}
+
+std::set<std::string> Plan::names_of_scene() const
+{
+    std::set<std::string> names;
+    for (const PlannedSimulation& simulation : simulations)
+        for (const PlannedAttribute& attribute : simulation.attributes)
+            if (attribute.is_of_scene() && attribute.name != "dt")
+                names.insert(attribute.group ? attribute.name.substr(group_prefix.size()) : attribute.name);
+    return names;
+}
+
+std::vector<std::vector<std::size_t>> Plan::passes() const
+{
+    std::vector<std::vector<std::size_t>> passes;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const NodeKind kind = nodes[i].node->type->kind;
+        if (kind == NodeKind::Source || kind == NodeKind::Dynamic) continue;
+        std::set<std::size_t> pass = {i};
+        if (kind == NodeKind::Solve) {
+            std::vector<std::size_t> open = nodes[i].inputs;
+            std::set<std::size_t> seen;
+            while (!open.empty()) {
+                const std::size_t at = open.back();
+                open.pop_back();
+                if (nodes[at].node->type->kind == NodeKind::Solve || !seen.insert(at).second) continue;
+                if (nodes[at].node->type->kind == NodeKind::Dynamic) pass.insert(at);
+                open.insert(open.end(), nodes[at].inputs.begin(), nodes[at].inputs.end());
+            }
+        }
+        passes.emplace_back(pass.begin(), pass.end());
+    }
+    return passes;
 }
 
 std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
@@ -314,8 +457,15 @@ std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
     }
     for (AttributeSpec& spec : columns)
         if (const auto given = defaults.find(spec.name); given != defaults.end()) spec.fallback = given->second;
-    for (const std::string& name : known_names_[simulation])
-        if (taken.insert(name).second) columns.push_back(*known_attribute(name));
+    const auto made_here = [&](const PlannedAttribute& attribute) {
+        return std::any_of(attribute.made_by.begin(), attribute.made_by.end(),
+                           [&](std::size_t maker) { return nodes[maker].simulation == simulation; });
+    };
+    for (const PlannedAttribute& attribute : simulations[simulation].attributes)
+        if (attribute.kept && known_attribute(attribute.name) && !made_here(attribute))
+            columns.push_back(*known_attribute(attribute.name));
+    std::erase_if(columns,
+                  [&](const AttributeSpec& spec) { return simulations[simulation].left_out.count(spec.name) > 0; });
     return columns;
 }
 
@@ -327,6 +477,9 @@ std::vector<std::string> Plan::groups_of(std::size_t simulation) const
         const Uses uses = uses_of(planned);
         groups.insert(uses.makes_groups.begin(), uses.makes_groups.end());
     }
+    std::erase_if(groups, [&](const std::string& name) {
+        return simulations[simulation].left_out.count(group_prefix + name) > 0;
+    });
     return {groups.begin(), groups.end()};
 }
 

@@ -25,9 +25,10 @@ struct Attribute {
         }
     }
 
-    void edit(PointSet& points, const Evaluation&) const
+    void edit(PointSet& points, const Evaluation& now) const
     {
-        for (const auto& [name, value] : values) points.set_fallback({name, value});
+        for (const auto& [name, value] : values)
+            if (now.keeps(name)) points.set_fallback({name, value});
     }
 };
 RAPID_NODE(Attribute);

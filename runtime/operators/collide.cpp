@@ -36,6 +36,8 @@ struct Collide {
     static NodeType declare()
     {
         return node<Collide>("collide", "Keeps points out of a shape: they bounce, slide and come to rest on it.")
+            .stage(Stage::Collision)
+            .takes("pscale")
             .param(&Collide::shape, "shape", Value(), any_number(), "", "what the points collide with")
             .required()
             .param(&Collide::bounce, "bounce", 0.5, between(0, 1), "",

@@ -58,7 +58,7 @@ struct Create {
     {
         Flow flow = std::move(inputs[0]);
         Simulation& simulation = *flow.simulation;
-        flow.points = now.at_start ? initial(simulation) : std::exchange(simulation.state, PointSet());
+        flow.points = now.at_start ? initial(simulation, now) : std::exchange(simulation.state, PointSet());
         for (const AttributeSpec& spec : simulation.columns) flow.points.set_fallback(spec);
         for (const std::string& name : simulation.groups) flow.points.group(name);
         return flow;
@@ -70,10 +70,14 @@ private:
         return std::visit([](const auto& c) -> AttributeValue { return c.fallback(); }, column);
     }
 
-    PointSet initial(Simulation& simulation) const
+    PointSet initial(Simulation& simulation, const Evaluation& now) const
     {
         PointSet set = points ? points->points : PointSet();
         set.remove("dt");
+        for (const std::string& name : set.column_names())
+            if (!now.keeps(name)) set.remove(name);
+        for (const std::string& name : set.group_names())
+            if (!now.keeps_group(name)) set.remove_group(name);
         if (!set.empty()) {
             const std::span<std::int64_t> ids = set.id().overwrite();
             std::iota(ids.begin(), ids.end(), std::int64_t{0});

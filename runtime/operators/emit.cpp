@@ -180,10 +180,10 @@ struct Emit {
     {
         return node<Emit>("emit", "Bears points from a surface, in a volume or at points.")
             .varies()
+            .stage(Stage::Emission)
             .writes("P")
             .writes("v")
             .writes("id")
-            .writes("dt")
             .param(&Emit::source, "source", Value(), any_number(), "", "what points are born from")
             .required()
             .param(&Emit::from, "from", Value(), any_number(), "",
@@ -229,7 +229,10 @@ struct Emit {
     void uses(Uses& uses) const
     {
         for (const AttributeSpec& spec : made()) uses.makes.push_back(spec);
-        if (life) uses.writes.insert(uses.writes.end(), {"age", "life"});
+        uses.gives.insert(uses.gives.end(), {"age", "birthtime"});
+        if (life && (may_end() || uses.functions.count("life"))) uses.gives.push_back("life");
+        const bool whole_frames = !age && birth == "begin" && !uses.functions.count("birth");
+        if (!whole_frames) uses.writes.push_back("dt");
         if (!joins.empty()) uses.makes_groups.push_back(joins);
     }
 
@@ -312,6 +315,9 @@ private:
         return names;
     }
 
+    // Whether a newborn's life is one that ends.
+    bool may_end() const { return std::isfinite(life->min); }
+
     std::vector<AttributeSpec> made() const
     {
         std::vector<AttributeSpec> specs;
@@ -345,6 +351,7 @@ private:
     void check_age() const;
     void move(const Simulation& simulation, const Evaluation& now);
     void bear(Flow& flow, const Births& births, const Evaluation& now);
+    bool joins_group(const Evaluation& now) const { return !joins.empty() && now.keeps_group(joins); }
     void make_columns(PointSet& points, const Evaluation& now) const;
     void append(PointSet& points, std::size_t n, const Evaluation& now) const;
     Newborn newborn_of(PointSet& points, std::size_t n, const Evaluation& now) const;
@@ -425,10 +432,12 @@ void Emit::bear(Flow& flow, const Births& births, const Evaluation& now)
 // Whether anything is born or not: all frames have the same columns.
 void Emit::make_columns(PointSet& points, const Evaluation& now) const
 {
-    for (const AttributeSpec& spec : made()) points.add(spec);
-    if (life)
-        for (const char* name : {"age", "life"}) points.add(*known_attribute(name));
-    if (!joins.empty()) points.group(joins);
+    for (const AttributeSpec& spec : made())
+        if (now.keeps(spec.name)) points.add(spec);
+    if (life && may_end())
+        for (const char* name : {"age", "life"})
+            if (now.keeps(name)) points.add(*known_attribute(name));
+    if (joins_group(now)) points.group(joins);
 
     const std::optional<double> L = same_age(now);
     const bool all_whole_frames = L && *L >= frame_length(now);
@@ -458,7 +467,7 @@ void Emit::append(PointSet& points, std::size_t n, const Evaluation& now) const
     } else if (!age) {
         common.push_back({"age", 0.0f});
     }
-    points.append(n, common, joins.empty() ? std::vector<std::string>() : std::vector{joins});
+    points.append(n, common, joins_group(now) ? std::vector{joins} : std::vector<std::string>());
 }
 
 Newborn Emit::newborn_of(PointSet& points, std::size_t n, const Evaluation& now) const
@@ -479,6 +488,7 @@ Newborn Emit::newborn_of(PointSet& points, std::size_t n, const Evaluation& now)
     for (const std::string& name : carried())
         std::visit(
             [&](const auto& column) {
+                if (!now.keeps(name)) return;
                 using T = std::decay_t<decltype(column[0])>;
                 if (column.is_uniform()) return;
                 newborn.carry.push_back([this, values = column.read(), to = points.column<T>(name).write().last(n)](

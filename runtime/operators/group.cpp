@@ -35,6 +35,7 @@ struct Group {
 
     void edit(PointSet& points, const Evaluation& now) const
     {
+        if (!now.keeps_group(name)) return;
         if (group.empty() && !where) return points.group(name).fill(1);
         const std::vector<std::uint8_t> members = select(points, group, where.get(), now);
         points.group(name) = Column<std::uint8_t>(std::span<const std::uint8_t>(members));

@@ -19,8 +19,12 @@ namespace rapid {
 namespace {
 
 // Adds the points of `from` to `into`, with all their columns and groups.
-void append_points(PointSet& into, const PointSet& from)
+void append_points(PointSet& into, PointSet from, const Evaluation& now)
 {
+    for (const std::string& name : from.column_names())
+        if (!now.keeps(name)) from.remove(name);
+    for (const std::string& name : from.group_names())
+        if (!now.keeps_group(name)) from.remove_group(name);
     std::vector<AttributeSpec> uniform;
     std::vector<std::string> joined;
     for (const auto& [name, column] : from.columns())
@@ -76,7 +80,7 @@ struct Merge {
 
     Flow start(std::span<Flow> inputs, const Evaluation& now) const { return evaluate(inputs, now); }
 
-    Flow evaluate(std::span<Flow> inputs, const Evaluation&) const
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now) const
     {
         Flow result = std::move(inputs[0]);
         Taken taken;
@@ -84,7 +88,7 @@ struct Merge {
         for (std::size_t i = 0; i < result.points.size(); ++i) taken.insert(ids[i]);
         for (std::size_t i = 1; i < inputs.size(); ++i) {
             try {
-                take(result, taken, std::move(inputs[i]));
+                take(result, taken, std::move(inputs[i]), now);
             } catch (Error& error) {
                 throw Error(fmt::format("input {}: {}", i + 1, error.message()));
             }
@@ -93,7 +97,7 @@ struct Merge {
     }
 
 private:
-    static void take(Flow& result, Taken& taken, Flow input)
+    static void take(Flow& result, Taken& taken, Flow input, const Evaluation& now)
     {
         Simulation& here = *result.simulation;
         const Simulation& there = *input.simulation;
@@ -109,7 +113,7 @@ private:
         const Strided<std::int64_t> ids = std::as_const(points).id().read();
         for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = taken.insert(ids[i]);
         points.keep(fresh);
-        append_points(result.points, points);
+        append_points(result.points, std::move(points), now);
 
         for (DynamicPtr& dynamic : input.dynamics)
             if (std::find(result.dynamics.begin(), result.dynamics.end(), dynamic) == result.dynamics.end())

@@ -23,6 +23,11 @@ struct Solve {
     {
         return node<Solve>("solve", "Advances the points by one frame: forces, motion, collision.")
             .kind(NodeKind::Solve)
+            .stage(Stage::Integration)
+            .stage(Stage::ErrorEstimate)
+            .takes("force")
+            .takes("mass")
+            .takes("life")
             .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
                    "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")

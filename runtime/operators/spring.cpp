@@ -32,6 +32,7 @@ struct Spring {
     static NodeType declare()
     {
         return node<Spring>("spring", "Holds points with a spring to a place or to a shape.")
+            .takes("mass")
             .param(&Spring::target, "target", Vec3d(0, 0, 0), any_number(), "m",
                    "a place, rapid.attr \"NAME\" for each point's own, or a shape")
             .param(&Spring::stiffness, "stiffness", 1.0, at_least(0), "N/m", "force a metre")

@@ -16,6 +16,7 @@ struct Write {
     {
         return node<Write>("write", "Writes the points as they are here, and passes them on.")
             .varies()
+            .stage(Stage::Writing)
             .param(&Write::file, "file", Value(), any_number(), "", "pattern of the file: #### is the frame")
             .required()
             .param(&Write::attributes, "attributes", Value(), any_number(), "",
@@ -23,7 +24,11 @@ struct Write {
             .constant();
     }
 
-    void uses(Uses& uses) const { uses.reads.insert(uses.reads.end(), attributes.begin(), attributes.end()); }
+    void uses(Uses& uses) const
+    {
+        uses.reads.insert(uses.reads.end(), attributes.begin(), attributes.end());
+        if (attributes.empty()) uses.reads_all = true;
+    }
 
     void check() const
     {

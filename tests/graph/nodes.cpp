@@ -1,4 +1,5 @@
 // Node types for the tests of plan and evaluation, one of each kind: the real ones are above this layer.
+#include <cmath>
 #include <new>
 
 #include "tests/graph/graph_under_test.h"
@@ -89,7 +90,8 @@ struct Make {
     void edit(PointSet& points, const Evaluation& now) const
     {
         ++evaluations[now.node];
-        for (const auto& [name, value] : values) points.add({name, value});
+        for (const auto& [name, value] : values)
+            if (now.keeps(name)) points.add({name, value});
     }
 };
 RAPID_NODE(Make);
@@ -107,6 +109,51 @@ struct Read {
 };
 RAPID_NODE(Read);
 
+// Bears nothing, but would write lives and birth times; and puts points into a group one by one.
+struct Bear {
+    double life = 1;
+    std::string joins;
+
+    static NodeType declare()
+    {
+        return node<Bear>("bear", "Gives lives.")
+            .param(&Bear::life, "life", 1.0, or_infinity(at_least(0)), "s", "infinite for points that never die")
+            .param(&Bear::joins, "joins", Value(), any_number(), "", "a group");
+    }
+    void uses(Uses& uses) const
+    {
+        uses.gives.push_back("birthtime");
+        if (std::isfinite(life) || uses.functions.count("life")) uses.gives.push_back("life");
+        if (joins.empty()) return;
+        uses.makes_groups.push_back(joins);
+        uses.joins_groups.push_back(joins);
+    }
+    void edit(PointSet&, const Evaluation&) const {}
+};
+RAPID_NODE(Bear);
+
+// Writes an attribute of each point, as a kernel does, and asks whether it is in a group.
+struct Assign {
+    std::string to, within;
+    bool all = false;
+
+    static NodeType declare()
+    {
+        return node<Assign>("assign", "Assigns an attribute.")
+            .param(&Assign::to, "to", Value(), any_number(), "", "an attribute")
+            .param(&Assign::within, "within", Value(), any_number(), "", "a group")
+            .param(&Assign::all, "all", false, any_number(), "", "may read everything");
+    }
+    void uses(Uses& uses) const
+    {
+        if (!to.empty()) uses.writes.push_back(to);
+        if (!within.empty()) uses.takes_groups.push_back(within);
+        uses.reads_all = all;
+    }
+    void edit(PointSet&, const Evaluation&) const {}
+};
+RAPID_NODE(Assign);
+
 struct Push {
     static NodeType declare() { return node<Push>("push", "A force."); }
     void contribute(const Chunk&, Forces&) const {}
@@ -115,7 +162,7 @@ RAPID_NODE(Push);
 
 // Posts the points back, and tells how many dynamics reached it.
 struct Post {
-    static NodeType declare() { return node<Post>("post", "Feeds back.").kind(NodeKind::Solve); }
+    static NodeType declare() { return node<Post>("post", "Feeds back.").kind(NodeKind::Solve).takes("life"); }
 
     Flow start(std::span<Flow> inputs, const Evaluation& now)
     {

@@ -26,6 +26,41 @@ const PlannedNode& planned(const Plan& plan, const std::string& name)
     return *found;
 }
 
+// Names of nodes, in their order.
+std::vector<std::string> names_of(const Plan& plan, const std::vector<std::size_t>& places)
+{
+    std::vector<std::string> names;
+    for (const std::size_t place : places) names.push_back(plan.nodes[place].node->name);
+    return names;
+}
+
+const PlannedAttribute& attribute(const Plan& plan, const std::string& name, std::size_t simulation = 0)
+{
+    const PlannedAttribute* found = plan.simulations[simulation].find(name);
+    REQUIRE(found);
+    return *found;
+}
+
+std::set<std::string> kept(const Plan& plan, std::size_t simulation = 0)
+{
+    std::set<std::string> names;
+    for (const PlannedAttribute& a : plan.simulations[simulation].attributes)
+        if (a.kept) names.insert(a.name);
+    return names;
+}
+
+// What outputs ask for: these names, and nothing else.
+PlanOptions asking_for(std::vector<std::string> names)
+{
+    PlanOptions options;
+    options.attributes = std::move(names);
+    options.all_made = false;
+    return options;
+}
+
+using Names = std::vector<std::string>;
+using NameSet = std::set<std::string>;
+
 std::string error_of_plan(const Graph& graph)
 {
     return error_of([&] { Plan(graph, {}); });
@@ -233,6 +268,175 @@ TEST_CASE("a graph without an output is an error of its file", "[plan]")
     GraphUnderTest scene;
     CHECK(error_of_plan(scene.returning(std::map<std::string, NodePtr>())) ==
           "scene.lua: the graph returns no output; end the file with `return` and a node");
+}
+
+TEST_CASE("a scene that needs nothing has P, v and id", "[plan]")
+{
+    GraphUnderTest scene;
+    const Plan plan(scene.returning(scene.node("post", {scene.node("source")})), {});
+    CHECK(kept(plan) == NameSet{"P", "id", "v"});
+    CHECK(plan.columns_of(0).empty());
+}
+
+TEST_CASE("an attribute that nobody reads is kept exactly where an output asks for it", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
+    const Graph& graph = scene.returning(scene.node("post", {made}));
+
+    CHECK(kept(Plan(graph, {})) == NameSet{"P", "heat", "id", "v"});
+    CHECK(attribute(Plan(graph, {}), "heat").asked_as_made);
+    CHECK(kept(Plan(graph, asking_for({"heat"}))) == NameSet{"P", "heat", "id", "v"});
+    CHECK(attribute(Plan(graph, asking_for({"heat"})), "heat").asked_by_name);
+
+    const Plan without(graph, asking_for({"mass"}));
+    CHECK(kept(without) == NameSet{"P", "id", "mass", "v"});
+    CHECK(without.simulations[0].left_out.count("heat") == 1);
+    for (const AttributeSpec& spec : without.columns_of(0)) CHECK(spec.name == "mass");
+}
+
+TEST_CASE("an attribute that a node reads is kept, and the plan knows who makes and who reads it", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
+    const NodePtr one = scene.node("read", {made}, {{"value", Value(AttributeRef{"heat"})}}, "one");
+    const NodePtr other = scene.node("read", {one}, {{"value", Value(AttributeRef{"heat"})}}, "other");
+    const Plan plan(scene.returning(scene.node("post", {other})), asking_for({}));
+    const PlannedAttribute& heat = attribute(plan, "heat");
+    CHECK(heat.kept);
+    CHECK(names_of(plan, heat.made_by) == Names{"make1"});
+    CHECK(names_of(plan, heat.read_by) == Names{"one", "other"});
+    CHECK(heat.bytes_per_point() == 4);
+}
+
+TEST_CASE("a reader that no output comes from keeps nothing alive", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
+    scene.node("read", {made}, {{"value", Value(AttributeRef{"heat"})}});
+    CHECK(kept(Plan(scene.returning(made), asking_for({}))) == NameSet{"P", "id", "v"});
+}
+
+TEST_CASE("what points are assigned one by one keeps its place", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
+    const NodePtr assigned = scene.node("assign", {made}, {{"to", Value("heat")}});
+    const Plan plan(scene.returning(scene.node("post", {assigned})), asking_for({}));
+    CHECK(kept(plan) == NameSet{"P", "heat", "id", "v"});
+    CHECK(names_of(plan, attribute(plan, "heat").written_by) == Names{"assign1"});
+}
+
+TEST_CASE("what may read every name keeps all that is made", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}, {"member", Value("hot")}});
+    const bool all = GENERATE(true, false);
+    const NodePtr assigned = scene.node("assign", {made}, {{"all", Value(all)}});
+    const NameSet names = kept(Plan(scene.returning(scene.node("post", {assigned})), asking_for({})));
+    CHECK(names == (all ? NameSet{"P", "group:hot", "heat", "id", "v"} : NameSet{"P", "id", "v"}));
+}
+
+TEST_CASE("life and age are there exactly where a life may end, and birth times where something reads them", "[plan]")
+{
+    const auto planned_with = [&](Value life, bool solved, std::vector<std::string> asked = {}) {
+        GraphUnderTest graph;
+        const NodePtr born = graph.node("bear", {graph.node("source")}, {{"life", std::move(life)}});
+        return kept(Plan(graph.returning(solved ? graph.node("post", {born}) : born), asking_for(std::move(asked))));
+    };
+    const double forever = std::numeric_limits<double>::infinity();
+    const Value later = of_frame([=](const Frame& f) { return Value(f.number < 9 ? forever : 1.0); });
+
+    CHECK(planned_with(2.0, true) == NameSet{"P", "age", "id", "life", "v"});
+    CHECK(planned_with(forever, true) == NameSet{"P", "id", "v"});
+    CHECK(planned_with(later, true) == NameSet{"P", "age", "id", "life", "v"});
+    CHECK(planned_with(2.0, false) == NameSet{"P", "id", "v"});
+    CHECK(planned_with(forever, true, {"age"}) == NameSet{"P", "age", "id", "v"});
+    CHECK(planned_with(forever, true, {"birthtime"}) == NameSet{"P", "birthtime", "id", "v"});
+}
+
+TEST_CASE("a group that nobody asks for is left out, unless points join it one by one", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"member", Value("hot")}});
+    const NodePtr joined = scene.node("bear", {made}, {{"joins", Value("old")}});
+    const NodePtr asks = scene.node("assign", {joined}, {{"within", Value("hot")}});
+    const NodePtr limited = scene.node("shift", {joined}, {{"group", Value("hot")}});
+
+    const Plan without(scene.returning(joined), asking_for({}));
+    CHECK(kept(without) == NameSet{"P", "group:old", "id", "v"});
+    CHECK(without.groups_of(0).empty());  // nothing feeds back here
+    for (const NodePtr& reader : {asks, limited}) {
+        const Plan plan(scene.returning(scene.node("post", {reader}, {}, "post")), asking_for({}));
+        CHECK(names_of(plan, attribute(plan, "group:hot").read_by) == Names{reader->name});
+        CHECK(plan.groups_of(0) == Names{"hot", "old"});
+    }
+    CHECK(kept(Plan(scene.returning(joined), asking_for({"hot"}))).count("group:hot") == 1);
+    CHECK(attribute(without, "group:old").bytes_per_point() == 1);
+}
+
+TEST_CASE("a reader behind a merge keeps the attribute in both simulations, and no other one does", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr here = scene.node("source", {}, {}, "here"), there = scene.node("source", {}, {}, "there");
+    const NodePtr hot = scene.node("make", {there}, {{"heat", Value(1.0)}});
+    const NodePtr both = scene.node("both", {here, hot});
+    const Value heat(AttributeRef{"heat"});
+    const NodePtr reader = scene.node("read", {both}, {{"value", heat}});
+    const NodePtr beside = scene.node("read", {scene.node("make", {here}, {{"heat", Value(1.0)}})}, {{"value", heat}});
+
+    const Plan joined(scene.returning(reader), asking_for({}));
+    CHECK(attribute(joined, "heat", 0).kept);
+    CHECK(attribute(joined, "heat", 1).kept);
+    const Plan apart(scene.returning({{"a", beside}, {"b", hot}}), asking_for({}));
+    CHECK(attribute(apart, "heat", 0).kept);
+    CHECK_FALSE(attribute(apart, "heat", 1).kept);
+}
+
+TEST_CASE("with keep_all nothing is left out, and nothing is evaluated once", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}, {"member", Value("hot")}});
+    PlanOptions options = asking_for({});
+    options.keep_all = true;
+    const Plan plan(scene.returning(made), options);
+    CHECK(plan.simulations[0].left_out.empty());
+    for (const AttributeSpec& known : known_attributes()) CHECK(kept(plan).count(known.name) == 1);
+    CHECK(kept(plan).count("heat") == 1);
+    CHECK(kept(plan).count("group:hot") == 1);
+    for (const PlannedNode& node : plan.nodes) CHECK_FALSE(node.once);
+    // An output that names nothing still gets what the scene has, and no more.
+    CHECK(plan.names_of_scene() == NameSet{"P", "heat", "hot", "id", "v"});
+}
+
+TEST_CASE("a node that changes says why, and one that does not has no reason to", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr still = scene.node("source", {}, {}, "still");
+    const NodePtr moving =
+        scene.node("shift", {still}, {{"by", of_frame([](const Frame&) { return Value(Vec3d(1, 0, 0)); })}}, "moving");
+    const NodePtr behind = scene.node("shift", {moving}, {}, "behind");
+    const NodePtr inside = scene.node("shift", {scene.node("source")}, {}, "inside");
+    const Plan plan(scene.returning({{"a", behind}, {"b", scene.node("post", {inside})}}), {});
+    CHECK(planned(plan, "still").changes.empty());
+    CHECK(planned(plan, "moving").changes == "its by changes with the frame");
+    CHECK(planned(plan, "behind").changes == "\"moving\" before it is evaluated anew");
+    CHECK(planned(plan, "inside").changes == "its points are fed back from frame to frame");
+    CHECK(planned(plan, "moving").reached_from == NameSet{"a"});
+    CHECK(planned(plan, "inside").reached_from == NameSet{"b"});
+}
+
+TEST_CASE("solve takes the dynamics upstream of it along in its pass, and each other node has its own", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr first = scene.node("push", {scene.node("source")}, {}, "first");
+    const NodePtr shifted = scene.node("shift", {first});
+    const NodePtr second = scene.node("push", {shifted}, {}, "second");
+    const NodePtr after = scene.node("shift", {scene.node("post", {second})}, {}, "after");
+    const Plan plan(scene.returning(after), {});
+    std::vector<Names> passes;
+    for (const std::vector<std::size_t>& pass : plan.passes()) passes.push_back(names_of(plan, pass));
+    CHECK(passes == std::vector<Names>{{"shift1"}, {"first", "second", "post1"}, {"after"}});
 }
 
 }  // namespace rapid

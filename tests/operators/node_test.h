@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -132,9 +133,11 @@ public:
     }
     PointSet at_start(PointSet points = {}) { return start({Flow{std::move(points), {}, simulation_}}).points; }
 
-    Uses uses() const
+    // functions: the parameters that are given as functions of the frame.
+    Uses uses(std::set<std::string> functions = {}) const
     {
         Uses uses = node_.type->uses;
+        uses.functions = std::move(functions);
         op_->uses(uses);
         return uses;
     }
@@ -143,6 +146,7 @@ public:
     FrameFigures figures;
     std::vector<std::string> warnings;
     std::function<void(const std::string&, const PointSet&)> write;
+    std::set<std::string> left_out;  // by a plan
 
 private:
     template <class F>
@@ -158,7 +162,8 @@ private:
                              RandomKey(simulation_->seed, node_.name),
                              figures,
                              warnings,
-                             write};
+                             write,
+                             &left_out};
         return f(now);
     }
 

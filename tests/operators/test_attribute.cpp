@@ -98,4 +98,11 @@ TEST_CASE("attribute refuses names and values that can't be", "[attribute]")
     CHECK(refusal("hitnum", 0.5) == "hitnum = 0.5 is not whole; it must be an integer");
 }
 
+TEST_CASE("attribute makes none of what the plan leaves out", "[attribute]")
+{
+    NodeTest attribute("attribute", {{"heat", 2.0}, {"wet", 1.0}});
+    attribute.left_out = {"heat"};
+    CHECK(attribute(2, points_at({{0, 0, 0}})).column_names() == std::vector<std::string>{"P", "id", "v", "wet"});
+}
+
 }  // namespace rapid

@@ -94,4 +94,18 @@ TEST_CASE("create refuses frame rates that are none, and known attributes of ano
           }) == "the initial points have \"pscale\" as vec3; it must be float");
 }
 
+TEST_CASE("create drops what the plan leaves out of the initial points", "[create]")
+{
+    PointSet points = points_at({{0, 0, 0}});
+    points.add({"heat", 1.0f});
+    points.add({"wet", 1.0f});
+    points.group("left");
+    points.group("right");
+    NodeTest create("create", {{"points", ObjectPtr(source_of(points))}});
+    create.left_out = {"heat", "group:left"};
+    const PointSet initial = create(1);
+    CHECK(initial.column_names() == std::vector<std::string>{"P", "id", "v", "wet"});
+    CHECK(initial.group_names() == std::vector<std::string>{"right"});
+}
+
 }  // namespace rapid

@@ -510,7 +510,44 @@ TEST_CASE("emit says what it makes, so that the columns exist from the first fra
     CHECK(std::get<float>(made.at("mass")) == 1);  // what points that emit did not make weigh
     CHECK(std::get<Vec3f>(made.at("N")) == Vec3f::Zero());
     CHECK(uses.makes_groups == std::vector<std::string>{"hot"});
-    CHECK(std::count(uses.writes.begin(), uses.writes.end(), "life") == 1);
+    CHECK(std::count(uses.gives.begin(), uses.gives.end(), "life") == 1);
+}
+
+TEST_CASE("emit makes none of what the plan leaves out, and bears the same points", "[emit]")
+{
+    PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
+    const std::vector<Vec3f> normals = {{0, 1, 0}, {1, 0, 0}};
+    from.set("N", Column<Vec3f>(std::span<const Vec3f>(normals)));
+    const Arguments arguments = {{"source", ObjectPtr(source_of(from))},
+                                 {"count", 3.0},
+                                 {"life", list({1.0, 2.0})},
+                                 {"group", "hot"},
+                                 {"spread", 10.0},
+                                 {"velocity", Vec3d(1, 0, 0)},
+                                 {"attributes", named({{"heat", 5.0}})}};
+    NodeTest pruned("emit", arguments), whole("emit", arguments);
+    pruned.left_out = {"N", "age", "group:hot", "heat", "life"};
+    const PointSet some = pruned(2), all = whole(2);
+    CHECK(some.column_names() == std::vector<std::string>{"P", "dt", "id", "v"});
+    CHECK(some.group_names().empty());
+    CHECK(all.column_names() == std::vector<std::string>{"N", "P", "age", "dt", "heat", "id", "life", "v"});
+    CHECK(all.group_names() == std::vector<std::string>{"hot"});
+    CHECK(values_of<Vec3f>(some, "P") == values_of<Vec3f>(all, "P"));
+    CHECK(values_of<Vec3f>(some, "v") == values_of<Vec3f>(all, "v"));
+    CHECK(values_of<float>(some, "dt") == values_of<float>(all, "dt"));
+}
+
+TEST_CASE("a life without end needs neither life nor age, unless it is a function that may end it later", "[emit]")
+{
+    const double forever = std::numeric_limits<double>::infinity();
+    const auto gives_life = [&](Value life, bool function) {
+        NodeTest emit("emit", {{"source", one_point()}, {"count", 1.0}, {"life", std::move(life)}});
+        const Uses uses = emit.uses(function ? std::set<std::string>{"life"} : std::set<std::string>());
+        return std::count(uses.gives.begin(), uses.gives.end(), "life") == 1;
+    };
+    CHECK(gives_life(2.0, false));
+    CHECK_FALSE(gives_life(forever, false));
+    CHECK(gives_life(forever, true));
 }
 
 TEST_CASE("emit refuses what it can't do, and says what it can", "[emit]")

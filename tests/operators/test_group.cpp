@@ -69,4 +69,11 @@ TEST_CASE("a group needs a name", "[group]")
           }) == "name = \"\" names no group; give it at least one letter");
 }
 
+TEST_CASE("a group that the plan leaves out is neither made nor asked for", "[group]")
+{
+    NodeTest group("group", {{"name", "hot"}});
+    group.left_out = {"group:hot"};
+    CHECK(group(2, points_at({{0, 0, 0}})).group_names().empty());
+}
+
 }  // namespace rapid

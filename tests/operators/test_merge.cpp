@@ -205,4 +205,19 @@ TEST_CASE("ids that are seen in runs take the memory of the runs", "[merge]")
     CHECK(adopted.runs() == 2);
 }
 
+TEST_CASE("merge takes none of what the plan leaves out", "[merge]")
+{
+    const auto here = simulation(), there = simulation();
+    PointSet other = points_at({{1, 0, 0}});
+    other.add({"heat", 1.0f});
+    other.add({"wet", 1.0f});
+    other.group("hot");
+    NodeTest merge("merge", {}, here);
+    merge.left_out = {"heat", "group:hot"};
+    const PointSet both = merge.evaluate(2, {Flow{points_at({{0, 0, 0}}), {}, here}, Flow{other, {}, there}}).points;
+    CHECK(both.size() == 2);
+    CHECK(both.column_names() == std::vector<std::string>{"P", "id", "v", "wet"});
+    CHECK(both.group_names().empty());
+}
+
 }  // namespace rapid

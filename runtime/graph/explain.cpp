@@ -1,0 +1,135 @@
+#include "runtime/graph/explain.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runtime/graph/point_function.h"
+
+namespace rapid {
+namespace {
+
+struct StageWords {
+    Stage stage;
+    const char* name;
+    const char* absent;  // why a plan lacks it
+};
+
+constexpr StageWords stage_words[] = {
+    {Stage::Emission, "emission", "no emit node"},
+    {Stage::Script, "script", "no node has a Lua function: workers have no interpreter"},
+    {Stage::Forces, "forces", "no force node"},
+    {Stage::Integration, "integration", "no solve node"},
+    {Stage::Collision, "collision", "no collide node"},
+    {Stage::ContactGrid, "contact grid", "no contact node"},
+    {Stage::Constraints, "constraints", "no constraint node"},
+    {Stage::ErrorEstimate, "error estimate", "no solve node"},
+    {Stage::Writing, "writing", "no -o and no write node"},
+};
+
+bool runs_script(const Node& node)
+{
+    return std::any_of(node.arguments.begin(), node.arguments.end(), [](const auto& argument) {
+        return argument.second.function() || argument.second.template object<PointFunction>();
+    });
+}
+
+bool needs(const Node& node, Stage stage)
+{
+    if (stage == Stage::Script) return runs_script(node);
+    return std::find(node.type->stages.begin(), node.type->stages.end(), stage) != node.type->stages.end();
+}
+
+std::string list_of(const Plan& plan, const std::vector<std::size_t>& places)
+{
+    std::vector<std::string> names;
+    for (const std::size_t place : places) names.push_back(plan.nodes[place].node->name);
+    return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// "swirl reads it", "swirl, solve1 read it".
+std::string done_by(const Plan& plan, const std::vector<std::size_t>& places, std::string_view verb)
+{
+    return fmt::format("{} {}{} it", list_of(plan, places), verb, places.size() == 1 ? "s" : "");
+}
+
+std::string why_kept(const Plan& plan, const PlannedAttribute& attribute)
+{
+    if (attribute.always) return "every point has it";
+    std::vector<std::string> reasons;
+    if (!attribute.read_by.empty()) reasons.push_back(done_by(plan, attribute.read_by, "read"));
+    if (!attribute.written_by.empty()) reasons.push_back(done_by(plan, attribute.written_by, "write"));
+    if (attribute.asked_by_name) reasons.push_back("an output asks for it");
+    if (attribute.asked_as_made && attribute.read_by.empty() && attribute.written_by.empty())
+        reasons.push_back(done_by(plan, attribute.made_by, "make") + ", and an output takes all that is made");
+    if (reasons.empty()) reasons.push_back("nothing is left out");
+    return fmt::format("{}", fmt::join(reasons, "; "));
+}
+
+std::string what_brings_in(const PlannedAttribute& attribute)
+{
+    if (attribute.name == "dt") return "a node that bears points within a frame";
+    if (attribute.group) {
+        const std::string name = attribute.name.substr(group_prefix.size());
+        return fmt::format("p:within \"{0}\" in a kernel, group = \"{0}\" of a node, or -o FILE:{0}", name);
+    }
+    return fmt::format("p.{0} in a kernel, rapid.attr \"{0}\", or -o FILE:{0}", attribute.name);
+}
+
+template <class T>
+void put_kept_first(std::vector<T>& all)
+{
+    std::stable_partition(all.begin(), all.end(), [](const T& one) { return one.kept; });
+}
+
+}  // namespace
+
+std::size_t Explanation::bytes_per_point() const
+{
+    std::size_t bytes = 0;
+    for (const ExplainedAttribute& attribute : attributes) bytes += attribute.bytes_per_point;
+    return bytes;
+}
+
+Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
+{
+    Explanation result;
+    for (const PlannedNode& planned : plan.nodes) {
+        const std::string why = plan.outputs.size() == 1 ? "reached from the output"
+                                                         : fmt::format("reached from the output{} {}",
+                                                                       planned.reached_from.size() == 1 ? "" : "s",
+                                                                       fmt::join(planned.reached_from, ", "));
+        result.nodes.push_back({planned.node->name, planned.node->type->name, true,
+                                planned.once ? "once" : "every frame", why, planned.changes});
+    }
+    for (const NodePtr& node : plan.left_out)
+        result.nodes.push_back({node->name, node->type->name, false, "never", "no output comes from it", ""});
+
+    for (const PlannedSimulation& simulation : plan.simulations)
+        for (const PlannedAttribute& attribute : simulation.attributes)
+            result.attributes.push_back(
+                {attribute.name, simulation.create->name, attribute.kept,
+                 attribute.kept ? attribute.bytes_per_point() : 0,
+                 attribute.kept ? why_kept(plan, attribute) : "no node reads it and no output asks for it",
+                 attribute.kept ? std::string() : what_brings_in(attribute)});
+    put_kept_first(result.attributes);
+
+    for (const StageWords& words : stage_words) {
+        std::vector<std::string> users;
+        for (const PlannedNode& planned : plan.nodes)
+            if (needs(*planned.node, words.stage)) users.push_back(planned.node->name);
+        if (words.stage == Stage::Writing)
+            for (const std::string& output : outputs) users.push_back("-o " + output);
+        result.stages.push_back(
+            {words.name, !users.empty(), users.empty() ? words.absent : fmt::format("{}", fmt::join(users, ", "))});
+    }
+    put_kept_first(result.stages);
+
+    for (const std::vector<std::size_t>& pass : plan.passes()) {
+        std::vector<std::string>& names = result.passes.emplace_back();
+        for (const std::size_t place : pass) names.push_back(plan.nodes[place].node->name);
+    }
+    return result;
+}
+
+}  // namespace rapid

@@ -1,0 +1,194 @@
+-- rapid explain: what the plan keeps and leaves out, with its reasons, in words and as JSON.
+local command = require "testing.command"
+local json = require "dkjson"
+
+local folder = command.folder()
+
+local function write(name, body)
+  folder:write(name, 'local rapid = require "rapid"\n' .. body)
+end
+
+local function explain(arguments)
+  return command.rapid("explain " .. arguments, { cwd = folder.path })
+end
+
+local function plan_of(arguments)
+  local result = explain(arguments .. " --json")
+  assert.equal(0, result.status, result.stderr)
+  local plan = json.decode(result.stdout)
+  local function by_name(list)
+    local named = {}
+    for _, one in ipairs(list) do named[one.name] = one end
+    return named
+  end
+  return { nodes = by_name(plan.nodes), attributes = by_name(plan.attributes), stages = by_name(plan.stages),
+           passes = plan.passes, bytes_per_point = plan.bytes_per_point, raw = plan }
+end
+
+local source = "source = rapid.mesh.sphere { radius = 1 }, rate = 100"
+
+write("falls.lua", [[
+local beside = rapid.create { name = "spare" }
+return rapid.create {} :emit { ]] .. source .. [[, attributes = { heat = 1 } } :gravity {} :solve {}
+]])
+write("bounces.lua", [[
+return rapid.create {} :emit { ]] .. source .. [[, life = 2 }
+  :points("swirl", function(p) p.v = p.v + vec3(p.age, 0, 0) end)
+  :gravity {} :collide { shape = rapid.shape.plane {} } :solve {} :write { file = "a.####.csv" }
+]])
+
+describe("rapid explain --json", function()
+  it("tells of each node whether it is kept, how often it is evaluated, and why", function()
+    local nodes = plan_of("falls.lua").nodes
+    assert.same({ name = "emit1", type = "emit", kept = true, evaluated = "every frame",
+                  why = "reached from the output", changes = "its points are fed back from frame to frame" },
+                nodes.emit1)
+    assert.same({ name = "spare", type = "create", kept = false, evaluated = "never", why = "no output comes from it" },
+                nodes.spare)
+  end)
+
+  it("names the outputs from which a node is reached where there are several", function()
+    write("two.lua", [[
+local shared = rapid.create {} :emit { ]] .. source .. [[ } :solve {}
+return { left = shared, right = shared:delete { where = function(p) return p.P.x > 0 end } }
+]])
+    local nodes = plan_of("two.lua").nodes
+    assert.equal("reached from the outputs left, right", nodes.solve1.why)
+    assert.equal("reached from the output right", nodes.delete1.why)
+  end)
+
+  it("evaluates once what never changes", function()
+    write("still.lua", [[
+return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.5 } } :attribute { heat = 1 }
+]])
+    local nodes = plan_of("still.lua").nodes
+    assert.equal("once", nodes.create1.evaluated)
+    assert.equal("once", nodes.attribute1.evaluated)
+    assert.is_nil(nodes.attribute1.changes)
+  end)
+
+  it("leaves an attribute out with the reason, and tells what brings it in", function()
+    local age = plan_of("falls.lua").attributes.age
+    assert.same({ name = "age", simulation = "create1", kept = false, bytes_per_point = 0,
+                  why = "no node reads it and no output asks for it",
+                  brought_in_by = 'p.age in a kernel, rapid.attr "age", or -o FILE:age' }, age)
+    assert.is_true(plan_of("falls.lua -o a.####.csv:age").attributes.age.kept)
+  end)
+
+  it("keeps an attribute for who reads it or asks for it", function()
+    local falls, bounces = plan_of("falls.lua").attributes, plan_of("bounces.lua").attributes
+    assert.equal("every point has it", falls.P.why)
+    assert.equal(12, falls.P.bytes_per_point)
+    assert.equal("emit1 makes it, and an output takes all that is made", falls.heat.why)
+    assert.equal("swirl, solve1 read it", bounces.age.why)
+    assert.equal("solve1 reads it; emit1 writes it", bounces.life.why)
+    assert.equal("an output asks for it", plan_of("falls.lua -o a.####.csv:mass").attributes.mass.why)
+    assert.is_false(plan_of("falls.lua -o a.####.csv:mass").attributes.heat.kept)
+  end)
+
+  it("adds up the bytes of a point", function()
+    for _, scene in ipairs { "falls.lua", "bounces.lua" } do
+      local plan, bytes = plan_of(scene), 0
+      for _, attribute in ipairs(plan.raw.attributes) do bytes = bytes + attribute.bytes_per_point end
+      assert.equal(bytes, plan.bytes_per_point)
+    end
+    -- P, v, id, dt, heat
+    assert.equal(12 + 12 + 8 + 4 + 4, plan_of("falls.lua").bytes_per_point)
+  end)
+
+  it("has all stages, each with who needs it or what is missing", function()
+    local falls, bounces = plan_of("falls.lua"), plan_of("bounces.lua -o b.####.csv")
+    for name, why in pairs { emission = "emit1", forces = "gravity1", integration = "solve1",
+                             ["error estimate"] = "solve1" } do
+      assert.same({ name = name, kept = true, why = why }, falls.stages[name])
+    end
+    for name, why in pairs { collision = "no collide node", ["contact grid"] = "no contact node",
+                             constraints = "no constraint node", writing = "no -o and no write node",
+                             script = "no node has a Lua function: workers have no interpreter" } do
+      assert.same({ name = name, kept = false, why = why }, falls.stages[name])
+    end
+    assert.equal(9, #falls.raw.stages)
+    assert.equal("collide1", bounces.stages.collision.why)
+    assert.equal("swirl", bounces.stages.script.why)
+    assert.equal("write1, -o b.####.csv", bounces.stages.writing.why)
+  end)
+
+  it("groups the nodes that go over the points together", function()
+    assert.same({ { "emit1" }, { "swirl" }, { "gravity1", "collide1", "solve1" }, { "write1" } },
+                plan_of("bounces.lua").passes)
+  end)
+
+  it("keeps nothing alive for a node that no output comes from", function()
+    write("unread.lua", [[
+local points = rapid.create {} :emit { ]] .. source .. [[ } :solve {}
+points:points("reader", function(p) p.v = vec3(p.age, 0, 0) end)
+return points
+]])
+    local plan = plan_of("unread.lua")
+    assert.is_false(plan.attributes.age.kept)
+    assert.is_false(plan.nodes.reader.kept)
+  end)
+end)
+
+describe("rapid explain", function()
+  it("says the same in words, what is kept before what is left out", function()
+    for _, scene in ipairs { "falls.lua", "bounces.lua" } do
+      local text, plan = explain(scene).stdout, plan_of(scene)
+      local left_out = text:find("\nLEFT OUT\n", 1, true)
+      assert.equal(1, (text:find("KEPT\n", 1, true)))
+      for _, list in ipairs { plan.raw.nodes, plan.raw.attributes, plan.raw.stages } do
+        for _, one in ipairs(list) do
+          local at = text:find("\n  " .. one.name:gsub("%p", "%%%0") .. " [^\n]*" .. one.why:gsub("%p", "%%%0"))
+          assert.truthy(at, one.name .. ": " .. one.why .. "\n" .. text)
+          assert.equal(one.kept, at < left_out, one.name)
+        end
+      end
+      assert.truthy(text:find(plan.bytes_per_point .. " bytes a point at most", 1, true), text)
+      for _, pass in ipairs(plan.passes) do
+        assert.truthy(text:find("\n  " .. table.concat(pass, ", ") .. "\n", 1, true), text)
+      end
+    end
+  end)
+
+  it("neither runs a frame nor writes a file", function()
+    local before = folder:list()
+    assert.equal(0, explain("bounces.lua -o c.####.csv").status)
+    assert.same(before, folder:list())
+  end)
+
+  it("refuses what check refuses, in the same words", function()
+    write("wrong.lua", 'return rapid.create {} :points("x", function(p) p.haet = 1 end) :solve {}')
+    local result = explain "wrong.lua"
+    assert.equal(2, result.status)
+    assert.equal(command.rapid("check wrong.lua", { cwd = folder.path }).stderr, result.stderr)
+    assert.equal(2, explain("falls.lua -o a.####.doc").status)
+  end)
+end)
+
+describe("rapid explain --against", function()
+  it("tells what each of two scenes needs and the other does not", function()
+    local result = json.decode(explain("falls.lua --against bounces.lua --json").stdout)
+    local function names(list)
+      local all = {}
+      for i, one in ipairs(list) do all[i] = one.name end
+      return all
+    end
+    assert.same({}, names(result.only_graph.nodes))
+    assert.same({ "heat" }, names(result.only_graph.attributes))
+    assert.same({}, names(result.only_graph.stages))
+    assert.same({ "swirl", "collide1", "write1" }, names(result.only_against.nodes))
+    assert.same({ "age", "life" }, names(result.only_against.attributes))
+    assert.same({ "script", "collision", "writing" }, names(result.only_against.stages))
+    assert.same({ plan_of("falls.lua").bytes_per_point, plan_of("bounces.lua").bytes_per_point },
+                result.bytes_per_point)
+  end)
+
+  it("says it in words", function()
+    local text = explain("falls.lua --against bounces.lua").stdout
+    local here = text:find("falls.lua NEEDS, AND bounces.lua DOES NOT\n", 1, true)
+    local there = text:find("bounces.lua NEEDS, AND falls.lua DOES NOT\n", 1, true)
+    local heat, life = text:find("\n  heat", 1, true), text:find("\n  life", 1, true)
+    assert.truthy(here < heat and heat < there and there < life, text)
+    assert.truthy(explain("falls.lua --against falls.lua").stdout:find("  nothing\n", 1, true))
+  end)
+end)

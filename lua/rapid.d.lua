@@ -220,6 +220,13 @@ function rapid.math.rotation_between(from, to) end
 ---@return rapid.LevelSet
 function rapid.levelset.box(options) end
 
+---The union, intersection or difference of two level sets.
+---@param levelset any  whose voxels the result has [level set, required]
+---@param other any  the second [level set, required]
+---@param how string  which [string, required]
+---@return rapid.LevelSet
+function rapid.levelset.combine(levelset, other, how) end
+
 ---@class rapid.options.levelset_from_mesh
 ---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
@@ -230,6 +237,23 @@ function rapid.levelset.box(options) end
 ---@return rapid.LevelSet
 function rapid.levelset.from_mesh(mesh, options) end
 
+---@class rapid.options.levelset_from_points
+---@field radius? number|rapid.Attribute  of the balls; the attribute pscale where the points have it [number, m, above 0, takes rapid.attr]
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
+
+---The balls around points.
+---@param points rapid.Points  their middles [points, required]
+---@param options? rapid.options.levelset_from_points
+---@return rapid.LevelSet
+function rapid.levelset.from_points(points, options) end
+
+---The surface moved along its normal.
+---@param levelset any  what to grow [level set, required]
+---@param metres number  outwards; inwards where below 0 [number, m, required]
+---@return rapid.LevelSet
+function rapid.levelset.offset(levelset, metres) end
+
 ---@class rapid.options.levelset_read
 ---@field grid? string  its name; the only level set, when not given [string]
 
@@ -238,6 +262,22 @@ function rapid.levelset.from_mesh(mesh, options) end
 ---@param options? rapid.options.levelset_read
 ---@return rapid.LevelSet
 function rapid.levelset.read(path, options) end
+
+---The same surface on voxels of another size.
+---@param levelset any  what to resample [level set, required]
+---@param voxel number  edge of a voxel [number, m, above 0, required]
+---@return rapid.LevelSet
+function rapid.levelset.resample(levelset, voxel) end
+
+---@class rapid.options.levelset_smooth
+---@field width? integer  of the filter [integer, voxels, from 1 to 64, default 1]
+---@field iterations? integer  times that it is applied [integer, from 1 to 1000, default 1]
+
+---Rounds edges and fills creases.
+---@param levelset any  what to smooth [level set, required]
+---@param options? rapid.options.levelset_smooth
+---@return rapid.LevelSet
+function rapid.levelset.smooth(levelset, options) end
 
 ---@class rapid.options.levelset_sphere
 ---@field radius? number  of the sphere [number, m, above 0, default 1]
@@ -290,8 +330,8 @@ function rapid.mesh.from(options) end
 ---@return rapid.Mesh
 function rapid.mesh.grid(options) end
 
----Reads OBJ, PLY, STL or glTF.
----@param path string  relative to the graph file [string, required]
+---Reads OBJ, PLY, STL or glTF, or a sequence of such files.
+---@param path string  relative to the graph file; with #### or $F4 in it a deforming mesh, a file for each frame [string, required]
 ---@return rapid.Mesh
 function rapid.mesh.read(path) end
 
@@ -472,12 +512,13 @@ function Node:avoid(params) end
 ---@class rapid.params.collide
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  what the points collide with [shape, required]
+---@field transform? rapid.Motion|fun(frame: rapid.Frame): rapid.Motion  moves the shape: a motion, a function of the frame that returns one, or keys by frame [motion]
 ---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution: the part of the speed that is kept [number, from 0 to 1, default 0.5, takes rapid.attr]
 ---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient [number, at least 0, default 0, takes rapid.attr]
 ---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
 ---@field method? "continuous"|"backtrack"|"project"|fun(frame: rapid.Frame): "continuous"|"backtrack"|"project"  on the path, at the time of impact; or after the step, by going back or out along the gradient [string, one of continuous, backtrack, project, default "continuous"]
 ---@field response? "bounce"|"slide"|"stick"|"die"|fun(frame: rapid.Frame): "bounce"|"slide"|"stick"|"die"  slide: without bounce; stick: held by the shape; die: killed [string, one of bounce, slide, stick, die, default "bounce"]
----@field record? any  writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, hittime, hitimpulse, hitpath [false or number, m/s, at least 0, default false]
+---@field record? number|boolean|fun(frame: rapid.Frame): number|boolean  writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, hittime, hitimpulse, hitpath [false or number, m/s, at least 0, default false]
 ---@field name? string  what the node is called in messages [string]
 
 ---Keeps points out of a shape: they bounce, slide and come to rest on it.
@@ -548,7 +589,10 @@ function Node:drag(params) end
 ---@field count? integer|fun(frame: rapid.Frame): integer  points born a frame [integer, at least 0]
 ---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
 ---@field birth? "random"|"begin"|"end"|"even"|fun(frame: rapid.Frame): "random"|"begin"|"end"|"even"  when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time [string, one of random, begin, end, even, default "random"]
----@field age? number|number[]|fun(frame: rapid.Frame): number|number[]  age at the end of the frame of birth, instead of `birth`; a number or {min, max} [number or {min, max}, s, at least 0]
+---@field age? any  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
+---@field motion? "spline"|"linear"|"none"|fun(frame: rapid.Frame): "spline"|"linear"|"none"  the way of a moving source within a frame: a cubic through the frames around it, a straight line, or none, as if it were where it is at the frame's end, at rest [string, one of spline, linear, none, default "spline"]
+---@field alpha? number|fun(frame: rapid.Frame): number  tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform [number, default 0.5]
+---@field cut? any  frames to which the source jumps from the frame before: nothing is born on the way. Where it is not given, a step of 8 times those around it and half the source's size is a jump, and reported [list of frames, from -2147483647 to 2147483647]
 ---@field inherit? number|fun(frame: rapid.Frame): number  fraction of the source's velocity that is added [number, default 1]
 ---@field velocity? rapid.Place|fun(frame: rapid.Frame): rapid.Place  mean direction and size [vec3, m/s, default {0, 0, 0}]
 ---@field speed? number|fun(frame: rapid.Frame): number  along the source's normal N, added to velocity [number, m/s, default 0]
@@ -744,7 +788,7 @@ function Node:spin(params) end
 
 ---@class rapid.params.spring
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field target? any  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape, m, default {0, 0, 0}]
+---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape, m, default {0, 0, 0}]
 ---@field stiffness? number|rapid.Attribute|fun(frame: rapid.Frame): number  force a metre [number, N/m, at least 0, default 1, takes rapid.attr]
 ---@field damping? number|rapid.Attribute|fun(frame: rapid.Frame): number  force by speed [number, N s/m, at least 0, default 0, takes rapid.attr]
 ---@field name? string  what the node is called in messages [string]

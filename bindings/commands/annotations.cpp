@@ -258,6 +258,8 @@ std::string lua_type(const Param& param)
         {"name of an attribute", "string"},
         {"names", "string|string[]"},
         {"number", "number"},
+        {"false or number", "number|boolean"},
+        {"vec3, attribute or shape", "rapid.Place|rapid.Attribute|rapid.Shape"},
         {"number or {min, max}", "number|number[]"},
         {"numbers by frame", "table<integer, number>"},
         {"points", "rapid.Points"},

@@ -5,6 +5,7 @@
 // at the time of impact on the point's path, where its distance from the shape is its radius.
 #include "runtime/graph/node.h"
 
+#include "runtime/shapes/animated.h"
 #include "runtime/solver/hits.h"
 
 namespace rapid {
@@ -25,8 +26,26 @@ void read_value(const Param& param, const Value& value, LeastSpeed& least)
         rapid::read_value(param, value, least.speed);
 }
 
+// A shape, or one that moves already.
+struct ColliderShape {
+    static constexpr std::string_view param_type = "shape";
+
+    ShapePtr rest;
+    MotionPtr motion;
+};
+
+void read_value(const Param& param, const Value& value, ColliderShape& shape)
+{
+    shape = {};
+    if (const auto animated = value.object<AnimatedShape>())
+        shape = {animated->rest(), animated->motion()};
+    else
+        rapid::read_value(param, value, shape.rest);
+}
+
 struct Collide {
-    ShapePtr shape;
+    ColliderShape shape;
+    MotionPtr transform;
     std::string method, response;
     LeastSpeed record;
     PerPoint<float> bounce, friction;
@@ -40,6 +59,8 @@ struct Collide {
             .takes("pscale")
             .param(&Collide::shape, "shape", Value(), any_number(), "", "what the points collide with")
             .required()
+            .param(&Collide::transform, "transform", Value(), any_number(), "",
+                   "moves the shape: a motion, a function of the frame that returns one, or keys by frame")
             .param(&Collide::bounce, "bounce", 0.5, between(0, 1), "",
                    "restitution: the part of the speed that is kept")
             .param(&Collide::friction, "friction", 0.0, at_least(0), "", "Coulomb's coefficient")
@@ -69,7 +90,8 @@ struct Collide {
         collider->node = now.node;
         collider->location = now.location;
         collider->group = group;
-        collider->shape = shape;
+        collider->shape = shape.rest;
+        collider->motion = !shape.motion ? transform : !transform ? shape.motion : product(transform, shape.motion);
         collider->bounce = bounce;
         collider->friction = friction;
         collider->radius = radius;

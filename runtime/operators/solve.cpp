@@ -10,6 +10,7 @@
 #include "runtime/operators/aging.h"
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set.h"
+#include "runtime/shapes/moving.h"
 
 namespace rapid {
 namespace {
@@ -50,6 +51,7 @@ struct Solve {
         Flow flow = std::move(inputs[0]);
         PointSet& points = flow.points;
         widen(points, flow.dynamics);
+        set_in_motion(flow.dynamics, flow.simulation->clock(), now.frame.number);
 
         SolveOptions options;
         options.substeps = substeps;
@@ -154,6 +156,24 @@ private:
             dynamic = std::move(widened);
         }
         wide_ = std::move(wide);
+    }
+
+    // Shapes that move, in their way through this frame.
+    static void set_in_motion(std::vector<DynamicPtr>& dynamics, const FrameClock& clock, double frame)
+    {
+        for (DynamicPtr& dynamic : dynamics) {
+            const auto collider = std::dynamic_pointer_cast<const Collider>(dynamic);
+            if (!collider || !collider->motion) continue;
+            auto going = std::make_shared<Collider>(*collider);
+            try {
+                going->shape = moving(collider->shape, *collider->motion, clock, frame - 1, frame);
+            } catch (Error& error) {
+                error.in_node(collider->node).at(collider->location);
+                throw;
+            }
+            going->motion = nullptr;
+            dynamic = std::move(going);
+        }
     }
 
     static double largest_radius(const Collider& collider, const PointSet& points)

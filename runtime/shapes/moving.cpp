@@ -124,6 +124,7 @@ public:
         for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] = poses[each * i].rotation * gradient[i];
     }
 
+    bool moves() const override { return true; }
     Vec3d velocity_at(const Vec3d& P, double time) const override { return track_.velocity_at(time).at(P); }
 
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override

@@ -64,6 +64,8 @@ public:
         static_cast<void>(time);
         distance(P, phi, gradient);
     }
+    // Whether it is elsewhere, or otherwise, within the frame.
+    virtual bool moves() const { return false; }
     // The velocity of the body at a place, m/s.
     virtual Vec3d velocity_at(const Vec3d& P, double time) const
     {

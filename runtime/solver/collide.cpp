@@ -76,6 +76,7 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points)
     : shape(collider.shape.get()),
       bounds(shape->bounds()),
       feature(shape->smallest_feature()),
+      moves(shape->moves()),
       method(collider.method),
       response(collider.response),
       record(collider.record),
@@ -139,7 +140,7 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     const bool steps_back = std::any_of(obstacles_.begin(), obstacles_.end(),
                                         [](const Obstacle& o) { return o.method != Method::Continuous; });
     if (steps_back) start_.assign(P.begin(), P.end());
-    hold_stuck();
+    hold_stuck(dt);
     fly(a_, dt);
     while (!going_.empty()) round_of_travellers(a_, dt);
     if (!steps_back) return;
@@ -157,37 +158,63 @@ void Collisions::touch(std::size_t i)
 
 // Points that have come to rest on a shape that they stick to stay, whatever pulls: they are flush with it, and have
 // its velocity.
-void Collisions::hold_stuck()
+void Collisions::hold_stuck(std::span<const double> dt)
 {
     for (const Obstacle& obstacle : obstacles_) {
         if (obstacle.response != Response::Stick) continue;
         asked_.clear();
         asked_P_.clear();
+        asked_time_.clear();
         for (std::size_t i = 0; i < size_; ++i) {
             stuck_[i] = 0;
-            if (!obstacle.members[first_ + i] || !(v_[i].norm() <= held)) continue;
+            if (!obstacle.members[first_ + i]) continue;
+            const double now = since_begin(i, dt[i]);
+            const Vec3d vc = obstacle.shape->velocity_at(P_[i], now);
+            if (!((v_[i] - vc).norm() <= held * (1 + vc.norm()))) continue;
             asked_.push_back(i);
             asked_P_.push_back(P_[i]);
+            asked_time_.push_back(now);
         }
         if (asked_.empty()) continue;
         phi_.resize(asked_.size());
-        obstacle.shape->distance(asked_P_, phi_, {});
+        obstacle.shape->distance_at(asked_P_, asked_time_, phi_, {});
         for (std::size_t j = 0; j < asked_.size(); ++j) {
             const std::size_t i = asked_[j];
-            const double radius = obstacle.radius[first_ + i];
+            const double radius = obstacle.radius[first_ + i], now = asked_time_[j];
             if (std::abs(phi_[j] - radius) > flush_within(P_[i], radius, obstacle.feature * 0x1p-21)) continue;
             stuck_[i] = 1;
-            v_[i].setZero();
             touch(i);
+            // Along the body's field of velocities: of the fourth order (Runge and Kutta).
+            const auto flow = [&](const Vec3d& x, double s) { return obstacle.shape->velocity_at(x, now + s); };
+            const double t = dt[i];
+            const Vec3d k1 = flow(P_[i], 0), k2 = flow(P_[i] + 0.5 * t * k1, 0.5 * t);
+            const Vec3d k3 = flow(P_[i] + 0.5 * t * k2, 0.5 * t), k4 = flow(P_[i] + t * k3, t);
+            P_[i] += t / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+            v_[i] = flow(P_[i], t);
+            surfaces_[i] = {
+                Surface{static_cast<int>(&obstacle - obstacles_.data()), normal_at(obstacle, P_[i], now + t)},
+                no_surface};
         }
     }
 }
 
+// The unit normal of a shape's field; zero where it has none.
+Vec3d Collisions::normal_at(const Obstacle& obstacle, const Vec3d& P, double time) const
+{
+    double phi = 0;
+    Vec3d gradient = Vec3d::Zero();
+    obstacle.shape->distance_at({&P, 1}, {&time, 1}, {&phi, 1}, {&gradient, 1});
+    return gradient.normalized();
+}
+
 Path Collisions::free_path(std::size_t i, double dt) const
 {
-    if (damped_.empty()) return {P_[i], v_[i], a_[i], dt, 0};
-    return {P_[i], path_v_[i], path_a_[i], dt, 0};
+    const bool free = damped_.empty();
+    return {P_[i], free ? v_[i] : path_v_[i], free ? a_[i] : path_a_[i], dt, 0, since_begin(i, dt)};
 }
+
+// The time of a point that has so much left of its sub-step, for shapes that move in the frame.
+double Collisions::since_begin(std::size_t i, double left) const { return consequences_.h - after_[i] - left; }
 
 // On the free path. A drag's velocity falls from the first to the last; between, it is on a straight line.
 Vec3d Collisions::velocity_after(std::size_t i, double s, double dt) const
@@ -213,9 +240,10 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
         for (const std::uint32_t i : near_) {
             if (!obstacle.members[first_ + i] || stuck_[i]) continue;
             asked_.push_back(i);
-            // Of a further shape, only an earlier contact is of interest.
-            asked_paths_.push_back(free_path(i, obstacle_[i] < 0 ? dt[i] : contact_[i].time));
-            asked_paths_.back().radius = obstacle.radius[first_ + i];
+            asked_paths_.push_back(free_path(i, dt[i]));
+            Path& path = asked_paths_.back();
+            path.radius = obstacle.radius[first_ + i];
+            if (obstacle_[i] >= 0) path.duration = contact_[i].time;  // only an earlier contact is of interest
         }
         ask_first_contacts(static_cast<int>(o));
     }
@@ -403,12 +431,13 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
     const auto ask = [&] {
         phi_.resize(asked_P_.size());
         gradients_.resize(asked_P_.size());
-        obstacle.shape->distance(asked_P_, phi_, gradients_);
+        obstacle.shape->distance_at(asked_P_, asked_time_, phi_, gradients_);
     };
     const auto radius = [&](std::size_t k) { return double(obstacle.radius[first_ + k]); };
 
     asked_.clear();
     asked_P_.clear();
+    asked_time_.clear();
     for (const std::uint32_t k : going_) {
         Traveller& t = travellers_[k];
         if (t.way != Traveller::Curved || t.on[0].collider != o) continue;
@@ -420,7 +449,8 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
             if (path.duration > most) path.duration = most, t.stops = false;
         }
         asked_.push_back(k);
-        asked_P_.push_back(place(path, path.duration));
+        asked_P_.push_back(place(path, path.duration));  // in the surface's frame, as it is now
+        asked_time_.push_back(since_begin(k, t.left));
     }
     if (asked_.empty()) return;
     ask();
@@ -473,10 +503,12 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
         const double angle2 = 2 * (1 - std::min(1.0, cosine));
         bends_[k].curvature = curvature;
         asked_[kept] = k;
+        asked_time_[kept] = asked_time_[j];
         asked_P_[kept++] = path.P + length * (1 - angle2 / 24) * (length > 0 ? middle.normalized() : middle);
     }
     asked_.resize(kept);
     asked_P_.resize(kept);
+    asked_time_.resize(kept);
 
     for (int step = 0; step < 2; ++step) {
         ask();
@@ -559,6 +591,7 @@ void Collisions::search()
             asked_.push_back(i);
             asked_paths_.push_back(paths_[i]);
             asked_paths_.back().radius = obstacle.radius[first_ + i];
+            asked_paths_.back().begin = since_begin(i, travellers_[i].left);
             if (obstacle_[i] >= 0) asked_paths_.back().duration = contact_[i].time;
         }
         ask_first_contacts(o);
@@ -671,6 +704,7 @@ void Collisions::correct(int o, std::span<const double> dt)
     const Obstacle& obstacle = obstacles_[o];
     asked_.clear();
     asked_P_.clear();
+    asked_time_.clear();
     for (std::size_t i = 0; i < size_; ++i) {
         const double radius = obstacle.radius[first_ + i];
         if (!obstacle.members[first_ + i] || stuck_[i]) continue;
@@ -678,12 +712,13 @@ void Collisions::correct(int o, std::span<const double> dt)
         if (((obstacle.bounds.min() - P_[i]).array() > radius).any()) continue;
         asked_.push_back(i);
         asked_P_.push_back(P_[i]);
+        asked_time_.push_back(since_begin(i, 0));
     }
     if (asked_.empty()) return;
     const auto ask = [&] {
         phi_.resize(asked_.size());
         gradients_.resize(asked_.size());
-        obstacle.shape->distance(asked_P_, phi_, gradients_);
+        obstacle.shape->distance_at(asked_P_, asked_time_, phi_, gradients_);
     };
     ask();
 
@@ -694,9 +729,9 @@ void Collisions::correct(int o, std::span<const double> dt)
         const double d = (obstacle.radius[first_ + i] - phi_[j]) / (slope > 0 ? slope : 1);
         if (!(d > 0)) continue;
         touch(i);
-        const Vec3d at = P_[i], v = v_[i], vc = Vec3d::Zero();
-        const Vec3d n = detail::unit_normal(gradients_[j], v);
-        const double vn = v.dot(n);
+        const Vec3d at = P_[i], v = v_[i], vc = obstacle.shape->velocity_at(at, asked_time_[j]);
+        const Vec3d n = detail::unit_normal(gradients_[j], v - vc);
+        const double vn = (v - vc).dot(n);
         const double bounce = obstacle.response == Response::Slide ? 0.0 : double(obstacle.bounce[first_ + i]);
         const double friction = obstacle.friction[first_ + i];
         if (obstacle.response == Response::Die || obstacle.response == Response::Stick) {
@@ -715,6 +750,7 @@ void Collisions::correct(int o, std::span<const double> dt)
             const Vec3d after = contact_response(v - back * a, vc, n, bounce, friction);
             P_[i] += back * (after - v + back * a);
             v_[i] = after + back * a;
+            asked_time_[again] = asked_time_[j];
             asked_[again] = i;
             asked_P_[again++] = P_[i];
         }
@@ -724,6 +760,7 @@ void Collisions::correct(int o, std::span<const double> dt)
     // Taken back by a time that the shape's curve makes inexact, a point may still be below the surface.
     asked_.resize(again);
     asked_P_.resize(again);
+    asked_time_.resize(again);
     if (again == 0) return;
     ask();
     for (std::size_t j = 0; j < again; ++j) {
@@ -794,7 +831,7 @@ void Collisions::leave_shape(Traveller& t, const Contact& contact, int o, const 
         // It has not come in by itself: out against what pulls, or upwards.
         const double pull = a.norm();
         const Vec3d down = pull > 0 ? Vec3d(a / pull) : Vec3d(-Vec3d::UnitY());
-        const Path fall{P_[t.i], down, Vec3d::Zero(), 0, obstacles_[o].radius[first_ + t.i]};
+        const Path fall{P_[t.i], down, Vec3d::Zero(), 0, obstacles_[o].radius[first_ + t.i], since_begin(t.i, t.left)};
         Contact above;
         obstacles_[o].shape->first_contact({&fall, 1}, {&above, 1});
         if (above.back == Contact::none) {
@@ -866,13 +903,19 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
     moved_.clear();
     for (const std::uint32_t i : touched_) {
         before_[i] = rounded[i];
-        if (P[i] != before_[i].cast<double>()) moved_.push_back(i);
+        const int on = surfaces_[i][0].obstacle;
+        if (P[i] != before_[i].cast<double>() || (on >= 0 && obstacles_[on].moves)) moved_.push_back(i);
     }
 
     // First onto the surface as far as double goes: what the way there has left of rounding is not to be seen.
     ask_surfaces([&](std::size_t i) { return P[i]; },
                  [&](std::size_t i, const Surface& surface, double f, double flush) {
-                     if (std::abs(f) <= flush) P[i] -= f * surface.n;
+                     // How a moving shape turns and speeds up within a step is not in the way of what rests on it.
+                     const Obstacle& obstacle = obstacles_[surface.obstacle];
+                     const double h = consequences_.h;
+                     const auto speed = [&](double time) { return obstacle.shape->velocity_at(P[i], time).norm(); };
+                     const double drawn = obstacle.moves ? h * (speed(0) + speed(h)) : 0;
+                     if (std::abs(f) <= flush + drawn) P[i] -= f * surface.n;
                  });
     cast(std::span<const Vec3d>(P), rounded);
     ask_surfaces([&](std::size_t i) { return Vec3d(rounded[i].cast<double>()); },

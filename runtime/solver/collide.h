@@ -32,6 +32,7 @@ struct Obstacle {
     const Shape* shape;
     Box3d bounds;
     double feature;  // m, the shape's smallest
+    bool moves;
     Method method;
     Response response;
     std::optional<double> record;  // m/s
@@ -57,6 +58,7 @@ struct Consequences {
     std::span<std::uint8_t> dead;  // set to 1 by a collider that kills; empty where none does
     Strided<float> mass;           // kg
     double time = 0;               // s since the start, at the end of the frame
+    double h = 0;                  // s, the frame's length
 };
 
 class Collisions {
@@ -125,6 +127,7 @@ private:
 
     void fly(Strided<Vec3d> a, std::span<const double> dt);
     Path free_path(std::size_t i, double dt) const;
+    double since_begin(std::size_t i, double left) const;
     Vec3d velocity_after(std::size_t i, double s, double dt) const;
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
     bool slides_on_plane(std::size_t i, const Vec3d& a, double dt);
@@ -145,7 +148,8 @@ private:
     void leave_shape(Traveller& t, const Contact& contact, int obstacle, const Vec3d& a);
     void settle(Traveller& t, const Support& support, const Vec3d& v);
     void touch(std::size_t i);
-    void hold_stuck();
+    void hold_stuck(std::span<const double> dt);
+    Vec3d normal_at(const Obstacle& obstacle, const Vec3d& P, double time) const;
     bool takes(Traveller& t, const Contact& contact, int obstacle);
     void count(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double speed, const Vec3d& change,
                double time, int obstacle);
@@ -195,6 +199,7 @@ private:
     std::vector<Path> asked_paths_;
     std::vector<Contact> answers_;
     std::vector<Vec3d> asked_P_, gradients_;
+    std::vector<double> asked_time_;  // s since the beginning of the frame
     std::vector<double> phi_;
 };
 

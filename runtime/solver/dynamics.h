@@ -13,6 +13,7 @@
 #include "runtime/error.h"
 #include "runtime/points/per_point.h"
 #include "runtime/points/point_set.h"
+#include "runtime/shapes/motion.h"
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
@@ -163,6 +164,7 @@ enum class Response { Bounce, Slide, Stick, Die };
 class Collider : public Dynamic {
 public:
     ShapePtr shape;
+    MotionPtr motion;  // of the shape, where it moves: then Solve asks for its way through the frame
     Method method = Method::Continuous;
     Response response = Response::Bounce;
     std::optional<double> record;    // m/s: contacts at least as fast are written to the hit attributes

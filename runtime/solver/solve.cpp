@@ -200,7 +200,8 @@ private:
 
     void advance_by_substeps(std::size_t begin, std::size_t end)
     {
-        Collisions collisions(scene_.obstacles, {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time});
+        Collisions collisions(scene_.obstacles,
+                              {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time, options_.h});
         Block block;
         double deepest = 0;
         for (; begin < end; begin += block_size) {

@@ -20,7 +20,9 @@ std::shared_ptr<const AnimatedMesh> AnimatedMesh::transformed(const MotionPtr& m
 MeshPtr AnimatedMesh::at(const FrameClock& clock, std::int64_t frame) const
 {
     const MeshPtr mesh = sequence_ ? sequence_->at(frame) : rest_;
-    return rapid::transformed(mesh, motion_->at(clock.at(static_cast<double>(frame))).affine());
+    const Pose pose = motion_->at(clock.at(static_cast<double>(frame)));
+    if (pose.translation.isZero(0) && pose.rotation.vec().isZero(0) && pose.scale == 1) return mesh;
+    return rapid::transformed(mesh, pose.affine());
 }
 
 }  // namespace rapid

@@ -258,6 +258,8 @@ private:
     {
         const Path now{there.X, there.velocity, Vec3d::Zero(), 0, path.radius / there.scale};
         rest_->first_contact({&now, 1}, {&contact, 1});
+        // What is flush with the surface for its frame, where the shape rests farther from the origin than it is now.
+        if (contact.time == Contact::none) return meet(w, 0, contact);
         contact.time = 0;
         contact.n = there.rotation * contact.n;
         contact.vc = w.seen.surface_velocity(0);

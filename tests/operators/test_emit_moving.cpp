@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <filesystem>
@@ -138,8 +139,8 @@ TEST_CASE("an impulse at the first frame is where the emitter begins, with the v
                    {"impulse", list({4.0})}});
     const PointSet born = emit.at_start();
     REQUIRE(born.size() == 4);
-    CHECK_THAT(born.P()[2], close_to({1, 0, 0}, 2 * speck_size));
-    CHECK_THAT(born.v()[2], close_to({6, 0, 0}, 1e-5));
+    CHECK_THAT(born.P()[2], close_to(Vec3f(1, 0, 0), 2 * speck_size));
+    CHECK_THAT(born.v()[2], close_to(Vec3f(6, 0, 0), 1e-5));
 }
 
 TEST_CASE("motion = \"linear\" is the straight line between two frames, \"none\" the place at the end, at rest",
@@ -156,8 +157,8 @@ TEST_CASE("motion = \"linear\" is the straight line between two frames, \"none\"
     for (int i = 0; i < 4; ++i) {
         const double t = (i + 1) / 4.0;
         CHECK_THAT(linear.P()[i], close_to(Vec3f(static_cast<float>(16 + 9 * t), 0, 0), 2 * speck_size));
-        CHECK_THAT(linear.v()[i], close_to({216, 0, 0}, 1e-4));
-        CHECK_THAT(none.P()[i], close_to({25, 0, 0}, 2 * speck_size));
+        CHECK_THAT(linear.v()[i], close_to(Vec3f(216, 0, 0), 1e-4));
+        CHECK_THAT(none.P()[i], close_to(Vec3f(25, 0, 0), 2 * speck_size));
         CHECK(none.v()[i] == Vec3f::Zero());
     }
 }
@@ -195,7 +196,7 @@ TEST_CASE("nothing is born along a jump, which is reported; cut says so, or that
     for (std::size_t i = 1; i < found.first.size(); ++i)
         if (found.first[i] - found.first[i - 1] < 40)
             widest = std::max(widest, std::abs(found.first[i] - found.first[i - 1] - 0.01));
-    CHECK(widest < 5e-6);
+    CHECK(widest < 2 * 3.9e-6 + speck_size);  // two places rounded at 51 m
 }
 
 TEST_CASE("a deforming mesh carries births along the ways of its faces, with their velocity and normals", "[emit]")
@@ -253,7 +254,7 @@ TEST_CASE("a moving sphere bears points on it wherever it is", "[emit]")
     for (std::size_t i = 0; i < born.size(); ++i) {
         const Vec3d center(2 * (3 + double(i + 1) / 100), 1, 0);
         CHECK((born.P()[i].cast<double>() - center).norm() == Approx(0.5).margin(1e-5));
-        CHECK_THAT(born.v()[i], close_to({48, 0, 0}, 1e-4));
+        CHECK_THAT(born.v()[i], close_to(Vec3f(48, 0, 0), 1e-4));
     }
 }
 
@@ -280,15 +281,17 @@ TEST_CASE("age can be the source's own attribute", "[emit]")
     CHECK(refusal(from) == "age = rapid.attr \"delya\": the source's point 0 has -1; ages are at least 0");
 }
 
-TEST_CASE("an animated mesh's births are the same bits on any number of threads, and whatever came before", "[emit]")
+TEST_CASE("births on a moving mesh are the same bits on any number of threads", "[emit]")
 {
     const auto source = moved(make_torus(1, 0.2, 20, Vec3d::Zero()),
                               places([](const Frame& f) { return Vec3d(std::sin(f.time), f.time, 0); }));
-    const Arguments arguments{{"source", source}, {"rate", 2e5}};
-    NodeTest one("emit", arguments), other("emit", arguments);
-    for (std::int64_t frame = 2; frame < 6; ++frame) one(frame);
-    for (std::int64_t frame = 2; frame < 6; ++frame) other(frame);
-    CHECK(values_of<Vec3f>(one(6), "P") == values_of<Vec3f>(other(6), "P"));
+    const auto born_on = [&](int threads) {
+        NodeTest emit("emit", {{"source", source}, {"rate", 1e6}});
+        PointSet born;
+        tbb::task_arena(threads).execute([&] { born = emit(2); });
+        return std::pair(values_of<Vec3f>(born, "P"), values_of<Vec3f>(born, "v"));
+    };
+    CHECK(born_on(1) == born_on(4));
 }
 
 }  // namespace rapid

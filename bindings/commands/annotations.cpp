@@ -261,6 +261,7 @@ std::string lua_type(const Param& param)
         {"false or number", "number|boolean"},
         {"vec3, attribute or shape", "rapid.Place|rapid.Attribute|rapid.Shape"},
         {"number or {min, max}", "number|number[]"},
+        {"number, {min, max} or rapid.attr", "number|number[]|rapid.Attribute"},
         {"numbers by frame", "table<integer, number>"},
         {"points", "rapid.Points"},
         {"ramp", "any[]"},

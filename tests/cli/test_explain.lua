@@ -69,7 +69,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
 
   it("leaves an attribute out with the reason, and tells what brings it in", function()
     local age = plan_of("falls.lua").attributes.age
-    assert.same({ name = "age", simulation = "create1", kept = false, bytes_per_point = 0,
+    assert.same({ name = "age", simulation = "create2", kept = false, bytes_per_point = 0,
                   why = "no node reads it and no output asks for it",
                   brought_in_by = 'p.age in a kernel, rapid.attr "age", or -o FILE:age' }, age)
     assert.is_true(plan_of("falls.lua -o a.####.csv:age").attributes.age.kept)

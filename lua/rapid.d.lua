@@ -109,6 +109,15 @@ local LevelSet = {}
 ---@param options? { grid?: string }
 ---@return rapid.LevelSet
 function LevelSet:write(path, options) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:union(other) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:intersect(other) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:subtract(other) end
 
 ---@class rapid
 local rapid = {}
@@ -220,13 +229,6 @@ function rapid.math.rotation_between(from, to) end
 ---@return rapid.LevelSet
 function rapid.levelset.box(options) end
 
----The union, intersection or difference of two level sets.
----@param levelset rapid.Shape  whose voxels the result has [level set, required]
----@param other rapid.Shape  the second [level set, required]
----@param how string  which [string, required]
----@return rapid.LevelSet
-function rapid.levelset.combine(levelset, other, how) end
-
 ---@class rapid.options.levelset_from_mesh
 ---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
@@ -249,10 +251,9 @@ function rapid.levelset.from_mesh(mesh, options) end
 function rapid.levelset.from_points(points, options) end
 
 ---The surface moved along its normal.
----@param levelset rapid.Shape  what to grow [level set, required]
 ---@param metres number  outwards; inwards where below 0 [number, m, required]
 ---@return rapid.LevelSet
-function rapid.levelset.offset(levelset, metres) end
+function LevelSet:offset(metres) end
 
 ---@class rapid.options.levelset_read
 ---@field grid? string  its name; the only level set, when not given [string]
@@ -264,20 +265,18 @@ function rapid.levelset.offset(levelset, metres) end
 function rapid.levelset.read(path, options) end
 
 ---The same surface on voxels of another size.
----@param levelset rapid.Shape  what to resample [level set, required]
 ---@param voxel number  edge of a voxel [number, m, above 0, required]
 ---@return rapid.LevelSet
-function rapid.levelset.resample(levelset, voxel) end
+function LevelSet:resample(voxel) end
 
 ---@class rapid.options.levelset_smooth
 ---@field width? integer  of the filter [integer, voxels, from 1 to 64, default 1]
 ---@field iterations? integer  times that it is applied [integer, from 1 to 1000, default 1]
 
 ---Rounds edges and fills creases.
----@param levelset rapid.Shape  what to smooth [level set, required]
 ---@param options? rapid.options.levelset_smooth
 ---@return rapid.LevelSet
-function rapid.levelset.smooth(levelset, options) end
+function LevelSet:smooth(options) end
 
 ---@class rapid.options.levelset_sphere
 ---@field radius? number  of the sphere [number, m, above 0, default 1]
@@ -589,10 +588,10 @@ function Node:drag(params) end
 ---@field count? integer|fun(frame: rapid.Frame): integer  points born a frame [integer, at least 0]
 ---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
 ---@field birth? "random"|"begin"|"end"|"even"|fun(frame: rapid.Frame): "random"|"begin"|"end"|"even"  when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time [string, one of random, begin, end, even, default "random"]
----@field age? number|number[]|rapid.Attribute|fun(frame: rapid.Frame): number|number[]|rapid.Attribute  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
+---@field age? any  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
 ---@field motion? "spline"|"linear"|"none"|fun(frame: rapid.Frame): "spline"|"linear"|"none"  the way of a moving source within a frame: a cubic through the frames around it, a straight line, or none, as if it were where it is at the frame's end, at rest [string, one of spline, linear, none, default "spline"]
 ---@field alpha? number|fun(frame: rapid.Frame): number  tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform [number, default 0.5]
----@field cut? integer[]|fun(frame: rapid.Frame): integer[]  frames to which the source jumps from the frame before: nothing is born on the way. Where it is not given, a step of 8 times those around it and half the source's size is a jump, and reported [list of frames, from -2147483647 to 2147483647]
+---@field cut? any  frames to which the source jumps from the frame before: nothing is born on the way. Where it is not given, a step of 8 times those around it and half the source's size is a jump, and reported [list of frames, from -2147483647 to 2147483647]
 ---@field inherit? number|fun(frame: rapid.Frame): number  fraction of the source's velocity that is added [number, default 1]
 ---@field velocity? rapid.Place|fun(frame: rapid.Frame): rapid.Place  mean direction and size [vec3, m/s, default {0, 0, 0}]
 ---@field speed? number|fun(frame: rapid.Frame): number  along the source's normal N, added to velocity [number, m/s, default 0]

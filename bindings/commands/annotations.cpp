@@ -123,6 +123,15 @@ local LevelSet = {}
 ---@param options? { grid?: string }
 ---@return rapid.LevelSet
 function LevelSet:write(path, options) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:union(other) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:intersect(other) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:subtract(other) end
 
 ---@class rapid
 local rapid = {}
@@ -382,6 +391,10 @@ std::string maker_of(const Maker& maker)
     for (const Param& param : maker.params)
         (param.required && maker.name != "mesh.from" ? first : named).push_back(param);
 
+    // levelset:offset(metres): a tool of the value that it takes first.
+    const bool tool = !first.empty() && first.front().name == family;
+    if (tool) first.erase(first.begin());
+
     std::string text, arguments;
     if (!named.empty())
         text += fmt::format("\n---@class rapid.options.{}_{}\n{}", family, own, fields_of(named, false));
@@ -394,7 +407,8 @@ std::string maker_of(const Maker& maker)
         text += fmt::format("---@param options? rapid.options.{}_{}\n", family, own);
         arguments += arguments.empty() ? "options" : ", options";
     }
-    return text + fmt::format("---@return {}\nfunction rapid.{}({}) end\n", results.at(family), called, arguments);
+    return text + fmt::format("---@return {}\nfunction {}({}) end\n", results.at(family),
+                              tool ? "LevelSet:" + own : "rapid." + called, arguments);
 }
 
 }  // namespace
@@ -405,7 +419,7 @@ std::string annotations_of(const Registry& registry)
     for (const Maker* maker : all_makers()) {
         const bool told_above = maker->name == "motion.translate" || maker->name == "motion.product" ||
                                 maker->name == "transform" || maker->name == "points.from" ||
-                                maker->name == "levelset.write";
+                                maker->name == "levelset.write" || maker->name == "levelset.combine";
         if (!told_above) text += maker_of(*maker);
     }
     text += point_class();

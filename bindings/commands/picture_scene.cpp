@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "runtime/shapes/shape.h"
+#include "runtime/shapes/animated.h"
 
 namespace rapid {
 namespace {
@@ -26,20 +26,26 @@ std::optional<PictureScene::Plane> plane_of(const Shape& shape)
 
 }  // namespace
 
-void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, PictureScene::Body::Role role)
+void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place,
+                      PictureScene::Body::Role role)
 {
+    const bool moved = !place.matrix().isIdentity(0);
     if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) {
-        scene.bodies.push_back({mesh, role});
+        scene.bodies.push_back({moved ? transformed(mesh, place) : mesh, role});
         return;
     }
     const auto shape = std::dynamic_pointer_cast<const Shape>(object);
     if (!shape) return;
     const auto [entry, fresh] = surfaces_.try_emplace(object);
     if (fresh) entry->second = shape->surface();
-    if (entry->second)
-        scene.bodies.push_back({entry->second, role});
-    else if (const std::optional<PictureScene::Plane> plane = plane_of(*shape))
+    if (entry->second) {
+        scene.bodies.push_back({moved ? transformed(entry->second, place) : entry->second, role});
+    } else if (std::optional<PictureScene::Plane> plane = plane_of(*shape)) {
+        const Vec3d on = place * (plane->offset * plane->normal);
+        plane->normal = (place.linear() * plane->normal).normalized();
+        plane->offset = plane->normal.dot(on);
         scene.planes.push_back(*plane);
+    }
 }
 
 std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
@@ -52,15 +58,30 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
         const auto role =
             planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
         const PlannedSimulation& simulation = plan_.simulations[planned.simulation];
-        const Frame now{static_cast<double>(frame), static_cast<double>(frame - simulation.start) / simulation.fps,
-                        1 / simulation.fps};
+        const FrameClock clock{simulation.fps, simulation.start};
+        const Frame now = clock.at(static_cast<double>(frame));
+        Eigen::Affine3d place = Eigen::Affine3d::Identity();
+        if (const auto transform = planned.node->arguments.find("transform");
+            transform != planned.node->arguments.end()) {
+            MotionPtr motion;
+            read_value(*planned.node->type->find("transform"), transform->second, motion);
+            if (motion) place = motion->at(now).affine();
+            moves = moves || (motion && motion->varies());
+        }
         for (const auto& [name, value] : planned.node->arguments) {
+            if (name == "transform") continue;
             const FrameFunction* function = value.function();
             const Value given = function ? function->call(now) : value;
-            const ObjectPtr* object = given.get<ObjectPtr>();
-            if (!object) continue;
             moves = moves || function;
-            add(*scene, *object, role);
+            if (const auto body = given.object<AnimatedMesh>()) {
+                moves = true;
+                add(*scene, body->at(clock, frame), place, role);
+            } else if (const auto shape = given.object<AnimatedShape>()) {
+                moves = true;
+                add(*scene, shape->rest(), place * shape->motion()->at(now).affine(), role);
+            } else if (const ObjectPtr* object = given.get<ObjectPtr>()) {
+                add(*scene, *object, place, role);
+            }
         }
     }
     if (!moves) still_ = scene;

@@ -13,15 +13,16 @@ class SceneOfPlan {
 public:
     explicit SceneOfPlan(const Plan& plan) : plan_(plan) {}
 
-    // Arguments that are functions are asked at the frame's time. Level sets are turned into meshes, each once.
+    // Arguments that are functions, and motions, are asked at the frame's time. Level sets are turned into meshes, each
+    // once.
     std::shared_ptr<const PictureScene> at(std::int64_t frame);
 
 private:
-    void add(PictureScene& scene, const ObjectPtr& object, PictureScene::Body::Role role);
+    void add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place, PictureScene::Body::Role role);
 
     const Plan& plan_;
     std::map<ObjectPtr, MeshPtr> surfaces_;
-    std::shared_ptr<const PictureScene> still_;  // where no argument is a function
+    std::shared_ptr<const PictureScene> still_;  // where nothing moves
 };
 
 }  // namespace rapid

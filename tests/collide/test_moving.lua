@@ -1,5 +1,6 @@
 -- Colliders that move.
 local scene = require "testing.scene"
+local command = require "testing.command"
 
 local function run(chain, points, frames, substeps)
   return scene.run(([[
@@ -89,6 +90,31 @@ return rapid.create { fps = 24, seed = 3 }
       for _, threads in ipairs { 2, 7 } do
         assert.same_points(one, scene.run(chain, { frames = {36, 36}, threads = threads })[36])
       end
+    end
+  end)
+end)
+
+describe("a picture", function()
+  it("shows a shape where it is at its frame", function()
+    local folder = command.folder()
+    local function pictures(transform)
+      folder:write("scene.lua", ([[
+local rapid = require "rapid"
+local box = rapid.shape.box { size = {1, 0.2, 0.4} }
+return rapid.create { points = rapid.points.from { P = {{2, 2, 0}} } } :collide { shape = box %s } :solve {}
+]]):format(transform))
+      local ran = command.rapid("run scene.lua -f 1-9x8 --quiet --size 160x90 --camera 0,2,5,0,0,0 -o a.####.png",
+        { cwd = folder.path })
+      assert.equal("", ran.stderr)
+      return folder:read "a.0001.png", folder:read "a.0009.png"
+    end
+    local first, last = pictures ""
+    assert.equal(first, last)
+    for _, transform in ipairs { ", transform = { [1] = rapid.scale(1), [9] = rapid.translate(0, 1, 0) }",
+        ":transform { [1] = rapid.scale(1), [9] = rapid.translate(0, 1, 0) }" } do
+      local begin, moved = pictures(transform)
+      assert.equal(first, begin)
+      assert.not_equal(begin, moved)
     end
   end)
 end)

@@ -104,15 +104,18 @@ std::string text_of(const Explanation& plan, bool kept)
         if (node.kept == kept)
             nodes.add(node.name, kept ? node.evaluated : "",
                       node.changes.empty() ? node.why : fmt::format("{}; {}", node.why, node.changes));
-    for (const auto& attribute : plan.attributes)
-        if (attribute.kept == kept)
-            attributes.add(
-                shown(attribute, plan), kept ? bytes(attribute.bytes_per_point) : "",
-                kept ? attribute.why : fmt::format("{}; {} brings it in", attribute.why, attribute.brought_in_by));
+    for (const auto& attribute : plan.attributes) {
+        if (attribute.kept != kept) continue;
+        const bool usual = kept || attribute.brought_in_by == usual_way_in(attribute.name);
+        attributes.add(
+            shown(attribute, plan), kept ? bytes(attribute.bytes_per_point) : "",
+            usual ? attribute.why : fmt::format("{}; {} brings it in", attribute.why, attribute.brought_in_by));
+    }
     for (const auto& stage : plan.stages)
         if (stage.kept == kept) stages.add(stage.name, "", stage.why);
-    const std::string of_attributes =
-        kept ? fmt::format(" attributes, {} bytes a point at most", plan.bytes_per_point()) : " attributes";
+    const std::string of_attributes = kept
+                                          ? fmt::format(" attributes, {} bytes a point at most", plan.bytes_per_point())
+                                          : fmt::format(" attributes ({} brings one in)", usual_way_in("NAME"));
     return (kept ? "KEPT\n" : "\nLEFT OUT\n") + nodes.text(" nodes") + attributes.text(of_attributes) +
            stages.text(" stages");
 }

@@ -73,7 +73,7 @@ std::string what_brings_in(const PlannedAttribute& attribute)
         const std::string name = attribute.name.substr(group_prefix.size());
         return fmt::format("p:within \"{0}\" in a kernel, group = \"{0}\" of a node, or -o FILE:{0}", name);
     }
-    return fmt::format("p.{0} in a kernel, rapid.attr \"{0}\", or -o FILE:{0}", attribute.name);
+    return usual_way_in(attribute.name);
 }
 
 template <class T>
@@ -89,6 +89,11 @@ std::size_t Explanation::bytes_per_point() const
     std::size_t bytes = 0;
     for (const ExplainedAttribute& attribute : attributes) bytes += attribute.bytes_per_point;
     return bytes;
+}
+
+std::string usual_way_in(const std::string& attribute)
+{
+    return fmt::format("p.{0} in a kernel, rapid.attr \"{0}\", or -o FILE:{0}", attribute);
 }
 
 Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)

@@ -44,6 +44,9 @@ struct Explanation {
     std::size_t bytes_per_point() const;
 };
 
+// What brings in an attribute that is left out, of almost all of them.
+std::string usual_way_in(const std::string& attribute);
+
 // outputs: what the run writes besides its `:write` nodes, as the user named it.
 Explanation explain(const Plan& plan, const std::vector<std::string>& outputs);
 

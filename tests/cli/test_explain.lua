@@ -73,6 +73,8 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
                   why = "no node reads it and no output asks for it",
                   brought_in_by = 'p.age in a kernel, rapid.attr "age", or -o FILE:age' }, age)
     assert.is_true(plan_of("falls.lua -o a.####.csv:age").attributes.age.kept)
+    assert.truthy(explain("falls.lua").stdout:find(
+      'attributes (p.NAME in a kernel, rapid.attr "NAME", or -o FILE:NAME brings one in)', 1, true))
   end)
 
   it("keeps an attribute for who reads it or asks for it", function()

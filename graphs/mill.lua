@@ -1,7 +1,7 @@
 -- mill: grain falls on a turning cross of paddles, is thrown off, and drifts away in the wind.
 --
--- Shows:  a collider that moves (transform, a function of the frame that is asked between frames too), forces, an action
---         inside the solver, and a tolerance in place of a number of sub-steps.
+-- Shows:  a collider that moves (transform, a function of the frame that is asked between frames too), forces, an
+--         action inside the solver, and a tolerance in place of a number of sub-steps.
 -- Proves: no grain is inside a paddle or below the floor, and the error of each frame is what was asked for
 --         (tests/graphs/test_mill.lua).
 -- Run:    rapid run graphs/mill.lua -f 1-96 -o /tmp/mill.####.png

@@ -69,26 +69,26 @@ namespace {
 ordered_json to_json(const FrameStatistics& frame)
 {
     const StageSeconds& s = frame.seconds;
-    ordered_json error;
+    ordered_json json = {
+        {"frame", frame.frame},
+        {"points", frame.points},
+        {"born", frame.born},
+        {"died", frame.died},
+        {"substeps", frame.substeps},
+        {"seconds",
+         {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}}};
     if (frame.error)
-        error = {{"position_p50", frame.error->p50},
-                 {"position_p95", frame.error->p95},
-                 {"position_max", frame.error->max},
-                 {"local", true}};
-    return {{"frame", frame.frame},
-            {"points", frame.points},
-            {"born", frame.born},
-            {"died", frame.died},
-            {"substeps", frame.substeps},
-            {"seconds",
-             {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}},
-            {"error", error},
-            {"penetration_max", frame.penetration_max},
-            {"constraint_residual_max", frame.constraint_residual_max},
-            {"collisions", frame.collisions},
-            {"contact_limit", frame.contact_limit},
-            {"trapped", frame.trapped},
-            {"beyond_tolerance", frame.beyond_tolerance}};
+        json["error"] = {{"position_p50", frame.error->p50},
+                         {"position_p95", frame.error->p95},
+                         {"position_max", frame.error->max},
+                         {"local", true}};
+    json["penetration_max"] = frame.penetration_max;
+    json["constraint_residual_max"] = frame.constraint_residual_max;
+    json["collisions"] = frame.collisions;
+    json["contact_limit"] = frame.contact_limit;
+    json["trapped"] = frame.trapped;
+    json["beyond_tolerance"] = frame.beyond_tolerance;
+    return json;
 }
 
 // "warning  points did so 5 times, in 3 frames from 7 to 48"; nothing where no frame counted any.

@@ -76,7 +76,7 @@ TEST_CASE("points that are given a life have an age", "[attribute]")
     GraphTest graph;
     const Value place = ObjectPtr(source_of(points_at({{0, 0, 0}})));
     const auto create = graph.node("create", {{"points", place}});
-    graph.run(graph.node("hold", {}, {graph.node("attribute", {{"life", 2.0}}, {create})}));
+    graph.run(graph.node("solve", {}, {graph.node("attribute", {{"life", 2.0}}, {create})}));
     const PointSet points = graph.next_frame();
     CHECK(values_of<float>(points, "life") == std::vector<float>{2});
     CHECK(values_of<float>(points, "age") == std::vector<float>{0});

@@ -208,6 +208,7 @@ TEST_CASE("ids that are seen in runs take the memory of the runs", "[merge]")
 TEST_CASE("merge takes none of what the plan leaves out", "[merge]")
 {
     const auto here = simulation(), there = simulation();
+    here->next_id = 1;
     PointSet other = points_at({{1, 0, 0}});
     other.add({"heat", 1.0f});
     other.add({"wet", 1.0f});

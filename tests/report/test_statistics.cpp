@@ -91,7 +91,22 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
         "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12,
-        "contact_limit": 3, "trapped": 2 })"));
+        "contact_limit": 3, "trapped": 2, "beyond_tolerance": 0 })"));
+}
+
+TEST_CASE("estimated errors are told by their median, 95 % and largest, in the file and in the summary", "[report]")
+{
+    FrameResult result = frame_result();
+    for (int i = 100; i >= 0; --i) result.figures.errors.push_back(i * 1e-4);
+    RunStatistics run = run_of({});
+    run.frames.push_back(statistics_of(result));
+    const ordered_json error = ordered_json::parse(to_json(run))["frames"][0]["error"];
+    CHECK(error["position_p50"] == 50 * 1e-4);
+    CHECK(error["position_p95"] == 95 * 1e-4);
+    CHECK(error["position_max"] == 100 * 1e-4);
+    CHECK(error["local"] == true);
+    CHECK_THAT(summary(run),
+               Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
 }
 
 TEST_CASE("a run that ended before its first frame has an empty list of frames", "[report]")

@@ -4,8 +4,7 @@
 // it meets these, which the process can't take down again:
 //
 //   Landlock    it reads `readable` and what is below, Rapid's own files and the system's libraries, creates and
-//   changes
-//               files below `writable`, and nothing else
+//               changes files below `writable`, and nothing else
 //   seccomp     it opens no socket, starts no process, and looks into no other one
 //   limits      no core file; no more memory of its own than the machine has
 //

@@ -60,7 +60,7 @@ std::vector<std::uint64_t> deaths(double fps, std::size_t frames, float age, boo
 {
     std::vector<float> lives;
     for (std::size_t n = 1; n <= frames; ++n) lives.push_back(static_cast<float>(double(n) / fps));
-    PointSet points = test::points_at(std::vector<Vec3f>(frames));
+    PointSet points = test::points_at(std::vector<Vec3f>(frames, Vec3f::Zero()));
     points.add({"age", age});
     points.set("life", Column<float>(std::span<const float>(lives)));
     NodeTest solve("solve", {}, test::simulation(fps));

@@ -22,7 +22,6 @@
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
-inline thread_local long g_walks = 0, g_steps = 0, g_fc = 0;
 
 // How near to the surface a point is flush with it, m: what rounding its position to single precision can do (ulp(x) is
 // at most 2^-23 |x|, and half of it an axis), and the field's own error. A point that a frame leaves on the surface

@@ -35,6 +35,19 @@ inline double flush_within(const Vec3d& P, double radius, double rounding)
 // this a point that slides could meet its own floor again and again, and get nowhere.
 inline bool is_along(double vn, const Vec3d& v) { return vn < 0 && vn * vn < 0x1p-96 * v.squaredNorm(); }
 
+// The first s >= 0 at which f + vn s + an s²/2 goes from above 0 to below, for f >= 0; infinite where it does not. Of
+// the two forms of the root the one without cancellation.
+inline double first_fall_through(double f, double vn, double an)
+{
+    const double discriminant = vn * vn - 2 * an * f;
+    if (an >= 0) {
+        if (vn >= 0 || discriminant < 0) return Contact::none;
+        return 2 * f / (std::sqrt(discriminant) - vn);
+    }
+    const double root = std::sqrt(discriminant);
+    return vn > 0 ? (vn + root) / -an : 2 * f / (root - vn);
+}
+
 inline Vec3d place(const Path& path, double s) { return path.P + s * (path.v + 0.5 * s * path.a); }
 
 // Whether a path can come near a box, by the box around the path. `end` is where it ends; on the way it is off the

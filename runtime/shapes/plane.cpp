@@ -20,19 +20,6 @@ struct PlaneSampler {
     }
 };
 
-// The first s >= 0 at which f + vn s + an s²/2 goes from above 0 to below, for f >= 0; infinite where it does not. Of
-// the two forms of the root the one without cancellation.
-double first_fall_through(double f, double vn, double an)
-{
-    const double discriminant = vn * vn - 2 * an * f;
-    if (an >= 0) {
-        if (vn >= 0 || discriminant < 0) return Contact::none;
-        return 2 * f / (std::sqrt(discriminant) - vn);
-    }
-    const double root = std::sqrt(discriminant);
-    return vn > 0 ? (vn + root) / -an : 2 * f / (root - vn);
-}
-
 class Plane final : public Shape {
 public:
     Plane(const Vec3d& n, double offset) : sampler_{n, offset}
@@ -47,6 +34,7 @@ public:
 
     std::string_view kind() const override { return "plane"; }
     Box3d bounds() const override { return bounds_; }
+    std::optional<HalfSpace> half_space() const override { return HalfSpace{sampler_.n, sampler_.offset}; }
 
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
     {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "runtime/object.h"
@@ -39,6 +40,12 @@ struct Contact {
     // without a velocity.
     double depth = 0;
     double back = none;
+};
+
+// The points with n · x <= offset, m.
+struct HalfSpace {
+    Vec3d n;
+    double offset;
 };
 
 class Mesh;
@@ -75,6 +82,9 @@ public:
 
     // The first contact of each path; shapes [n], [n].
     virtual void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const = 0;
+
+    // What it is, where it is one: whoever asks about many points then need not.
+    virtual std::optional<HalfSpace> half_space() const { return std::nullopt; }
 
     // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow band.
     virtual double band() const { return std::numeric_limits<double>::infinity(); }

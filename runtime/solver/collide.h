@@ -33,6 +33,7 @@ struct Obstacle {
     Box3d bounds;
     double feature;  // m, the shape's smallest
     bool moves;
+    std::optional<HalfSpace> plane;
     Method method;
     Response response;
     std::optional<double> record;  // m/s
@@ -68,8 +69,8 @@ public:
     {
     }
 
-    // A new block: the points [first, first + size) of the set.
-    void begin(std::size_t first, std::size_t size);
+    // A new block, of the points at these places of the set.
+    void begin(std::span<const std::uint32_t> places);
 
     void advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& drift);
 
@@ -131,12 +132,14 @@ private:
     Vec3d velocity_after(std::size_t i, double s, double dt) const;
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
     bool slides_on_plane(std::size_t i, const Vec3d& a, double dt);
+    bool passes_plane(std::size_t i, int obstacle, const Vec3d& a, double dt);
     bool goes_on(Traveller& t, const Vec3d& a, double dt);
     bool plan(Traveller& t, Path& path, const Vec3d& a, double dt);
     bool chatters(Traveller& t);
     void bend(Strided<Vec3d> a, std::span<const double> dt);
     void bend_on(int obstacle, Strided<Vec3d> a, std::span<const double> dt);
-    bool may_reach_shape(std::size_t i, const Path& path, int obstacle) const;
+    bool may_reach_shape(std::size_t i, const Vec3d& from, const Vec3d& to, const Vec3d& a, double duration,
+                         std::size_t obstacle) const;
     bool may_meet(const Traveller& t, const Path& path, int obstacle) const;
     void search();
     void ask_first_contacts(int obstacle);
@@ -162,7 +165,8 @@ private:
 
     std::span<const Obstacle> obstacles_;
     const Consequences consequences_;
-    std::size_t first_ = 0, size_ = 0;
+    std::span<const std::uint32_t> places_;  // of the block's points, in the set
+    std::size_t size_ = 0;
     std::vector<double> widest_;  // of each obstacle, the largest radius in the block, m
 
     std::span<Vec3d> P_, v_;
@@ -180,6 +184,7 @@ private:
     std::vector<std::uint8_t> stuck_;    // whether it is held by a shape that it sticks to
     std::vector<Vec3d> start_;           // where it was at the beginning of the sub-step
     std::vector<std::uint8_t> met_;      // whether it has met a shape since begin()
+    std::vector<int> near_count_;        // how many shapes it may come near
     std::vector<int> obstacle_;          // the first that the path meets, or -1
     std::vector<Contact> contact_;       // with it
     std::vector<Traveller> travellers_;  // and the next three of those that have met something
@@ -189,9 +194,13 @@ private:
     std::vector<Vec3f> before_;                     // at the beginning of the frame
 
     // Places in the block.
-    std::vector<std::uint32_t> near_;     // those whose free path may come near a shape
-    std::vector<std::uint32_t> touched_;  // those that have met a shape since begin()
-    std::vector<std::uint32_t> moved_;    // of these, those that are elsewhere than at the beginning of the frame
+    std::vector<std::vector<std::uint32_t>> near_;  // by obstacle, those whose free path may come near it
+    std::vector<std::uint32_t> touched_;            // those that have met a shape since begin()
+    // Of these, those that are elsewhere on a surface than at the beginning of the frame, by the surface's side and
+    // obstacle.
+    std::array<std::vector<std::vector<std::uint32_t>>, 2> moved_on_;
+    std::vector<std::uint32_t> held_;              // those that are stuck
+    std::vector<std::uint32_t> meeting_;           // those whose free path meets a shape
     std::vector<std::uint32_t> going_, going_on_;  // those whose sub-step is not over
 
     // What a shape is asked.

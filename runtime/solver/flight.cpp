@@ -64,6 +64,12 @@ void Flight::begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<V
     }
 }
 
+void Flight::exchange(std::span<Vec3d> P, std::span<Vec3d> v)
+{
+    std::swap_ranges(P_.begin(), P_.end(), coordinates(P));
+    std::swap_ranges(v_.begin(), v_.end(), coordinates(v));
+}
+
 void Flight::find_near(const Box3d& box, double radius, std::vector<std::uint32_t>& near) const
 {
     near.clear();

@@ -17,7 +17,17 @@ public:
     // Shapes [n]; m, m/s, m/s², s. The accelerations are constant within the sub-step.
     void begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<Vec3d> a, std::span<const double> dt);
 
-    // The state at the end.
+    // For a point whose state at the end is another than that of its path.
+    void end_with(std::size_t i, const Vec3d& P, const Vec3d& v)
+    {
+        P_.segment<3>(3 * i) = P;
+        v_.segment<3>(3 * i) = v;
+    }
+
+    // Gives the states at the end for those at the beginning.
+    void exchange(std::span<Vec3d> P, std::span<Vec3d> v);
+
+    // The state that it has: at the end, and after exchange() at the beginning.
     Vec3d P(std::size_t i) const { return P_.segment<3>(3 * i); }
     Vec3d v(std::size_t i) const { return v_.segment<3>(3 * i); }
 

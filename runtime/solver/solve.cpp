@@ -7,10 +7,12 @@
 #include <cmath>
 #include <exception>
 #include <mutex>
+#include <numeric>
 
 #include "runtime/parallel.h"
 #include "runtime/solver/collide.h"
 #include "runtime/solver/damped_motion.h"
+#include "runtime/solver/fall.h"
 
 namespace rapid {
 namespace {
@@ -45,7 +47,7 @@ struct Scene {
     Strided<float> mass{&unit_mass, 0};
 
     bool is_uniform() const { return forces.empty() && !force; }
-    bool only_falls() const { return is_uniform() && actions.empty() && obstacles.empty(); }
+    bool falls() const { return is_uniform() && actions.empty(); }
 };
 
 template <class F>
@@ -124,7 +126,8 @@ public:
             const Column<std::uint8_t>* group = points.find_group(options.group);
             members_ = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};
         }
-        if (points.has("dt")) own_dt_ = points.column<float>("dt").read();
+        time_.h = options.h;
+        if (points.has("dt")) time_.own = points.column<float>("dt").read();
     }
 
     SolveResult run()
@@ -143,71 +146,43 @@ public:
     }
 
 private:
-    // The whole frame in double, whether or not newborn points make a column of it.
-    double dt(std::size_t i) const
-    {
-        if (!own_dt_.data || own_dt_[i] == static_cast<float>(options_.h)) return options_.h;
-        return own_dt_[i];
-    }
-
     void advance(std::size_t begin, std::size_t end)
     {
         require_finite(begin, end, "is", "before the step; a node before this one made it so");
-        if (!scene_.only_falls() || members_.data)
-            advance_by_substeps(begin, end);
-        else if (!own_dt_.data)
-            fall(begin, end);
-        else
-            fall_for_own_time(begin, end);
+        std::vector<std::uint32_t> places;
+        if (scene_.falls() && !members_.data) {
+            fall(begin, end, places);
+        } else {
+            places.resize(end - begin);
+            std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
+        }
+        if (!places.empty()) advance_by_substeps(places);
         require_finite(begin, end, "became", "in the step; the frame was not written");
     }
 
-    // Nothing but one acceleration: the parabola is exact, and sub-steps would only repeat it. Three constants recur
-    // along the packed coordinates.
-    void fall(std::size_t begin, std::size_t end)
+    // Those that are not near a shape at any time of the frame. The others are listed.
+    void fall(std::size_t begin, std::size_t end, std::vector<std::uint32_t>& near)
     {
-        constexpr std::size_t period = 24;  // whole vectors of 8, whole points
-        const double dt = options_.h;
-        double half[period], gain[period];
-        for (std::size_t l = 0; l < period; ++l) {
-            half[l] = 0.5 * dt * scene_.uniform[l % 3];
-            gain[l] = dt * scene_.uniform[l % 3];
+        Fall fall(scene_.uniform);
+        for (const Obstacle& obstacle : scene_.obstacles) {
+            float widest = 0;
+            for (std::size_t i = begin; i < (obstacle.radius.stride ? end : begin + 1); ++i)
+                widest = std::max(widest, obstacle.radius[i]);
+            fall.avoid(obstacle.bounds, widest);
         }
-        float* P = P_[begin].data();
-        float* v = v_[begin].data();
-        const auto fall_by = [&](std::size_t l) {
-            const double speed = v[l];
-            P[l] = static_cast<float>(P[l] + dt * (speed + half[l]));
-            v[l] = static_cast<float>(speed + gain[l]);
-        };
-        std::size_t left = 3 * (end - begin);
-        for (; left >= period; left -= period, P += period, v += period)
-            for (std::size_t l = 0; l < period; ++l) fall_by(l);
-        for (std::size_t l = 0; l < left; ++l) fall_by(l);
+        fall.advance(P_, v_, time_, begin, end, near);
     }
 
-    void fall_for_own_time(std::size_t begin, std::size_t end)
-    {
-        for (std::size_t i = begin; i < end; ++i) {
-            const double dt = this->dt(i);
-            for (int k = 0; k < 3; ++k) {
-                const double speed = v_[i][k];
-                P_[i][k] = static_cast<float>(P_[i][k] + dt * (speed + 0.5 * dt * scene_.uniform[k]));
-                v_[i][k] = static_cast<float>(speed + dt * scene_.uniform[k]);
-            }
-        }
-    }
-
-    void advance_by_substeps(std::size_t begin, std::size_t end)
+    // Points of one chunk, in order; all of it where forces or actions act.
+    void advance_by_substeps(std::span<const std::uint32_t> places)
     {
         Collisions collisions(scene_.obstacles,
                               {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time, options_.h});
         Block block;
         double deepest = 0;
-        for (; begin < end; begin += block_size) {
-            const std::size_t size = std::min(block_size, end - begin);
-            block.begin(*this, begin, size);
-            if (!scene_.obstacles.empty()) collisions.begin(begin, size);
+        for (std::size_t begin = 0; begin < places.size(); begin += block_size) {
+            block.begin(*this, places.subspan(begin, std::min(block_size, places.size() - begin)));
+            if (!scene_.obstacles.empty()) collisions.begin(block.places);
             for (int substep = 0; substep < options_.substeps; ++substep) {
                 const Strided<Vec3d> a = accelerations(block, substep);
                 const auto drift = [&](std::span<const double> dt, double halves_after) {
@@ -231,13 +206,15 @@ private:
                     drift(block.half, halves_after);
                 }
             }
-            const std::span<Vec3f> P = P_.subspan(begin, size), v = v_.subspan(begin, size);
             if (members_.data) block.restore_others(*this);
-            cast(std::span<const Vec3d>(block.v), v);
             if (!scene_.obstacles.empty())
-                deepest = std::max(deepest, collisions.round(block.P, P));
+                deepest = std::max(deepest, collisions.round(block.P, block.rounded));
             else
-                cast(std::span<const Vec3d>(block.P), P);
+                cast(std::span<const Vec3d>(block.P), block.rounded);
+            for (std::size_t i = 0; i < block.places.size(); ++i) {
+                P_[block.places[i]] = block.rounded[i];
+                v_[block.places[i]] = block.v[i].cast<float>();
+            }
         }
         const std::scoped_lock lock(mutex_);
         result_.collisions += collisions.contacts;
@@ -248,33 +225,39 @@ private:
 
     // The state of a block within the frame.
     struct Block {
-        std::size_t first = 0;
+        std::span<const std::uint32_t> places;  // in the set
         std::vector<Vec3d> P, v, middle, a;
+        std::vector<Vec3f> rounded;  // P at the beginning of the frame, and at its end
         std::vector<double> dt, time, half, after;
         std::vector<Vec3d> force;
         std::vector<Linear> linear;  // empty where no force has such a part
         std::vector<Damped> damped;  // the way of each point with it
         Forces one;
 
-        void begin(const Step& step, std::size_t at, std::size_t size)
+        void begin(const Step& step, std::span<const std::uint32_t> at)
         {
-            first = at;
+            places = at;
+            const std::size_t size = at.size();
             P.resize(size);
             v.resize(size);
             dt.resize(size);
-            cast(std::span<const Vec3f>(step.P_.subspan(at, size)), P);
-            cast(std::span<const Vec3f>(step.v_.subspan(at, size)), v);
+            rounded.resize(size);
             const double substeps = step.options_.substeps;
-            for (std::size_t i = 0; i < size; ++i) dt[i] = step.dt(at + i) / substeps;
+            for (std::size_t i = 0; i < size; ++i) {
+                rounded[i] = step.P_[at[i]];
+                P[i] = rounded[i].cast<double>();
+                v[i] = step.v_[at[i]].cast<double>();
+                dt[i] = step.time_(at[i]) / substeps;
+            }
         }
 
         // Points that are not of the group stay as they were.
         void restore_others(const Step& step)
         {
             for (std::size_t i = 0; i < P.size(); ++i) {
-                if (step.members_[first + i]) continue;
-                P[i] = step.P_[first + i].cast<double>();
-                v[i] = step.v_[first + i].cast<double>();
+                if (step.members_[places[i]]) continue;
+                P[i] = step.P_[places[i]].cast<double>();
+                v[i] = step.v_[places[i]].cast<double>();
             }
         }
 
@@ -339,7 +322,7 @@ private:
         block.middle.resize(size);
         for (std::size_t i = 0; i < size; ++i) block.middle[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
         block.set_time(options_, substep);
-        const Chunk chunk{points_, block.first, block.middle, block.v, block.dt, block.time, substep};
+        const Chunk chunk{points_, block.places.front(), block.middle, block.v, block.dt, block.time, substep};
         for (const LocalForce& local : scene_.forces) {
             block.one.reset(size);
             if (local.uniform)
@@ -347,12 +330,12 @@ private:
             else
                 at_node(*local.force, [&] { local.force->contribute(chunk, block.one); });
             for (std::size_t i = 0; i < size; ++i) {
-                if (!local.all && !local.members[block.first + i]) continue;
+                if (!local.all && !local.members[block.places[i]]) continue;
                 const Vec3d a = block.one.acceleration(i);
                 if (!a.allFinite())
                     throw Error(
                         fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written",
-                                    name_of(block.first + i), a.x(), a.y(), a.z()))
+                                    name_of(block.places[i]), a.x(), a.y(), a.z()))
                         .in_node(local.force->node)
                         .at(local.force->location);
                 block.a[i] += a;
@@ -360,7 +343,7 @@ private:
             if (!block.one.has_linear()) continue;
             if (block.linear.empty()) block.linear.resize(size);
             for (std::size_t i = 0; i < size; ++i)
-                if (local.all || local.members[block.first + i]) block.linear[i].add(block.one.linear(i));
+                if (local.all || local.members[block.places[i]]) block.linear[i].add(block.one.linear(i));
         }
         return {block.a.data(), 1};
     }
@@ -369,7 +352,7 @@ private:
     void stop_dead(Block& block) const
     {
         for (std::size_t i = 0; i < block.dt.size(); ++i)
-            if (dead_[block.first + i]) block.dt[i] = 0;
+            if (dead_[block.places[i]]) block.dt[i] = 0;
     }
 
     // All actions, in the order of the chain, on the points where they are in the middle of the sub-step. The forces
@@ -379,12 +362,12 @@ private:
         const std::size_t size = block.P.size();
         block.set_time(options_, substep);
         block.force.assign(size, Vec3d::Zero());
-        const std::span<std::uint8_t> dead(dead_.data() + block.first, size);
-        const Chunk chunk{points_, block.first, block.P, block.v, block.dt, block.time, substep};
+        const std::span<std::uint8_t> dead(dead_.data() + block.places.front(), size);
+        const Chunk chunk{points_, block.places.front(), block.P, block.v, block.dt, block.time, substep};
         for (const LocalAction& local : scene_.actions)
             at_node(*local.action, [&] { local.pass->act(chunk, block.force, dead); });
         for (std::size_t i = 0; i < size; ++i) {
-            block.v[i] += block.dt[i] * acceleration_by(block.force[i], block.first + i);
+            block.v[i] += block.dt[i] * acceleration_by(block.force[i], block.places[i]);
             if (dead[i]) block.dt[i] = block.half[i] = 0;
         }
     }
@@ -392,7 +375,7 @@ private:
     void add_force_attribute(Block& block)
     {
         for (std::size_t i = 0; i < block.P.size(); ++i)
-            block.a[i] += acceleration_by((*scene_.force)[block.first + i].cast<double>(), block.first + i);
+            block.a[i] += acceleration_by((*scene_.force)[block.places[i]].cast<double>(), block.places[i]);
     }
 
     Vec3d acceleration_by(const Vec3d& force, std::size_t point) const
@@ -436,7 +419,7 @@ private:
     const SolveOptions& options_;
     const Scene scene_;
     std::span<Vec3f> P_, v_;
-    Strided<float> own_dt_{nullptr, 0};
+    OwnTime time_;
     Strided<std::uint8_t> members_{nullptr, 0};  // of the group that is advanced; null for all
     std::vector<std::uint8_t> dead_;             // 1: killed by an action or a collider; empty where none does
     std::optional<Hits> hits_;

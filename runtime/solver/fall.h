@@ -1,0 +1,59 @@
+// Points that one acceleration moves and nothing else: from single precision to single precision in one go, whatever
+// the sub-steps, because the parabola is exact and they would only repeat it. Points whose way may come near a shape
+// are left as they are, for Collisions.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/points/column.h"
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// How long each point moves in the frame, s: by its own column, which a newborn's age has made shorter, or h.
+struct OwnTime {
+    double h = 0;
+    Strided<float> own{nullptr, 0};  // null where all move for h
+
+    // The whole frame in double, whether or not newborn points make a column of it.
+    double operator()(std::size_t i) const
+    {
+        if (!own.data || own[i] == static_cast<float>(h)) return h;
+        return own[i];
+    }
+};
+
+class Fall {
+public:
+    // g in m/s².
+    explicit Fall(const Vec3d& g);
+
+    // No point is advanced that may come within `radius` of the box on its way, or has begun there: by the box around
+    // its path, and with what rounding a position to single precision can do.
+    void avoid(const Box3d& box, double radius);
+
+    // Advances the points [begin, end). Those that are left as they are, are appended to `near`, in order.
+    void advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                 std::vector<std::uint32_t>& near) const;
+
+private:
+    // What belongs to the axes recurs along the packed coordinates: in whole vectors of 8, and whole points.
+    static constexpr int period = 24, points_a_period = period / 3;
+    using Period = std::array<double, period>;
+
+    struct Limits {
+        Period least, most;
+    };
+
+    static Period by_axis(const Vec3d& x);
+    template <class Near>
+    void advance_period(float* P, float* v, const Period& t, const Near& near) const;
+
+    Period g_;
+    std::vector<Limits> limits_;  // of the boxes, widened
+};
+
+}  // namespace rapid

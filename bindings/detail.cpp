@@ -172,15 +172,18 @@ void run_detail(const Kernel& function, Flow& flow, const Evaluation& now, const
     const int top = lua_gettop(L);
     Detail detail{flow.points, {}};
     struct Running {
-        lua_State* L;
+        State& state;
         int top;
         ~Running()
         {
+            ++state.detail_serial;
+            lua_State* L = state.lua();
             lua_settop(L, top);
             lua_pushnil(L);
             lua_setfield(L, LUA_REGISTRYINDEX, current);
         }
-    } const running{L, top};
+    } const running{state, top};
+    ++state.detail_serial;
     lua_pushlightuserdata(L, &detail);
     lua_setfield(L, LUA_REGISTRYINDEX, current);
 
@@ -236,6 +239,8 @@ void push_detail_natives(State& state)
         lua_pushcfunction(L, f.func);
         lua_setfield(L, -2, f.name);
     }
+    lua_pushlightuserdata(L, &state.detail_serial);
+    lua_setfield(L, -2, "serial");
 }
 
 }  // namespace rapid

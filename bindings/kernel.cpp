@@ -64,6 +64,8 @@ ColumnMemory memory_of(const Column<T>& column)
             values.stride * sizeof(T)};
 }
 
+std::size_t scalar_bytes(const std::string& type) { return type == "vec3d" || type == "int64" ? 8 : 4; }
+
 rapid_column at_point(const ColumnMemory& memory, std::size_t first)
 {
     return {const_cast<char*>(memory.data) + first * memory.element_bytes, memory.stride};
@@ -327,7 +329,46 @@ void Kernel::run_chunk(const Pass& pass, rapid_chunk& chunk) const
     chunk.time = pass.caller.frame.time;
     chunk.dt = pass.caller.frame.dt;
 
-    State& state = host_.local();
+    const KernelOrder::Way way = host_.kernel_way(pass.caller.node);
+    if (way == KernelOrder::Forward) return call_runner(host_.local(), pass, chunk);
+    const std::int64_t size = chunk.size;
+    for (std::int64_t k = 0; k < size; ++k) {
+        const std::int64_t i = way == KernelOrder::Reversed ? size - 1 - k : k;
+        std::vector<rapid_column> columns, members_of_groups;
+        rapid_chunk point = point_of(pass, chunk, i, columns, members_of_groups);
+        call_runner(way == KernelOrder::TwoStates && i % 2 == 1 ? host_.second() : host_.local(), pass, point);
+    }
+}
+
+// The chunk's point i as a chunk of its own, whose columns and groups lie in the vectors.
+rapid_chunk Kernel::point_of(const Pass& pass, const rapid_chunk& chunk, std::int64_t i,
+                             std::vector<rapid_column>& columns, std::vector<rapid_column>& groups)
+{
+    for (std::size_t c = 0; c < pass.layout.columns.size(); ++c) {
+        const rapid_column& of_chunk = chunk.columns[c];
+        const auto bytes = static_cast<std::int64_t>(scalar_bytes(pass.layout.columns[c].type));
+        columns.push_back({static_cast<char*>(of_chunk.data) + i * of_chunk.stride * bytes, of_chunk.stride});
+    }
+    for (std::size_t g = 0; g < pass.layout.groups.size(); ++g) {
+        const rapid_column& of_chunk = chunk.groups[g];
+        groups.push_back({static_cast<char*>(of_chunk.data) + i * of_chunk.stride, of_chunk.stride});
+    }
+    const auto at = [i](auto* first) { return first ? first + i : nullptr; };
+    rapid_chunk point = chunk;
+    point.size = 1;
+    point.first += i;
+    point.columns = columns.data();
+    point.groups = groups.data();
+    point.kill = at(chunk.kill);
+    point.result = at(chunk.result);
+    point.members = at(chunk.members);
+    point.times = at(chunk.times);
+    point.steps = at(chunk.steps);
+    return point;
+}
+
+void Kernel::call_runner(State& state, const Pass& pass, rapid_chunk& chunk) const
+{
     lua_State* L = state.lua();
     push_runner(state, pass.layout);
     const int runner = lua_gettop(L);
@@ -350,6 +391,7 @@ void Kernel::run_chunk(const Pass& pass, rapid_chunk& chunk) const
     lua_rawgeti(L, runner, 1);
     lua_pushlightuserdata(L, &chunk);
     try {
+        const State::InKernel in_kernel(state);
         state.call(1, 0);
     } catch (Error& error) {
         lua_rawgeti(L, runner, 2);
@@ -375,7 +417,7 @@ void Kernel::run_pass(Pass& pass) const
     std::mutex mutex;
     std::optional<Error> first;
     std::atomic<std::size_t> failed_at{pass.points.size()};
-    for_each_chunk(pass.points.size(), [&](std::size_t begin, std::size_t end) {
+    const auto visit = [&](std::size_t begin, std::size_t end) {
         if (begin > failed_at.load(std::memory_order_relaxed)) return;
         try {
             run_chunk(pass, begin, end);
@@ -386,7 +428,11 @@ void Kernel::run_pass(Pass& pass) const
                 first = error;
             }
         }
-    });
+    };
+    if (host_.kernel_way(pass.caller.node) == KernelOrder::Reversed)
+        visit(0, pass.points.size());  // the last chunk first, too
+    else
+        for_each_chunk(pass.points.size(), visit);
     if (first) throw *first;
 }
 

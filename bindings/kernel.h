@@ -10,6 +10,7 @@
 #include "runtime/graph/point_function.h"
 
 struct rapid_chunk;  // lua/chunk.h
+struct rapid_column;
 
 namespace rapid {
 
@@ -70,6 +71,9 @@ private:
     void run_pass(Pass& pass) const;
     void run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const;
     void run_chunk(const Pass& pass, rapid_chunk& chunk) const;
+    static rapid_chunk point_of(const Pass& pass, const rapid_chunk& chunk, std::int64_t i,
+                                std::vector<rapid_column>& columns, std::vector<rapid_column>& groups);
+    void call_runner(State& state, const Pass& pass, rapid_chunk& chunk) const;
     // Leaves the runner for this layout on the state's stack: a list of run, at, set_params and the pass whose
     // parameters it has.
     void push_runner(State& state, const Layout& layout) const;

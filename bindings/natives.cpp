@@ -96,15 +96,28 @@ std::string shown_name(const Maker& maker, const Table& options)
     return "rapid." + (maker.name.rfind("motion.", 0) == 0 ? maker.name.substr(dot + 1) : maker.name);
 }
 
+// What is made in a kernel would be made once a point, in states that do not tell each other. Error: one runs now.
+void refuse_in_kernels(const State& state, const std::string& what, const std::string& remedy)
+{
+    if (state.runs_kernel()) throw Error(fmt::format("a kernel can't call {}; {}", what, remedy));
+}
+
+// native.outside_kernels(what, remedy)
+int outside_kernels(State& state)
+{
+    refuse_in_kernels(state, text_at(state, 1), text_at(state, 2));
+    return 0;
+}
+
 // What the main state's call of this constructor made; for the main state itself, what `make` makes.
 template <class F>
 int construct(State& state, const F& make)
 {
-    ScriptHost& host = state.host();
-    if (state.is_main() && host.authored) {
+    if (state.is_loaded()) {  // for a function of the frame: it is no worker's to ask for
         state.push_object(make());
         return 1;
     }
+    ScriptHost& host = state.host();
     const std::size_t call = state.next_made++;
     if (state.is_main()) {
         host.made.emplace_back(ObjectPtr());
@@ -127,11 +140,12 @@ int construct(State& state, const F& make)
 
 int make_object(State& state)
 {
+    const Maker& maker = find_maker(text_at(state, 1));
+    const auto options = table_at(state, 2);
+    refuse_in_kernels(state, shown_name(maker, *options), "make it outside, once");
     return construct(state, [&] {
-        const Maker& maker = find_maker(text_at(state, 1));
         ScriptHost& host = state.host();
         MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read};
-        const auto options = table_at(state, 2);
         try {
             check_named(*options);
             const auto make = [&] { return maker.make(maker, *options, context); };
@@ -182,6 +196,7 @@ Value parse_setting(const std::string& name, const std::string& text, const Valu
 
 int declare_parameter(State& state)
 {
+    refuse_in_kernels(state, "rapid.param", "call it outside, once");
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
     if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param takes a name, a default and a line of documentation");
@@ -264,6 +279,8 @@ int make_node(State& state)
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
     const NodeType& type = host.registry.at(text_at(state, 1));
+    if (state.is_loaded())
+        throw Error(fmt::format(":{} is called while a frame runs; the graph's body makes the nodes", type.name));
 
     // The caller's table is not changed.
     lua_newtable(L);
@@ -444,6 +461,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"set_index", native<set_index>},
                                       {"run", run_body},
                                       {"shape", native<shape_of>},
+                                      {"outside_kernels", native<outside_kernels>},
                                       {"trace_aborted", native<trace_aborted>},
                                       {"read_module", native<read_source<false>>},
                                       {"read_node", native<read_source<true>>}};
@@ -452,8 +470,8 @@ void push_natives(State& state, const std::string& chunk_header)
         lua_pushcfunction(L, function.func);
         lua_setfield(L, -2, function.name);
     }
-    lua_pushboolean(L, !state.is_main());
-    lua_setfield(L, -2, "is_worker");
+    lua_pushboolean(L, !state.is_main() || state.host().options().quiet);
+    lua_setfield(L, -2, "is_quiet");
     push_detail_natives(state);
     lua_setfield(L, -2, "detail");
     lua_pushlstring(L, chunk_header.data(), chunk_header.size());

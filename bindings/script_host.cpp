@@ -74,7 +74,6 @@ ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options
 
     run_file(*main_);
     collect_outputs(*main_);
-    authored = true;
 
     std::vector<std::string> names;
     for (const Session::Parameter& parameter : parameters) names.push_back(parameter.name);
@@ -84,6 +83,7 @@ ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options
                                     did_you_mean(name, names)))
                 .at({graph.file, 0});
 
+    const Section section(*this, fmt::format("{}: reading the kernels' bytecode", graph.file));
     for (const std::shared_ptr<Kernel>& kernel : kernels) {
         try {
             kernel->analyse();
@@ -95,8 +95,7 @@ ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options
             throw;
         }
     }
-    main_->push_entry("loaded");
-    main_->call(0, 0);
+    main_->set_loaded();
 }
 
 ScriptHost::~ScriptHost()
@@ -159,8 +158,24 @@ State& ScriptHost::local()
 {
     if (std::this_thread::get_id() == main_thread_) return *main_;
     std::unique_ptr<State>& worker = workers_.local();
-    if (worker) return *worker;
+    if (!worker) worker = make_worker();
+    return *worker;
+}
 
+State& ScriptHost::second()
+{
+    if (!second_) second_ = make_worker();
+    return *second_;
+}
+
+KernelOrder::Way ScriptHost::kernel_way(const std::string& node) const
+{
+    const KernelOrder& order = options_.kernel_order;
+    return order.node.empty() || order.node == node ? order.way : KernelOrder::Forward;
+}
+
+std::unique_ptr<State> ScriptHost::make_worker()
+{
     auto state = std::make_unique<State>(*this, false);
     lua_State* L = state->lua();
     state->push_entry("run");
@@ -184,10 +199,8 @@ State& ScriptHost::local()
             throw Error("the kernel is another one when the graph file is run again; it must do the same each time")
                 .at(kernel->location);
     }
-    state->push_entry("loaded");
-    state->call(0, 0);
-    worker = std::move(state);
-    return *worker;
+    state->set_loaded();
+    return state;
 }
 
 std::optional<ScriptHost::Source> ScriptHost::find_module(std::string_view name, bool node,
@@ -237,14 +250,23 @@ void ScriptHost::load_shipped_nodes()
     }
 }
 
+namespace {
+
+// Of --script-timeout; longer than any run, and no more than a clock holds.
+std::chrono::steady_clock::duration duration_of(double seconds)
+{
+    return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+        std::chrono::duration<double>(std::min(seconds, 1e8)));
+}
+
+}  // namespace
+
+// The watchdog is not woken: it never sleeps for longer than the time that a section has.
 ScriptHost::Section::Section(ScriptHost& host, std::string what) : host_(host)
 {
     const std::lock_guard lock(host.watch_mutex_);
     host.watched_.push_back(std::move(what));
-    host.deadline_ = std::chrono::steady_clock::now() +
-                     std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                         std::chrono::duration<double>(std::min(host.options_.script_timeout, 1e8)));
-    host.watch_wake_.notify_all();
+    host.deadline_ = std::chrono::steady_clock::now() + duration_of(host.options_.script_timeout);
 }
 
 ScriptHost::Section::~Section()
@@ -258,13 +280,11 @@ void ScriptHost::watch()
 {
     std::unique_lock lock(watch_mutex_);
     while (!stop_watching_) {
-        if (watched_.empty()) {
-            watch_wake_.wait(lock);
+        const auto now = std::chrono::steady_clock::now();
+        if (watched_.empty() || now < deadline_) {
+            watch_wake_.wait_until(lock, watched_.empty() ? now + duration_of(options_.script_timeout) : deadline_);
             continue;
         }
-        const auto deadline = deadline_;
-        watch_wake_.wait_until(lock, deadline);
-        if (stop_watching_ || watched_.empty() || std::chrono::steady_clock::now() < deadline_) continue;
         const std::string message =
             fmt::format("{}: the script runs for more than {:g} s; --script-timeout sets the limit",
                         fmt::join(watched_, ", "), options_.script_timeout);

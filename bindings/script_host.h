@@ -41,13 +41,15 @@ public:
     // The calling thread's state; made when it is first asked for. Error: the file behaves otherwise than in the main
     // state.
     State& local();
+    // A second state of the main thread, for KernelOrder::TwoStates.
+    State& second();
+    // The way of a node's kernel over the points.
+    KernelOrder::Way kernel_way(const std::string& node) const;
 
     // What the constructors of the main state made, in order; a worker's calls take them from here. A call that failed
     // left its message.
     using Made = std::variant<ObjectPtr, std::string>;
     std::deque<Made> made;
-    // Once the main state has run the file, what functions of the frame make there is no worker's to ask for.
-    bool authored = false;
     // While a function of the frame runs: what it has made before.
     MadeBefore* made_before = nullptr;
 
@@ -73,6 +75,7 @@ public:
     };
 
 private:
+    std::unique_ptr<State> make_worker();
     void run_file(State& state);
     void collect_outputs(State& state);
     void watch();
@@ -80,7 +83,7 @@ private:
     std::filesystem::path file_;
     std::string text_;
     SessionOptions options_;
-    std::unique_ptr<State> main_;
+    std::unique_ptr<State> main_, second_;
     tbb::enumerable_thread_specific<std::unique_ptr<State>> workers_;
     std::thread::id main_thread_;
 

@@ -343,6 +343,7 @@ int define_node_type(State& state)
 {
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
+    if (state.is_loaded()) throw Error("rapid.node is called while a frame runs; a node's file defines it");
 
     std::string_view role;  // empty where there is none, or several
     int functions = 0;

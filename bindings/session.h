@@ -17,11 +17,24 @@
 
 namespace rapid {
 
+// How kernels go over the points. Anything but the first way is for `rapid check --races`, on one thread.
+struct KernelOrder {
+    enum Way {
+        Forward,    // in chunks, on all threads, each of which has a state of its own
+        Reversed,   // one by one, from the last point to the first, in one state
+        TwoStates,  // one by one, in two states by turns
+    };
+    Way way = Forward;
+    std::string node;  // where given, of this node's kernel alone
+};
+
 struct SessionOptions {
     std::map<std::string, std::string> set;            // --set NAME=VALUE
     double script_timeout = 600;                       // s, a frame (or a load) may spend in scripts
     std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory, a state
     bool may_write = false;                            // levelset:write acts in a run alone
+    bool quiet = false;                                // print says nothing
+    KernelOrder kernel_order;
     // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
     std::function<void(const std::string& message)> on_timeout;
     // Where given, told of each file before it is read, and of each where a module or node was looked for.

@@ -56,6 +56,10 @@ int describe_error(lua_State* L)
         message = fmt::format("error raised with a {} instead of a message", luaL_typename(L, 1));
     }
 
+    // Then Lua leaves no more than a few slots to whoever describes it.
+    constexpr std::string_view of_overflow = "stack overflow";
+    const bool overflow = message.size() >= of_overflow.size() &&
+                          message.compare(message.size() - of_overflow.size(), of_overflow.size(), of_overflow) == 0;
     State& state = State::of(L);
     std::string place;
     lua_Debug info;
@@ -75,9 +79,12 @@ int describe_error(lua_State* L)
         place = fmt::format("{}:{}", state.tail_call.file, state.tail_call.line);
     // The language's own words for `p.v.x = 1`.
     if (message == "attempt to write to constant location")
-        message = "a component can't be assigned: a vec3 does not change; make a new one: p.v = vec3(1, p.v.y, p.v.z)";
-    luaL_traceback(L, L, nullptr, 1);
-    const std::string trace = lua_tostring(L, -1);
+        message = "neither a component nor the frame can be assigned; make a new vec3: p.v = vec3(1, p.v.y, p.v.z)";
+    std::string trace;
+    if (!overflow) {
+        luaL_traceback(L, L, nullptr, 1);
+        trace = lua_tostring(L, -1);
+    }
     lua_settop(L, 0);
     lua_createtable(L, 3, 0);
     lua_pushlstring(L, message.data(), message.size());
@@ -260,7 +267,8 @@ void State::open_libraries()
     luaL_openlibs(L_);
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();
-    for (const char* name : {"vec3", "bytecode", "kernel", "detail", "numeric", "shape", "ramp", "sandbox", "rapid"}) {
+    for (const char* name :
+         {"words", "vec3", "bytecode", "kernel", "detail", "numeric", "shape", "ramp", "sandbox", "rapid"}) {
         lua_getglobal(L_, "package");
         lua_getfield(L_, -1, "preload");
         const std::string text = read_text(folder / (std::string(name) + ".lua"));
@@ -332,6 +340,13 @@ void State::push_entry(const char* name)
     lua_rawgeti(L_, LUA_REGISTRYINDEX, entries_);
     lua_getfield(L_, -1, name);
     lua_remove(L_, -2);
+}
+
+void State::set_loaded()
+{
+    push_entry("loaded");
+    call(0, 0);
+    loaded_ = true;
 }
 
 void State::push_kernel(std::size_t kernel) { lua_rawgeti(L_, LUA_REGISTRYINDEX, kernel_references_[kernel]); }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,21 @@ public:
     void push_entry(const char* name);
     // Pushes the function of a kernel, by its number.
     void push_kernel(std::size_t kernel);
+    // Whether the graph's body has run.
+    bool is_loaded() const { return loaded_; }
+    void set_loaded();
+
+    // While a kernel works on points, graph code makes nothing.
+    bool runs_kernel() const { return runs_kernel_; }
+    class InKernel {
+    public:
+        explicit InKernel(State& state) : state_(state) { state_.runs_kernel_ = true; }
+        ~InKernel() { state_.runs_kernel_ = false; }
+
+    private:
+        State& state_;
+    };
+
     // Keeps the function at the top of the stack as the next kernel, and takes it off.
     std::size_t add_kernel();
     std::size_t kernel_count() const { return kernel_references_.size(); }
@@ -58,6 +74,9 @@ public:
     // The number of the next constructor call.
     std::size_t next_made = 0;
 
+    // Of the :detail function that runs, and another one when it has ended (lua/detail.lua).
+    std::int32_t detail_serial = 0;
+
     // The place of the call that ends the body of the file that runs, `return ...:solve {}`: it leaves no frame behind
     // for where(). Line 0: none.
     Location tail_call;
@@ -74,6 +93,7 @@ private:
     ScriptHost& host_;
     bool main_;
     std::size_t memory_ = 0;
+    bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;  // to options().script_memory, now
     lua_State* L_ = nullptr;
     int entries_ = 0;

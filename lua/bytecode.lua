@@ -12,8 +12,9 @@
 --   kills            whether `kill` is called or could be
 --   stores           places (line, what) where it writes upvalues, globals or shared tables
 --
--- Helpers are the functions that it can reach through upvalues, globals and tables of them, as they are when the graph
--- file has run.
+-- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
+-- they are when the graph file has run. They are followed with what they are called with, and what they return.
+-- Not followed is what lies in the tables that a kernel makes: `rapid check --races` runs it to see.
 local bit = require "bit"
 local util = require "jit.util"
 local vmdef = require "jit.vmdef"
@@ -51,9 +52,12 @@ local function string_constant(f, index)
 end
 
 -- The table or function behind a shared value's field, without running metamethods.
-local function field(value, name)
-  if type(value) == "table" and name ~= nil then return rawget(value, name) end
-  return nil
+local function field(value, name, depth)
+  if type(value) ~= "table" or name == nil then return nil end
+  local found = rawget(value, name)
+  local meta = debug.getmetatable(value)
+  if found ~= nil or not meta or depth == 10 then return found end
+  return field(rawget(meta, "__index"), name, (depth or 0) + 1)
 end
 
 local analyse_function
@@ -79,19 +83,46 @@ local function upvalues_by_name(f, outer)
   end
 end
 
--- Functions of Lua that write into their first argument.
+-- Functions of Lua that write into an argument, by its place from 1.
 local writers = {
-  [table.insert] = "table.insert", [table.remove] = "table.remove", [table.sort] = "table.sort",
+  [table.insert] = { "table.insert", 1 }, [table.remove] = { "table.remove", 1 }, [table.sort] = { "table.sort", 1 },
+  [table.move] = { "table.move", 5 },
 }
 
+-- Native functions that give back what they are given, or what lies in it. `pairs` and `next` are ours.
+local handing_on = { [ipairs] = true, [unpack] = true, [select] = true, [assert] = true, [setmetatable] = true }
+
+-- All other native functions that graph code finds; any further one is an iterator that it has made.
+local library = {}
+for _, functions in ipairs { _G, string, math, table, coroutine, bit } do
+  for _, f in pairs(functions) do library[f] = true end
+end
+
+-- Whether a function of the sandbox stands for one that hands on: they are Lua, so known by name.
+local function hands_on(f, env)
+  return handing_on[f] or f == rawget(env, "pairs") or f == rawget(env, "next") or f == rawget(env, "setmetatable")
+end
+
+-- The functions that a shared table holds, and those of its metatable: indexing it by a name that is not known, going
+-- over it, or an operator may call them.
+local function analyse_inside(value, found)
+  if type(value) ~= "table" or found.inside[value] then return end
+  found.inside[value] = true
+  for _, map in ipairs { value, debug.getmetatable(value) or nil } do
+    for _, element in next, map do
+      if type(element) == "function" then analyse_function(element, found) end
+    end
+  end
+end
+
 -- One pass of instructions from `pc` with the registers `regs`; returns the successors. Findings go to `found`.
-local function step(f, pc, regs, found, outer)
+local function step(f, pc, regs, found, outer, call)
   local ins, mode = util.funcbc(f, pc)
   if not ins then return {} end
   local name = names[band(ins, 0xff)]
   local a, b, c, d = band(rshift(ins, 8), 0xff), rshift(ins, 24), band(rshift(ins, 16), 0xff), rshift(ins, 16)
   local writes_a = band(mode, 7) == 1
-  local result
+  local result, over_shared
 
   local function line()
     return util.funcinfo(f, pc).currentline
@@ -125,7 +156,7 @@ local function step(f, pc, regs, found, outer)
     result = upvalue_of(f, d, outer)
   elseif name == "GGET" then
     local key = string_constant(f, d)
-    result = { kind = "shared", value = found.env[key] }
+    result = { kind = "shared", value = rawget(found.env, key) }
   elseif name == "TGETS" then
     result = index_read(regs[b], string_constant(f, c))
   elseif name == "TGETV" or name == "TGETB" or name == "TGETR" then
@@ -133,6 +164,7 @@ local function step(f, pc, regs, found, outer)
     if name == "TGETV" and key and key.kind == "string" then
       result = index_read(object, key.value)
     elseif object and object.kind == "shared" then
+      analyse_inside(object.value, found)
       result = { kind = "shared", value = name == "TGETB" and field(object.value, c) or nil }
     end
   elseif name == "TSETS" then
@@ -160,9 +192,18 @@ local function step(f, pc, regs, found, outer)
     store(("assigns the global %q"):format(string_constant(f, d)))
   elseif name == "FNEW" then
     local child = util.funck(f, -d - 1)
-    if child then analyse_function(child, found, false, upvalues_by_name(f, outer)) end
+    if child then
+      result = { kind = "closure", value = child, outer = upvalues_by_name(f, outer) }
+      analyse_function(child, found, nil, result.outer)
+    end
   elseif name == "CALL" or name == "CALLM" or name == "CALLT" or name == "CALLMT" then
     local callee, first = regs[a], a + 2 -- two slots a frame
+    local arguments = name == "CALL" and c - 1 or name == "CALLM" and c or name == "CALLT" and d - 1 or d
+    local given = {} -- of what all points share, by place from 0
+    for place = 0, arguments - 1 do
+      local argument = regs[first + place]
+      if argument and argument.kind == "shared" then given[place] = argument end
+    end
     if callee and callee.kind == "method" and (callee.value == "join" or callee.value == "leave") then
       local group = regs[first + 1]
       if group and group.kind == "string" then
@@ -175,19 +216,38 @@ local function step(f, pc, regs, found, outer)
       if group and group.kind == "string" then found.asks[group.value] = true else found.asks_any = true end
     elseif callee and callee.kind == "attribute" then
       found.calls[callee.value] = found.calls[callee.value] or line()
+    elseif callee and callee.kind == "closure" then
+      result = analyse_function(callee.value, found, given, callee.outer)
     elseif callee and callee.kind == "shared" and type(callee.value) == "function" then
-      analyse_function(callee.value, found, false)
-      local target = regs[first]
-      if writers[callee.value] and target and target.kind == "shared" then
-        store(("changes a table that all points share by %s"):format(writers[callee.value]))
+      local called = callee.value
+      local writer = writers[called]
+      result = analyse_function(called, found, given)
+      if writer and given[arguments >= writer[2] and writer[2] - 1 or 0] then
+        store(("changes a table that all points share by %s"):format(writer[1]))
+      elseif hands_on(called, found.env) then
+        for _, argument in pairs(given) do
+          analyse_inside(argument.value, found)
+          result = shared
+        end
+      elseif found.resumes(called, given[0]) or not library[called] and not util.funcinfo(called).bytecodes then
+        store "resumes a coroutine, or an iterator, that was made outside of it"
       end
     end
     for slot = a, a + 250 do regs[slot] = nil end
+    if result then
+      for slot = a, a + math.max(b - 2, 0) do regs[slot] = shared end
+      regs[a] = result
+    end
+  elseif name == "ITERC" or name == "ITERN" then
+    -- of pairs(t): the iterator, t and the last key lie before it
+    if regs[a - 2] and regs[a - 2].kind == "shared" then over_shared = true end
   end
 
   -- A shared function that is passed on, or kept in a local, may be called by whoever gets it.
-  if result and result.kind == "shared" and type(result.value) == "function" then
-    analyse_function(result.value, found, false)
+  -- So may those of a table's metatable, by an operator.
+  if result and result.kind == "shared" then
+    if type(result.value) == "function" then analyse_function(result.value, found) end
+    if type(result.value) == "table" and debug.getmetatable(result.value) then analyse_inside(result.value, found) end
   end
 
   if writes_a then
@@ -196,8 +256,17 @@ local function step(f, pc, regs, found, outer)
     for slot = a, d do regs[slot] = nil end
   elseif name == "VARG" or name == "ITERC" or name == "ITERN" or name == "TNEW" then
     for slot = a, a + 250 do regs[slot] = nil end
+    if over_shared then regs[a], regs[a + 1] = shared, shared end
   elseif name == "FORI" or name == "FORL" or name == "IFORL" then
     regs[a + 3] = nil
+  end
+
+  if name:find "^RET" then
+    for slot = a, name == "RETM" and a + 250 or a + d - 2 do
+      if regs[slot] and regs[slot].kind == "shared" then call.returned = regs[slot] end
+    end
+  elseif name == "CALLT" or name == "CALLMT" then
+    if result and result.kind == "shared" then call.returned = result end
   end
 
   local target = pc + d - 0x7fff
@@ -211,24 +280,51 @@ local function step(f, pc, regs, found, outer)
   return { pc + 1 }
 end
 
--- f: a function, or the prototype of one that a kernel makes; outer: of a prototype, what finds the upvalues of the
--- functions around it by name. The kernel's first parameter is the point; of helpers nothing is known.
-function analyse_function(f, found, is_kernel, outer)
-  if found.seen[f] then return end
-  found.seen[f] = true
+local most_calls = 8 -- of one helper, with shared values of its own; further ones are looked at together
+
+-- What is known of f, called with these shared values: { given, returned }, and whether it is new.
+local function call_of(f, given, found)
+  local calls = found.calls_of[f] or {}
+  found.calls_of[f] = calls
+  if #calls == most_calls then
+    local any = {}
+    for place in pairs(given) do any[place] = shared end
+    given = any
+  end
+  for _, call in ipairs(calls) do
+    local same = true
+    for place = 0, 250 do
+      local a, b = call.given[place], given[place]
+      same = same and (a == b or (a and b and a.value == b.value) or false)
+    end
+    if same then return call, false end
+  end
+  local call = { given = given }
+  calls[#calls + 1] = call
+  return call, true
+end
+
+-- f: a function, or the prototype of one that a kernel makes; given: what is known of its arguments, by place from 0;
+-- outer: of a prototype, what finds the upvalues of the functions around it by name. Returns what f returns, if all
+-- points share it.
+function analyse_function(f, found, given, outer)
   local info = util.funcinfo(f)
   if not info.bytecodes then return end -- native
-  if info.source:sub(1, 7) == "=[rapid" then return end -- ours
+  if info.source:find "^=%[rapid" or info.linedefined < 0 then return end -- ours, or LuaJIT's
+  local call, is_new = call_of(f, given or {}, found)
+  if not is_new then return call.returned end
 
   local entry = {}
-  if is_kernel and info.params > 0 then entry[0] = point end
+  for place, value in pairs(call.given) do
+    if place < info.params then entry[place] = value end
+  end
   local states = { [1] = entry }
   local open = { 1 }
   while #open > 0 do
     local pc = table.remove(open)
     local regs = {}
     for slot, value in pairs(states[pc]) do regs[slot] = value end
-    for _, next_pc in ipairs(step(f, pc, regs, found, outer)) do
+    for _, next_pc in ipairs(step(f, pc, regs, found, outer, call)) do
       local known = states[next_pc]
       if not known then
         states[next_pc] = {}
@@ -246,16 +342,19 @@ function analyse_function(f, found, is_kernel, outer)
       end
     end
   end
+  return call.returned
 end
 
--- env: the environment in which the kernel's globals live; of_a_point: its first parameter is one.
-local function analyse(kernel, env, of_a_point)
+-- env: the environment in which the kernel's globals live; resumes(f, first): whether calling f goes on with a
+-- coroutine; of_a_point: the kernel's first parameter is a point.
+local function analyse(kernel, env, resumes, of_a_point)
   local found = {
-    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, seen = {},
-    env = env,
+    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
+    inside = {}, env = env, resumes = resumes,
   }
-  analyse_function(kernel, found, of_a_point)
-  found.seen, found.env = nil, nil
+  -- Behind the point and the frame come the parameters of a Lua node, which all points share.
+  analyse_function(kernel, found, of_a_point and { [0] = point, [2] = shared } or { [2] = shared })
+  found.calls_of, found.inside, found.env, found.resumes = nil, nil, nil, nil
   return found
 end
 

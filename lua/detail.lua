@@ -3,25 +3,24 @@
 --   #points, points[i].P, points[i].heat = 1, points[i]:join "hot", :leave, :within, :kill(), :rand(k)
 --   points:add { P = vec3(0, 1, 0), heat = 3 }      appended when the function ends
 --   points:kill(i)                                  removed when the function ends
---   points:neighbours(i, radius)                    places of the points within the radius, in order, without i
+--   points:neighbours(i, radius)                    places of the points within the radius, in order, without i; the
+--                                                   others as they lay when this radius was first asked for
 --   points:sum "heat", :mean, :min, :max, :bounds() two corners
 --   points:sort "heat", points:sort(function(p) return p.P.y end)
 --   points.detail.total = 3                         a value that kernels read as frame.detail.total
 --
 -- A column's memory is asked of the host when it is first read, and again when it is first written: until then other
--- sets may share it.
+-- sets may share it. What a function keeps of its points is of no use when it has ended: each view knows the number of
+-- the run that it belongs to. The types and functions are made once, as compiled code and FFI types are never freed.
 local ffi = require "ffi"
 local vector = require "vec3"
+local words = require "words"
 
 local vec3, quat, istype = vector.type, vector.quat, ffi.istype
 local floor, huge = math.floor, math.huge
 local MAX = 3.4028234663852886e38
 
-local function describe(value)
-  if type(value) == "string" then return ("%q"):format(value) end
-  if type(value) == "number" or type(value) == "cdata" or type(value) == "boolean" then return tostring(value) end
-  return value == nil and "nil" or "a " .. type(value)
-end
+local describe = words.value
 
 local function wrong_type(name, wanted, value)
   error(("attribute %q takes %s, not %s"):format(name, wanted, describe(value)), 0)
@@ -87,209 +86,266 @@ local types = {
 
 local read_only = { id = true, dt = true, index = true }
 
+local over = "points can't be used outside the :detail function that they were given to"
+
 -- native: the host's functions, all about the set that the function runs on; rand: as kernels draw.
--- Returns run(f, frame, params, size, random, details): the places (from 0) of the killed, those added, and details.
+-- Returns run(f, frame, params, size, random, details): the places (from 0) of the killed, and the details.
 local function make(native, rand)
-  local function run(f, frame, params, size, random, details)
-    local columns, groups, killed, added = {}, {}, {}, {}
+  -- Of the run: one at a time.
+  local columns, groups, killed, added, size, frame, random, details
+  local serial = ffi.cast("const int32_t*", native.serial) -- of the run; another one as soon as it has ended
 
-    local function column_of(name, writable)
-      local column = columns[name]
-      if column and (column.writable or not writable) then return column end
-      local data, stride, kind = native.column(name, writable) -- says which attributes there are
-      local about = types[kind]
-      column = {
-        data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
-        load = about.load, store = about.store, check = about.check, kind = kind,
-      }
-      columns[name] = column
-      return column
-    end
-    local function group_of(name, writable)
-      if type(name) ~= "string" then error(("a group has a name, not %s"):format(describe(name)), 0) end
-      local group = groups[name]
-      if group and (group.writable or not writable) then return group end
-      local data, stride = native.group(name, writable)
-      if not data then return nil end -- nobody is in it yet
-      group = { data = ffi.cast("uint8_t*", data), stride = stride, writable = writable }
-      groups[name] = group
-      return group
-    end
+  -- Names of fields that no attribute is likely to have: fields hide what __index would find.
+  local point_view = ffi.typeof "struct { const int32_t rapid_place, rapid_serial; }"
+  local set_view = ffi.typeof "struct { const int32_t rapid_serial; }"
 
-    local function load(name, i)
-      if name == "dt" and not native.has "dt" then return frame.dt end -- nobody is newborn
-      local column = column_of(name, false)
-      return column.load(column.data, i * column.stride)
-    end
+  local function column_of(name, writable)
+    local column = columns[name]
+    if column and (column.writable or not writable) then return column end
+    if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe(name)), 0) end
+    local data, stride, kind = native.column(name, writable) -- says which attributes there are
+    local about = types[kind]
+    column = {
+      data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
+      load = about.load, store = about.store, check = about.check, kind = kind,
+    }
+    columns[name] = column
+    return column
+  end
+  local function group_of(name, writable)
+    if type(name) ~= "string" then error(("a group has a name, not %s"):format(describe(name)), 0) end
+    local group = groups[name]
+    if group and (group.writable or not writable) then return group end
+    local data, stride = native.group(name, writable)
+    if not data then return nil end -- nobody is in it yet
+    group = { data = ffi.cast("uint8_t*", data), stride = stride, writable = writable }
+    groups[name] = group
+    return group
+  end
 
-    local view = ffi.typeof "struct { const int32_t place; }" -- a type of its own each time
-    local methods = {}
-    function methods.within(p, name)
-      local group = group_of(name, false)
-      return group ~= nil and group.data[p.place * group.stride] ~= 0
-    end
-    function methods.join(p, name)
-      group_of(name, true).data[p.place] = 1
-    end
-    function methods.leave(p, name)
-      group_of(name, true).data[p.place] = 0
-    end
-    function methods.kill(p)
-      killed[p.place] = true
-    end
-    function methods.rand(p, use, anew)
-      if anew == frame then anew = frame.number end
-      if type(use) ~= "number" or (anew ~= nil and type(anew) ~= "number") then
-        error("p:rand takes a number, which of the point's random numbers, and the frame where they are to be new", 0)
-      end
-      return rand(random, load("id", p.place), use, anew == 0 and 5e-324 or anew or 0)
-    end
-    ffi.metatype(view, {
-      __index = function(p, name)
-        if name == "index" then return p.place + 1 end
-        return methods[name] or load(name, p.place)
-      end,
-      __newindex = function(p, name, x)
-        if read_only[name] then error(("%s is read only"):format(name), 0) end
-        local column = column_of(name, true)
-        column.check(name, x)
-        column.store(column.data, p.place * column.stride, x)
-      end,
-      __tostring = function(p) return ("point %d"):format(p.place + 1) end,
-    })
+  local function load(name, i)
+    if name == "dt" and not native.has "dt" then return frame.dt end -- nobody is newborn
+    local column = column_of(name, false)
+    return column.load(column.data, i * column.stride)
+  end
 
-    local function place_of(what, i)
-      if type(i) ~= "number" or floor(i) ~= i or i < 1 or i > size then
-        error(("%s: there is no point %s; the set has 1 to %d"):format(what, describe(i), size), 0)
-      end
-      return i - 1
+  -- Checked before any memory is touched: methods can be called with anything.
+  local function place_in(p, method)
+    if not istype(point_view, p) then
+      error(("p:%s is called on a point: with a colon, not a dot"):format(method), 0)
     end
+    if p.rapid_serial ~= serial[0] then error(over, 0) end
+    return p.rapid_place
+  end
 
-    -- Folds a column's values, in order.
-    local function fold(name, empty, start, step)
-      local column = column_of(name, false)
-      if column.kind == "quat" then error(("attribute %q is a quat, which has no order and no sum"):format(name), 0) end
-      if size == 0 then return empty end
-      if column.kind ~= "vec3" then
-        local total = start
-        for i = 0, size - 1 do total = step(total, column.load(column.data, i * column.stride)) end
-        return total
-      end
-      local x, y, z = start, start, start
-      for i = 0, size - 1 do
-        local value = column.load(column.data, i * column.stride)
-        x, y, z = step(x, value.x), step(y, value.y), step(z, value.z)
-      end
-      return vec3(x, y, z)
+  local methods = {}
+  function methods.within(p, name)
+    local place, group = place_in(p, "within"), group_of(name, false)
+    return group ~= nil and group.data[place * group.stride] ~= 0
+  end
+  function methods.join(p, name)
+    local place = place_in(p, "join")
+    group_of(name, true).data[place] = 1
+  end
+  function methods.leave(p, name)
+    local place = place_in(p, "leave")
+    group_of(name, true).data[place] = 0
+  end
+  function methods.kill(p)
+    killed[place_in(p, "kill")] = true
+  end
+  function methods.rand(p, use, anew)
+    local place = place_in(p, "rand")
+    if anew == frame then anew = frame.number end
+    if type(use) ~= "number" or (anew ~= nil and type(anew) ~= "number") then
+      error("p:rand takes a number, which of the point's random numbers, and the frame where they are to be new", 0)
     end
-    local function smaller(a, b) return b < a and b or a end
-    local function larger(a, b) return b > a and b or a end
+    return rand(random, load("id", place), use, anew == 0 and 5e-324 or anew or 0)
+  end
+  ffi.metatype(point_view, {
+    __index = function(p, name)
+      if p.rapid_serial ~= serial[0] then error(over, 0) end
+      if name == "index" then return p.rapid_place + 1 end
+      return methods[name] or load(name, p.rapid_place)
+    end,
+    __newindex = function(p, name, x)
+      if p.rapid_serial ~= serial[0] then error(over, 0) end
+      if read_only[name] then error(("%s is read only"):format(name), 0) end
+      local column = column_of(name, true)
+      column.check(name, x)
+      column.store(column.data, p.rapid_place * column.stride, x)
+    end,
+    __tostring = function(p) return ("point %d"):format(p.rapid_place + 1) end,
+  })
 
-    local set = {}
-    function set.sum(_, name)
-      return fold(name, 0, 0, function(a, b) return a + b end)
+  local function check_set(points, method)
+    if not istype(set_view, points) then
+      error(("points:%s is called on the points: with a colon, not a dot"):format(method), 0)
     end
-    function set.mean(_, name)
-      local total = set.sum(nil, name)
-      return size > 0 and total / size or nil
-    end
-    function set.min(_, name) return fold(name, nil, huge, smaller) end
-    function set.max(_, name) return fold(name, nil, -huge, larger) end
-    function set.bounds(_)
-      return set.min(nil, "P"), set.max(nil, "P")
-    end
-    function set.kill(_, i)
-      killed[place_of("points:kill", i)] = true
-    end
-    function set.add(_, values)
-      if type(values) ~= "table" then error("points:add takes the new point's values: { P = vec3(x, y, z) }", 0) end
-      local copy = {}
-      for name, value in pairs(values) do
-        if read_only[name] then error(("%s is read only"):format(name), 0) end
-        column_of(name, false).check(name, value)
-        copy[name] = value
-      end
-      added[#added + 1] = copy
-    end
-    function set.neighbours(_, i, radius)
-      if type(radius) ~= "number" then
-        error(("points:neighbours takes a place and a radius, not %s"):format(describe(radius)), 0)
-      end
-      return native.neighbours(place_of("points:neighbours", i), radius)
-    end
-    function set.sort(_, key)
-      local of = key
-      if type(key) == "string" then
-        of = function(p) return p[key] end
-      elseif type(key) ~= "function" then
-        error(("points:sort takes the name of an attribute or a function of a point, not %s"):format(describe(key)), 0)
-      end
-      local keys, order = {}, {}
-      for i = 1, size do
-        keys[i], order[i] = of(view(i - 1)), i
-        if type(keys[i]) ~= "number" or keys[i] ~= keys[i] then
-          error(("points:sort: the key of point %d is %s; it must be a number"):format(i, describe(keys[i])), 0)
-        end
-      end
-      table.sort(order, function(a, b)
-        if keys[a] ~= keys[b] then return keys[a] < keys[b] end
-        return a < b
-      end)
-      native.reorder(order)
-      local before = killed
-      columns, groups, killed = {}, {}, {}
-      for i = 1, size do killed[i - 1] = before[order[i] - 1] end
-    end
-    set.detail = setmetatable({}, {
-      __index = details,
-      __newindex = function(_, name, value)
-        local finite = type(value) == "number" and value > -huge and value < huge or istype(vec3, value)
-        if type(name) ~= "string" or not finite then
-          error(("points.detail.%s = %s; a detail value is a finite number or a vec3")
-            :format(tostring(name), describe(value)), 0)
-        end
-        details[name] = value
-      end,
-      __metatable = false,
-    })
+    if points.rapid_serial ~= serial[0] then error(over, 0) end
+  end
 
-    local points = newproxy(true)
-    local metatable = getmetatable(points)
-    metatable.__metatable = false
-    metatable.__len = function() return size end
-    metatable.__tostring = function() return ("%d points"):format(size) end
-    metatable.__index = function(_, key)
-      if type(key) == "number" then return view(place_of("points", key)) end
+  local function place_of(what, i)
+    if type(i) ~= "number" or floor(i) ~= i or i < 1 or i > size then
+      error(("%s: there is no point %s; the set has 1 to %d"):format(what, describe(i), size), 0)
+    end
+    return i - 1
+  end
+
+  -- Folds a column's values, in order.
+  local function fold(name, empty, start, step)
+    local column = column_of(name, false)
+    if column.kind == "quat" then error(("attribute %q is a quat, which has no order and no sum"):format(name), 0) end
+    if size == 0 then return empty end
+    if column.kind ~= "vec3" then
+      local total = start
+      for i = 0, size - 1 do total = step(total, column.load(column.data, i * column.stride)) end
+      return total
+    end
+    local x, y, z = start, start, start
+    for i = 0, size - 1 do
+      local value = column.load(column.data, i * column.stride)
+      x, y, z = step(x, value.x), step(y, value.y), step(z, value.z)
+    end
+    return vec3(x, y, z)
+  end
+  local function plus(a, b) return a + b end
+  local function smaller(a, b) return b < a and b or a end
+  local function larger(a, b) return b > a and b or a end
+
+  local set = {}
+  function set.sum(points, name)
+    check_set(points, "sum")
+    return fold(name, 0, 0, plus)
+  end
+  function set.mean(points, name)
+    check_set(points, "mean")
+    local total = fold(name, 0, 0, plus)
+    return size > 0 and total / size or nil
+  end
+  function set.min(points, name)
+    check_set(points, "min")
+    return fold(name, nil, huge, smaller)
+  end
+  function set.max(points, name)
+    check_set(points, "max")
+    return fold(name, nil, -huge, larger)
+  end
+  function set.bounds(points)
+    return set.min(points, "P"), set.max(points, "P")
+  end
+  function set.kill(points, i)
+    check_set(points, "kill")
+    killed[place_of("points:kill", i)] = true
+  end
+  function set.add(points, values)
+    check_set(points, "add")
+    if type(values) ~= "table" then error("points:add takes the new point's values: { P = vec3(x, y, z) }", 0) end
+    local copy, names = {}, {}
+    for name in pairs(values) do
+      if type(name) ~= "string" then
+        error(("points:add takes values by name, { P = vec3(x, y, z) }, not by %s"):format(describe(name)), 0)
+      end
+      names[#names + 1] = name
+    end
+    table.sort(names) -- the first wrong one, the same each time
+    for _, name in ipairs(names) do
+      if read_only[name] then error(("%s is read only"):format(name), 0) end
+      column_of(name, false).check(name, values[name])
+      copy[name] = values[name]
+    end
+    added[#added + 1] = copy
+  end
+  function set.neighbours(points, i, radius)
+    check_set(points, "neighbours")
+    if type(radius) ~= "number" then
+      error(("points:neighbours takes a place and a radius, not %s"):format(describe(radius)), 0)
+    end
+    return native.neighbours(place_of("points:neighbours", i), radius)
+  end
+  function set.sort(points, key)
+    check_set(points, "sort")
+    local of = key
+    if type(key) == "string" then
+      of = function(p) return p[key] end
+    elseif type(key) ~= "function" then
+      error(("points:sort takes the name of an attribute or a function of a point, not %s"):format(describe(key)), 0)
+    end
+    local keys, order = {}, {}
+    for i = 1, size do
+      keys[i], order[i] = of(point_view(i - 1, serial[0])), i
+      if type(keys[i]) ~= "number" or keys[i] ~= keys[i] then
+        error(("points:sort: the key of point %d is %s; it must be a number"):format(i, describe(keys[i])), 0)
+      end
+    end
+    check_set(points, "sort") -- a key function that yields may come back when the run has ended
+    table.sort(order, function(a, b)
+      if keys[a] ~= keys[b] then return keys[a] < keys[b] end
+      return a < b
+    end)
+    native.reorder(order)
+    local before = killed
+    columns, groups, killed = {}, {}, {}
+    for i = 1, size do killed[i - 1] = before[order[i] - 1] end
+  end
+
+  -- points.detail
+  local values_view = newproxy(true)
+  local of_values = getmetatable(values_view)
+  of_values.__metatable = false
+  of_values.__tostring = function() return "the detail values" end
+  of_values.__index = function(_, name) return details[name] end
+  of_values.__newindex = function(_, name, value)
+    local finite = type(value) == "number" and value > -huge and value < huge or istype(vec3, value)
+    if type(name) ~= "string" or not finite then
+      error(("points.detail.%s = %s; a detail value is a finite number or a vec3"):format(words.name(name),
+        describe(value)), 0)
+    end
+    details[name] = value
+  end
+
+  ffi.metatype(set_view, {
+    __len = function() return size end,
+    __tostring = function() return ("%d points"):format(size) end,
+    __index = function(points, key)
+      if points.rapid_serial ~= serial[0] then error(over, 0) end
+      if type(key) == "number" then return point_view(place_of("points", key), serial[0]) end
+      if key == "detail" then return values_view end
       local known = set[key]
       if known == nil then
         error(("points have no %s; they have add, bounds, detail, kill, max, mean, min, neighbours, sort and sum")
           :format(describe(key)), 0)
       end
       return known
-    end
-    metatable.__newindex = function(_, key)
+    end,
+    __newindex = function(_, key)
       error(("points[%s] can't be assigned; assign its attributes"):format(describe(key)), 0)
-    end
+    end,
+  })
 
-    f(points, frame, params)
-
-    if #added > 0 then
-      native.append(#added)
-      columns = {}
-      for k, values in ipairs(added) do
-        for name, value in pairs(values) do
-          local column = column_of(name, true)
-          column.store(column.data, (size + k - 1) * column.stride, value)
-        end
+  local function append_added()
+    if #added == 0 then return end
+    native.append(#added)
+    columns, groups = {}, {}
+    for k, values in ipairs(added) do
+      for name, value in pairs(values) do
+        local column = column_of(name, true)
+        column.store(column.data, (size + k - 1) * column.stride, value)
       end
     end
+  end
+
+  return function(f, now, params, count, key, detail_values)
+    columns, groups, killed, added = {}, {}, {}, {}
+    size, frame, random, details = count, now, key, detail_values
+    f(set_view(serial[0]), now, params)
+    append_added()
     local places = {}
     for i = 0, size - 1 do
       if killed[i] then places[#places + 1] = i end
     end
     return places, details
   end
-  return run
 end
 
 return { make = make }

@@ -21,7 +21,7 @@ local function run(chunk, name)
 end
 
 -- Nothing of ours is on the search path of graph code; what it may load stands beside the graph, or on RAPID_PATH.
-local env, loaded, load_text = sandbox.make(native.read_module, native.is_worker, run)
+local env, loaded, load_text = sandbox.make(native, run)
 string.dump = nil -- it is reached through no copy, and through no method of strings
 
 local loading = {} -- nodes whose files run now
@@ -78,7 +78,7 @@ function entry.load_node(name)
 end
 
 function entry.analyse(f, of_a_point)
-  return bytecode.analyse(f, env, of_a_point)
+  return bytecode.analyse(f, env, sandbox.resumes, of_a_point)
 end
 
 entry.fingerprint = bytecode.fingerprint

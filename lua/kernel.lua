@@ -6,6 +6,7 @@
 -- traces, and fall to a fifth of their speed.
 local ffi = require "ffi"
 local vector = require "vec3"
+local words = require "words"
 
 local vec3, quat = vector.type, vector.quat
 
@@ -55,15 +56,12 @@ local setter_text = {
 -- As Solve holds P and v within a frame.
 getter_text.vec3d, setter_text.vec3d = getter_text.vec3, setter_text.vec3
 
+-- The names of pointers in the runners' text: types that have been read once, not at every chunk.
 local pointer_type = {
-  vec3d = "double*", float = "float*", vec3 = "float*", quat = "float*", int32 = "int32_t*", int64 = "int64_t*",
+  vec3d = "doubles", float = "floats", vec3 = "floats", quat = "floats", int32 = "int32s", int64 = "int64s",
 }
 
-local function describe(value)
-  if type(value) == "string" then return ("%q"):format(value) end
-  if type(value) == "number" or type(value) == "cdata" or type(value) == "boolean" then return tostring(value) end
-  return value == nil and "nil" or "a " .. type(value)
-end
+local describe = words.value
 
 -- The host adds the place, the nearest line of graph code, and the point.
 local function wrong_type(name, wanted, value)
@@ -91,7 +89,7 @@ end
 -- A view's refusals.
 local function missing(name, getters)
   error(("no attribute %q here; a computed name must be one that the kernel also names as a constant (it names %s)")
-    :format(tostring(name), table.concat(sorted_names(getters), ", ")), 0)
+    :format(words.name(name), table.concat(sorted_names(getters), ", ")), 0)
 end
 
 local text_head = [[
@@ -100,17 +98,26 @@ local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.fl
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
 local MAX = 3.4028234663852886e38
+local chunks, floats, doubles = ffi.typeof "rapid_chunk*", ffi.typeof "float*", ffi.typeof "double*"
+local int32s, int64s, bytes = ffi.typeof "int32_t*", ffi.typeof "int64_t*", ffi.typeof "uint8_t*"
 local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that setting it spoils no other load
 cursor.i = -1
 local first, frame, random, params, details = 0, nil, 0, nil, {}
 local kill, result, members, substep, times, steps, step
 local getters, setters, methods = {}, {}, {}
 local id_column, id_stride
+local setup = function(...) end -- of the columns and groups
+
+-- What the view, its methods and the step do outside of the loop: columns may be gone by then.
+local function dead()
+  error("a point can't be used outside its kernel", 0)
+end
 ]]
 
 local text_methods = [[
 function methods.rand(...)
   local _, use, frame_or_number = ...
+  if cursor.i < 0 then dead() end
   if type(use) ~= "number" then wrong_use("a number, which of the point's random numbers", use) end
   local anew = 0
   if frame_or_number ~= nil then
@@ -124,12 +131,9 @@ function methods.rand(...)
 end
 
 function methods.kill(...)
+  if cursor.i < 0 then dead() end
   if kill == nil then error("kill is out of reach here", 0) end
   kill[cursor.i] = 1
-end
-
-local function dead()
-  error("a point can't be used outside its kernel", 0)
 end
 
 local function read(...)
@@ -176,12 +180,15 @@ step_view.__metatable = false
 step_view.__tostring = function() return "a step" end
 step_view.__index = function(...)
   local _, name = ...
+  if cursor.i < 0 then dead() end
   local get = step_getters[name]
   if not get then refuse.step(name) end
   local value = get()
   return value
 end
 ]]
+
+local block_size = 8
 
 -- layout.columns: { name, type, slot (from 0), writable }; layout.groups: { name, slot, writable };
 -- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve.
@@ -194,46 +201,49 @@ local function make_runner(kernel, layout, pointers)
     text[#text + 1] = (line:gsub("%$N", slot or ""):gsub("%$S", function() return ("%q"):format(name) end))
   end
 
-  local locals, setup = {}, {}
-  for _, column in ipairs(layout.columns) do
-    local n = tostring(column.slot)
-    locals[#locals + 1] = ("local c%s, s%s"):format(n, n)
-    setup[#setup + 1] = ("  c%s, s%s = cast(%q, chunk.columns[%s].data), tonumber(chunk.columns[%s].stride)"):format(n,
-      n, pointer_type[column.type], n, n)
-    if column.name == "id" then setup[#setup + 1] = ("  id_column, id_stride = c%s, s%s"):format(n, n) end
-  end
-  for _, group in ipairs(layout.groups) do
-    local n = tostring(group.slot)
-    locals[#locals + 1] = ("local g%s, t%s"):format(n, n)
-    setup[#setup + 1] = ("  g%s, t%s = cast(\"uint8_t*\", chunk.groups[%s].data), tonumber(chunk.groups[%s].stride)")
-      :format(n, n, n, n)
-  end
-  text[#text + 1] = table.concat(locals, "\n") .. "\n"
-  for _, column in ipairs(layout.columns) do
-    add("getters[$S] = function(...) " .. getter_text[column.type] .. " end", column.name, tostring(column.slot))
-    if column.writable then
-      add("setters[$S] = function(...) local x = ...\n" .. setter_text[column.type] .. "\nend", column.name,
-        tostring(column.slot))
+  -- A block of columns or groups with its locals; begin() calls the last block's setup, and that the one before. A
+  -- function of Lua has at most 200 locals and 60 upvalues.
+  local function add_blocks(entries, add_entry)
+    for from = 1, #entries, block_size do
+      text[#text + 1] = "do\nlocal before = setup"
+      local lines = {}
+      for place = from, math.min(from + block_size - 1, #entries) do
+        lines[#lines + 1] = add_entry(entries[place], tostring(entries[place].slot))
+      end
+      text[#text + 1] = "setup = function(...)\nlocal chunk = ...\nbefore(chunk)\n" .. table.concat(lines, "\n")
+        .. "\nend\nend"
     end
   end
+
+  add_blocks(layout.columns, function(column, n)
+    add("local c$N, s$N", column.name, n)
+    add("getters[$S] = function(...) " .. getter_text[column.type] .. " end", column.name, n)
+    if column.writable then
+      add("setters[$S] = function(...) local x = ...\n" .. setter_text[column.type] .. "\nend", column.name, n)
+    end
+    local line = ("c%s, s%s = cast(%s, chunk.columns[%s].data), tonumber(chunk.columns[%s].stride)"):format(n, n,
+      pointer_type[column.type], n, n)
+    return column.name == "id" and line .. (" id_column, id_stride = c%s, s%s"):format(n, n) or line
+  end)
   text[#text + 1] = [[
 if not getters.dt then getters.dt = function(...) return frame.dt end end
 getters.index = function(...) return first + cursor.i + 1 end
+local within, join, leave = {}, {}, {}
 ]]
-
-  -- Groups by name: a chain of closures, chosen when the name is looked up.
-  text[#text + 1] = "local within, join, leave = {}, {}, {}"
-  for _, group in ipairs(layout.groups) do
-    local n = tostring(group.slot)
+  -- Groups by name: closures, chosen when the name is looked up.
+  add_blocks(layout.groups, function(group, n)
+    add("local g$N, t$N", group.name, n)
     add("within[$S] = function(...) return g$N[cursor.i * t$N] ~= 0 end", group.name, n)
     if group.writable then
       add("join[$S] = function(...) g$N[cursor.i] = 1 end", group.name, n)
       add("leave[$S] = function(...) g$N[cursor.i] = 0 end", group.name, n)
     end
-  end
+    return ("g%s, t%s = cast(bytes, chunk.groups[%s].data), tonumber(chunk.groups[%s].stride)"):format(n, n, n, n)
+  end)
   text[#text + 1] = [[
 function methods.within(...)
   local _, name = ...
+  if cursor.i < 0 then dead() end
   local ask = within[name]
   if ask == nil then return false end
   local member = ask()
@@ -241,12 +251,14 @@ function methods.within(...)
 end
 function methods.join(...)
   local _, name = ...
+  if cursor.i < 0 then dead() end
   local act = join[name]
   if not act then refuse.group(name, "join") end
   act()
 end
 function methods.leave(...)
   local _, name = ...
+  if cursor.i < 0 then dead() end
   local act = leave[name]
   if not act then refuse.group(name, "leave") end
   act()
@@ -262,8 +274,10 @@ local function begin(...)
   frame = frame_type(chunk.number, chunk.time, chunk.dt)
   shown.details = details
   kill, result, members = chunk.kill, chunk.result, chunk.members
-  substep, times, steps = chunk.substep, chunk.times, chunk.steps]]
-  text[#text + 1] = table.concat(setup, "\n") .. "\nend\n"
+  substep, times, steps = chunk.substep, chunk.times, chunk.steps
+  setup(chunk)
+end
+]]
 
   local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0"
     or layout.action and "kernel(p, step, params)" or "kernel(p, frame, params)"
@@ -271,7 +285,7 @@ local function begin(...)
   text[#text + 1] = [[
 local function run(...)
   local pointer = ...
-  local chunk = cast("rapid_chunk*", pointer)
+  local chunk = cast(chunks, pointer)
   begin(chunk)
   for k = 0, tonumber(chunk.size) - 1 do ]] .. test .. [[ end
   cursor.i = -1
@@ -287,36 +301,35 @@ local function set_params(values, detail_values)
     if type(value) == "userdata" then adopt(value) end
   end
   setmetatable(values, { __index = function(_, name) refuse.param(name, values) end })
-  params = setmetatable({}, {
-    __index = values,
-    __newindex = function(_, name) refuse.assign(name) end,
-    __metatable = false,
-  })
+  params = newproxy(true) -- no table: table.insert would write into it
+  local of_params = getmetatable(params)
+  of_params.__index, of_params.__metatable = values, false
+  of_params.__newindex = function(_, name) refuse.assign(name) end
 end
 jit.off(set_params) -- once a pass
 return run, at, set_params
 ]]
   local refuse = { wrong_type = wrong_type, not_finite = not_finite, not_whole = not_whole, missing = missing }
   function refuse.write(name, getters)
-    if layout.predicate then error(("assigns %q; a test must not change its point"):format(tostring(name)), 0) end
+    if layout.predicate then error(("assigns %q; a test must not change its point"):format(words.name(name)), 0) end
     if name == "id" or name == "dt" or name == "index" then error(("%s is read only"):format(name), 0) end
     if getters[name] then
       error(("assigns %q under a computed name; name it as a constant somewhere in the kernel"):format(name), 0)
     end
-    error(("no attribute %q; add :attribute{ %s = 0 } before it"):format(tostring(name), tostring(name)), 0)
+    error(("no attribute %q; add :attribute{ %s = 0 } before it"):format(words.name(name), words.name(name)), 0)
   end
   function refuse.param(name, values)
-    error(("no parameter %q; the node has %s"):format(tostring(name), table.concat(sorted_names(values), ", ")), 0)
+    error(("no parameter %q; the node has %s"):format(words.name(name), table.concat(sorted_names(values), ", ")), 0)
   end
   function refuse.assign(name)
-    error(("params.%s can't be assigned; parameters are the graph's"):format(tostring(name)), 0)
+    error(("params.%s can't be assigned; parameters are the graph's"):format(words.name(name)), 0)
   end
   function refuse.group(name, what)
     error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
       :format(what, describe(name), what), 0)
   end
   function refuse.step(name)
-    error(("the step has no %q; it has time, dt, index and detail"):format(tostring(name)), 0)
+    error(("the step has no %q; it has time, dt, index and detail"):format(words.name(name)), 0)
   end
   function refuse.use(wanted, value)
     error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)
@@ -330,22 +343,25 @@ end
 local function prepare(rand, adopt)
   -- The detail values that frame.detail and step.detail show: those of the pass that runs.
   local shown = { details = {} }
-  shown.view = setmetatable({}, {
-    __index = function(_, name)
-      local value = shown.details[name]
-      if value == nil then
-        local names = sorted_names(shown.details)
-        error(("no detail value %q; %s"):format(tostring(name), #names > 0 and "there are " .. table.concat(names, ", ")
-          or "a :detail node sets one: points.detail." .. tostring(name) .. " = 0"), 0)
-      end
-      return value
-    end,
-    __newindex = function(_, name)
-      error(("detail.%s can't be assigned in a kernel; points.detail.%s can, in :detail")
-        :format(tostring(name), tostring(name)), 0)
-    end,
-    __metatable = false,
-  })
+  shown.view = newproxy(true) -- no table: table.insert would write into it
+  local of_view = getmetatable(shown.view)
+  of_view.__metatable = false
+  of_view.__tostring = function() return "the detail values" end
+  of_view.__index = function(...)
+    local _, name = ...
+    local value = shown.details[name]
+    if value == nil then
+      local names = sorted_names(shown.details)
+      name = words.name(name)
+      error(("no detail value %q; %s"):format(name, #names > 0 and "there are " .. table.concat(names, ", ")
+        or "a :detail node sets one: points.detail." .. name .. " = 0"), 0)
+    end
+    return value
+  end
+  of_view.__newindex = function(_, name)
+    name = words.name(name)
+    error(("detail.%s can't be assigned in a kernel; points.detail.%s can, in :detail"):format(name, name), 0)
+  end
 
   local frame_type = ffi.typeof "struct { const double number, time, dt; }"
   ffi.metatype(frame_type, {
@@ -353,7 +369,7 @@ local function prepare(rand, adopt)
     __index = function(...)
       local _, name = ...
       if name == "detail" then return shown.view end
-      error(("the frame has no %q; it has number, time, dt and detail"):format(tostring(name)), 2)
+      error(("the frame has no %q; it has number, time, dt and detail"):format(words.name(name)), 2)
     end,
   })
   local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown }

@@ -3,6 +3,7 @@
 -- Everything here only gathers arguments; the host makes the values, checks them and remembers where they were asked
 -- for. A call with a place of its own among the arguments (a path, a mesh, a motion) is turned into named arguments.
 local vector = require "vec3"
+local words = require "words"
 
 local function options_of(what, options)
   if options == nil then return {} end
@@ -222,7 +223,7 @@ local function make(native, load_node, numeric, shapes)
     if known[name] then return known[name] end
     local what = kind == "points" and "points have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
       or "a " .. kind .. " has"
-    name = tostring(name)
+    name = words.name(name)
     error(("%s no %q%s"):format(what, name, native.did_you_mean(name, names_of(known))), 2)
   end, function(a, b)
     return native.make("motion.product", { first = a, second = b })
@@ -232,7 +233,7 @@ local function make(native, load_node, numeric, shapes)
   local function closed(library, what)
     return setmetatable(library, {
       __index = function(_, name)
-        name = tostring(name)
+        name = words.name(name)
         error(("%s has no %q%s"):format(what, name, native.did_you_mean(name, names_of(library))), 2)
       end,
       __metatable = false,

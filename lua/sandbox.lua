@@ -4,13 +4,9 @@
 -- (the order of a string hash, math.random). Libraries are copies, so nothing that graph code does to them reaches
 -- ours.
 local ffi = require "ffi"
+local words = require "words"
 
 local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
-
--- "nil", "a number", "a table"
-local function article(value)
-  return value == nil and "nil" or "a " .. type(value)
-end
 
 local function copy(library, without)
   local result = {}
@@ -57,7 +53,7 @@ local function sorted_keys(map, what)
 end
 
 local function sorted_pairs(map)
-  if type(map) ~= "table" then error(("pairs takes a table, not %s"):format(article(map)), 2) end
+  if type(map) ~= "table" then error(("pairs takes a table, not %s"):format(words.article(map)), 2) end
   local keys, place = sorted_keys(map, "pairs"), 0
   return function()
     repeat
@@ -69,7 +65,7 @@ local function sorted_pairs(map)
 end
 
 local function sorted_next(map, key)
-  if type(map) ~= "table" then error(("next takes a table, not %s"):format(article(map)), 2) end
+  if type(map) ~= "table" then error(("next takes a table, not %s"):format(words.article(map)), 2) end
   local keys = sorted_keys(map, "next")
   if key == nil then return keys[1], map[keys[1]] end
   for place, known in ipairs(keys) do
@@ -94,12 +90,68 @@ local function safe_format(format, ...)
   return raw_format(format, unpack(values, 1, count))
 end
 
--- read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and where it
--- was looked for. In a quiet environment (a worker's) print says nothing: the first state has said it.
-local function make(read_module, quiet, run)
+-- Coroutines that run each other, and functions of C that call Lua, lie on the C stack, which Lua does not watch.
+local most_nested = 100
+local nested = 0
+
+local function enter(what)
+  if nested == most_nested then
+    error(("stack overflow: %s inside of each other, more than %d deep"):format(what, most_nested), 3)
+  end
+  nested = nested + 1
+end
+
+local function leave(...)
+  nested = nested - 1
+  return ...
+end
+
+local function safe_gsub(text, pattern, replacement, count)
+  if type(replacement) ~= "function" and type(replacement) ~= "table" then
+    return string.gsub(text, pattern, replacement, count)
+  end
+  enter "string.gsub"
+  local ok, result, replaced = leave(pcall(string.gsub, text, pattern, replacement, count))
+  if not ok then error(result, 0) end
+  return result, replaced
+end
+
+local function safe_resume(thread, ...)
+  if type(thread) ~= "thread" then error("coroutine.resume takes a coroutine, not " .. words.article(thread), 2) end
+  enter "coroutines"
+  return leave(coroutine.resume(thread, ...))
+end
+
+local wrapped = setmetatable({}, { __mode = "k" }) -- what coroutine.wrap has given
+
+local function result_of(ok, ...)
+  if not ok then error((...), 0) end
+  return ...
+end
+
+local function safe_wrap(f)
+  if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. words.article(f), 2) end
+  local thread = coroutine.create(f)
+  local function run(...)
+    enter "coroutines"
+    return result_of(leave(coroutine.resume(thread, ...)))
+  end
+  wrapped[run] = true
+  return run
+end
+
+-- Whether calling f with these arguments goes on where another call of it has stopped.
+local function resumes(f, first)
+  return wrapped[f] or (f == safe_resume and first ~= nil)
+end
+
+-- native.read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and
+-- where it was looked for; native.outside_kernels(what, remedy) is an error while a kernel runs. In a quiet environment
+-- (a worker's) print says nothing: the first state has said it.
+local function make(native, run)
   local env = {}
   local strings = copy(string, { "dump" })
-  strings.format = safe_format
+  strings.format, strings.gsub = safe_format, safe_gsub
 
   -- Methods of strings are a copy of their own, which graph code gets no hold of: our modules call them too.
   local of_strings = debug.getmetatable("")
@@ -116,6 +168,7 @@ local function make(read_module, quiet, run)
   env.math = copy(math, { "random", "randomseed" })
   env.table = copy(table, { "foreach", "foreachi", "getn" })
   env.coroutine = copy(coroutine)
+  env.coroutine.resume, env.coroutine.wrap = safe_resume, safe_wrap
 
   function env.setmetatable(object, meta)
     if type(object) ~= "table" then error("setmetatable takes a table", 2) end
@@ -126,15 +179,15 @@ local function make(read_module, quiet, run)
     return getmetatable(object)
   end
   function env.print(...)
-    if quiet then return end
-    local words = {}
-    for place = 1, select("#", ...) do words[place] = safe_tostring((select(place, ...))) end
-    print(table.concat(words, "\t"))
+    if native.is_quiet then return end
+    local texts = {}
+    for place = 1, select("#", ...) do texts[place] = safe_tostring((select(place, ...))) end
+    print(table.concat(texts, "\t"))
   end
 
   -- Text only: bytecode could say what Lua cannot.
   local function load_text(text, name)
-    if type(text) ~= "string" then return nil, "load takes a text, not " .. article(text) end
+    if type(text) ~= "string" then return nil, "load takes a text, not " .. words.article(text) end
     if text:byte(1) == 27 then return nil, "bytecode is not loaded" end
     local chunk, message = loadstring(text, name)
     if not chunk then return nil, message end
@@ -142,8 +195,8 @@ local function make(read_module, quiet, run)
   end
   -- A chunk named "=..." would pass for one of ours.
   function env.load(text, name)
-    if type(name) == "string" then name = "@" .. name:gsub("^[@=]", "") end
-    return load_text(text, name)
+    native.outside_kernels("load", "what it makes can't be checked there")
+    return load_text(text, "@" .. (type(name) == "string" and name:gsub("^[@=]", "") or "text given to load"))
   end
   env.loadstring = env.load
 
@@ -151,8 +204,9 @@ local function make(read_module, quiet, run)
   function env.require(name)
     if type(name) ~= "string" then error("require takes the name of a module", 2) end
     if loaded[name] ~= nil then return loaded[name] end
+    native.outside_kernels("require", "let the graph's body do it first")
     if loading[name] then error(("module %q requires itself, by way of those that it requires"):format(name), 2) end
-    local text, where = read_module(name)
+    local text, where = native.read_module(name)
     if not text then error(("no module %q; looked for %s"):format(name, where), 2) end
     local chunk, message = load_text(text, where)
     if not chunk then error(message, 0) end
@@ -168,4 +222,4 @@ end
 
 assert(ffi.abi "gc64", "the host counts on frames of two slots")
 
-return { make = make }
+return { make = make, resumes = resumes }

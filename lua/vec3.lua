@@ -5,6 +5,7 @@
 -- trace at such a function: they are called so often that it would, in vain, and then refuse the loops that they are
 -- called from. And none ends in a tail call, hence the parentheses: the compiler gives up after fifteen of them.
 local ffi = require "ffi"
+local words = require "words"
 
 local sqrt, sin, acos = math.sqrt, math.sin, math.acos
 local istype = ffi.istype
@@ -78,6 +79,17 @@ function methods.lerp(...)
   return (vec3(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, a.z + (b.z - a.z) * t))
 end
 
+-- Of values that have a text of their own.
+local function concat(a, b)
+  for _, value in ipairs { a, b } do
+    local kind = type(value)
+    if kind ~= "cdata" and kind ~= "string" and kind ~= "number" then
+      error(("attempt to concatenate %s"):format(words.article(value)), 2)
+    end
+  end
+  return tostring(a) .. tostring(b)
+end
+
 local function no_order()
   error("vec3 values have no order; compare their lengths or components", 2)
 end
@@ -119,9 +131,9 @@ ffi.metatype(vec3, {
   __pow = function(a, b) wrong_operand("^", a, b) end,
   __len = function() error("a vec3 has no #; its length is v:length()", 2) end,
   __call = function() error("a vec3 is not a function", 2) end,
-  __concat = function(a, b) return tostring(a) .. tostring(b) end,
+  __concat = concat,
   __newindex = function(_, name)
-    error(("a vec3 has no %q, and can't be changed; make a new one: vec3(x, y, z)"):format(tostring(name)), 2)
+    error(("a vec3 has no %q, and can't be changed; make a new one: vec3(x, y, z)"):format(words.name(name)), 2)
   end,
   __tostring = function(a)
     return ("vec3(%.9g, %.9g, %.9g)"):format(a.x, a.y, a.z)
@@ -130,7 +142,7 @@ ffi.metatype(vec3, {
     local _, name = ...
     local method = methods[name]
     if method then return method end
-    error(("a vec3 has no %q; it has x, y, z, dot, cross, length, normalized and lerp"):format(tostring(name)), 2)
+    error(("a vec3 has no %q; it has x, y, z, dot, cross, length, normalized and lerp"):format(words.name(name)), 2)
   end,
 })
 
@@ -207,18 +219,18 @@ ffi.metatype(quat, {
     return istype(quat, a) and istype(quat, b) and a.x == b.x and a.y == b.y and a.z == b.z and a.w == b.w
   end,
   __newindex = function(_, name)
-    error(("a quat has no %q, and can't be changed; make a new one: quat(x, y, z, w)"):format(tostring(name)), 2)
+    error(("a quat has no %q, and can't be changed; make a new one: quat(x, y, z, w)"):format(words.name(name)), 2)
   end,
   __tostring = function(a)
     return ("quat(%.9g, %.9g, %.9g, %.9g)"):format(a.x, a.y, a.z, a.w)
   end,
-  __concat = function(a, b) return tostring(a) .. tostring(b) end,
+  __concat = concat,
   __index = function(...)
     local _, name = ...
     local method = rotations[name]
     if method then return method end
     error(("a quat has no %q; it has x, y, z, w, rotate, inverse, length, normalized and slerp"):format(
-      tostring(name)), 2)
+      words.name(name)), 2)
   end,
 })
 

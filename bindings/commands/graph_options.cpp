@@ -54,4 +54,14 @@ std::unique_ptr<Session> GraphOptions::load_other(const std::string& file,
     return std::make_unique<Session>(file, std::move(options));
 }
 
+std::unique_ptr<Session> GraphOptions::load_again(const KernelOrder& order,
+                                                  std::function<void(const std::string& message)> on_timeout) const
+{
+    SessionOptions options = session_;
+    options.quiet = true;
+    options.kernel_order = order;
+    options.on_timeout = std::move(on_timeout);
+    return std::make_unique<Session>(file_, std::move(options));
+}
+
 }  // namespace rapid

@@ -25,6 +25,9 @@ public:
     // Another graph, with the same limits; --set is of the first one only.
     std::unique_ptr<Session> load_other(const std::string& file,
                                         std::function<void(const std::string& message)> on_timeout) const;
+    // Once more, as load() has done it, without a word, and to run kernels in another order.
+    std::unique_ptr<Session> load_again(const KernelOrder& order,
+                                        std::function<void(const std::string& message)> on_timeout) const;
 
 private:
     std::string file_;

@@ -15,8 +15,12 @@ double seconds_since(std::chrono::steady_clock::time_point begin)
 
 }  // namespace
 
-Evaluator::Evaluator(const Plan& plan, WriteHook write)
-    : plan_(plan), write_(std::move(write)), next_(plan.first_frame()), kept_(plan.nodes.size())
+Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
+    : plan_(plan),
+      write_(std::move(write)),
+      result_(std::move(result)),
+      next_(plan.first_frame()),
+      kept_(plan.nodes.size())
 {
     for (const PlannedSimulation& planned : plan.simulations) {
         auto simulation = std::make_shared<Simulation>();
@@ -103,6 +107,7 @@ Flow Evaluator::evaluate(std::size_t i, std::vector<Flow>& results, std::vector<
                           : planned.op->evaluate(inputs, evaluation);
         if (node.type->kind == NodeKind::Solve) frame.figures.solve_seconds += seconds_since(begin);
         if (planned.once) kept_[i] = result;
+        if (result_) result_(node, next_, result.points);
         return result;
     } catch (Error& error) {
         error.in_node(node.name).at(node.location);

@@ -30,7 +30,10 @@ public:
     using WriteHook =
         std::function<void(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)>;
 
-    explicit Evaluator(const Plan& plan, WriteHook write = {});
+    // Told of each node's result.
+    using ResultHook = std::function<void(const Node& node, std::int64_t frame, const PointSet& points)>;
+
+    explicit Evaluator(const Plan& plan, WriteHook write = {}, ResultHook result = {});
 
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
@@ -44,6 +47,7 @@ private:
 
     const Plan& plan_;
     WriteHook write_;
+    ResultHook result_;
     std::int64_t next_;
     std::vector<std::shared_ptr<Simulation>> simulations_;
     std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once

@@ -95,6 +95,36 @@ return rapid.create { fps = 24 }
     assert.same({ 2, 1, 0 }, values(run("points:kill(4) points:sort(function(p) return -p.heat end)")[2], "id"))
   end)
 
+  it("kills, adds and sorts in any order", function()
+    -- Heats 1, 2, 3, 4: the last is killed, then all are turned round, then the one with heat 2.
+    local points = run([[
+if frame.number == 2 then
+  points:kill(4) points:add { heat = 9 } points[1]:join "g"
+  points:sort(function(p) return -p.heat end)
+  points[3]:kill() points[2].n = points[4]:within "g" and points[1].heat or 0
+end]], {2, 2})[2]
+    assert.same({ 3, 1, 9 }, values(points, "heat"))
+    assert.same({ 4, 0, 0 }, values(points, "n"))
+    assert.same({ 2, 0, 4 }, values(points, "id"))
+  end)
+
+  it("sees attributes of any name", function()
+    local points = scene.run([[
+return rapid.create { points = two } :attribute { place = 5, serial = 6, size = 7 }
+  :detail("d", function(points)
+    points[1].place = points[1].place + 1 points[1].size = points[2].serial
+  end) :solve {}]], { frames = {2, 2} })[2]
+    assert.same({ 6, 6, 6 }, { points[1].place, points[1].serial, points[1].size })
+  end)
+
+  it("runs as often as a long sequence has frames", function()
+    local result = scene.run([[
+local chain = rapid.create { points = two } :attribute { n = 0 }
+for i = 1, 60 do chain = chain:detail("d" .. i, function(points) points[1].n = points[1].n + 1 end) end
+return chain:solve {}]], { frames = {601, 601} })
+    assert.equal(36000, result[601][1].n)
+  end)
+
   it("joins and leaves groups, and draws random numbers", function()
     local points = run([[
 for i = 1, #points do if points[i].heat > 2 then points[i]:join "hot" end end

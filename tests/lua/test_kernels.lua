@@ -279,3 +279,19 @@ describe("a test of a point", function()
     end
   end)
 end)
+
+describe("a kernel of many names", function()
+  it("reads and writes a hundred attributes, and joins as many groups", function()
+    local made, body = {}, {}
+    for i = 1, 100 do
+      made[i] = ("a%d = %d"):format(i, i)
+      body[i] = ("p.a%d = p.a%d * 2 + p.a%d if p.id == %d then p:join 'g%d' end"):format(i, i, i % 100 + 1, i % 2, i)
+    end
+    local text = "return rapid.create { points = two } :attribute { %s } :points('k', function(p) %s end) :solve {}"
+    local points = scene.run(text:format(table.concat(made, ", "), table.concat(body, " ")), { frames = {2, 2} })[2]
+    for i = 1, 99 do
+      assert.equal(3 * i + 1, points[1]["a" .. i])
+      assert.equal(1, #points:group("g" .. i))
+    end
+  end)
+end)

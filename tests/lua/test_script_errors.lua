@@ -125,12 +125,64 @@ describe("a kernel that keeps something for other points", function()
       ["local f = bump f()"] = { "local n = 0 local function bump() n = n + 1 end", 'assigns the upvalue "n"' },
       ["local function inc() count = count + 1 end inc()"] = { "local count = 0", 'assigns the upvalue "count"' },
       ["pcall(bump)"] = { "local n = 0 local function bump() n = n + 1 end", 'assigns the upvalue "n"' },
+      ["local b = get() b.n = 1"] = { "local box = {} local function get() return box end", field:format "n" },
+      ["same(box).n = 1"] = { "local box = {} local function same(t) return t end", field:format "n" },
+      ["for _, t in ipairs(list) do t.n = 1 end"] = { "local list = { {} }", field:format "n" },
+      ["for _, t in pairs(list) do t.n = 1 end"] = { "local list = { {} }", field:format "n" },
+      ["local _, t = next(list) t.n = 1"] = { "local list = { {} }", field:format "n" },
+      ["local t = unpack(list) t.n = 1"] = { "local list = { {} }", field:format "n" },
+      ["for _, f in ipairs(list) do f() end"] = { "local n = 0 local list = { function() --[[bump]] n = n + 1 end }",
+                                                  'assigns the upvalue "n"' },
+      ["box:bump()"] = { "local box = { bump = function(self) self.n = 1 end }", field:format "n" },
+      ["object:bump()"] = {
+        "local C = {} C.__index = C function C:bump() self.n = 1 end local object = setmetatable({}, C)",
+        field:format "n" },
+      ["local x = lazy.anything"] = {
+        "local n = 0 local lazy = setmetatable({}, { __index = function() --[[bump]] n = n + 1 return n end })",
+        'assigns the upvalue "n"' },
+      ["local x = lazy + 1"] = {
+        "local n = 0 local lazy = setmetatable({}, { __add = function() --[[bump]] n = n + 1 return n end })",
+        'assigns the upvalue "n"' },
+      ["local function set(t) t.n = 1 end set(box)"] = { "local box = {}", field:format "n" },
+      ["table.move({ 1 }, 1, 1, 1, box)"] = { "local box = {}", "changes a table that all points share by table.move" },
+      ["p.n = later()"] = { "local later = coroutine.wrap(function() end)",
+                            "resumes a coroutine, or an iterator, that was made outside of it" },
+      ["p.n = coroutine.resume(thread)"] = { "local thread = coroutine.create(function() end)",
+                                             "resumes a coroutine, or an iterator, that was made outside of it" },
+      ["local word = words()"] = { "local words = ('a b'):gmatch '%a'",
+                                   "resumes a coroutine, or an iterator, that was made outside of it" },
     } do
       local before, what = case[1], case[2]
       local line = before:find "bump" and 1 or 2
       assert.equal(('scene.lua:%d: node "kernel": the kernel %s%s'):format(line, what, keep),
         scene.kernel_error(body, nil, before), body)
     end
+  end)
+
+  it("is not one that makes tables of its own", function()
+    scene.kernel([[
+local t, sum = { 3, 1 }, 0
+for k, v in pairs(box) do t[k] = v end
+for _, v in ipairs(box.list) do t[#t + 1] = v end
+local function add(into, v) into.sum = (into.sum or 0) + v sum = sum + v end
+add(t, box.n) table.insert(t, 1, 2) table.sort(t) table.remove(t)
+local copied = copy(box) copied.n = 5
+local own = coroutine.wrap(function(x) t.last = x coroutine.yield(x) end) own(1)
+assert(t.sum == 7 and sum == 7 and copied.n == 5 and box.n == 7)]], nil,
+      "local function copy(t) local c = {} for k, v in pairs(t) do c[k] = v end return c end " ..
+      "local box = { n = 7, list = { 1, 2 } }")
+  end)
+
+  it("in a parameter of a Lua node is refused, too", function()
+    scene.folder:write("keeps.lua", [[
+return require "rapid".node {
+  name = "keeps", doc = "Keeps.", params = { all = { "floats", default = { 1, 2 }, doc = "numbers" } },
+  points = function(p, frame, params)
+    params.all[1] = p.id
+  end,
+}]])
+    assert.equal('keeps.lua:4: node "keeps1": the kernel assigns into a table that all points share' .. keep,
+      scene.error "return rapid.create { points = two } :keeps {} :solve {}")
   end)
 
   it("is refused by rapid check", function()

@@ -133,17 +133,13 @@ void Kernel::analyse()
     lua_getfield(L, -1, "stores");
     lua_rawgeti(L, -1, 1);
     if (lua_istable(L, -1)) {
-        lua_getfield(L, -1, "what");
+        lua_getfield(L, -1, "message");
         lua_getfield(L, -2, "line");
         lua_getfield(L, -3, "source");
-        const std::string what = lua_tostring(L, -3), source = lua_tostring(L, -1);
+        const std::string message = lua_tostring(L, -3), source = lua_tostring(L, -1);
         const int line = static_cast<int>(lua_tonumber(L, -2));
         lua_pop(L, 6);
-        throw Error(
-            fmt::format("the kernel {}; kernels run in parallel, in states of their own: keep it in an attribute of "
-                        "the point, or do it once for the whole set in :detail",
-                        what))
-            .at({source.substr(source.rfind('@', 0) == 0 ? 1 : 0), line});
+        throw Error(message).at({source.substr(source.rfind('@', 0) == 0 ? 1 : 0), line});
     }
     lua_pop(L, 2);
 

@@ -10,7 +10,7 @@
 --                    are the calls of a method `join` of anything
 --   calls            names on the point itself that it calls as if they were methods
 --   kills            whether `kill` is called or could be
---   stores           places (line, what) where it writes upvalues, globals or shared tables
+--   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
 --
 -- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
 -- they are when the graph file has run. They are followed with what they are called with, and what they return.
@@ -36,6 +36,7 @@ end
 
 local point = { kind = "point" }
 local shared = { kind = "shared" } -- of unknown value
+local parameters = { kind = "shared", value = {} } -- of a Lua node
 
 local methods = { join = true, leave = true, within = true, kill = true, rand = true }
 
@@ -127,8 +128,11 @@ local function step(f, pc, regs, found, outer, call)
   local function line()
     return util.funcinfo(f, pc).currentline
   end
+  local function refuse(message)
+    found.stores[#found.stores + 1] = { line = line(), source = util.funcinfo(f).source, message = message }
+  end
   local function store(what)
-    found.stores[#found.stores + 1] = { line = line(), source = util.funcinfo(f).source, what = what }
+    refuse(("the kernel %s; %s"):format(what, found.remedy))
   end
   local function index_read(object, key)
     if object == point then
@@ -171,6 +175,8 @@ local function step(f, pc, regs, found, outer, call)
     local object, key = regs[b], string_constant(f, c)
     if object == point then
       found.writes[key] = found.writes[key] or line()
+    elseif object == parameters then
+      refuse(("params.%s can't be assigned; parameters are the graph's"):format(key))
     elseif object and object.kind == "shared" then
       store(("assigns the field %q of a table that all points share"):format(key))
     else
@@ -183,7 +189,7 @@ local function step(f, pc, regs, found, outer, call)
     local key = name == "TSETV" and regs[c] or nil
     if object == point and key and key.kind == "string" then
       found.writes[key.value] = found.writes[key.value] or line()
-    elseif object and object.kind == "shared" then
+    elseif object and object ~= parameters and object.kind == "shared" then
       store("assigns into a table that all points share")
     end
   elseif name == "USETV" or name == "USETS" or name == "USETN" or name == "USETP" then
@@ -345,16 +351,23 @@ function analyse_function(f, found, given, outer)
   return call.returned
 end
 
+local to_remember = {
+  point = "kernels run in parallel, in states of their own: keep it in an attribute of the point, or do it once for " ..
+    "the whole set in :detail",
+  set = "a frame depends on the points that enter it, and nothing else: keep it in a detail value, " ..
+    "points.detail.NAME = value",
+}
+
 -- env: the environment in which the kernel's globals live; resumes(f, first): whether calling f goes on with a
 -- coroutine; of_a_point: the kernel's first parameter is a point.
 local function analyse(kernel, env, resumes, of_a_point)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
-    inside = {}, env = env, resumes = resumes,
+    inside = {}, env = env, resumes = resumes, remedy = of_a_point and to_remember.point or to_remember.set,
   }
   -- Behind the point and the frame come the parameters of a Lua node, which all points share.
-  analyse_function(kernel, found, of_a_point and { [0] = point, [2] = shared } or { [2] = shared })
-  found.calls_of, found.inside, found.env, found.resumes = nil, nil, nil, nil
+  analyse_function(kernel, found, of_a_point and { [0] = point, [2] = parameters } or { [2] = parameters })
+  found.calls_of, found.inside, found.env, found.resumes, found.remedy = nil, nil, nil, nil, nil
   return found
 end
 

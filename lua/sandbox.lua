@@ -89,6 +89,7 @@ local function safe_format(format, ...)
   end
   return raw_format(format, unpack(values, 1, count))
 end
+jit.off(safe_format) -- unpack is not compiled: its loop would be, in vain
 
 -- Coroutines that run each other, and functions of C that call Lua, lie on the C stack, which Lua does not watch.
 local most_nested = 100

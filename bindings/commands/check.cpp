@@ -37,7 +37,8 @@ public:
             };
             const std::unique_ptr<Session> session = graph_.load(false, on_timeout);
             for (const std::string& warning : session->warnings()) print_warning(warning);
-            const PlanOptions options = files_.plan_options(graph_.seed());
+            PlanOptions options = files_.plan_options(graph_.seed());
+            options.keep_all = races_;  // what no file asks for may be what tells
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) print_warning(warning);
             files_.resolve(plan, true);

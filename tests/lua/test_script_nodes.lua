@@ -87,8 +87,17 @@ return rapid.node { name = "fails", doc = "Fails.",
   points = function(p, frame, params)
     params.by = 2
   end }]])
-    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are the graph's " ..
-      "(point id 0, frame 2)", scene.error "return rapid.create { points = two } :fails {} :solve {}")
+    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are the graph's",
+      scene.error "return rapid.create { points = two } :fails {} :solve {}")
+    scene.folder:write("fails.lua", [[
+local rapid = require "rapid"
+return rapid.node { name = "fails", doc = "Fails.",
+  params = { by = { "float", default = 1, doc = "amount" } },
+  detail = function(points, frame, params)
+    params.by = points:sum "id"
+  end }]])
+    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are the graph's",
+      scene.error "return rapid.create { points = two } :fails {} :solve {}")
     scene.folder:write("fails.lua", [[
 local rapid = require "rapid"
 return rapid.node { name = "fails", doc = "Fails.", points = function(p) p.v = p.v * p.haet end }]])

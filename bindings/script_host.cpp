@@ -72,8 +72,14 @@ ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options
     text_ = *text;
     graph.file = shown(file);
 
-    run_file(*main_);
-    collect_outputs(*main_);
+    {
+        const Section section(*this, fmt::format("{}: the graph's body", graph.file));
+        run_file(*main_, 1);
+    }
+    if (options_.knobs && options_.knobs->empty())
+        lua_pop(main_->lua(), 1);  // a study that is only asked what it asks: no scene was made
+    else
+        collect_outputs(*main_);
 
     std::vector<std::string> names;
     for (const Session::Parameter& parameter : parameters) names.push_back(parameter.name);
@@ -108,17 +114,17 @@ ScriptHost::~ScriptHost()
     watchdog_.join();
 }
 
-// Leaves what the file returned on the stack.
-void ScriptHost::run_file(State& state)
+// Leaves the first `results` values that the file returned on the stack.
+void ScriptHost::run_file(State& state, int results)
 {
     lua_State* L = state.lua();
-    const Section section(*this, fmt::format("{}: the graph's body", graph.file));
     state.push_entry("run");
     lua_pushlstring(L, text_.data(), text_.size());
     const std::string name = "@" + graph.file;
     lua_pushlstring(L, name.data(), name.size());
+    state.push(options_.knobs ? Value(std::make_shared<const Table>(Table{{}, {}, *options_.knobs})) : Value());
     try {
-        state.call(2, 1);
+        state.call(3, results);
     } catch (Error& error) {
         error.at({graph.file, 0});  // where no line is known: a stack overflow, no memory left
         throw;
@@ -178,11 +184,7 @@ std::unique_ptr<State> ScriptHost::make_worker()
 {
     auto state = std::make_unique<State>(*this, false);
     lua_State* L = state->lua();
-    state->push_entry("run");
-    lua_pushlstring(L, text_.data(), text_.size());
-    const std::string name = "@" + graph.file;
-    lua_pushlstring(L, name.data(), name.size());
-    state->call(2, 0);
+    run_file(*state, 0);
     if (state->kernel_count() != kernels.size())
         throw Error(
             fmt::format("the graph file made {} kernels at first and {} in a worker; it must do the same each time it "

@@ -76,7 +76,7 @@ public:
 
 private:
     std::unique_ptr<State> make_worker();
-    void run_file(State& state);
+    void run_file(State& state, int results);
     void collect_outputs(State& state);
     void watch();
 

@@ -9,11 +9,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
+#include "runtime/report/study.h"
 
 namespace rapid {
 
@@ -35,6 +37,8 @@ struct SessionOptions {
     bool may_write = false;                            // levelset:write acts in a run alone
     bool quiet = false;                                // print says nothing
     KernelOrder kernel_order;
+    // Of a study file: the knobs of the scene that is to be its graph. Empty: none is made; study() alone is asked.
+    std::optional<Knobs> knobs;
     // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
     std::function<void(const std::string& message)> on_timeout;
     // Where given, told of each file before it is read, and of each where a module or node was looked for.
@@ -64,6 +68,12 @@ public:
 
     // What was doubtful while the file ran: a mesh with holes, ...
     const std::vector<std::string>& warnings() const;
+
+    // Of a study file: what it asks; its closed form, with ids from 0 in order, for a row of these knobs; and its own
+    // measure of error, of points that are matched place by place. Error: what the script raised or returned.
+    Study study() const;
+    PointSet study_reference(const Frame& frame, const Knobs& knobs) const;
+    double study_error(const PointSet& points, const PointSet& reference) const;
 
     // The node types that are there without any graph: the native ones and those of the shipped Lua nodes.
     static Registry all_node_types();

@@ -214,8 +214,9 @@ int run_body(lua_State* L)
         ~Ending() { place = before; }
     } const ending{state.tail_call,
                    std::exchange(state.tail_call, {lua_tostring(L, 2), static_cast<int>(lua_tointeger(L, 3))})};
-    lua_settop(L, 1);
-    lua_call(L, 0, 1);
+    lua_remove(L, 3);
+    lua_remove(L, 2);
+    lua_call(L, lua_gettop(L) - 1, 1);
     return 1;
 }
 
@@ -268,7 +269,7 @@ void State::open_libraries()
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();
     for (const char* name :
-         {"words", "vec3", "bytecode", "kernel", "detail", "numeric", "shape", "ramp", "sandbox", "rapid"}) {
+         {"words", "vec3", "bytecode", "kernel", "detail", "numeric", "shape", "ramp", "sandbox", "study", "rapid"}) {
         lua_getglobal(L_, "package");
         lua_getfield(L_, -1, "preload");
         const std::string text = read_text(folder / (std::string(name) + ".lua"));

@@ -100,7 +100,8 @@ private:
     std::vector<int> kernel_references_;
 };
 
-// native.run(chunk, file, line): calls the body of a file, which ends in a call at that line, or in none (nil).
+// native.run(chunk, file, line, ...): calls the body of a file, or the scene of a study with its knobs, which ends in a
+// call at that line, or in none (nil).
 int run_body(lua_State* L);
 
 // Runs f and turns an Error into a Lua error with the place of the calling graph code. For functions that Lua calls.

@@ -12,12 +12,13 @@ local language = require "rapid"
 local numeric = require "numeric"
 local ramp = require "ramp"
 local shape = require "shape"
+local study = require "study"
 local vector = require "vec3"
 local ffi = require "ffi"
 
 -- Runs the body of a file; the place of a call that ends it is kept for errors, because no frame of it is left then.
-local function run(chunk, name)
-  return native.run(chunk, (name:gsub("^@", "")), bytecode.tail_call_line(chunk))
+local function run(chunk, name, ...)
+  return native.run(chunk, (name:gsub("^@", "")), bytecode.tail_call_line(chunk), ...)
 end
 
 -- Nothing of ours is on the search path of graph code; what it may load stands beside the graph, or on RAPID_PATH.
@@ -51,7 +52,8 @@ ffi.cdef(native.chunk_header)
 local shapes = shape.make(native)
 local engine = kernel.prepare(native.rand, shapes.pointer_of)
 
-local rapid = language.make(native, load_node, numeric.make(native.noise, native.curl_noise), shapes)
+local studies = study.make(native, vector)
+local rapid = language.make(native, load_node, numeric.make(native.noise, native.curl_noise), shapes, studies)
 loaded.rapid = rapid
 env.vec3, env.quat = vector.make, vector.make_quat
 
@@ -59,13 +61,21 @@ local run_detail = detail.make(native.detail, engine.rand)
 
 local entry = {}
 
--- Runs the graph and returns what it returned: a node, or a table of nodes by name.
-function entry.run(text, name)
+local asked -- what the study file that was run asks
+
+-- Runs the graph and returns what it returned: a node, or a table of nodes by name. With knobs the file is a study, and
+-- the graph that of its scene; without any of them there, none.
+function entry.run(text, name, knobs)
   local chunk, message = load_text(text, name)
   if not chunk then error(message, 0) end
   -- Interpreted: a graph's body runs once, and bytecode that is compiled is no longer what bytecode.lua reads.
   jit.off()
-  return run(chunk, name)
+  local result = run(chunk, name)
+  asked = studies.definition_of(result)
+  if asked and not knobs then error("this is a study; run it with: rapid study " .. name:sub(2), 0) end
+  if not knobs then return result end
+  if not asked then error("the file returns no study; end it with: return rapid.study { ... }", 0) end
+  if next(knobs) then return run(asked.scene, name, knobs) end
 end
 
 function entry.loaded()
@@ -91,6 +101,19 @@ end
 function entry.detail(f, number, time, dt, params, size, random, details)
   local key = ffi.cast("const uint64_t*", random)[0]
   return run_detail(f, engine.frame(number, time, dt, details), params, size, key, details)
+end
+
+function entry.study()
+  return studies.describe(asked)
+end
+
+-- The closed form of a study at a frame, for a row of these knobs.
+function entry.reference(number, time, dt, knobs)
+  return asked.reference(engine.frame(number, time, dt), knobs)
+end
+
+function entry.study_error(points, reference)
+  return studies.error_of(asked, points, reference)
 end
 
 -- Tells the host of each trace that the compiler gives up.

@@ -23,8 +23,8 @@ local function names_of(map)
 end
 
 -- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil;
--- numeric: what rapid.math holds; shapes: what can be asked of shapes (lua/shape.lua).
-local function make(native, load_node, numeric, shapes)
+-- numeric: what rapid.math holds; shapes: what can be asked of shapes (lua/shape.lua); studies: lua/study.lua.
+local function make(native, load_node, numeric, shapes, studies)
   local rapid = { math = numeric }
 
   -- A maker with the named positional arguments first.
@@ -164,6 +164,8 @@ local function make(native, load_node, numeric, shapes)
     if type(definition.name) == "string" then definitions[definition.name] = definition end
     return definition
   end
+
+  rapid.study = studies.define -- returned by a study file
 
   -- Methods of values, by what they are.
   local function transformed(object, motion)

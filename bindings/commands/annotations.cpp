@@ -66,6 +66,22 @@ function Quat:normalized() end
 ---@return rapid.Quat
 function Quat:slerp(r, t) end
 
+---@class rapid.StudyDefinition
+---@field name string
+---@field scene fun(knobs: table): rapid.Node|table<string, rapid.Node>
+---@field frames integer[]  the first and the last
+---@field sweep table<string, (number|string|boolean)[]>  the values of each knob
+---@field lines? string|string[]  the knobs that tell the lines of the plot apart
+---@field reference table|fun(frame: rapid.Frame, knobs: table): table  knobs, or a closed form: { P = {...} }
+---@field error? "rms"|"max"|"p95"|fun(points: table, reference: table): number  of columns, place by place
+---@field error_frames? "all"|"last"
+---@field repeat_runs? integer  timed runs of each row, 5 if not given
+
+---What `rapid study` runs; its file returns it.
+---@param definition rapid.StudyDefinition
+---@return table
+function rapid.study(definition) end
+
 ---@overload fun(list: number[]): rapid.Vec3
 ---@param x number
 ---@param y number

@@ -18,6 +18,7 @@ public:
 
     const std::string& file() const { return file_; }
     const std::optional<std::uint64_t>& seed() const { return seed_; }
+    const SessionOptions& session() const { return session_; }
 
     // Error: what is wrong with the file or with --set. may_write, on_timeout, on_read: see SessionOptions.
     std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,

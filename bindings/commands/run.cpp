@@ -1,11 +1,11 @@
 // rapid run: computes the frames in order and writes them.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <csignal>
 
 #include "bindings/commands/command.h"
 #include "bindings/commands/frame_files.h"
+#include "bindings/commands/frame_selection.h"
 #include "bindings/commands/graph_options.h"
 #include "bindings/commands/run_report.h"
 #include "bindings/commands/signals.h"
@@ -16,48 +16,6 @@
 
 namespace rapid {
 namespace {
-
-// Without -f: two seconds at 24 frames a second.
-constexpr std::int64_t default_frames = 48;
-
-// -f 1-48, 1-48x2, 12. All frames from the scene's first one are computed; these are written.
-struct FrameRange {
-    std::int64_t first, last, step = 1;
-
-    bool contains(std::int64_t frame) const { return frame >= first && frame <= last && (frame - first) % step == 0; }
-    bool single() const { return first + step > last; }
-};
-
-FrameRange read_frames(const std::string& text)
-{
-    const auto wrong = [&](const char* what) {
-        return Error(fmt::format("-f {}: {}; it must be a frame (12), a range (1-48), or a range and a step (1-48x2)",
-                                 text, what));
-    };
-    const char* at = text.data();
-    const char* const end = at + text.size();
-    const auto number = [&] {
-        std::int32_t value = 0;  // as far as file formats and names go
-        const auto parsed = std::from_chars(at, end, value);
-        if (parsed.ec == std::errc::result_out_of_range) throw wrong("a frame's number must fit 32 bits");
-        if (parsed.ec != std::errc()) throw wrong("a number is missing");
-        at = parsed.ptr;
-        return std::int64_t{value};
-    };
-
-    FrameRange range{number(), 0};
-    range.last = range.first;
-    if (at == end) return range;
-    if (*at++ != '-') throw wrong("a - is missing");
-    range.last = number();
-    if (range.last < range.first) throw wrong("it ends before it begins");
-    if (at == end) return range;
-    if (*at++ != 'x') throw wrong("an x is missing");
-    range.step = number();
-    if (range.step < 1) throw wrong("the step must be at least 1");
-    if (at != end) throw wrong("there is more behind it");
-    return range;
-}
 
 class Run : public Command {
 public:
@@ -115,7 +73,7 @@ public:
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) report.warning(warning);
 
-            const FrameRange frames = range_of(plan);
+            const FrameSelection frames = range_of(plan);
             files_.resolve(plan, !frames.single());
             report.begin(plan.first_frame(), frames.last);
             return compute(plan, frames, report);
@@ -140,16 +98,16 @@ private:
         return openings;
     }
 
-    FrameRange range_of(const Plan& plan) const
+    FrameSelection range_of(const Plan& plan) const
     {
         const std::int64_t start = plan.first_frame();
-        const FrameRange range = frames_.value_or(FrameRange{start, start + default_frames - 1});
+        const FrameSelection range = frames_.value_or(FrameSelection{start, start + default_frames - 1});
         if (range.first < start)
             throw Error(fmt::format("-f: frame {} is before the scene's first, {}", range.first, start));
         return range;
     }
 
-    int compute(const Plan& plan, const FrameRange& frames, RunReport& report)
+    int compute(const Plan& plan, const FrameSelection& frames, RunReport& report)
     {
         try {
             Evaluator evaluator(
@@ -188,7 +146,7 @@ private:
 
     GraphOptions graph_;
     FrameFiles files_;
-    std::optional<FrameRange> frames_;
+    std::optional<FrameSelection> frames_;
     std::string stats_;
     bool keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, within_walls_ = false;
     std::vector<std::string> allowed_;

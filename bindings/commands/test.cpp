@@ -3,16 +3,15 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "bindings/commands/child.h"
 #include "bindings/commands/command.h"
 #include "bindings/test_host.h"
 
@@ -58,13 +57,6 @@ std::string indented(std::string text)
     return "  " + text + '\n';
 }
 
-// This process ends with its parent, however that ends.
-void end_with(pid_t parent)
-{
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) _exit(status_failed);  // it ended before the line above
-}
-
 // The child: runs the tests of one file and tells of each.
 int run_child(const std::string& file, const TestOptions& options)
 {
@@ -98,7 +90,7 @@ public:
     int run(const CommonOptions& common) override
     {
         if (parent_) {
-            end_with(*parent_);
+            end_with_parent(*parent_);
             return run_child(files_.front(), options(common));
         }
 

@@ -17,38 +17,6 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-// Places of the points that are in both sets.
-struct Match {
-    std::vector<std::size_t> a, b;
-};
-
-// The sets in order of id walk side by side; equal ids are matched in turn.
-Match match_ids(const PointSet& a, const PointSet& b, Comparison& result)
-{
-    const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
-    const auto place = [](const std::vector<std::size_t>& order, std::size_t i) {
-        return order.empty() ? i : order[i];
-    };
-    Match match;
-    std::size_t i = 0, j = 0;
-    while (i < a.size() || j < b.size()) {
-        const std::size_t at_a = place(order_a, i), at_b = place(order_b, j);
-        if (j == b.size() || (i < a.size() && a.id()[at_a] < b.id()[at_b])) {
-            result.only_a.push_back(a.id()[at_a]);
-            ++i;
-        } else if (i == a.size() || b.id()[at_b] < a.id()[at_a]) {
-            result.only_b.push_back(b.id()[at_b]);
-            ++j;
-        } else {
-            match.a.push_back(at_a);
-            match.b.push_back(at_b);
-            ++i;
-            ++j;
-        }
-    }
-    return match;
-}
-
 double difference(double a, double b)
 {
     if (a == b) return 0;  // infinities too
@@ -95,7 +63,7 @@ ValueDifference difference(const A& a, const B& b)
 }
 
 // Fills in all but the names and types, from the difference of each matched pair.
-void summarise(AttributeDifference& result, std::vector<double>& amounts, const Match& match, const PointSet& a)
+void summarise(AttributeDifference& result, std::vector<double>& amounts, const IdMatch& match, const PointSet& a)
 {
     if (amounts.empty()) return;
     double squares = 0;
@@ -115,7 +83,7 @@ void summarise(AttributeDifference& result, std::vector<double>& amounts, const 
 }
 
 template <class A, class B>
-void compare_columns(AttributeDifference& result, const Column<A>& in_a, const Column<B>& in_b, const Match& match,
+void compare_columns(AttributeDifference& result, const Column<A>& in_a, const Column<B>& in_b, const IdMatch& match,
                      const PointSet& a, double absolute, double relative)
 {
     const Strided<A> values_a = in_a.read();
@@ -147,8 +115,8 @@ double bounds_diagonal(const PointSet& a, const PointSet& b)
     return bounds.isEmpty() ? 0 : bounds.diagonal().norm();
 }
 
-AttributeDifference compare_attribute(const std::string& name, const PointSet& a, const PointSet& b, const Match& match,
-                                      const Comparison& comparison)
+AttributeDifference compare_attribute(const std::string& name, const PointSet& a, const PointSet& b,
+                                      const IdMatch& match, const Comparison& comparison)
 {
     AttributeDifference result;
     result.name = name;
@@ -169,7 +137,7 @@ AttributeDifference compare_attribute(const std::string& name, const PointSet& a
     return result;
 }
 
-AttributeDifference compare_group(const std::string& name, const PointSet& a, const PointSet& b, const Match& match)
+AttributeDifference compare_group(const std::string& name, const PointSet& a, const PointSet& b, const IdMatch& match)
 {
     AttributeDifference result;
     result.name = name;
@@ -184,6 +152,33 @@ AttributeDifference compare_group(const std::string& name, const PointSet& a, co
 
 }  // namespace
 
+// The sets in order of id walk side by side.
+IdMatch match_by_id(const PointSet& a, const PointSet& b)
+{
+    const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
+    const auto place = [](const std::vector<std::size_t>& order, std::size_t i) {
+        return order.empty() ? i : order[i];
+    };
+    IdMatch match;
+    std::size_t i = 0, j = 0;
+    while (i < a.size() || j < b.size()) {
+        const std::size_t at_a = place(order_a, i), at_b = place(order_b, j);
+        if (j == b.size() || (i < a.size() && a.id()[at_a] < b.id()[at_b])) {
+            match.only_a.push_back(a.id()[at_a]);
+            ++i;
+        } else if (i == a.size() || b.id()[at_b] < a.id()[at_a]) {
+            match.only_b.push_back(b.id()[at_b]);
+            ++j;
+        } else {
+            match.a.push_back(at_a);
+            match.b.push_back(at_b);
+            ++i;
+            ++j;
+        }
+    }
+    return match;
+}
+
 Comparison compare(const PointSet& a, const PointSet& b, double tolerance)
 {
     Comparison result;
@@ -191,7 +186,9 @@ Comparison compare(const PointSet& a, const PointSet& b, double tolerance)
     result.points_b = b.size();
     result.tolerance = tolerance;
     result.tolerance_P = tolerance * bounds_diagonal(a, b);
-    const Match match = match_ids(a, b, result);
+    IdMatch match = match_by_id(a, b);
+    result.only_a = std::move(match.only_a);
+    result.only_b = std::move(match.only_b);
     result.compared = match.a.size();
 
     std::set<std::string> names, groups;

@@ -10,6 +10,14 @@
 
 namespace rapid {
 
+// Which points of two sets have the same id: places a[i] and b[i] belong together, in order of id. Ids that occur more
+// than once are matched in turn.
+struct IdMatch {
+    std::vector<std::size_t> a, b;
+    std::vector<std::int64_t> only_a, only_b;  // ids
+};
+IdMatch match_by_id(const PointSet& a, const PointSet& b);
+
 // Over the points that are in both sets. A value's difference is the length of the difference vector (of scalars: its
 // amount); NaN differs by 0 from NaN, and infinitely from everything else.
 struct AttributeDifference {

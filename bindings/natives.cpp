@@ -14,6 +14,7 @@
 #include "runtime/graph/registry.h"
 #include "runtime/noise.h"
 #include "runtime/shapes/shape.h"
+#include "runtime/shapes/vector_grid.h"
 
 namespace rapid {
 namespace {
@@ -56,6 +57,15 @@ double shape_distance(const void* shape, double x, double y, double z, double* g
     static_cast<const Shape*>(shape)->distance({&P, 1}, {&phi, 1}, {&slope, 1});
     Eigen::Map<Vec3d>(gradient, 3) = slope;
     return phi;
+}
+
+// Likewise.
+void vector_grid_sample(const void* grid, double x, double y, double z, double* value)
+{
+    const Vec3d P(x, y, z);
+    Vec3d found;
+    static_cast<const VectorGrid*>(grid)->sample({&P, 1}, {&found, 1});
+    Eigen::Map<Vec3d>(value, 3) = found;
 }
 
 std::string text_at(State& state, int index)
@@ -402,12 +412,13 @@ int set_index(State& state)
     return 0;
 }
 
-// native.shape(object): the shape's pointer, valid while the object is; nil for any other object.
-int shape_of(State& state)
+// native.shape(object), native.vector_grid(object): its pointer, valid while the object is; nil for any other object.
+template <class T>
+int pointer_to(State& state)
 {
-    const auto shape = std::dynamic_pointer_cast<const Shape>(state.to_object(1));
-    if (shape)
-        lua_pushlightuserdata(state.lua(), const_cast<Shape*>(shape.get()));
+    const auto object = std::dynamic_pointer_cast<const T>(state.to_object(1));
+    if (object)
+        lua_pushlightuserdata(state.lua(), const_cast<T*>(object.get()));
     else
         lua_pushnil(state.lua());
     return 1;
@@ -460,7 +471,8 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"kind", native<kind_of>},
                                       {"set_index", native<set_index>},
                                       {"run", run_body},
-                                      {"shape", native<shape_of>},
+                                      {"shape", native<pointer_to<Shape>>},
+                                      {"vector_grid", native<pointer_to<VectorGrid>>},
                                       {"outside_kernels", native<outside_kernels>},
                                       {"trace_aborted", native<trace_aborted>},
                                       {"read_module", native<read_source<false>>},
@@ -484,6 +496,7 @@ void push_natives(State& state, const std::string& chunk_header)
     push_pointer("noise", &noise_at);
     push_pointer("curl_noise", &curl_noise_at);
     push_pointer("shape_distance", &shape_distance);
+    push_pointer("vector_grid_sample", &vector_grid_sample);
 }
 
 }  // namespace rapid

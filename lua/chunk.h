@@ -26,6 +26,9 @@ typedef double (*rapid_rand)(uint64_t random, int64_t id, double use, double fra
 // Of a shape's own pointer; gradient: shape [3].
 typedef double (*rapid_shape_distance)(const void* shape, double x, double y, double z, double* gradient);
 
+// Of a grid of vectors' own pointer; value: shape [3].
+typedef void (*rapid_vector_grid_sample)(const void* grid, double x, double y, double z, double* value);
+
 // runtime/noise.h; curl: shape [3].
 typedef double (*rapid_noise)(double x, double y, double z, double time, double octaves, double seed);
 typedef void (*rapid_curl_noise)(double x, double y, double z, double time, double octaves, double seed, double* curl);

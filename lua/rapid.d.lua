@@ -135,9 +135,27 @@ function LevelSet:intersect(other) end
 ---@return rapid.LevelSet
 function LevelSet:subtract(other) end
 
+---@class rapid.Grid  of vectors
+local Grid = {}
+---Between the voxels' values.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Grid:sample(P) end
+
 ---@class rapid
 local rapid = {}
-rapid.mesh, rapid.levelset, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}
+rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
+
+---@class rapid.options.grid_from
+---@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once
+---@field size? rapid.Place    full edge lengths [m, default 1]
+---@field center? rapid.Place  its middle [m, default 0]
+---@field voxel? number        between nodes [m, default 0.1]
+
+---A grid of vectors by a function of the place.
+---@param options rapid.options.grid_from
+---@return rapid.Grid
+function rapid.grid.from(options) end
 
 ---A value that --set can replace.
 ---@generic T
@@ -233,6 +251,15 @@ function rapid.math.rotation(axis, degrees) end
 ---@param to rapid.Vec3
 ---@return rapid.Quat
 function rapid.math.rotation_between(from, to) end
+
+---@class rapid.options.grid_read
+---@field grid? string  its name; the only grid of vectors, when not given [string]
+
+---Reads a grid of vectors from a .vdb file.
+---@param path string  relative to the graph file [string, required]
+---@param options? rapid.options.grid_read
+---@return rapid.Grid
+function rapid.grid.read(path, options) end
 
 ---@class rapid.options.levelset_box
 ---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
@@ -634,6 +661,19 @@ function Node:emit(params) end
 ---@param params? rapid.params.fade_by_age
 ---@return rapid.Node
 function Node:fade_by_age(params) end
+
+---@class rapid.params.field
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field grid rapid.Grid|fun(frame: rapid.Frame): rapid.Grid  of vectors, by rapid.grid [vector grid, required]
+---@field mode? "force"|"velocity"|fun(frame: rapid.Frame): "force"|"velocity"  what the vectors are: forces (N), or velocities (m/s) that points are drawn to [string, one of force, velocity, default "force"]
+---@field strength? number|rapid.Attribute|fun(frame: rapid.Frame): number  the vectors are multiplied by it [number, default 1, takes rapid.attr]
+---@field drag? number|rapid.Attribute|fun(frame: rapid.Frame): number  with velocities, the rate at which points come to them; 1 when not given [number, 1/s, at least 0, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Moves points by a grid of vectors: a force, or the velocity of a flow.
+---@param params rapid.params.field
+---@return rapid.Node
+function Node:field(params) end
 
 ---@class rapid.params.follow_curve
 ---@field duration? number|fun(frame: rapid.Frame): number  from the first to the last, each span alike [number, s, at least 1e-06, default 1]

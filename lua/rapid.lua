@@ -2,6 +2,7 @@
 --
 -- Everything here only gathers arguments; the host makes the values, checks them and remembers where they were asked
 -- for. A call with a place of its own among the arguments (a path, a mesh, a motion) is turned into named arguments.
+local ffi = require "ffi"
 local vector = require "vec3"
 local words = require "words"
 
@@ -21,6 +22,8 @@ local function names_of(map)
   table.sort(names)
   return names
 end
+
+local grid_options = { size = true, center = true, voxel = true, at = true }
 
 -- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil;
 -- numeric: what rapid.math holds; shapes: what can be asked of shapes (lua/shape.lua); studies: lua/study.lua.
@@ -57,6 +60,51 @@ local function make(native, load_node, numeric, shapes, studies)
     sphere = maker "levelset.sphere",
     box = maker "levelset.box",
     torus = maker "levelset.torus",
+  }
+  -- Asks the function at each node of the lattice, z fastest.
+  local function grid_from(options)
+    options = options_of("rapid.grid.from", options)
+    local function fault(name, what)
+      error(("rapid.grid.from: %s = %s; it must be %s"):format(name, tostring(options[name]), what), 3)
+    end
+    for name in pairs(options) do
+      if not grid_options[name] then
+        error(("rapid.grid.from: unknown parameter %q%s"):format(tostring(name),
+          native.did_you_mean(tostring(name), names_of(grid_options))), 2)
+      end
+    end
+    local voxel, at = options.voxel or 0.1, options.at
+    if type(voxel) ~= "number" or voxel ~= voxel or voxel <= 0 then fault("voxel", "above 0 m") end
+    if type(at) ~= "function" then fault("at", "a function of a place that returns a vec3") end
+    local function place(name, value)
+      if type(value) == "table" and #value == 3 then value = vector.make(value[1], value[2], value[3]) end
+      if not ffi.istype(vector.type, value) then fault(name, "a vec3 or {x, y, z}") end
+      return value
+    end
+    local size = place("size", options.size or {1, 1, 1})
+    local center = place("center", options.center or {0, 0, 0})
+    local nodes, origin = {}, center - size * 0.5
+    for i, length in ipairs { size.x, size.y, size.z } do
+      nodes[i] = math.floor(length / voxel + 1.5)
+      if not (length >= 0 and nodes[i] < 2 ^ 15) then fault("size", "at least 0 m, and below 32,768 voxels") end
+    end
+    local values, n = {}, 0
+    for i = 0, nodes[1] - 1 do
+      for j = 0, nodes[2] - 1 do
+        for k = 0, nodes[3] - 1 do
+          local value = at(origin + vector.make(i, j, k) * voxel)
+          if not ffi.istype(vector.type, value) then fault("at", "a function that returns a vec3 everywhere") end
+          values[n + 1], values[n + 2], values[n + 3] = value.x, value.y, value.z
+          n = n + 3
+        end
+      end
+    end
+    return native.make("grid.of_values", { origin = origin, voxel = voxel, nodes = nodes, values = values })
+  end
+
+  rapid.grid = {
+    read = maker("grid.read", "path"),
+    from = grid_from,
   }
   rapid.shape = {
     plane = maker "shape.plane",
@@ -201,6 +249,7 @@ local function make(native, load_node, numeric, shapes, studies)
         return object
       end,
     },
+    ["vector grid"] = { sample = shapes.sample },
     motion = {},
   }
   for _, kind in ipairs { "shape", "plane", "sphere", "box" } do
@@ -216,6 +265,7 @@ local function make(native, load_node, numeric, shapes, studies)
     local object, name = ...
     local query = shapes.queries[name] -- in kernels: what traces can follow comes first
     if query and shapes.pointer_of(object) then return query end
+    if name == "sample" and shapes.grid_of(object) then return shapes.sample end
     local kind = native.kind(object)
     if kind == "node" then
       if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
@@ -241,7 +291,9 @@ local function make(native, load_node, numeric, shapes, studies)
       __metatable = false,
     })
   end
-  for _, name in ipairs { "math", "mesh", "levelset", "shape", "points" } do closed(rapid[name], "rapid." .. name) end
+  for _, name in ipairs { "math", "mesh", "levelset", "grid", "shape", "points" } do
+    closed(rapid[name], "rapid." .. name)
+  end
   return closed(rapid, "rapid")
 end
 

@@ -1,7 +1,8 @@
--- What kernels and graph code ask of a shape or a level set:
+-- What kernels and graph code ask of a shape, a level set or a grid of vectors:
 --
 --   shape:distance(P)    m, negative inside; beyond a level set's band a bound of the right sign
 --   shape:gradient(P)    a vec3 out of the shape, of length 1 where the distance is exact; zero where there is none
+--   grid:sample(P)       a vec3, between the voxels' values
 --
 -- An object's pointer is asked of the host once, and then found in a table, which compiled traces can do. The functions
 -- are vararg for the reason that vec3.lua gives.
@@ -10,29 +11,39 @@ local vector = require "vec3"
 
 local vec3, istype = vector.type, ffi.istype
 
--- native.shape(object): light userdata, a shape; nil for any other object. native.shape_distance: the function to ask.
+-- native.shape(object): light userdata, a shape; nil for any other object; native.vector_grid likewise.
+-- native.shape_distance, native.vector_grid_sample: the functions to ask.
 local function make(native)
   local ask = ffi.cast("rapid_shape_distance", native.shape_distance)
-  local gradient = ffi.new "double[3]"
-  local pointers = setmetatable({}, { __mode = "k" }) -- false: no shape
+  local ask_grid = ffi.cast("rapid_vector_grid_sample", native.vector_grid_sample)
+  local gradient, value = ffi.new "double[3]", ffi.new "double[3]"
 
-  local function pointer_of(...)
-    local object = ...
-    local known = pointers[object]
-    if known == nil then
-      local pointer = native.shape(object)
-      known = pointer ~= nil and ffi.cast("const void*", pointer)
-      pointers[object] = known
+  -- The pointer of an object that `find` knows; false for any other.
+  local function pointers_by(find)
+    local pointers = setmetatable({}, { __mode = "k" })
+    return function(...)
+      local object = ...
+      local known = pointers[object]
+      if known == nil then
+        local pointer = find(object)
+        known = pointer ~= nil and ffi.cast("const void*", pointer)
+        pointers[object] = known
+      end
+      return known
     end
-    return known
+  end
+
+  local pointer_of, grid_of = pointers_by(native.shape), pointers_by(native.vector_grid)
+
+  local function place_shown(P)
+    return (type(P) == "number" or P == nil) and tostring(P) or "a " .. type(P)
   end
 
   local function refuse(what, shape, P)
     if type(shape) ~= "userdata" or not pointer_of(shape) then
       error(("shape:%s(P) is asked of a shape: with a colon, not a dot"):format(what), 0)
     end
-    local shown = (type(P) == "number" or P == nil) and tostring(P) or "a " .. type(P)
-    error(("shape:%s(P) takes a vec3, not %s"):format(what, shown), 0)
+    error(("shape:%s(P) takes a vec3, not %s"):format(what, place_shown(P)), 0)
   end
 
   local queries = {}
@@ -53,7 +64,16 @@ local function make(native)
     return (vec3(gradient[0], gradient[1], gradient[2]))
   end
 
-  return { pointer_of = pointer_of, queries = queries }
+  local function sample(...)
+    local grid, P = ...
+    local pointer = type(grid) == "userdata" and grid_of(grid)
+    if not pointer then error("grid:sample(P) is asked of a grid of vectors: with a colon, not a dot", 0) end
+    if not istype(vec3, P) then error(("grid:sample(P) takes a vec3, not %s"):format(place_shown(P)), 0) end
+    ask_grid(pointer, P.x, P.y, P.z, value)
+    return (vec3(value[0], value[1], value[2]))
+  end
+
+  return { pointer_of = pointer_of, queries = queries, grid_of = grid_of, sample = sample }
 end
 
 return { make = make }

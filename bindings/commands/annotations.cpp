@@ -149,9 +149,27 @@ function LevelSet:intersect(other) end
 ---@return rapid.LevelSet
 function LevelSet:subtract(other) end
 
+---@class rapid.Grid  of vectors
+local Grid = {}
+---Between the voxels' values.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Grid:sample(P) end
+
 ---@class rapid
 local rapid = {}
-rapid.mesh, rapid.levelset, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}
+rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
+
+---@class rapid.options.grid_from
+---@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once
+---@field size? rapid.Place    full edge lengths [m, default 1]
+---@field center? rapid.Place  its middle [m, default 0]
+---@field voxel? number        between nodes [m, default 0.1]
+
+---A grid of vectors by a function of the place.
+---@param options rapid.options.grid_from
+---@return rapid.Grid
+function rapid.grid.from(options) end
 
 ---A value that --set can replace.
 ---@generic T
@@ -295,6 +313,7 @@ std::string lua_type(const Param& param)
         {"shape", "rapid.Shape"},
         {"string", "string"},
         {"table", "table"},
+        {"vector grid", "rapid.Grid"},
         {"vec3", "rapid.Place"},
     };
     std::string type;
@@ -395,11 +414,9 @@ std::string node_of(const NodeType& type)
 // first, as lua/rapid.lua has it.
 std::string maker_of(const Maker& maker)
 {
-    static const std::map<std::string_view, std::string_view> results = {{"mesh", "rapid.Mesh"},
-                                                                         {"levelset", "rapid.LevelSet"},
-                                                                         {"shape", "rapid.Shape"},
-                                                                         {"points", "rapid.Points"},
-                                                                         {"motion", "rapid.Motion"}};
+    static const std::map<std::string_view, std::string_view> results = {
+        {"mesh", "rapid.Mesh"},   {"levelset", "rapid.LevelSet"}, {"grid", "rapid.Grid"},
+        {"shape", "rapid.Shape"}, {"points", "rapid.Points"},     {"motion", "rapid.Motion"}};
     const std::size_t dot = maker.name.find('.');
     const std::string family = maker.name.substr(0, dot), own = maker.name.substr(dot + 1);
     const std::string called = family == "motion" ? own : maker.name;
@@ -435,7 +452,8 @@ std::string annotations_of(const Registry& registry)
     for (const Maker* maker : all_makers()) {
         const bool told_above = maker->name == "motion.translate" || maker->name == "motion.product" ||
                                 maker->name == "transform" || maker->name == "points.from" ||
-                                maker->name == "levelset.write" || maker->name == "levelset.combine";
+                                maker->name == "grid.of_values" || maker->name == "levelset.write" ||
+                                maker->name == "levelset.combine";
         if (!told_above) text += maker_of(*maker);
     }
     text += point_class();

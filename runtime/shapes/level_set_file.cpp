@@ -5,22 +5,13 @@
 #include <algorithm>
 
 #include "runtime/error.h"
+#include "runtime/shapes/grid_file.h"
 #include "runtime/shapes/level_set_grid.h"
 
 namespace rapid {
 namespace {
 
 using openvdb::FloatGrid;
-
-// `"density" (float), "surface" (level set)`.
-std::string list_of(const openvdb::GridPtrVec& grids)
-{
-    std::string list;
-    for (const auto& grid : grids)
-        list += fmt::format("{}\"{}\" ({}{})", list.empty() ? "" : ", ", grid->getName(),
-                            grid->getGridClass() == openvdb::GRID_LEVEL_SET ? "level set of " : "", grid->valueType());
-    return list.empty() ? "none" : list;
-}
 
 bool is_level_set(const openvdb::GridBase& grid)
 {
@@ -29,22 +20,15 @@ bool is_level_set(const openvdb::GridBase& grid)
 
 openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
 {
-    if (!name.empty()) {
-        for (const auto& grid : grids)
-            if (grid->getName() == name) return grid;
-        std::vector<std::string> names;
-        for (const auto& grid : grids) names.push_back(grid->getName());
-        throw Error(fmt::format("there is no grid \"{}\" in \"{}\"; it has {}{}", name, path, list_of(grids),
-                                did_you_mean(name, names)));
-    }
+    if (!name.empty()) return grid_of_name(path, name, grids);
     openvdb::GridPtrVec level_sets;
     for (const auto& grid : grids)
         if (is_level_set(*grid)) level_sets.push_back(grid);
     if (level_sets.size() == 1) return level_sets[0];
     if (level_sets.empty())
-        throw Error(fmt::format("there is no level set in \"{}\"; its grids are {}", path, list_of(grids)));
+        throw Error(fmt::format("there is no level set in \"{}\"; its grids are {}", path, grids_of(grids)));
     throw Error(fmt::format("there are {} level sets in \"{}\": {}; name one by grid", level_sets.size(), path,
-                            list_of(level_sets)));
+                            grids_of(level_sets)));
 }
 
 // The metadata of all grids, and the values of the chosen one alone.

@@ -1,0 +1,62 @@
+// field: a grid of vectors moves points.
+//
+//   mode "force"       F = strength value                     N, at where the point is; with the mass of each point
+//   mode "velocity"    a = -drag (v - strength value)         the flow of a fluid: treated exactly, no drag is too
+//   stiff
+//
+// The value is that of the middle of the step: of second order in how the field varies along the way.
+#include "runtime/graph/node.h"
+#include "runtime/shapes/vector_grid.h"
+
+namespace rapid {
+namespace {
+
+struct Field {
+    VectorGridPtr grid;
+    std::string mode;
+    PerPoint<float> strength;
+    std::optional<PerPoint<float>> drag;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Field>("field", "Moves points by a grid of vectors: a force, or the velocity of a flow.")
+            .takes("mass")
+            .param(&Field::grid, "grid", Value(), any_number(), "", "of vectors, by rapid.grid")
+            .required()
+            .param(&Field::mode, "mode", "force", any_number(), "",
+                   "what the vectors are: forces (N), or velocities (m/s) that points are drawn to")
+            .choices({"force", "velocity"})
+            .param(&Field::strength, "strength", 1.0, any_number(), "", "the vectors are multiplied by it")
+            .param(&Field::drag, "drag", Value(), at_least(0), "1/s",
+                   "with velocities, the rate at which points come to them; 1 when not given");
+    }
+
+    void check() const
+    {
+        if (mode == "force" && drag)
+            throw Error("drag goes with mode = \"velocity\"; a force has none: leave it out, or add :drag");
+    }
+
+    void contribute(const Chunk& chunk, Forces& forces) const
+    {
+        std::vector<Vec3d> values(chunk.size());
+        grid->sample(chunk.P, values);
+        const Strided<float> size = chunk.read(strength);
+        if (mode == "velocity") {
+            const Strided<float> rate = drag ? chunk.read(*drag) : Strided<float>{&unit, 0};
+            for (std::size_t i = 0; i < chunk.size(); ++i) forces.add_drag(i, rate[i], size[i] * values[i]);
+        } else {
+            const auto* masses = chunk.points.find<float>("mass");
+            const Strided<float> mass = masses ? masses->read() : Strided<float>{&unit, 0};
+            for (std::size_t i = 0; i < chunk.size(); ++i) forces.add(i, size[i] / mass[chunk.first + i] * values[i]);
+        }
+    }
+
+private:
+    static constexpr float unit = 1;
+};
+RAPID_NODE(Field);
+
+}  // namespace
+}  // namespace rapid

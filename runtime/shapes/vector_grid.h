@@ -1,0 +1,37 @@
+// A field of vectors in space: an OpenVDB grid, read from a file or made of values at the nodes of a lattice.
+//
+// Trilinear between voxels, of second order in their size; where the grid has no values it is its background, {0, 0, 0}
+// unless the file says otherwise. Values are those of the world's axes: what the grid's map turns, it turns in place.
+// A staggered grid (of a fluid solver: each component on its own faces of the voxel) is asked as one.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "runtime/object.h"
+#include "runtime/vec.h"
+
+namespace rapid {
+
+class VectorGrid : public Object {
+public:
+    static constexpr std::string_view param_type = "vector grid";
+    std::string_view kind() const override { return "vector grid"; }
+
+    // P, values: shape [n], m and the grid's own unit. From any number of threads.
+    virtual void sample(std::span<const Vec3d> P, std::span<Vec3d> values) const = 0;
+};
+
+using VectorGridPtr = std::shared_ptr<const VectorGrid>;
+
+// The grid of that name in a .vdb file; the only grid of three floats, where the name is empty. Error: what is wrong
+// with the file, and which grids it has.
+VectorGridPtr read_vector_grid(const std::filesystem::path& path, const std::string& name);
+
+// A lattice of nodes `voxel` metres apart, from `origin` on along each axis. values: shape [nodes x, y, z], z fastest.
+VectorGridPtr make_vector_grid(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes,
+                               std::span<const Vec3f> values);
+
+}  // namespace rapid

@@ -50,25 +50,17 @@ bool flag_of(lua_State* L, const char* field)
 }
 
 struct ColumnMemory {
-    const char* data;           // of the set's first point
-    std::int64_t stride;        // in scalars, as rapid_column's
-    std::size_t element_bytes;  // of a point; 0 where all share one value
+    const char* data = nullptr;     // of the set's first point
+    std::size_t element_bytes = 0;  // of a point; 0 where all share one value
+
+    void* at(std::size_t point) const { return const_cast<char*>(data) + point * element_bytes; }
 };
 
 template <class T>
 ColumnMemory memory_of(const Column<T>& column)
 {
-    constexpr std::int64_t scalars = std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1;
     const Strided<T> values = column.read();
-    return {reinterpret_cast<const char*>(values.data), scalars * static_cast<std::int64_t>(values.stride),
-            values.stride * sizeof(T)};
-}
-
-std::size_t scalar_bytes(const std::string& type) { return type == "vec3d" || type == "int64" ? 8 : 4; }
-
-rapid_column at_point(const ColumnMemory& memory, std::size_t first)
-{
-    return {const_cast<char*>(memory.data) + first * memory.element_bytes, memory.stride};
+    return {reinterpret_cast<const char*>(values.data), values.stride * sizeof(T)};
 }
 
 }  // namespace
@@ -78,6 +70,7 @@ struct Kernel::Layout {
     struct Entry {
         std::string name, type;
         bool writable;
+        bool uniform = false;  // all points share one value
     };
     std::vector<Entry> columns, groups;
     bool predicate = false, masked = false, action = false;
@@ -86,8 +79,9 @@ struct Kernel::Layout {
     void finish()
     {
         key = fmt::format("{}{}{}", predicate ? 'p' : '-', masked ? 'm' : '-', action ? 'a' : '-');
-        for (const Entry& e : columns) key += fmt::format(" {}:{}{}", e.name, e.type, e.writable ? "!" : "");
-        for (const Entry& e : groups) key += fmt::format(" ({}{})", e.name, e.writable ? "!" : "");
+        const auto marks = [](const Entry& e) { return e.writable ? "!" : e.uniform ? "=" : ""; };
+        for (const Entry& e : columns) key += fmt::format(" {}:{}{}", e.name, e.type, marks(e));
+        for (const Entry& e : groups) key += fmt::format(" ({}{})", e.name, marks(e));
     }
 };
 
@@ -193,38 +187,38 @@ Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments&
         // p:rand needs the id.
         if (!written && !reads_.count(name) && !may_.count(name) && !arguments.reads.count(name) && name != "id")
             continue;
-        layout.columns.push_back({name, std::string(type_name(type_of(column))), written});
+        const bool uniform = std::visit([](const auto& c) { return c.is_uniform(); }, column);
+        // What is written will be made writable, each point with a value of its own.
+        layout.columns.push_back({name, std::string(type_name(type_of(column))), written, uniform && !written});
     }
     for (const auto& [name, members] : points.groups()) {
         const bool written = !predicate && (joins_.count(name) || arguments.joins.count(name));
-        if (written || asks_any_ || asks_.count(name)) layout.groups.push_back({name, "", written});
+        if (written || asks_any_ || asks_.count(name))
+            layout.groups.push_back({name, "", written, members.is_uniform() && !written});
     }
     layout.finish();
     return layout;
 }
 
 // P and v are in double inside Solve, and the force is the sub-step's.
-Kernel::Layout Kernel::layout_of_action(const PointSet& points, const KernelArguments& arguments, bool masked) const
+void Kernel::make_layout_of_action(Layout& layout) const
 {
-    Layout layout = layout_for(points, arguments, false, masked);
     layout.action = true;
     std::erase_if(layout.columns, [](const Layout::Entry& e) { return e.name == "force"; });
     for (Layout::Entry& entry : layout.columns)
-        if (entry.name == "P" || entry.name == "v") entry.type = "vec3d";
+        if (entry.name == "P" || entry.name == "v") entry.type = "vec3d", entry.uniform = false;
     const bool pushes = writes_.count("force") || may_write_.count("force");
     if (pushes || reads_.count("force") || may_.count("force")) layout.columns.push_back({"force", "vec3d", pushes});
     layout.finish();
-    return layout;
 }
 
-void Kernel::push_runner(State& state, const Layout& layout) const
+State::Runner& Kernel::runner_for(State& state, const Layout& layout) const
 {
-    lua_State* L = state.lua();
-    const std::string slot = fmt::format("rapid.runner {} {}", number, layout.key);
-    lua_getfield(L, LUA_REGISTRYINDEX, slot.c_str());
-    if (lua_istable(L, -1)) return;
-    lua_pop(L, 1);
+    std::vector<State::Runner>& runners = state.runners[number];
+    for (State::Runner& runner : runners)
+        if (runner.layout == layout.key) return runner;
 
+    lua_State* L = state.lua();
     state.push_entry("runner");
     state.push_kernel(number);
     lua_newtable(L);
@@ -236,8 +230,8 @@ void Kernel::push_runner(State& state, const Layout& layout) const
             lua_setfield(L, -2, "name");
             lua_pushlstring(L, entries[i].type.data(), entries[i].type.size());
             lua_setfield(L, -2, "type");
-            lua_pushnumber(L, static_cast<double>(i));
-            lua_setfield(L, -2, "slot");
+            lua_pushboolean(L, entries[i].uniform);
+            lua_setfield(L, -2, "uniform");
             lua_pushboolean(L, entries[i].writable);
             lua_setfield(L, -2, "writable");
             lua_rawseti(L, -2, static_cast<int>(i) + 1);
@@ -252,12 +246,18 @@ void Kernel::push_runner(State& state, const Layout& layout) const
     lua_setfield(L, -2, "masked");
     lua_pushboolean(L, layout.action);
     lua_setfield(L, -2, "action");
-    state.call(2, 3);
-    lua_createtable(L, 3, 0);
-    lua_insert(L, -4);
-    for (int i = 3; i >= 1; --i) lua_rawseti(L, -1 - i, i);
+
+    State::Runner runner{layout.key};
+    const std::size_t pointers = layout.columns.size() + layout.groups.size();
+    runner.chunk = static_cast<rapid_chunk*>(lua_newuserdata(L, sizeof(rapid_chunk) + pointers * sizeof(void*)));
+    *runner.chunk = {};
+    runner.chunk->at = -1;
     lua_pushvalue(L, -1);
-    lua_setfield(L, LUA_REGISTRYINDEX, slot.c_str());
+    luaL_ref(L, LUA_REGISTRYINDEX);  // for as long as the state lives
+    state.call(3, 2);
+    runner.set_params = luaL_ref(L, LUA_REGISTRYINDEX);
+    runner.run = luaL_ref(L, LUA_REGISTRYINDEX);
+    return runners.emplace_back(std::move(runner));
 }
 
 // What a node's evaluation leaves for a pass that runs after it.
@@ -283,7 +283,7 @@ struct Kernel::Pass {
         serial = ++last;
         for (const Layout::Entry& entry : layout.columns)
             columns.push_back(entry.type == "vec3d"
-                                  ? ColumnMemory{}
+                                  ? ColumnMemory{nullptr, sizeof(Vec3d)}
                                   : std::visit([](const auto& c) { return memory_of(c); }, *points.find(entry.name)));
         for (const Layout::Entry& entry : layout.groups) groups.push_back(memory_of(*points.find_group(entry.name)));
     }
@@ -299,111 +299,99 @@ struct Kernel::Pass {
     std::uint8_t* result = nullptr;
 };
 
+// What a runner is given: pointers are to the first point's value in the layout's columns, and then in its groups.
+struct Kernel::Call {
+    rapid_chunk chunk{};
+    std::vector<void*> pointers;
+};
+
 void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const
 {
-    std::vector<rapid_column> columns;
-    for (const ColumnMemory& memory : pass.columns) columns.push_back(at_point(memory, begin));
-    rapid_chunk chunk{};
-    chunk.size = static_cast<std::int64_t>(end - begin);
-    chunk.first = static_cast<std::int64_t>(begin);
-    chunk.columns = columns.data();
-    chunk.kill = pass.kill ? pass.kill + begin : nullptr;
-    chunk.result = pass.result ? pass.result + begin : nullptr;
-    run_chunk(pass, chunk);
+    Call call;
+    call.chunk.size = static_cast<std::int32_t>(end - begin);
+    call.chunk.first = static_cast<double>(begin);
+    call.chunk.kill = pass.kill ? pass.kill + begin : nullptr;
+    call.chunk.result = pass.result ? pass.result + begin : nullptr;
+    call.pointers.reserve(pass.columns.size() + pass.groups.size());
+    for (const ColumnMemory& memory : pass.columns) call.pointers.push_back(memory.at(begin));
+    run_chunk(pass, call);
 }
 
 // The chunk's place, columns and results are set.
-void Kernel::run_chunk(const Pass& pass, rapid_chunk& chunk) const
+void Kernel::run_chunk(const Pass& pass, Call& call) const
 {
+    rapid_chunk& chunk = call.chunk;
     const auto begin = static_cast<std::size_t>(chunk.first);
-    std::vector<rapid_column> groups;
-    for (const ColumnMemory& memory : pass.groups) groups.push_back(at_point(memory, begin));
-    chunk.groups = groups.data();
+    for (const ColumnMemory& memory : pass.groups) call.pointers.push_back(memory.at(begin));
     chunk.members = pass.members ? const_cast<std::uint8_t*>(pass.members) + begin : nullptr;
     chunk.random = pass.caller.random.value;
-    chunk.number = pass.caller.frame.number;
+    chunk.number = static_cast<double>(pass.caller.frame.number);
     chunk.time = pass.caller.frame.time;
     chunk.dt = pass.caller.frame.dt;
 
     const KernelOrder::Way way = host_.kernel_way(pass.caller.node);
-    if (way == KernelOrder::Forward) return call_runner(host_.local(), pass, chunk);
-    const std::int64_t size = chunk.size;
-    for (std::int64_t k = 0; k < size; ++k) {
-        const std::int64_t i = way == KernelOrder::Reversed ? size - 1 - k : k;
-        std::vector<rapid_column> columns, members_of_groups;
-        rapid_chunk point = point_of(pass, chunk, i, columns, members_of_groups);
-        call_runner(way == KernelOrder::TwoStates && i % 2 == 1 ? host_.second() : host_.local(), pass, point);
+    if (way == KernelOrder::Forward) return call_runner(host_.local(), pass, call);
+    const std::int32_t size = chunk.size;
+    for (std::int32_t k = 0; k < size; ++k) {
+        const std::int32_t i = way == KernelOrder::Reversed ? size - 1 - k : k;
+        call_runner(way == KernelOrder::TwoStates && i % 2 == 1 ? host_.second() : host_.local(), pass,
+                    one_point(pass, call, i));
     }
 }
 
-// The chunk's point i as a chunk of its own, whose columns and groups lie in the vectors.
-rapid_chunk Kernel::point_of(const Pass& pass, const rapid_chunk& chunk, std::int64_t i,
-                             std::vector<rapid_column>& columns, std::vector<rapid_column>& groups)
+// The chunk's point i as a chunk of its own.
+Kernel::Call Kernel::one_point(const Pass& pass, const Call& call, std::int32_t i)
 {
-    for (std::size_t c = 0; c < pass.layout.columns.size(); ++c) {
-        const rapid_column& of_chunk = chunk.columns[c];
-        const auto bytes = static_cast<std::int64_t>(scalar_bytes(pass.layout.columns[c].type));
-        columns.push_back({static_cast<char*>(of_chunk.data) + i * of_chunk.stride * bytes, of_chunk.stride});
-    }
-    for (std::size_t g = 0; g < pass.layout.groups.size(); ++g) {
-        const rapid_column& of_chunk = chunk.groups[g];
-        groups.push_back({static_cast<char*>(of_chunk.data) + i * of_chunk.stride, of_chunk.stride});
+    Call point = call;
+    for (std::size_t c = 0; c < point.pointers.size(); ++c) {
+        const std::size_t columns = pass.columns.size();
+        const ColumnMemory& memory = c < columns ? pass.columns[c] : pass.groups[c - columns];
+        point.pointers[c] = static_cast<char*>(point.pointers[c]) + static_cast<std::size_t>(i) * memory.element_bytes;
     }
     const auto at = [i](auto* first) { return first ? first + i : nullptr; };
-    rapid_chunk point = chunk;
-    point.size = 1;
-    point.first += i;
-    point.columns = columns.data();
-    point.groups = groups.data();
-    point.kill = at(chunk.kill);
-    point.result = at(chunk.result);
-    point.members = at(chunk.members);
-    point.times = at(chunk.times);
-    point.steps = at(chunk.steps);
+    rapid_chunk& chunk = point.chunk;
+    chunk.size = 1;
+    chunk.first += i;
+    chunk.kill = at(chunk.kill);
+    chunk.result = at(chunk.result);
+    chunk.members = at(chunk.members);
+    chunk.times = at(chunk.times);
+    chunk.steps = at(chunk.steps);
     return point;
 }
 
-void Kernel::call_runner(State& state, const Pass& pass, rapid_chunk& chunk) const
+void Kernel::call_runner(State& state, const Pass& pass, const Call& call) const
 {
     lua_State* L = state.lua();
-    push_runner(state, pass.layout);
-    const int runner = lua_gettop(L);
-
-    lua_rawgeti(L, runner, 4);
-    const bool has_values = lua_tonumber(L, -1) == static_cast<double>(pass.serial);
-    lua_pop(L, 1);
-    if (!has_values && (!pass.values.empty() || may_.count("detail"))) {
-        lua_rawgeti(L, runner, 3);
+    State::Runner& runner = runner_for(state, pass.layout);
+    if (runner.pass != pass.serial && (!pass.values.empty() || may_.count("detail"))) {
+        lua_rawgeti(L, LUA_REGISTRYINDEX, runner.set_params);
         Table table, details;
         table.named = pass.values;
         for (const auto& [name, value] : pass.points.details) details.named[name] = value_of(value);
         state.push(Value(std::make_shared<const Table>(std::move(table))));
         state.push(Value(std::make_shared<const Table>(std::move(details))));
         state.call(2, 0);
-        lua_pushnumber(L, static_cast<double>(pass.serial));
-        lua_rawseti(L, runner, 4);
+        runner.pass = pass.serial;
     }
 
-    lua_rawgeti(L, runner, 1);
-    lua_pushlightuserdata(L, &chunk);
+    *runner.chunk = call.chunk;
+    runner.chunk->at = -1;
+    std::copy(call.pointers.begin(), call.pointers.end(), reinterpret_cast<void**>(runner.chunk + 1));
+    lua_rawgeti(L, LUA_REGISTRYINDEX, runner.run);
     try {
         const State::InKernel in_kernel(state);
-        state.call(1, 0);
+        state.call(0, 0);
     } catch (Error& error) {
-        lua_rawgeti(L, runner, 2);
-        state.call(0, 1);
-        const double place = lua_tonumber(L, -1);
-        lua_settop(L, runner - 1);
-        const std::string at =
-            place < 0 ? fmt::format("frame {}", pass.caller.frame.number)
-                      : fmt::format("point id {}, frame {}", pass.points.id()[static_cast<std::size_t>(place)],
-                                    pass.caller.frame.number);
+        const int place = std::exchange(runner.chunk->at, -1);
+        const auto id = [&] { return pass.points.id()[static_cast<std::size_t>(call.chunk.first + place)]; };
+        const std::string at = place < 0 ? fmt::format("frame {}", pass.caller.frame.number)
+                                         : fmt::format("point id {}, frame {}", id(), pass.caller.frame.number);
         const Location where = error.location().file.empty() ? location : error.location();
         Error placed(fmt::format("{} ({})", error.message(), at));
         placed.at(where).in_node(pass.caller.node).with_trace(error.trace());
         throw placed;
     }
-    lua_settop(L, runner - 1);
 }
 
 void Kernel::run_pass(Pass& pass) const
@@ -461,27 +449,29 @@ void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::
     run_pass(pass);
 }
 
-// Makes what the kernel writes writable; false where it has no point to visit. chosen: the group as it is now, since a
-// kernel may leave the very group that chooses its points.
-bool Kernel::make_writable(PointSet& points, const std::string& group, const KernelArguments& arguments,
-                           Column<std::uint8_t>& chosen, bool& masked) const
+// The layout for a set, in which what the kernel writes is writable; none where it has no point to visit. chosen: the
+// group as it is now, since a kernel may leave the very group that chooses its points.
+std::optional<Kernel::Layout> Kernel::prepare(PointSet& points, const std::string& group,
+                                              const KernelArguments& arguments, Column<std::uint8_t>& chosen,
+                                              bool action) const
 {
     for (const auto* names : {&joins_, &arguments.joins})
         for (const std::string& name : *names) points.group(name);
     const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
-    if (points.empty() || (!group.empty() && !members)) return false;  // nobody is in it yet
+    if (points.empty() || (!group.empty() && !members)) return std::nullopt;  // nobody is in it yet
     if (members && members->is_uniform()) {
-        if (!(*members)[0]) return false;
+        if (!(*members)[0]) return std::nullopt;
         members = nullptr;
     }
-    masked = members != nullptr;
+    const bool masked = members != nullptr;
     if (masked) chosen = *members;
-    const Layout layout = layout_for(points, arguments, false, masked);
+    Layout layout = layout_for(points, arguments, false, masked);
     for (const Layout::Entry& entry : layout.columns)
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
     for (const Layout::Entry& entry : layout.groups)
         if (entry.writable) points.group(entry.name).write();
-    return true;
+    if (action) make_layout_of_action(layout);
+    return layout;
 }
 
 void Kernel::run(PointSet& points, const std::string& group, const Evaluation& now,
@@ -489,15 +479,14 @@ void Kernel::run(PointSet& points, const std::string& group, const Evaluation& n
 {
     const Stopwatch watch(now.figures);
     Column<std::uint8_t> chosen;
-    bool masked = false;
-    if (!make_writable(points, group, arguments, chosen, masked)) return;
+    const std::optional<Layout> layout = prepare(points, group, arguments, chosen, false);
+    if (!layout) return;
 
-    const Layout layout = layout_for(points, arguments, false, masked);
     const Caller caller(now);
     std::vector<std::uint8_t> kill(kills_ ? points.size() : 0);
-    Pass pass(points, caller, layout, arguments.values);
+    Pass pass(points, caller, *layout, arguments.values);
     pass.kill = kills_ ? kill.data() : nullptr;
-    pass.members = masked ? std::as_const(chosen).read().data : nullptr;
+    pass.members = layout->masked ? std::as_const(chosen).read().data : nullptr;
     run_pass(pass);
 
     if (std::find(kill.begin(), kill.end(), 1) != kill.end()) {
@@ -523,23 +512,21 @@ public:
 
     void act(const Chunk& chunk, std::span<Vec3d> force, std::span<std::uint8_t> dead) override
     {
-        std::vector<rapid_column> columns;
+        Call call;
         for (std::size_t i = 0; i < layout_.columns.size(); ++i) {
             const std::string& name = layout_.columns[i].name;
-            if (layout_.columns[i].type != "vec3d")
-                columns.push_back(at_point(pass_.columns[i], chunk.first));
-            else
-                columns.push_back({name == "P" ? chunk.P.data() : name == "v" ? chunk.v.data() : force.data(), 3});
+            call.pointers.push_back(layout_.columns[i].type != "vec3d" ? pass_.columns[i].at(chunk.first)
+                                    : name == "P"                      ? chunk.P.data()
+                                    : name == "v"                      ? chunk.v.data()
+                                                                       : force.data());
         }
-        rapid_chunk seen{};
-        seen.size = static_cast<std::int64_t>(chunk.size());
-        seen.first = static_cast<std::int64_t>(chunk.first);
-        seen.columns = columns.data();
-        seen.kill = dead.data();
-        seen.substep = chunk.substep;
-        seen.times = chunk.time.data();
-        seen.steps = chunk.dt.data();
-        kernel_.run_chunk(pass_, seen);
+        call.chunk.size = static_cast<std::int32_t>(chunk.size());
+        call.chunk.first = static_cast<double>(chunk.first);
+        call.chunk.kill = dead.data();
+        call.chunk.substep = chunk.substep;
+        call.chunk.times = chunk.time.data();
+        call.chunk.steps = chunk.dt.data();
+        kernel_.run_chunk(pass_, call);
     }
 
 private:
@@ -562,11 +549,10 @@ public:
     std::unique_ptr<ActionPass> begin(PointSet& points) const override
     {
         Column<std::uint8_t> chosen;
-        bool masked = false;
-        if (!kernel_.make_writable(points, group, arguments_, chosen, masked)) return nullptr;
-        return std::make_unique<KernelActionPass>(kernel_, points, caller_,
-                                                  kernel_.layout_of_action(points, arguments_, masked),
-                                                  arguments_.values, std::move(chosen));
+        std::optional<Layout> layout = kernel_.prepare(points, group, arguments_, chosen, true);
+        if (!layout) return nullptr;
+        return std::make_unique<KernelActionPass>(kernel_, points, caller_, std::move(*layout), arguments_.values,
+                                                  std::move(chosen));
     }
 
 private:

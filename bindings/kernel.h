@@ -3,19 +3,17 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "bindings/state.h"
 #include "runtime/graph/point_function.h"
-
-struct rapid_chunk;  // lua/chunk.h
-struct rapid_column;
 
 namespace rapid {
 
 class ScriptHost;
-class State;
 
 // What a Lua node's kernel is given besides the points.
 struct KernelArguments {
@@ -61,22 +59,20 @@ public:
 private:
     struct Layout;
     struct Pass;
+    struct Call;
     class KernelAction;
     class KernelActionPass;
 
     Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate, bool masked) const;
-    Layout layout_of_action(const PointSet& points, const KernelArguments& arguments, bool masked) const;
-    bool make_writable(PointSet& points, const std::string& group, const KernelArguments& arguments,
-                       Column<std::uint8_t>& chosen, bool& masked) const;
+    void make_layout_of_action(Layout& layout) const;
+    std::optional<Layout> prepare(PointSet& points, const std::string& group, const KernelArguments& arguments,
+                                  Column<std::uint8_t>& chosen, bool action) const;
     void run_pass(Pass& pass) const;
     void run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const;
-    void run_chunk(const Pass& pass, rapid_chunk& chunk) const;
-    static rapid_chunk point_of(const Pass& pass, const rapid_chunk& chunk, std::int64_t i,
-                                std::vector<rapid_column>& columns, std::vector<rapid_column>& groups);
-    void call_runner(State& state, const Pass& pass, rapid_chunk& chunk) const;
-    // Leaves the runner for this layout on the state's stack: a list of run, at, set_params and the pass whose
-    // parameters it has.
-    void push_runner(State& state, const Layout& layout) const;
+    void run_chunk(const Pass& pass, Call& call) const;
+    static Call one_point(const Pass& pass, const Call& call, std::int32_t i);
+    void call_runner(State& state, const Pass& pass, const Call& call) const;
+    State::Runner& runner_for(State& state, const Layout& layout) const;
 
     ScriptHost& host_;
 

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "runtime/graph/value.h"
 
 struct lua_State;
+struct rapid_chunk;  // lua/chunk.h
 
 namespace rapid {
 
@@ -73,6 +75,16 @@ public:
 
     // The number of the next constructor call.
     std::size_t next_made = 0;
+
+    // What carries a kernel over points in this state (lua/kernel.lua), for columns of one layout: functions in the
+    // registry, and the chunk that they see, with pointers to columns behind it.
+    struct Runner {
+        std::string layout;
+        int run = 0, set_params = 0;
+        rapid_chunk* chunk = nullptr;
+        std::uint64_t pass = 0;  // whose parameters it has been given
+    };
+    std::map<std::size_t, std::vector<Runner>> runners;  // by kernel
 
     // Of the :detail function that runs, and another one when it has ended (lua/detail.lua).
     std::int32_t detail_serial = 0;

@@ -1,24 +1,25 @@
 // What a kernel's runner sees of the points: compiled into the host, and given as text to ffi.cdef (lua/kernel.lua).
 // Graph code never gets hold of any of it.
 
-typedef struct rapid_column {
-    void* data;      // of the chunk's first point
-    int64_t stride;  // scalars from one point to the next: 1, 3 (vec3), 4 (quat), or 0 where all points share one value
-} rapid_column;
+typedef struct rapid_float3 { float x, y, z; } rapid_float3;
+typedef struct rapid_float4 { float x, y, z, w; } rapid_float4;
+typedef struct rapid_double3 { double x, y, z; } rapid_double3;
 
+// A runner has one, at the same place for as long as it lives: the host writes it before each call.
 typedef struct rapid_chunk {
-    int64_t size;           // points
-    int64_t first;          // place in the set of the chunk's first point
-    rapid_column* columns;  // as the runner's layout numbers them
-    rapid_column* groups;   // uint8, 0 or 1
-    uint8_t* kill;          // shape [size], set to 1 by p:kill(); null where the kernel never kills
-    uint8_t* result;        // shape [size], what a predicate returned; null for other kernels
-    uint8_t* members;       // shape [size], the points to visit; null for all
-    uint64_t random;        // key of the node's random numbers
-    double number, time, dt;  // the frame, seconds
+    double number, time, dt;  // the frame, seconds; first, since kernels get them as they lie here
+    double first;             // place in the set of the chunk's first point
     double substep;           // of an action, from 0
+    int32_t size;             // points
+    int32_t at;               // the point that is being worked on, -1 for none
+    uint64_t random;          // key of the node's random numbers
+    uint8_t* kill;            // shape [size], set to 1 by p:kill(); null where the kernel never kills
+    uint8_t* result;          // shape [size], what a predicate returned; null for other kernels
+    uint8_t* members;         // shape [size], the points to visit; null for all
     const double* times;      // of an action: each point's own time, s since the start, and sub-step, s; shape [size]
     const double* steps;
+    // Behind it lie pointers to the first point's value in each column, and then in each group (uint8, 0 or 1), as the
+    // runner's layout numbers them. Where all points share one value, there is one.
 } rapid_chunk;
 
 typedef double (*rapid_rand)(uint64_t random, int64_t id, double use, double frame);

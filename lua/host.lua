@@ -93,8 +93,8 @@ end
 
 entry.fingerprint = bytecode.fingerprint
 
-function entry.runner(f, layout)
-  return engine.runner(f, layout)
+function entry.runner(f, layout, memory)
+  return engine.runner(f, layout, memory)
 end
 
 -- A :detail function; random: points to the key of the node's random numbers.

@@ -1,10 +1,11 @@
 -- Runners: what carries a kernel over the points of a chunk.
 --
--- A kernel sees the point through a view `p` whose reads and writes are closures over the chunk's columns; it never
--- gets a pointer, and an index outside its own point cannot be said. The trace compiler inlines all of it. Each kernel
--- gets a runner from generated text, with function prototypes of its own: kernels that share one runner share its
--- traces, and fall to a fifth of their speed.
+-- A kernel sees the point through a view `p` whose reads and writes go to the chunk's columns, at this one point; it
+-- never gets a pointer, and an index outside its own point cannot be said. The trace compiler inlines all of it. Each
+-- kernel gets a runner from generated text, with function prototypes of its own: kernels that share one runner share
+-- its traces, and fall to a fifth of their speed.
 local ffi = require "ffi"
+local util = require "jit.util"
 local vector = require "vec3"
 local words = require "words"
 
@@ -12,53 +13,58 @@ local vec3, quat = vector.type, vector.quat
 
 jit.off(true, true) -- all of this file, but not the runners' text
 
--- One attribute's getter and setter by type. $N is its column's number, $S its name.
+-- One attribute's getter and setter by type. $C is its column's pointer, $I the point's place in it, $S its name.
 local getter_text = {
-  float = "return (tonumber(c$N[cursor.i * s$N]))",
-  int32 = "return (tonumber(c$N[cursor.i * s$N]))",
-  int64 = "return (tonumber(c$N[cursor.i * s$N]))",
-  vec3 = "local k = cursor.i * s$N return (vec3(c$N[k], c$N[k + 1], c$N[k + 2]))",
-  quat = "local k = cursor.i * s$N return (quat(c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3]))",
+  float = "return (tonumber($C[$I]))",
+  int32 = "return (tonumber($C[$I]))",
+  int64 = "return (tonumber($C[$I]))",
+  vec3 = "local a = $C[$I] return (vec3(a.x, a.y, a.z))",
+  quat = "local a = $C[$I] return (quat(a.x, a.y, a.z, a.w))",
 }
 
+-- A sum of squares below MAX2 says in one comparison that all are finite and none is too large; near it, each is asked.
 local setter_text = {
   float = [[
     if type(x) ~= "number" then wrong_type($S, "a number", x) end
-    if not (x >= -MAX and x <= MAX) then not_finite($S, x) end
-    c$N[cursor.i] = x]],
+    if not (x * x <= MAX2) then not_finite($S, x) end
+    $C[i] = x]],
   int32 = [[
     if type(x) ~= "number" then wrong_type($S, "a whole number", x) end
     if not (x >= -2147483648 and x <= 2147483647 and floor(x) == x) then not_whole($S, x) end
-    c$N[cursor.i] = x]],
+    $C[i] = x]],
   int64 = [[
     if type(x) ~= "number" then wrong_type($S, "a whole number", x) end
     if not (x >= -9007199254740992 and x <= 9007199254740992 and floor(x) == x) then not_whole($S, x) end
-    c$N[cursor.i] = x]],
+    $C[i] = x]],
   vec3 = [[
     if not istype(vec3, x) then wrong_type($S, "a vec3", x) end
     local x1, x2, x3 = x.x, x.y, x.z
-    if not (x1 >= -MAX and x1 <= MAX and x2 >= -MAX and x2 <= MAX and x3 >= -MAX and x3 <= MAX) then
+    if not (x1 * x1 + x2 * x2 + x3 * x3 <= MAX2) and not (x1 * x1 <= MAX2 and x2 * x2 <= MAX2 and x3 * x3 <= MAX2) then
       not_finite($S, x)
     end
-    local k = cursor.i * 3
-    c$N[k], c$N[k + 1], c$N[k + 2] = x1, x2, x3]],
+    local a = $C[i]
+    a.x, a.y, a.z = x1, x2, x3]],
   quat = [[
     if not istype(quat, x) then wrong_type($S, "a quat", x) end
     local x1, x2, x3, x4 = x.x, x.y, x.z, x.w
-    if not (x1 >= -MAX and x1 <= MAX and x2 >= -MAX and x2 <= MAX and x3 >= -MAX and x3 <= MAX and x4 >= -MAX
-        and x4 <= MAX) then
+    if not (x1 * x1 + x2 * x2 + x3 * x3 + x4 * x4 <= MAX2)
+        and not (x1 * x1 <= MAX2 and x2 * x2 <= MAX2 and x3 * x3 <= MAX2 and x4 * x4 <= MAX2) then
       not_finite($S, x)
     end
-    local k = cursor.i * 4
-    c$N[k], c$N[k + 1], c$N[k + 2], c$N[k + 3] = x1, x2, x3, x4]],
+    local a = $C[i]
+    a.x, a.y, a.z, a.w = x1, x2, x3, x4]],
 }
 
 -- As Solve holds P and v within a frame.
 getter_text.vec3d, setter_text.vec3d = getter_text.vec3, setter_text.vec3
 
--- The names of pointers in the runners' text: types that have been read once, not at every chunk.
-local pointer_type = {
-  vec3d = "doubles", float = "floats", vec3 = "floats", quat = "floats", int32 = "int32s", int64 = "int64s",
+local operators = {
+  "__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__concat", "__len", "__lt", "__le", "__call",
+}
+
+local element_type = {
+  vec3d = "rapid_double3", float = "float", vec3 = "rapid_float3", quat = "rapid_float4", int32 = "int32_t",
+  int64 = "int64_t",
 }
 
 local describe = words.value
@@ -87,26 +93,24 @@ local function sorted_names(map)
 end
 
 -- A view's refusals.
-local function missing(name, getters)
+local function missing(name, names)
   error(("no attribute %q here; a computed name must be one that the kernel also names as a constant (it names %s)")
-    :format(words.name(name), table.concat(sorted_names(getters), ", ")), 0)
+    :format(words.name(name), table.concat(sorted_names(names), ", ")), 0)
 end
 
+-- Names are compared one after the other: in a trace they are constants, and nothing is left of the comparisons, where
+-- a look-up in a table would leave its checks. What lies in upvalues that are never assigned, and is no longer than two
+-- pointers, is a constant there too: the chunk's address, the view, the frame.
 local text_head = [[
-local ffi, vec3, quat, kernel, frame_type, rand, adopt, shown, refuse, layout = ...
-local istype, cast, floor, type, tonumber, error = ffi.istype, ffi.cast, math.floor, type, tonumber, error
+local ffi, vec3, quat, kernel, memory, frame_type, rand, adopt, shown, refuse, names, flush = ...
+local istype, floor, type, tonumber, error = ffi.istype, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
-local MAX = 3.4028234663852886e38
-local chunks, floats, doubles = ffi.typeof "rapid_chunk*", ffi.typeof "float*", ffi.typeof "double*"
-local int32s, int64s, bytes = ffi.typeof "int32_t*", ffi.typeof "int64_t*", ffi.typeof "uint8_t*"
-local cursor = ffi.new "struct { int32_t i; }" -- the point; no upvalue, so that setting it spoils no other load
-cursor.i = -1
-local first, frame, random, params, details = 0, nil, 0, nil, {}
-local kill, result, members, substep, times, steps, step
-local getters, setters, methods = {}, {}, {}
-local id_column, id_stride
-local setup = function(...) end -- of the columns and groups
+local MAX2 = 3.4028234663852886e38 * 3.4028234663852886e38
+local columns, chunk, frame = memory, memory.chunk, ffi.cast(ffi.typeof("$&", frame_type), memory)
+local point_type, step_type = ffi.typeof "struct {}", ffi.typeof "struct {}"
+local p, step = point_type(), step_type()
+local params, details = nil, {}
 
 -- What the view, its methods and the step do outside of the loop: columns may be gone by then.
 local function dead()
@@ -115,185 +119,157 @@ end
 ]]
 
 local text_methods = [[
-function methods.rand(...)
+local function draw(...)
   local _, use, frame_or_number = ...
-  if cursor.i < 0 then dead() end
+  local i = chunk.at
+  if i < 0 then dead() end
   if type(use) ~= "number" then wrong_use("a number, which of the point's random numbers", use) end
   local anew = 0
   if frame_or_number ~= nil then
     anew = frame_or_number
-    if istype(frame_type, anew) then anew = anew.number elseif anew == step then anew = times[cursor.i] end
+    if istype(frame_type, anew) then anew = anew.number elseif istype(step_type, anew) then anew = chunk.times[i] end
     if type(anew) ~= "number" then wrong_use("the frame, or a number, behind the comma", anew) end
     if anew == 0 then anew = 5e-324 end -- 0 is the number that stays the same in every frame
   end
-  local drawn = rand(random, id_column[cursor.i * id_stride], use, anew)
+  local drawn = rand(chunk.random, $ID, use, anew)
   return drawn
 end
 
-function methods.kill(...)
-  if cursor.i < 0 then dead() end
-  if kill == nil then error("kill is out of reach here", 0) end
-  kill[cursor.i] = 1
+local function kill(...)
+  local i = chunk.at
+  if i < 0 then dead() end
+  if chunk.kill == nil then error("kill is out of reach here", 0) end
+  chunk.kill[i] = 1
 end
-
-local function read(...)
-  local _, name = ...
-  if cursor.i < 0 then dead() end
-  local get = getters[name]
-  if get then
-    local value = get() -- no tail call: the trace compiler gives up after fifteen of them
-    return value
-  end
-  local method = methods[name]
-  if method then return method end
-  missing(name, getters)
-end
-
-local function write(...)
-  local _, name, x = ...
-  if cursor.i < 0 then dead() end
-  local set = setters[name]
-  if set then
-    set(x)
-    return
-  end
-  refuse.write(name, getters)
-end
-
-local p = newproxy(true)
-local view = getmetatable(p)
-view.__index, view.__newindex, view.__metatable = read, write, false
-view.__tostring = function() return "a point" end
 ]]
 
 -- What an action gets in place of the frame: the point's own time.
 local text_step = [[
-local step_getters = {
-  time = function(...) return times[cursor.i] end,
-  dt = function(...) return steps[cursor.i] end,
-  index = function(...) return substep end,
-  detail = function(...) return shown.view end,
-}
-step = newproxy(true)
-local step_view = getmetatable(step)
-step_view.__metatable = false
-step_view.__tostring = function() return "a step" end
-step_view.__index = function(...)
-  local _, name = ...
-  if cursor.i < 0 then dead() end
-  local get = step_getters[name]
-  if not get then refuse.step(name) end
-  local value = get()
-  return value
-end
+ffi.metatype(step_type, refuse.operators("the step is no number; compute with what it has, by name: step.dt", {
+  __metatable = false,
+  __tostring = function() return "a step" end,
+  __newindex = function(_, name) refuse.step(name) end,
+  __index = function(...)
+    local _, name = ...
+    local i = chunk.at
+    if i < 0 then dead() end
+    if name == "time" then return (chunk.times[i]) end
+    if name == "dt" then return (chunk.steps[i]) end
+    if name == "index" then return (chunk.substep) end
+    if name == "detail" then return (shown.view) end
+    refuse.step(name)
+  end,
+}))
 ]]
 
-local block_size = 8
-
--- layout.columns: { name, type, slot (from 0), writable }; layout.groups: { name, slot, writable };
+-- layout.columns: { name, type, uniform, writable }; layout.groups: { name, uniform, writable };
 -- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve.
--- Returns run(chunk); at(), the place in the set of the point that is being worked on; and set_params(values), for the
--- third argument of a Lua node's kernel.
-local function make_runner(kernel, layout, pointers)
+-- memory: a userdata with room for rapid_chunk and, behind it, a pointer for each column and then each group. The host
+-- writes it before each run().
+-- Returns run(), and set_params(values, details): the third argument of a Lua node's kernel, and what frame.detail
+-- shows.
+local function make_runner(kernel, layout, memory, pointers)
+  local fields, names = { "rapid_chunk chunk;" }, { dt = true, index = true }
   local text = { text_head }
-  local function add(line, name, slot)
-    -- A function gives the name, in which % means nothing.
-    text[#text + 1] = (line:gsub("%$N", slot or ""):gsub("%$S", function() return ("%q"):format(name) end))
+  local function add(lines, entry, pointer)
+    local values = {
+      ["$C"] = "columns." .. pointer, ["$I"] = entry.uniform and "0" or "i", ["$S"] = ("%q"):format(entry.name),
+    }
+    text[#text + 1] = (lines:gsub("%$%u", values))
+  end
+  local function add_function(name, arguments, body)
+    text[#text + 1] = ("local function %s(...)\nlocal %s = ...\nlocal i = chunk.at\nif i < 0 then dead() end")
+      :format(name, arguments)
+    body()
+    text[#text + 1] = "end"
   end
 
-  -- A block of columns or groups with its locals; begin() calls the last block's setup, and that the one before. A
-  -- function of Lua has at most 200 locals and 60 upvalues.
-  local function add_blocks(entries, add_entry)
-    for from = 1, #entries, block_size do
-      text[#text + 1] = "do\nlocal before = setup"
-      local lines = {}
-      for place = from, math.min(from + block_size - 1, #entries) do
-        lines[#lines + 1] = add_entry(entries[place], tostring(entries[place].slot))
+  for place, column in ipairs(layout.columns) do
+    fields[#fields + 1] = ("%s* c%d;"):format(element_type[column.type], place)
+    names[column.name] = true
+    if column.name == "id" then
+      text[#text + 1] = (text_methods:gsub("%$ID", ("columns.c%d[%s]"):format(place, column.uniform and "0" or "i")))
+    end
+  end
+  for place in ipairs(layout.groups) do fields[#fields + 1] = ("uint8_t* g%d;"):format(place) end
+
+  add_function("within", "_, group", function()
+    for place, group in ipairs(layout.groups) do
+      add("if group == $S then return ($C[$I] ~= 0) end", group, "g" .. place)
+    end
+    text[#text + 1] = "return false"
+  end)
+  local function add_change(what, value)
+    add_function(what, "_, group", function()
+      for place, group in ipairs(layout.groups) do
+        if group.writable then
+          add(("if group == $S then $C[i] = %d return end"):format(value), group, "g" .. place)
+        end
       end
-      text[#text + 1] = "setup = function(...)\nlocal chunk = ...\nbefore(chunk)\n" .. table.concat(lines, "\n")
-        .. "\nend\nend"
-    end
+      text[#text + 1] = ("refuse.group(group, %q)"):format(what)
+    end)
   end
-
-  add_blocks(layout.columns, function(column, n)
-    add("local c$N, s$N", column.name, n)
-    add("getters[$S] = function(...) " .. getter_text[column.type] .. " end", column.name, n)
-    if column.writable then
-      add("setters[$S] = function(...) local x = ...\n" .. setter_text[column.type] .. "\nend", column.name, n)
+  add_change("join", 1)
+  add_change("leave", 0)
+  add_function("read", "_, name", function()
+    for place, column in ipairs(layout.columns) do
+      add("if name == $S then " .. getter_text[column.type] .. " end", column, "c" .. place)
     end
-    local line = ("c%s, s%s = cast(%s, chunk.columns[%s].data), tonumber(chunk.columns[%s].stride)"):format(n, n,
-      pointer_type[column.type], n, n)
-    return column.name == "id" and line .. (" id_column, id_stride = c%s, s%s"):format(n, n) or line
+    text[#text + 1] = [[
+if name == "dt" then return (frame.dt) end
+if name == "index" then return (chunk.first + i + 1) end
+if name == "rand" then return draw end
+if name == "within" then return within end
+if name == "join" then return join end
+if name == "leave" then return leave end
+if name == "kill" then return kill end
+missing(name, names)]]
+  end)
+  add_function("write", "_, name, x", function()
+    for place, column in ipairs(layout.columns) do
+      if column.writable then
+        add("if name == $S then\n" .. setter_text[column.type] .. "\nreturn end", column, "c" .. place)
+      end
+    end
+    text[#text + 1] = "refuse.write(name)"
   end)
   text[#text + 1] = [[
-if not getters.dt then getters.dt = function(...) return frame.dt end end
-getters.index = function(...) return first + cursor.i + 1 end
-local within, join, leave = {}, {}, {}
+ffi.metatype(point_type, refuse.operators("p is the point; compute with what it has, by name: p.v", {
+  __index = read, __newindex = write, __metatable = false, __tostring = function() return "a point" end,
+}))
 ]]
-  -- Groups by name: closures, chosen when the name is looked up.
-  add_blocks(layout.groups, function(group, n)
-    add("local g$N, t$N", group.name, n)
-    add("within[$S] = function(...) return g$N[cursor.i * t$N] ~= 0 end", group.name, n)
-    if group.writable then
-      add("join[$S] = function(...) g$N[cursor.i] = 1 end", group.name, n)
-      add("leave[$S] = function(...) g$N[cursor.i] = 0 end", group.name, n)
-    end
-    return ("g%s, t%s = cast(bytes, chunk.groups[%s].data), tonumber(chunk.groups[%s].stride)"):format(n, n, n, n)
-  end)
-  text[#text + 1] = [[
-function methods.within(...)
-  local _, name = ...
-  if cursor.i < 0 then dead() end
-  local ask = within[name]
-  if ask == nil then return false end
-  local member = ask()
-  return member
-end
-function methods.join(...)
-  local _, name = ...
-  if cursor.i < 0 then dead() end
-  local act = join[name]
-  if not act then refuse.group(name, "join") end
-  act()
-end
-function methods.leave(...)
-  local _, name = ...
-  if cursor.i < 0 then dead() end
-  local act = leave[name]
-  if not act then refuse.group(name, "leave") end
-  act()
-end
-]]
-  text[#text + 1] = text_methods
   if layout.action then text[#text + 1] = text_step end
-  -- Vararg, so that no trace starts here, nor in run(): the conversion of a pointer is not compiled.
-  text[#text + 1] = [[
-local function begin(...)
-  local chunk = ...
-  first, random = tonumber(chunk.first), chunk.random
-  frame = frame_type(chunk.number, chunk.time, chunk.dt)
-  shown.details = details
-  kill, result, members = chunk.kill, chunk.result, chunk.members
-  substep, times, steps = chunk.substep, chunk.times, chunk.steps
-  setup(chunk)
-end
-]]
 
-  local body = layout.predicate and "result[k] = kernel(p, frame, params) and 1 or 0"
-    or layout.action and "kernel(p, step, params)" or "kernel(p, frame, params)"
-  local test = layout.masked and "if members[k] ~= 0 then cursor.i = k " .. body .. " end" or "cursor.i = k " .. body
+  local info = util.funcinfo(kernel)
+  local body = ("kernel(p, %s%s)"):format(layout.action and "step" or "frame",
+    (info.params > 2 or info.isvararg) and ", params" or "")
+  if layout.predicate then body = "chunk.result[k] = " .. body .. " and 1 or 0" end
+  if layout.masked then body = "if chunk.members[k] ~= 0 then " .. body .. " end" end
+  body = "chunk.at = k " .. body
+  -- Vararg, so that no trace starts at run() itself. A loop that is always left at once would be refused, and where one
+  -- point after the other has made a trace of the kernel, a loop could only jump to it.
+  -- A trace's loop goes the way of the point at which it was recorded; other ways branch off it, at half the speed. The
+  -- first points are not typical, so the traces are made anew after a while: of most points' way, most likely.
   text[#text + 1] = [[
-local function run(...)
-  local pointer = ...
-  local chunk = cast(chunks, pointer)
-  begin(chunk)
-  for k = 0, tonumber(chunk.size) - 1 do ]] .. test .. [[ end
-  cursor.i = -1
-end
-local function at()
-  local place = cursor.i
-  cursor.i = -1
-  return place < 0 and -1 or first + place
+local run
+local calls, renewal, single = 0, 64, false
+run = function(...)
+  shown.details = details
+  if chunk.size == 1 then
+    single = true
+    local k = 0
+    ]] .. body .. [[
+
+  else
+    calls = calls + 1
+    if single or calls == renewal then
+      flush(run)
+      flush(kernel, true)
+      single, renewal = false, math.max(renewal, calls * 4)
+    end
+    for k = 0, chunk.size - 1 do ]] .. body .. [[ end
+  end
+  chunk.at = -1
 end
 local function set_params(values, detail_values)
   details = detail_values
@@ -307,13 +283,13 @@ local function set_params(values, detail_values)
   of_params.__newindex = function(_, name) refuse.assign(name) end
 end
 jit.off(set_params) -- once a pass
-return run, at, set_params
+return run, set_params
 ]]
   local refuse = { wrong_type = wrong_type, not_finite = not_finite, not_whole = not_whole, missing = missing }
-  function refuse.write(name, getters)
+  function refuse.write(name)
     if layout.predicate then error(("assigns %q; a test must not change its point"):format(words.name(name)), 0) end
     if name == "id" or name == "dt" or name == "index" then error(("%s is read only"):format(name), 0) end
-    if getters[name] then
+    if names[name] then
       error(("assigns %q under a computed name; name it as a constant somewhere in the kernel"):format(name), 0)
     end
     error(("no attribute %q; add :attribute{ %s = 0 } before it"):format(words.name(name), words.name(name)), 0)
@@ -328,15 +304,22 @@ return run, at, set_params
     error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
       :format(what, describe(name), what), 0)
   end
+  function refuse.operators(what, meta)
+    for _, name in ipairs(operators) do
+      meta[name] = function() error(what, 0) end
+    end
+    return meta
+  end
   function refuse.step(name)
     error(("the step has no %q; it has time, dt, index and detail"):format(words.name(name)), 0)
   end
   function refuse.use(wanted, value)
     error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)
   end
-  local chunk = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
-  return chunk(ffi, vec3, quat, kernel, pointers.frame_type, pointers.rand, pointers.adopt, pointers.shown, refuse,
-    layout)
+  local make = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
+  local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
+  return make(ffi, vec3, quat, kernel, pointer, pointers.frame_type, pointers.rand, pointers.adopt, pointers.shown,
+    refuse, names, jit.flush)
 end
 
 -- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua).
@@ -378,7 +361,7 @@ local function prepare(rand, adopt)
       shown.details = details or {}
       return frame_type(number, time, dt)
     end,
-    runner = function(kernel, layout) return make_runner(kernel, layout, pointers) end,
+    runner = function(kernel, layout, memory) return make_runner(kernel, layout, memory, pointers) end,
     rand = pointers.rand,
   }
 end

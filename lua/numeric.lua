@@ -13,8 +13,8 @@
 local ffi = require "ffi"
 local vector = require "vec3"
 
-local abs, cos, floor, pi, sin = math.abs, math.cos, math.floor, math.pi, math.sin
-local vec3, quat, istype = vector.type, vector.quat, ffi.istype
+local abs, cos, floor, max, min, pi, sin = math.abs, math.cos, math.floor, math.max, math.min, math.pi, math.sin
+local vec3, quat, istype, type = vector.type, vector.quat, ffi.istype, type
 
 local function show(value)
   local kind = type(value)
@@ -36,7 +36,7 @@ function numeric.clamp(...)
     need_numbers("clamp(x, lo, hi)", x, lo, hi)
   end
   if lo > hi then error(("clamp(x, lo, hi): lo = %g is above hi = %g"):format(lo, hi), 0) end
-  return x < lo and lo or x > hi and hi or x
+  return (min(hi, max(lo, x))) -- no branch, which each point would take its own way
 end
 
 function numeric.fit(...)

@@ -7,8 +7,9 @@
 local ffi = require "ffi"
 local words = require "words"
 
+-- Locals: in a trace they are constants, and a global is looked up.
 local sqrt, sin, acos = math.sqrt, math.sin, math.acos
-local istype = ffi.istype
+local istype, type = ffi.istype, type
 
 local vec3 = ffi.typeof "struct { const double x, y, z; }"
 local quat = ffi.typeof "struct { const double x, y, z, w; }"
@@ -42,37 +43,35 @@ local function need_two(what, a, b)
   need_vec3(what, b)
 end
 
-local methods = {}
-
-function methods.dot(...)
+local function dot(...)
   local a, b = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:dot(w)", a, b) end
   return a.x * b.x + a.y * b.y + a.z * b.z
 end
 
-function methods.cross(...)
+local function cross(...)
   local a, b = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:cross(w)", a, b) end
   return (vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x))
 end
 
-function methods.length(...)
+local function length(...)
   local a = ...
   if not istype(vec3, a) then need_vec3("v:length()", a) end
   return (sqrt(a.x * a.x + a.y * a.y + a.z * a.z))
 end
 
 -- Of length 1; the zero vector stays zero.
-function methods.normalized(...)
+local function normalized(...)
   local a = ...
   if not istype(vec3, a) then need_vec3("v:normalized()", a) end
-  local length = sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
-  if length == 0 then return a end
-  return (vec3(a.x / length, a.y / length, a.z / length))
+  local size = sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
+  if size == 0 then return a end
+  return (vec3(a.x / size, a.y / size, a.z / size))
 end
 
 -- a at t = 0, b at t = 1.
-function methods.lerp(...)
+local function lerp(...)
   local a, b, t = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:lerp(w, t)", a, b) end
   if type(t) ~= "number" then error(("v:lerp(w, t) takes a number t, not %s"):format(show(t)), 2) end
@@ -140,21 +139,23 @@ ffi.metatype(vec3, {
   end,
   __index = function(...)
     local _, name = ...
-    local method = methods[name]
-    if method then return method end
+    -- Compared one after the other: in a trace nothing is left of it, where a look-up in a table leaves its checks.
+    if name == "cross" then return cross end
+    if name == "dot" then return dot end
+    if name == "length" then return length end
+    if name == "lerp" then return lerp end
+    if name == "normalized" then return normalized end
     error(("a vec3 has no %q; it has x, y, z, dot, cross, length, normalized and lerp"):format(words.name(name)), 2)
   end,
 })
 
 -- Rotations: (x, y, z) = axis sin(angle / 2), w = cos(angle / 2), as Houdini's orient holds them.
-local rotations = {}
-
 local function need_quat(what, value)
   if not istype(quat, value) then error(("%s takes a quat, not %s"):format(what, show(value)), 0) end
 end
 
 -- v, turned: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
-function rotations.rotate(...)
+local function rotate(...)
   local q, v = ...
   if not istype(quat, q) then need_quat("q:rotate(v)", q) end
   if not istype(vec3, v) then need_vec3("q:rotate(v)", v) end
@@ -165,39 +166,39 @@ function rotations.rotate(...)
 end
 
 -- The turn back, for a quaternion of length 1.
-function rotations.inverse(...)
+local function inverse(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:inverse()", q) end
   return (quat(-q.x, -q.y, -q.z, q.w))
 end
 
-function rotations.length(...)
+local function quat_length(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:length()", q) end
   return (sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w))
 end
 
 -- Of length 1; zero becomes no turn.
-function rotations.normalized(...)
+local function quat_normalized(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:normalized()", q) end
-  local length = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
-  if length == 0 then return (quat(0, 0, 0, 1)) end
-  return (quat(q.x / length, q.y / length, q.z / length, q.w / length))
+  local size = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+  if size == 0 then return (quat(0, 0, 0, 1)) end
+  return (quat(q.x / size, q.y / size, q.z / size, q.w / size))
 end
 
 -- The shortest turn from q (t = 0) to r (t = 1), at even speed; both of length 1.
-function rotations.slerp(...)
+local function slerp(...)
   local q, r, t = ...
   if not istype(quat, q) then need_quat("q:slerp(r, t)", q) end
   if not istype(quat, r) then need_quat("q:slerp(r, t)", r) end
   if type(t) ~= "number" then error(("q:slerp(r, t) takes a number t, not %s"):format(show(t)), 0) end
-  local dot = q.x * r.x + q.y * r.y + q.z * r.z + q.w * r.w
-  local sign = dot < 0 and -1 or 1 -- r and -r are the same turn
-  dot = dot * sign
+  local cosine = q.x * r.x + q.y * r.y + q.z * r.z + q.w * r.w
+  local sign = cosine < 0 and -1 or 1 -- r and -r are the same turn
+  cosine = cosine * sign
   local a, b = 1 - t, t * sign
-  if dot < 0.9999995 then -- else the arc is a line, within rounding
-    local angle = acos(dot)
+  if cosine < 0.9999995 then -- else the arc is a line, within rounding
+    local angle = acos(cosine)
     local s = sin(angle)
     a, b = sin((1 - t) * angle) / s, sin(t * angle) / s * sign
   end
@@ -227,8 +228,11 @@ ffi.metatype(quat, {
   __concat = concat,
   __index = function(...)
     local _, name = ...
-    local method = rotations[name]
-    if method then return method end
+    if name == "inverse" then return inverse end
+    if name == "length" then return quat_length end
+    if name == "normalized" then return quat_normalized end
+    if name == "rotate" then return rotate end
+    if name == "slerp" then return slerp end
     error(("a quat has no %q; it has x, y, z, w, rotate, inverse, length, normalized and slerp"):format(
       words.name(name)), 2)
   end,

@@ -253,6 +253,8 @@ describe("a kernel that writes what can't be kept", function()
 
   it("keeps the largest float", function()
     assert.equal(3.4028234663852886e38, scene.kernel("p.heat = 3.4028234663852886e38", "heat = {0, 0}")[1].heat)
+    local largest = scene.kernel("local x = 3.4028234663852886e38 p.v = vec3(x, -x, x)")[1].v
+    assert.same({ 3.4028234663852886e38, -3.4028234663852886e38 }, { largest.x, largest.y })
   end)
 
   it("names the first point that fails, whichever thread comes upon one first", function()

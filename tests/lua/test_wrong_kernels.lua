@@ -51,6 +51,11 @@ local at_a_point = {
   ["p.heat = rapid.math.clmap(p.heat, 0, 1)"] = 'rapid.math has no "clmap"; did you mean "clamp"?',
   ["p.heat = rapid.math.clamp(p.heat, 2, 1)"] = "clamp(x, lo, hi): lo = 2 is above hi = 1",
   ["p.heat = rapid.math.noise(p.heat)"] = "noise(P, time, octaves, seed) takes a vec3 P, not 1",
+  ["p.heat = p + 1"] = "p is the point; compute with what it has, by name: p.v",
+  ["p.heat = 2 * p"] = "p is the point; compute with what it has, by name: p.v",
+  ["p.heat = p()"] = "p is the point; compute with what it has, by name: p.v",
+  ["p.v = vec3(3e38, 3.5e38, 0)"] =
+    "v became vec3(3e+38, 3.5e+38, 0); a float is finite, within 3.4e38 either way",
   ["p.heat = p:rand()"] = "p:rand takes a number, which of the point's random numbers, not nil",
   ["p.heat = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time, dt and detail',
   ["frame.number = 3"] = read_only,

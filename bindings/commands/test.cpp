@@ -7,13 +7,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "bindings/commands/child.h"
 #include "bindings/commands/command.h"
-#include "bindings/test_host.h"
+#include "bindings/commands/test_report.h"
 
 namespace rapid {
 namespace {
@@ -23,10 +24,6 @@ using nlohmann::json;
 
 // Where a child finds the pipe to tell its parent of the tests: a JSON object a line.
 constexpr int report_descriptor = 3;
-
-struct Counts {
-    int passed = 0, failed = 0, skipped = 0, broken = 0;
-};
 
 // test_*.lua below a folder, in order of path; any other file as it is.
 std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
@@ -49,12 +46,6 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
         files.insert(files.end(), found.begin(), found.end());
     }
     return files;
-}
-
-std::string indented(std::string text)
-{
-    for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; ++at) text.replace(at, 1, "\n  ");
-    return "  " + text + '\n';
 }
 
 // The child: runs the tests of one file and tells of each.
@@ -82,6 +73,10 @@ public:
     {
         app.add_option("FILES", files_, "test files, or folders of test_*.lua")->type_name("")->required();
         app.add_option("--filter", filter_, "only tests whose name this Lua pattern matches")->type_name("PATTERN");
+        app.add_option("--format", format_, "what is printed: text, tap or junit")
+            ->type_name("")
+            ->check(CLI::IsMember(
+                std::vector<std::string>(std::begin(TestReport::formats), std::end(TestReport::formats))));
         // Our own: the process of one file.
         app.add_option("--child-of", parent_)->group("");
         app.add_option("--already-run", already_run_)->group("");
@@ -96,12 +91,14 @@ public:
 
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         setenv("RAPID_BIN", program.c_str(), 0);  // for tests of the command itself
-        Counts counts;
-        for (const fs::path& file : find_tests(files_)) run_file(program, file, common, counts);
+        const std::vector<fs::path> files = find_tests(files_);
+        report_ = TestReport::make(format_, common.verbose);
+        for (const fs::path& file : files) run_file(program, file, common);
+        const TestCounts& counts = counts_;
         if (counts.broken == 0 && counts.passed + counts.failed + counts.skipped == 0)
             throw Error(filter_.empty() ? "no tests were found; a file needs describe and it"
                                         : fmt::format("no test has a name that matches \"{}\"", filter_));
-        print(fmt::format("{} passed, {} failed, {} skipped\n", counts.passed, counts.failed, counts.skipped));
+        report_->end(counts);
         return counts.broken > 0 ? status_refused : counts.failed > 0 ? status_failed : status_done;
     }
 
@@ -115,22 +112,17 @@ private:
     }
 
     // After a test that ended its process, the file goes on behind that test.
-    void run_file(const std::string& program, const fs::path& file, const CommonOptions& common, Counts& counts) const
+    void run_file(const std::string& program, const fs::path& file, const CommonOptions& common)
     {
         int already_run = 0;
         while (true) {
-            const Ending ending = run_process(program, file, common, already_run, counts);
+            const Ending ending = run_process(program, file, common, already_run);
             if (ending.orderly) return;
             // Its own words, if it had any, are on standard error already.
-            if (ending.running.empty()) {
-                ++counts.broken;
-                print(fmt::format("BROKEN {}\n{}", file.string(), indented("the tests ended with " + ending.how)));
-                return;
-            }
-            ++counts.failed;
-            print(fmt::format(
-                "FAILED {}\n{}", ending.running,
-                indented(fmt::format("{}: the test ended the process with {}", file.string(), ending.how))));
+            if (ending.running.empty())
+                return add({TestEvent::Broken, file.string(), "", "the tests ended with " + ending.how});
+            add({TestEvent::Failed, file.string(), ending.running,
+                 fmt::format("{}: the test ended the process with {}", file.string(), ending.how)});
             already_run += ending.started;
         }
     }
@@ -141,14 +133,13 @@ private:
         std::string running;  // the test that was running then
         int started;          // tests, in this process
     };
-    Ending run_process(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run,
-                       Counts& counts) const
+    Ending run_process(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run)
     {
         int ends[2];
         if (pipe2(ends, O_CLOEXEC) != 0) throw Error(fmt::format("no pipe: {}", std::strerror(errno)));
         const pid_t child = spawn(program, file, common, already_run, ends[1]);
         close(ends[1]);
-        Ending ending = follow(ends[0], common.verbose, counts);
+        Ending ending = follow(ends[0], file.string());
         int status = 0;
         waitpid(child, &status, 0);
         ending.orderly = ending.orderly && WIFEXITED(status) && WEXITSTATUS(status) == status_done;
@@ -181,55 +172,44 @@ private:
     }
 
     // Reads what the child tells, to its end.
-    static Ending follow(int descriptor, bool verbose, Counts& counts)
+    Ending follow(int descriptor, const std::string& file)
     {
         const std::unique_ptr<std::FILE, decltype(&std::fclose)> pipe(fdopen(descriptor, "r"), &std::fclose);
         Ending ending{false, "", "", 0};
         char* text = nullptr;
         std::size_t capacity = 0;
+        auto began = std::chrono::steady_clock::now();
         while (getline(&text, &capacity, pipe.get()) > 0) {
             const json event = json::parse(text, nullptr, false);
             if (event.is_discarded()) break;  // cut off with the process
             ending.orderly = event.contains("end");
             if (ending.orderly) break;
-            const bool starts = event.at("kind").get<TestEvent::Kind>() == TestEvent::Started;
-            ending.running = starts ? event.at("name").get<std::string>() : "";
-            ending.started += starts;
-            count(event, verbose, counts);
+            const auto kind = event.at("kind").get<TestEvent::Kind>();
+            const std::string name = event.at("name");
+            const auto now = std::chrono::steady_clock::now();
+            ending.running = "";
+            if (kind == TestEvent::Started) {
+                ending.running = name;
+                ++ending.started;
+            } else {
+                add({kind, file, name, event.at("message"), std::chrono::duration<double>(now - began).count()});
+            }
+            began = now;
         }
         std::free(text);
         return ending;
     }
 
-    static void count(const json& event, bool verbose, Counts& counts)
+    void add(const TestResult& result)
     {
-        const std::string name = event.at("name");
-        const auto kind = event.at("kind").get<TestEvent::Kind>();
-        const auto tell = [&](const char* what) {
-            print(fmt::format("{} {}\n{}", what, name, indented(event.at("message"))));
-        };
-        switch (kind) {
-            case TestEvent::Started:
-                break;
-            case TestEvent::Passed:
-                ++counts.passed;
-                if (verbose) print(fmt::format("passed {}\n", name));
-                break;
-            case TestEvent::Skipped:
-                ++counts.skipped;
-                if (verbose) print(fmt::format("skipped {}\n", name));
-                break;
-            case TestEvent::Failed:
-                ++counts.failed, tell("FAILED");
-                break;
-            case TestEvent::Broken:
-                ++counts.broken, tell("BROKEN");
-                break;
-        }
+        counts_.add(result.kind);
+        report_->add(result);
     }
 
     std::vector<std::string> files_;
-    std::string filter_;
+    std::string filter_, format_ = "text";
+    std::unique_ptr<TestReport> report_;
+    TestCounts counts_;
     std::optional<pid_t> parent_;
     int already_run_ = 0;
 };

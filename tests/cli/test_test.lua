@@ -66,6 +66,55 @@ describe("rapid test", function()
     assert.equal('no test has a name that matches "three"\n', none.stderr)
   end)
 
+  local mixed = [[
+describe("a <test> # 1", function()
+  it("is true", function() end)
+  it("is false", function() error("1 < 2 & \"3\"\nsecond line", 0) end)
+  pending("is to come")
+end)
+]]
+
+  it("speaks TAP with --format tap", function()
+    local folder = new_folder { ["a.lua"] = mixed, ["bad.lua"] = "error 'no'" }
+    local result = folder:test "--format tap a.lua bad.lua"
+    assert.equal(2, result.status)
+    assert.equal([[
+TAP version 13
+ok 1 - a <test> \# 1 is true
+not ok 2 - a <test> \# 1 is false
+# 1 < 2 & "3"
+# second line
+ok 3 - a <test> \# 1 is to come # SKIP
+not ok 4 - bad.lua
+# bad.lua:1: no
+1..4
+]], (result.stdout:gsub("(\n# )a%.lua:%d+: ", "%1")))
+  end)
+
+  it("writes JUnit's XML with --format junit", function()
+    local folder = new_folder { ["a.lua"] = mixed, ["good.lua"] = passing }
+    local result = folder:test "--format junit a.lua good.lua"
+    assert.equal(1, result.status)
+    assert.equal([[
+<?xml version="1.0" encoding="UTF-8"?>
+<testsuites name="rapid test" tests="4" failures="1" errors="0" skipped="1" time="T">
+  <testsuite name="a.lua" tests="3" failures="1" errors="0" skipped="1" time="T">
+    <testcase classname="a.lua" name="a &lt;test&gt; # 1 is true" time="T"/>
+    <testcase classname="a.lua" name="a &lt;test&gt; # 1 is false" time="T">
+      <failure message="1 &lt; 2 &amp; &quot;3&quot;">1 &lt; 2 &amp; &quot;3&quot;&#10;second line</failure>
+    </testcase>
+    <testcase classname="a.lua" name="a &lt;test&gt; # 1 is to come" time="T">
+      <skipped/>
+    </testcase>
+  </testsuite>
+  <testsuite name="good.lua" tests="1" failures="0" errors="0" skipped="0" time="T">
+    <testcase classname="good.lua" name="one is true" time="T"/>
+  </testsuite>
+</testsuites>
+]], (result.stdout:gsub('time="%d+%.%d%d%d"', 'time="T"'):gsub("a%.lua:%d+: ", "")))
+    assert.equal(2, folder:test("--format html a.lua").status)
+  end)
+
   it("ends with 2 where a file is not there, does not load, or holds no tests", function()
     local folder = new_folder {
       ["bad.lua"] = "describe(", ["raises.lua"] = "error 'no'", ["empty.lua"] = "", ["good.lua"] = passing,

@@ -65,7 +65,8 @@ int describe_error(lua_State* L)
     lua_Debug info;
     for (int level = 1; lua_getstack(L, level, &info); ++level) {
         lua_getinfo(L, "Sl", &info);
-        if (place.empty() && runs_body(L, info) && state.tail_call.line > 0) break;
+        if (place.empty() && runs_body(L, info) && state.tail_call.line > 0)
+            place = fmt::format("{}:{}", state.tail_call.file, state.tail_call.line);
         if (info.currentline < 0) continue;
         const std::string prefix = fmt::format("{}:{}: ", info.short_src, info.currentline);
         const bool own = message.rfind(prefix, 0) == 0;

@@ -14,7 +14,7 @@ files["lua/host.lua"] = { globals = { string = { fields = { "dump" } } } }
 
 files["tests"] = {
   std = "luajit+busted",
-  read_globals = { "rapid", "vec3", "quat", assert = { fields = { "near", "points", "same_points" } } },
+  read_globals = { "rapid", "vec3", "quat", assert = { fields = { "conserved", "near", "points", "same_points" } } },
 }
 
 -- What `rapid new` writes.

@@ -4,6 +4,8 @@
 --   assert.points(p).finite()                         no NaN, no infinity
 --   assert.points(p).outside(distance, tolerance)     distance(P) >= -tolerance for every point
 --   assert.points(p).inside(distance, tolerance)      distance(P) <= tolerance
+--   assert.conserved(result, quantity, tolerance)     the sum of quantity(point), numbers or vec3, is that of the first
+--                                                     frame at every frame
 --   assert.same_points(a, b)                          the same points, attributes and groups, bit by bit
 local assert = require "luassert"
 local say = require "say"
@@ -84,6 +86,53 @@ return function(native)
   end)
   register("inside", function(state, arguments)
     return wrong_side(points_of(state), arguments[1], arguments[2], -1, "outside")
+  end)
+
+  -- The sum of a quantity, and each point's own by id.
+  local function sum_of(points, quantity)
+    local sum, by_id = nil, {}
+    for i = 1, #points do
+      local value = quantity(points[i])
+      by_id[points[i].id] = value
+      sum = sum and sum + value or value
+    end
+    return sum or 0, by_id
+  end
+
+  -- The point whose quantity differs most between two frames.
+  local function most_changed(before, after, points)
+    local most, what = -1, "no point is left"
+    for i = 1, #points do
+      local id = points[i].id
+      local change = before[id] and distance_between(before[id], after[id]) or math.huge
+      if change > most or change ~= change then
+        most = change
+        what = ("point %d (id %d): %s, and %s before"):format(i, id, show(after[id]), before[id] and show(before[id])
+          or "not there")
+      end
+    end
+    return what
+  end
+
+  register("conserved", function(_, arguments)
+    local result, quantity, tolerance = arguments[1], arguments[2], arguments[3]
+    if type(quantity) ~= "function" or type(tolerance) ~= "number" then
+      return "assert.conserved takes the result of rapid.run, a function of a point, and a tolerance"
+    end
+    local first, of_points
+    for frame, points in result:frames() do
+      local sum, by_id = sum_of(points, quantity)
+      if not first then
+        first, of_points = sum, by_id
+      else
+        local off = distance_between(first, sum)
+        if not off then return ("%s and %s can't be compared"):format(show(first), show(sum)) end
+        if off > tolerance or off ~= off then
+          return ("frame %d: the sum is %s, and %s at the first frame; it is off by %s; most of all %s"):format(frame,
+            show(sum), show(first), show(off), most_changed(of_points, by_id, points))
+        end
+      end
+    end
   end)
 
   register("same_points", function(_, arguments)

@@ -273,6 +273,33 @@ describe("a test", function()
       "frame 3, output main, point 1 (id 0): P is {0, 1, 0} and {0, 4, 0}")
   end)
 
+  it("asserts that a sum over the points is conserved, and names the frame, the sums and the point", function()
+    holds [[
+      local a = rapid.run("scene.lua", { frames = {1, 3} })
+      assert.conserved(a, function(p) return p.heat end, 0)
+      assert.conserved(a, function(p) return p.P end, 0)]]
+    fails([[
+      local a = rapid.run("scene.lua", { frames = {1, 3}, set = { up = 24 } })
+      assert.conserved(a, function(p) return p.heat + (p.id == 1 and p.P.y or 0) end, 1.5)]],
+      "frame 3: the sum is 12, and 9 at the first frame; it is off by 3; most of all point 2 (id 1): 10, and 7 before")
+    fails('assert.conserved(rapid.run("scene.lua", { frames = {1, 2} }), 1)',
+      "assert.conserved takes the result of rapid.run, a function of a point, and a tolerance")
+  end)
+
+  it("fails as README shows it", function()
+    local folder = new_folder { ["test_sparks.lua"] = ([[
+describe("sparks", function()
+  it("never enter the floor", function()
+    local result = rapid.run(%q, { frames = {1, 48}, set = { rate = 1000 } })
+    assert.points(result[48]).outside(function(P) return P.y - 0.05 end)
+  end)
+end)
+]]):format(io.popen("pwd"):read "*l" .. "/graphs/sparks.lua") }
+    local shown = folder:test("test_sparks.lua").stdout:gsub("([^\n]+\n)", "    %1")
+    local readme = io.open("README.md"):read "*a"
+    assert.truthy(readme:find(shown:gsub("\n$", ""), 1, true), shown)
+  end)
+
   it("finds NaN near nothing", function()
     fails("assert.near(0, 0 / 0, 1e9)", "is not within 1e+09 of 0")
     fails("assert.near(1, 1.5, 0.25)", "t.lua:2: 1.5 is not within 0.25 of 1; it is off by 0.5")

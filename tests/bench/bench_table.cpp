@@ -1,0 +1,308 @@
+// The table of how near Rapid is to its limits: each figure beside one of the same run on the same machine, so that the
+// ratios can be read anywhere. Runs the other benchmarks that stand beside it, and whole scenes with the command.
+//
+//   tests/bench/run [--json FILE] [--repeat N] [--only TEXT]
+//
+// Quoted are ratios of medians. What is compared runs in turn, so that a machine that is busy for a while is busy for
+// both sides.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using Words = std::vector<std::string>;
+
+struct Row {
+    std::string name;
+    double value, limit;
+    std::string unit;       // "" for a ratio
+    bool at_least = false;  // of the limit
+    std::string detail;
+
+    bool reached() const { return at_least ? value >= limit : value <= limit; }
+};
+
+double median(std::vector<double> x)
+{
+    std::sort(x.begin(), x.end());
+    return x.size() % 2 ? x[x.size() / 2] : 0.5 * (x[x.size() / 2 - 1] + x[x.size() / 2]);
+}
+
+struct Ended {
+    double seconds;
+    double bytes;  // the most that were resident
+};
+
+// Runs a program to its end. Error: it fails.
+Ended run(const Words& words, const fs::path& output = "/dev/null")
+{
+    std::vector<char*> arguments;
+    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
+    posix_spawn_file_actions_t files;
+    posix_spawn_file_actions_init(&files);
+    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    const auto began = std::chrono::steady_clock::now();
+    pid_t child = 0;
+    const int failed = posix_spawn(&child, arguments[0], &files, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&files);
+    if (failed) throw std::runtime_error(fmt::format("can't run {}", words[0]));
+    int status = 0;
+    rusage usage{};
+    wait4(child, &status, 0, &usage);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+        throw std::runtime_error(fmt::format("failed: {}", fmt::join(words, " ")));
+    return {seconds, 1024.0 * static_cast<double>(usage.ru_maxrss)};
+}
+
+class Table {
+public:
+    Table(fs::path bin, fs::path graphs, int repeat, std::string only)
+        : bin_(std::move(bin)), graphs_(std::move(graphs)), repeat_(repeat), only_(std::move(only))
+    {
+        scratch_ = fs::temp_directory_path() / fmt::format("rapid-bench-{}", getpid());
+        fs::create_directories(scratch_);
+    }
+    ~Table() { fs::remove_all(scratch_); }
+    Table(const Table&) = delete;
+    Table& operator=(const Table&) = delete;
+
+    void fill()
+    {
+        fall();
+        colliders();
+        formats();
+        small_scenes();
+        scripts();
+        main_job();
+        examples();
+    }
+
+    json as_json() const
+    {
+        json rows = json::array();
+        for (const Row& row : rows_)
+            rows.push_back({{"name", row.name},
+                            {"value", row.value},
+                            {"limit", row.limit},
+                            {"unit", row.unit},
+                            {"at_least", row.at_least},
+                            {"reached", row.reached()},
+                            {"detail", row.detail}});
+        return {{"rows", rows}};
+    }
+
+private:
+    bool asked(const std::string& name) const { return name.find(only_) != std::string::npos; }
+
+    void add(Row row)
+    {
+        fmt::print("{:<62} {:>9.3g} {:<5} {} {:<6.4g} {}   {}\n", row.name, row.value, row.unit,
+                   row.at_least ? "at least" : "at most ", row.limit, row.reached() ? "  " : "NO", row.detail);
+        std::fflush(stdout);
+        rows_.push_back(std::move(row));
+    }
+
+    // Medians of several benchmarks of one program, ms, run in turn.
+    std::map<std::string, double> measure(const std::string& program, const Words& names) const
+    {
+        const fs::path answer = scratch_ / "benchmarks.json";
+        run({(bin_ / program).string(), fmt::format("--benchmark_filter=^({})$", fmt::join(names, "|")),
+             fmt::format("--benchmark_repetitions={}", repeat_), "--benchmark_enable_random_interleaving=true",
+             "--benchmark_min_time=0.2", "--benchmark_format=json"},
+            answer);
+        std::map<std::string, double> medians;
+        std::ifstream file(answer);
+        for (const json& one : json::parse(file).at("benchmarks"))
+            if (one.value("aggregate_name", "") == "median") medians[one.at("run_name")] = one.at("real_time");
+        for (const std::string& name : names)
+            if (!medians.count(name)) throw std::runtime_error(fmt::format("{} has no benchmark {}", program, name));
+        return medians;
+    }
+
+    void compare(const std::string& name, const std::string& program, const std::string& ours,
+                 const std::string& theirs, double limit)
+    {
+        if (!asked(name)) return;
+        const auto ms = measure(program, {ours, theirs});
+        add({name, ms.at(ours) / ms.at(theirs), limit, "", false,
+             fmt::format("{:.4g} ms, {:.4g} ms", ms.at(ours), ms.at(theirs))});
+    }
+
+    fs::path scene(const std::string& name, const std::string& text) const
+    {
+        const fs::path file = scratch_ / (name + ".lua");
+        std::ofstream(file) << "local rapid = require \"rapid\"\n" << text;
+        return file;
+    }
+
+    Words command(const fs::path& graph, const Words& options) const
+    {
+        Words words = {(bin_ / "rapid").string(), "run", graph.string(), "--quiet"};
+        words.insert(words.end(), options.begin(), options.end());
+        return words;
+    }
+
+    // Medians of whole runs, in turn.
+    std::vector<Ended> in_turn(const std::vector<Words>& commands) const
+    {
+        std::vector<std::vector<double>> seconds(commands.size()), bytes(commands.size());
+        for (int k = 0; k < repeat_; ++k)
+            for (std::size_t c = 0; c < commands.size(); ++c) {
+                const Ended ended = run(commands[c]);
+                seconds[c].push_back(ended.seconds);
+                bytes[c].push_back(ended.bytes);
+            }
+        std::vector<Ended> all;
+        for (std::size_t c = 0; c < commands.size(); ++c) all.push_back({median(seconds[c]), median(bytes[c])});
+        return all;
+    }
+
+    void compare_runs(const std::string& name, const Words& ours, const Words& theirs, double limit)
+    {
+        if (!asked(name)) return;
+        const std::vector<Ended> ended = in_turn({ours, theirs});
+        add({name, ended[0].seconds / ended[1].seconds, limit, "", false,
+             fmt::format("{:.3f} s, {:.3f} s", ended[0].seconds, ended[1].seconds)});
+    }
+
+    void fall()
+    {
+        compare("gravity, 10 million points, two threads / loop by hand", "bench_solver",
+                "free_fall_rapid/threads:2/real_time", "free_fall_by_hand/threads:2/real_time", 1.3);
+        compare("the same with 16 sub-steps / with one", "bench_solver",
+                "free_fall_rapid_16_substeps/threads:2/real_time", "free_fall_rapid/threads:2/real_time", 3);
+    }
+
+    void colliders()
+    {
+        compare("a collider that no point is near / without it", "bench_solver",
+                "far_from_level_set/threads:2/real_time", "nothing_to_hit/threads:2/real_time", 1.2);
+    }
+
+    void formats()
+    {
+        const auto write = [](const char* format) {
+            return fmt::format("write_format/{}/process_time/real_time", format);
+        };
+        compare("writing .vdb / bare OpenVDB", "bench_io", write("vdb"), "bare_openvdb/process_time/real_time", 1.25);
+        compare("writing .bgeo / raw interleaved write", "bench_io", write("bgeo"),
+                "raw_interleaved/process_time/real_time", 1.3);
+        compare("writing .ply / raw interleaved write", "bench_io", write("ply"),
+                "raw_interleaved/process_time/real_time", 1.3);
+    }
+
+    void small_scenes()
+    {
+        const fs::path empty = scene("empty", "return rapid.create {} :solve {}\n");
+        const std::string name = "run of an empty scene", points = "memory of gravity on 10 million points, a point";
+        if (asked(name)) add({name, 1000 * in_turn({command(empty, {"-f", "1-1"})})[0].seconds, 60, "ms", false, ""});
+        if (!asked(points)) return;
+        const fs::path crowd =
+            scene("crowd",
+                  "return rapid.create {}\n"
+                  "  :emit { source = rapid.shape.box { size = {10, 10, 10} }, scatter = \"volume\",\n"
+                  "          count = function(frame) return frame.number == 1 and 1e7 or 0 end }\n"
+                  "  :gravity {} :solve {}\n");
+        const std::vector<Ended> ended = in_turn({command(empty, {"-f", "1-2"}), command(crowd, {"-f", "1-4"})});
+        add({"memory of an empty scene", ended[0].bytes / 1e6, 60, "MB", false, ""});
+        add({points, (ended[1].bytes - ended[0].bytes) / 1e7, 72, "bytes", false, ""});
+    }
+
+    void scripts()
+    {
+        const std::string emit =
+            "local cloud = rapid.create {}\n"
+            "  :emit { source = rapid.shape.box {}, scatter = \"volume\", rate = 4e6 }\n"
+            "local function slow(p) p.v = p.v * 0.99 end\n"
+            "local function drawn(p, frame) p.v = p.v - p.P * frame.dt end\n"
+            "local function held(p) if p.P.y < 0 then p.v = p.v + vec3(0, 0.1, 0) end end\n";
+        const fs::path three = scene("three", emit +
+                                                  "return cloud :points(\"a\", slow) :points(\"b\", drawn)\n"
+                                                  "  :points(\"c\", held) :solve {}\n");
+        const fs::path one = scene("one", emit +
+                                              "return cloud :points(\"a\", function(p, frame)\n"
+                                              "  p.v = p.v * 0.99\n"
+                                              "  p.v = p.v - p.P * frame.dt\n"
+                                              "  if p.P.y < 0 then p.v = p.v + vec3(0, 0.1, 0) end\n"
+                                              "end) :solve {}\n");
+        compare_runs("three Lua nodes / one with the three bodies", command(three, {"-f", "1-48"}),
+                     command(one, {"-f", "1-48"}), 1.15);
+    }
+
+    void main_job()
+    {
+        const std::string name = "first.lua, a million points: times faster than Blender's 10.7 s";
+        if (!asked(name)) return;
+        const double seconds =
+            in_turn({command(graphs_ / "first.lua", {"--set", "rate=500000", "-f", "1-48"})})[0].seconds;
+        add({name, 10.7 / seconds, 25, "", true, fmt::format("{:.3f} s", seconds)});
+    }
+
+    // Long enough that starting does not count, where the scene has a rate.
+    void examples()
+    {
+        const std::vector<std::pair<std::string, Words>> scenes = {{"first", {"--set", "rate=200000"}},
+                                                                   {"embers", {}},
+                                                                   {"magic", {}},
+                                                                   {"sparks", {"--set", "rate=200000"}},
+                                                                   {"spray", {"--set", "rate=200000"}}};
+        for (const auto& [name, options] : scenes) {
+            const auto with = [&, &extra = options](Words more) {
+                more.insert(more.end(), extra.begin(), extra.end());
+                return command(graphs_ / (name + ".lua"), more);
+            };
+            compare_runs(name + ".lua: two threads / one", with({"--threads", "2"}), with({"--threads", "1"}), 0.56);
+            compare_runs(name + ".lua: pruned / --keep-all", with({}), with({"--keep-all"}), 1.0);
+        }
+    }
+
+    const fs::path bin_, graphs_;
+    const int repeat_;
+    const std::string only_;
+    fs::path scratch_;
+    std::vector<Row> rows_;
+};
+
+}  // namespace
+
+int main(int count, char** words)
+{
+    CLI::App app("how near Rapid is to its limits");
+    std::string out, only;
+    int repeat = 5;
+    app.add_option("--json", out, "writes the table as JSON too")->type_name("FILE");
+    app.add_option("--repeat", repeat, "runs of each figure, of which the median is taken")->check(CLI::PositiveNumber);
+    app.add_option("--only", only, "rows whose name has this text")->type_name("TEXT");
+    CLI11_PARSE(app, count, words);
+    try {
+        const fs::path bin = fs::read_symlink("/proc/self/exe").parent_path();
+        Table table(bin, fs::path(RAPID_SOURCE_DIR) / "graphs", repeat, only);
+        table.fill();
+        if (!out.empty()) std::ofstream(out) << table.as_json().dump(2) << '\n';
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "bench: {}\n", error.what());
+        return 1;
+    }
+    return 0;
+}

@@ -153,9 +153,18 @@ void Kernel::analyse()
     lua_pop(L, 1);
 }
 
-void Kernel::uses_in_action(Uses& uses) const
+void Kernel::uses(Uses& uses, const KernelArguments& arguments) const
 {
     this->uses(uses);
+    uses.reads.insert(uses.reads.end(), arguments.reads.begin(), arguments.reads.end());
+    uses.writes.insert(uses.writes.end(), arguments.writes.begin(), arguments.writes.end());
+    uses.makes_groups.insert(uses.makes_groups.end(), arguments.joins.begin(), arguments.joins.end());
+    uses.joins_groups.insert(uses.joins_groups.end(), arguments.joins.begin(), arguments.joins.end());
+}
+
+void Kernel::uses_in_action(Uses& uses, const KernelArguments& arguments) const
+{
+    this->uses(uses, arguments);
     for (auto* names : {&uses.reads, &uses.writes, &uses.may}) std::erase(*names, "force");
 }
 
@@ -201,14 +210,15 @@ Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments&
 }
 
 // P and v are in double inside Solve, and the force is the sub-step's.
-void Kernel::make_layout_of_action(Layout& layout) const
+void Kernel::make_layout_of_action(Layout& layout, const KernelArguments& arguments) const
 {
     layout.action = true;
     std::erase_if(layout.columns, [](const Layout::Entry& e) { return e.name == "force"; });
     for (Layout::Entry& entry : layout.columns)
         if (entry.name == "P" || entry.name == "v") entry.type = "vec3d", entry.uniform = false;
-    const bool pushes = writes_.count("force") || may_write_.count("force");
-    if (pushes || reads_.count("force") || may_.count("force")) layout.columns.push_back({"force", "vec3d", pushes});
+    const bool pushes = writes_.count("force") || may_write_.count("force") || arguments.writes.count("force");
+    if (pushes || reads_.count("force") || may_.count("force") || arguments.reads.count("force"))
+        layout.columns.push_back({"force", "vec3d", pushes});
     layout.finish();
 }
 
@@ -470,7 +480,7 @@ std::optional<Kernel::Layout> Kernel::prepare(PointSet& points, const std::strin
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
     for (const Layout::Entry& entry : layout.groups)
         if (entry.writable) points.group(entry.name).write();
-    if (action) make_layout_of_action(layout);
+    if (action) make_layout_of_action(layout, arguments);
     return layout;
 }
 

@@ -18,7 +18,7 @@ class ScriptHost;
 // What a Lua node's kernel is given besides the points.
 struct KernelArguments {
     std::map<std::string, Value> values;  // its third argument
-    // Attributes and groups that parameters name; the kernel gets at them under computed names.
+    // Attributes and groups that the node names; the kernel gets at them under computed names.
     std::set<std::string> reads, writes, joins;
 };
 
@@ -44,8 +44,10 @@ public:
 
     ScriptHost& host() const { return host_; }
 
-    // The names that it uses as an action, where `force` is that of the sub-step and no attribute.
-    void uses_in_action(Uses& uses) const;
+    // With the names that its node declares.
+    void uses(Uses& uses, const KernelArguments& arguments) const;
+    // As an action, where `force` is that of the sub-step and no attribute.
+    void uses_in_action(Uses& uses, const KernelArguments& arguments) const;
 
     const std::size_t number;  // in each state
     const Location location;   // of the function
@@ -64,7 +66,7 @@ private:
     class KernelActionPass;
 
     Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate, bool masked) const;
-    void make_layout_of_action(Layout& layout) const;
+    void make_layout_of_action(Layout& layout, const KernelArguments& arguments) const;
     std::optional<Layout> prepare(PointSet& points, const std::string& group, const KernelArguments& arguments,
                                   Column<std::uint8_t>& chosen, bool action) const;
     void run_pass(Pass& pass) const;

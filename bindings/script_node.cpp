@@ -16,10 +16,30 @@ namespace {
 
 constexpr char definitions[] = "rapid.definitions";  // in each state's registry: kernels by type name
 
+constexpr std::string_view reads_doc = "attributes that the kernel reads under names that it computes";
+constexpr std::string_view writes_doc = "attributes that it assigns under names that it computes";
+
+// What a kernel's node declares, since its bytecode does not tell it.
+KernelArguments declared(const std::vector<std::string>& reads, const std::vector<std::string>& writes)
+{
+    KernelArguments arguments;
+    arguments.reads.insert(reads.begin(), reads.end());
+    arguments.writes.insert(writes.begin(), writes.end());
+    return arguments;
+}
+
+void check_writable(const std::vector<std::string>& writes)
+{
+    for (const char* name : {"id", "dt", "index"})
+        if (std::find(writes.begin(), writes.end(), name) != writes.end())
+            throw Error(fmt::format("writes: {} is read only", name));
+}
+
 // points: an edit of the points, one by one, written in Lua.
 struct Points {
     std::string group;
     std::shared_ptr<const Kernel> kernel;
+    std::vector<std::string> reads, writes;
 
     static NodeType declare()
     {
@@ -28,10 +48,15 @@ struct Points {
             .of_type(std::string(PointFunction::param_type))
             .required()
             .constant()
-            .varies();
+            .varies()
+            .param(&Points::reads, "reads", Value(), any_number(), "", std::string(reads_doc))
+            .constant()
+            .param(&Points::writes, "writes", Value(), any_number(), "", std::string(writes_doc))
+            .constant();
     }
-    void uses(Uses& uses) const { kernel->uses(uses); }
-    void edit(PointSet& points, const Evaluation& now) { kernel->run(points, group, now, {}); }
+    void check() const { check_writable(writes); }
+    void uses(Uses& uses) const { kernel->uses(uses, declared(reads, writes)); }
+    void edit(PointSet& points, const Evaluation& now) { kernel->run(points, group, now, declared(reads, writes)); }
 };
 RAPID_NODE(Points);
 
@@ -39,6 +64,7 @@ RAPID_NODE(Points);
 struct ScriptAction {
     std::string group;
     std::shared_ptr<const Kernel> kernel;
+    std::vector<std::string> reads, writes;
 
     static NodeType declare()
     {
@@ -47,10 +73,15 @@ struct ScriptAction {
             .of_type(std::string(PointFunction::param_type))
             .required()
             .constant()
-            .varies();
+            .varies()
+            .param(&ScriptAction::reads, "reads", Value(), any_number(), "", std::string(reads_doc))
+            .constant()
+            .param(&ScriptAction::writes, "writes", Value(), any_number(), "", std::string(writes_doc))
+            .constant();
     }
-    void uses(Uses& uses) const { kernel->uses_in_action(uses); }
-    DynamicPtr dynamic(const Evaluation& now) const { return kernel->action(group, now, {}); }
+    void check() const { check_writable(writes); }
+    void uses(Uses& uses) const { kernel->uses_in_action(uses, declared(reads, writes)); }
+    DynamicPtr dynamic(const Evaluation& now) const { return kernel->action(group, now, declared(reads, writes)); }
 };
 RAPID_NODE(ScriptAction);
 
@@ -106,14 +137,9 @@ public:
     {
         if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
         if (kind_ == NodeKind::Dynamic)
-            fields_.kernel->uses_in_action(uses);
+            fields_.kernel->uses_in_action(uses, fields_.arguments);
         else
-            fields_.kernel->uses(uses);
-        const KernelArguments& named = fields_.arguments;
-        uses.reads.insert(uses.reads.end(), named.reads.begin(), named.reads.end());
-        uses.writes.insert(uses.writes.end(), named.writes.begin(), named.writes.end());
-        uses.makes_groups.insert(uses.makes_groups.end(), named.joins.begin(), named.joins.end());
-        uses.joins_groups.insert(uses.joins_groups.end(), named.joins.begin(), named.joins.end());
+            fields_.kernel->uses(uses, fields_.arguments);
     }
     void check() const override {}
 

@@ -94,8 +94,9 @@ end
 
 -- A view's refusals.
 local function missing(name, names)
-  error(("no attribute %q here; a computed name must be one that the kernel also names as a constant (it names %s)")
-    :format(words.name(name), table.concat(sorted_names(names), ", ")), 0)
+  name = words.name(name)
+  error(("no attribute %q here; a name that is computed is declared, reads = { %q }, or also named as a constant (the " ..
+    "kernel names %s)"):format(name, name, table.concat(sorted_names(names), ", ")), 0)
 end
 
 -- Names are compared one after the other: in a trace they are constants, and nothing is left of the comparisons, where
@@ -290,9 +291,11 @@ return run, set_params
     if layout.predicate then error(("assigns %q; a test must not change its point"):format(words.name(name)), 0) end
     if name == "id" or name == "dt" or name == "index" then error(("%s is read only"):format(name), 0) end
     if names[name] then
-      error(("assigns %q under a computed name; name it as a constant somewhere in the kernel"):format(name), 0)
+      error(("assigns %q under a computed name; declare it: writes = { %q }"):format(name, name), 0)
     end
-    error(("no attribute %q; add :attribute{ %s = 0 } before it"):format(words.name(name), words.name(name)), 0)
+    name = words.name(name)
+    error(("no attribute %q here; add :attribute{ %s = 0 } before it, or where its name is computed writes = { %q }")
+      :format(name, name, name), 0)
   end
   function refuse.param(name, values)
     error(("no parameter %q; the node has %s"):format(words.name(name), table.concat(sorted_names(values), ", ")), 0)

@@ -497,6 +497,8 @@ local Node = {}
 ---@class rapid.params.action
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field kernel fun(p: rapid.Point, step: rapid.Step)  function(p, step) [function of a point, required]
+---@field reads? string|string[]  attributes that the kernel reads under names that it computes [names]
+---@field writes? string|string[]  attributes that it assigns under names that it computes [names]
 ---@field name? string  what the node is called in messages [string]
 
 ---Edits the points with a Lua function inside Solve, at every sub-step.
@@ -784,6 +786,8 @@ function Node:merge(...) end
 ---@class rapid.params.points
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field kernel fun(p: rapid.Point, frame: rapid.Frame)  function(p, frame) [function of a point, required]
+---@field reads? string|string[]  attributes that the kernel reads under names that it computes [names]
+---@field writes? string|string[]  attributes that it assigns under names that it computes [names]
 ---@field name? string  what the node is called in messages [string]
 
 ---Edits the points with a Lua function, one by one, in parallel.

@@ -216,11 +216,40 @@ describe("a kernel that asks for what is not there", function()
   end)
 
   it("is refused when it runs, where the name is computed", function()
-    assert.equal('scene.lua:2: node "kernel": no attribute "heat" here; a computed name must be one that the kernel ' ..
-      "also names as a constant (it names P, dt, id, index) (point id 0, frame 2)",
+    assert.equal('scene.lua:2: node "kernel": no attribute "heat" here; a name that is computed is declared, ' ..
+      'reads = { "heat" }, or also named as a constant (the kernel names P, dt, id, index) (point id 0, frame 2)',
       scene.kernel_error("local name = 'he' .. 'at' p.P = p.P * p[name]", "heat = {1, 2}"))
     assert.near({2, 0, 0}, scene.kernel("local name = 'he' .. 'at' p.v = vec3(p[name], 0, 0) local _ = p.heat",
       "heat = {1, 2}")[2].v, 0)
+  end)
+end)
+
+describe("a kernel's computed names", function()
+  local chain = [[
+return rapid.create { points = two } :attribute { red = 2, blue = 0 }
+  :%s { name = "mix", reads = %s, writes = %s, kernel = function(p)
+      p["bl" .. "ue"] = p["re" .. "d"] + 1
+    end } :solve {}]]
+
+  it("are those that its node declares", function()
+    for _, node in ipairs { "points", "action" } do
+      local result = scene.run(chain:format(node, '{ "red" }', '{ "blue" }'), { frames = {1, 2} })
+      assert.equal(3, result[2][1].blue)
+    end
+    local pushed = scene.run([[
+return rapid.create { points = two } :action { reads = { "force" }, writes = { "force" }, kernel = function(p)
+    p["for" .. "ce"] = p["for" .. "ce"] + vec3(24, 0, 0)
+  end } :solve {}]], { frames = {1, 2} })
+    assert.near({1, 0, 0}, pushed[2][1].v, 1e-6)
+  end)
+
+  it("are checked as others are, before the first frame", function()
+    assert.equal('scene.lua:2: node "mix": no attribute "rde"; did you mean "red"? (or add :attribute{ rde = 0 } ' ..
+      "before it)", scene.error(chain:format("points", '{ "rde" }', '{ "blue" }')))
+    assert.equal('scene.lua:2: node "mix": writes: id is read only',
+      scene.error(chain:format("action", '{ "red" }', '{ "id" }')))
+    assert.match('assigns "blue" under a computed name; declare it: writes = { "blue" } %(point id 0, frame 2%)',
+      scene.error(chain:format("points", '{ "red", "blue" }', "{}")))
   end)
 end)
 

@@ -95,8 +95,8 @@ end
 -- A view's refusals.
 local function missing(name, names)
   name = words.name(name)
-  error(("no attribute %q here; a name that is computed is declared, reads = { %q }, or also named as a constant (the " ..
-    "kernel names %s)"):format(name, name, table.concat(sorted_names(names), ", ")), 0)
+  error(("no attribute %q here; a name that is computed is declared, reads = { %q }, or also named as a constant " ..
+    "(the kernel names %s)"):format(name, name, table.concat(sorted_names(names), ", ")), 0)
 end
 
 -- Names are compared one after the other: in a trace they are constants, and nothing is left of the comparisons, where

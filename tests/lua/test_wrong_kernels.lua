@@ -62,8 +62,8 @@ local at_a_point = {
   ["p.heat = frame.detail.total"] =
     'no detail value "total"; a :detail node sets one: points.detail.total = 0',
   ["p.heat = p['he' .. 'at'] + p['co' .. 'unt']"] =
-    'no attribute "count" here; a name that is computed is declared, reads = { "count" }, or also named as a constant ' ..
-    "(the kernel names dt, heat, id, index)",
+    'no attribute "count" here; a name that is computed is declared, reads = { "count" }, or also named as a ' ..
+    "constant (the kernel names dt, heat, id, index)",
   ["p['he' .. 'at'] = 1"] =
     'no attribute "heat" here; add :attribute{ heat = 0 } before it, or where its name is computed writes = { "heat" }',
   ["local t; t.x = p.heat"] = "attempt to index local 't' (a nil value)",

@@ -732,6 +732,20 @@ function Node:group_by_bounds(params) end
 ---@return rapid.Node
 function Node:group_by_shape(params) end
 
+---@class rapid.params.interact
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field radius number|fun(frame: rapid.Frame): number  within which points are neighbours [number, m, above 0, required]
+---@field separation? number|rapid.Attribute|fun(frame: rapid.Frame): number  drives them apart, most where they touch [number, m/s², at least 0, default 0, takes rapid.attr]
+---@field cohesion? number|rapid.Attribute|fun(frame: rapid.Frame): number  draws them together, most at half the radius [number, m/s², at least 0, default 0, takes rapid.attr]
+---@field alignment? number|rapid.Attribute|fun(frame: rapid.Frame): number  rate at which their velocities become equal [number, 1/s, at least 0, default 0, takes rapid.attr]
+---@field drag? number|rapid.Attribute|fun(frame: rapid.Frame): number  rate at which they stop approaching and parting; what turns about them goes on [number, 1/s, at least 0, default 0, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Moves points by their neighbours: apart, together, in step, without haste.
+---@param params rapid.params.interact
+---@return rapid.Node
+function Node:interact(params) end
+
 ---@class rapid.params.jitter
 ---@field strength? number|fun(frame: rapid.Frame): number  root mean square speed gained in a second [number, m/s, at least 0, default 1]
 ---@field group? string  acts on this group only [string]

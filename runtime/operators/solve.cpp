@@ -11,6 +11,7 @@
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set.h"
 #include "runtime/shapes/moving.h"
+#include "runtime/solver/interaction.h"
 
 namespace rapid {
 namespace {
@@ -59,6 +60,7 @@ struct Solve {
         options.h = now.frame.dt;
         options.frame = static_cast<std::int64_t>(now.frame.number);
         options.group = group;
+        interact(points, flow.dynamics, options);
         const PointSet sample = sample_of(points);
         Tolerated done;
         if (tolerance)
@@ -66,6 +68,7 @@ struct Solve {
         else
             done = {solve(points, flow.dynamics, options), substeps, 0,
                     estimate_errors(sample, flow.dynamics, options)};
+        interact(points, flow.dynamics, options);
         const SolveResult& result = done.result;
         now.figures.substeps = std::max(now.figures.substeps, done.substeps);
         now.figures.errors.insert(now.figures.errors.end(), done.errors.begin(), done.errors.end());

@@ -1,0 +1,167 @@
+#include "runtime/solver/interaction.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "runtime/parallel.h"
+#include "runtime/random.h"
+#include "runtime/shapes/neighbours.h"
+
+namespace rapid {
+namespace {
+
+const float unit_mass = 1;
+
+// (1 - e^(-2 k t)) / 2: of the difference of two velocities that decays at the rate k on both sides, what each gets of
+// the other's in the time t. At most a half, which makes them equal.
+double exchanged(double k, double t) { return -0.5 * std::expm1(-2 * k * t); }
+
+class Neighbourhood {
+public:
+    Neighbourhood(const Interaction& interaction, PointSet& points, const SolveOptions& options)
+        : interaction_(interaction),
+          h_(options.h),
+          P_(std::as_const(points).P().read()),
+          v_(std::as_const(points).v().read()),
+          id_(std::as_const(points).id().read()),
+          separation_(interaction.separation.read(points)),
+          cohesion_(interaction.cohesion.read(points)),
+          alignment_(interaction.alignment.read(points)),
+          drag_(interaction.drag.read(points))
+    {
+        if (const auto* masses = std::as_const(points).find<float>("mass")) mass_ = masses->read();
+        if (const auto* own = std::as_const(points).find<float>("dt")) own_dt_ = own->read();
+
+        const Column<std::uint8_t>* group = points.find_group(interaction.group);
+        std::vector<Vec3f> places;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (!interaction.group.empty() && !(group && (*group)[i])) continue;
+            if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve says so, with the point's name
+                members_.clear();
+                return;
+            }
+            if (!(mass_[i] > 0 && std::isfinite(mass_[i])))
+                throw Error(fmt::format("point {}, frame {}: its mass is {:g}; with interactions it must be above 0",
+                                        id_[i], options.frame, mass_[i]));
+            members_.push_back(static_cast<std::uint32_t>(i));
+            places.push_back(P_[i]);
+        }
+        if (!members_.empty()) grid_.emplace(places, interaction.radius);
+    }
+
+    // The change of each member's velocity, m/s.
+    std::vector<Vec3d> kicks()
+    {
+        weights_.assign(members_.size(), 0);
+        for_all([&](std::size_t m, std::size_t other) { weights_[m] += weight_at(distance(m, other)); });
+        std::vector<Vec3d> kicks(members_.size(), Vec3d::Zero());
+        for_all([&](std::size_t m, std::size_t other) { kicks[m] += kick(m, other); });
+        return kicks;
+    }
+
+    std::span<const std::uint32_t> members() const { return members_; }
+
+private:
+    // Each member with each of its neighbours, in order of their places in the set.
+    template <class F>
+    void for_all(const F& f) const
+    {
+        for_each_chunk(members_.size(), [&](std::size_t begin, std::size_t end) {
+            std::vector<std::uint32_t> near;
+            for (std::size_t m = begin; m < end; ++m) {
+                grid_->find(P_[members_[m]].template cast<double>(), near);
+                for (const std::uint32_t other : near)
+                    if (other != m) f(m, other);
+            }
+        });
+    }
+
+    Vec3d between(std::size_t m, std::size_t other) const
+    {
+        return P_[members_[other]].cast<double>() - P_[members_[m]].cast<double>();
+    }
+    double distance(std::size_t m, std::size_t other) const { return between(m, other).norm(); }
+    double weight_at(double d) const { return std::max(0.0, 1 - d / interaction_.radius); }
+    double time(std::size_t i) const
+    {
+        if (!own_dt_.data || own_dt_[i] == static_cast<float>(h_)) return h_;
+        return own_dt_[i];
+    }
+
+    // Symmetric in the two but for the sign, to the bit.
+    Vec3d kick(std::size_t m, std::size_t other) const
+    {
+        const std::size_t i = members_[m], j = members_[other];
+        const auto mean = [&](const Strided<float>& strength) { return 0.5 * (double(strength[i]) + strength[j]); };
+        const double frame = std::min(time(i), time(j)), t = 0.5 * frame;
+        const Vec3d d = between(m, other);
+        const double length = d.norm(), w = weight_at(length);
+        const Vec3d n = length > 0 ? Vec3d(d / length) : direction(id_[i], id_[j]);
+
+        // An acceleration whose slope is `slope` at the most moves the two towards where it ends, in a frame, by no
+        // more than the way there: as one step of Newton's method for its implicit solution does. The 4: a
+        // neighbourhood's weights average to a quarter of its number, by which the slopes are not shared.
+        const auto held = [&](double a, double slope) { return a / (1 + 4 * slope * t * frame); };
+        const double push = held(mean(separation_) * w, mean(separation_) / interaction_.radius);
+        const double draw = held(mean(cohesion_) * 4 * w * (1 - w), 4 * mean(cohesion_) / interaction_.radius);
+
+        const Vec3d u = v_[j].cast<double>() - v_[i].cast<double>();
+        const double align = exchanged(mean(alignment_), t);
+        const double along = exchanged(mean(alignment_) + mean(drag_), t);
+        const Vec3d along_n = n * n.dot(u);
+
+        const double share = 1 / std::max({1.0, weights_[m], weights_[other]});
+        const double part = 2.0 * mass_[j] / (double(mass_[i]) + mass_[j]);
+        return part * share * (t * (draw - push) * n + w * (align * u + (along - align) * along_n));
+    }
+
+    // Of points in one place: any, but the opposite one for the other.
+    static Vec3d direction(std::int64_t a, std::int64_t b)
+    {
+        const auto u = uniform4(RandomKey(0, "interact"), static_cast<std::uint64_t>(std::min(a, b)),
+                                static_cast<std::uint64_t>(std::max(a, b)));
+        const double z = 2 * u[0] - 1, around = 2 * EIGEN_PI * u[1], r = std::sqrt(1 - z * z);
+        const Vec3d n(r * std::cos(around), r * std::sin(around), z);
+        return a < b ? n : Vec3d(-n);
+    }
+
+    const Interaction& interaction_;
+    double h_;
+    Strided<Vec3f> P_, v_;
+    Strided<std::int64_t> id_;
+    Strided<float> separation_, cohesion_, alignment_, drag_;
+    Strided<float> mass_{&unit_mass, 0}, own_dt_{nullptr, 0};
+    std::vector<std::uint32_t> members_;  // their places in the set
+    std::optional<Neighbours> grid_;      // of the members
+    std::vector<double> weights_;         // Σ w, of each member
+};
+
+}  // namespace
+
+void interact(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+{
+    for (const DynamicPtr& dynamic : dynamics) {
+        const auto* interaction = dynamic_cast<const Interaction*>(dynamic.get());
+        if (!interaction || points.empty()) continue;
+        try {
+            Neighbourhood neighbourhood(*interaction, points, options);
+            const std::vector<Vec3d> kicks = neighbourhood.kicks();
+            const Column<std::uint8_t>* advanced = options.group.empty() ? nullptr : points.find_group(options.group);
+            const std::span<Vec3f> v = points.v().write();
+            for (std::size_t m = 0; m < kicks.size(); ++m) {
+                const std::size_t i = neighbourhood.members()[m];
+                if (!options.group.empty() && !(advanced && (*advanced)[i])) continue;
+                v[i] = (v[i].cast<double>() + kicks[m]).cast<float>();
+            }
+        } catch (Error& error) {
+            error.in_node(interaction->node).at(interaction->location);
+            throw;
+        }
+    }
+}
+
+}  // namespace rapid

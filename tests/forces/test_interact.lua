@@ -1,0 +1,39 @@
+-- :interact in a chain: two points between which the closed form is simple; its equations are tested in tests/solver.
+local scene = require "testing.scene"
+
+local function two(frames, parameters, extra)
+  return scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0, 0, 0}}, v = {{2, 0, 0}, {0, 0, 0}} } }
+  :group { name = "first", where = function(p) return p.id == 0 end }
+  :interact { radius = 1e6, %s } %s :solve {}]]):format(parameters, extra or ""), { frames = {frames, frames} })[frames]
+end
+
+describe("interact", function()
+  it("brings neighbours to one velocity at twice the rate of alignment, and keeps momentum", function()
+    local points = two(13, "alignment = 1.5")
+    assert.near({1 + math.exp(-2 * 1.5 * 0.5), 0, 0}, points[1].v, 2e-6)
+    assert.near({1 - math.exp(-2 * 1.5 * 0.5), 0, 0}, points[2].v, 2e-6)
+    assert.near(1, points[1].P.x + points[2].P.x, 2e-6) -- the mean went on at 1 m/s
+  end)
+
+  it("is among the points of its group", function()
+    local points = two(13, 'alignment = 1.5, group = "first"')
+    assert.near({2, 0, 0}, points[1].v, 0)
+    assert.near({0, 0, 0}, points[2].v, 0)
+  end)
+
+  it("adds to what other forces do", function()
+    local points = two(25, "alignment = 1", ":gravity {}")
+    assert.near(-9.81, points[1].v.y, 1e-5)
+  end)
+
+  it("says what is wrong", function()
+    assert.truthy(scene.error("return rapid.create {} :interact {} :solve {}"):find("radius", 1, true))
+    assert.truthy(scene.error("return rapid.create {} :interact { radius = 1, drag = -1 } :solve {}")
+      :find("drag = -1 is out of range", 1, true))
+    local text = "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, mass = {0} } } " ..
+      ":interact { radius = 1 } :solve {}"
+    assert.truthy(scene.error(text, { frames = {1, 2} })
+      :find('node "interact1": point 0, frame 2: its mass is 0; with interactions it must be above 0', 1, true))
+  end)
+end)

@@ -14,6 +14,21 @@ float chosen(std::uint32_t bits, float a, float b)
     return std::bit_cast<float>((std::bit_cast<std::uint32_t>(a) & bits) | (std::bit_cast<std::uint32_t>(b) & ~bits));
 }
 
+// Without its sign, as bits: those of infinity and NaN are at least `infinite`, those of all others below.
+std::uint32_t size_bits(float x) { return std::bit_cast<std::uint32_t>(x) & 0x7fffffffu; }
+constexpr std::uint32_t infinite = 0x7f800000u;
+
+bool all_finite(std::span<const Vec3f> values)
+{
+    const float* x = coordinates(values);
+    std::uint32_t largest = 0;
+    for (std::size_t l = 0; l < 3 * values.size(); ++l) largest = std::max(largest, size_bits(x[l]));
+    return largest < infinite;
+}
+
+// Points that are looked at, and then advanced, while they are in the first-level cache.
+constexpr std::size_t block = 256;
+
 }  // namespace
 
 Fall::Period Fall::by_axis(const Vec3d& x)
@@ -28,25 +43,35 @@ Fall::Fall(const Vec3d& g) : g_(by_axis(g)) {}
 void Fall::avoid(const Box3d& box, double radius)
 {
     const Vec3d margin = Vec3d::Constant(radius * (1 + 0x1p-21));
-    limits_.push_back({by_axis(box.min() - margin), by_axis(box.max() + margin)});
+    boxes_.emplace_back(box.min() - margin, box.max() + margin);
+    limits_.push_back({by_axis(boxes_.back().min()), by_axis(boxes_.back().max())});
 }
 
-// near(p) is told, for each of the period's points, whether it stays.
-template <class Near>
-void Fall::advance_period(float* P, float* v, const Period& t, const Near& near) const
+// One period. near(p) is told, for each of its points, whether it stays; `largest`, by coordinate, keeps the size of
+// what is written.
+template <bool Avoids, class Near>
+void Fall::advance_period(float* P, float* v, const Period& t, std::uint32_t* largest, const Near& near) const
 {
     float P1[period], v1[period];
-    double lowest[period], highest[period];
+    [[maybe_unused]] double lowest[period], highest[period];
     for (int l = 0; l < period; ++l) {
         const double x = P[l], u = v[l], gain = t[l] * g_[l];
         const double x1 = x + t[l] * (u + 0.5 * gain);
-        // The parabola is off the straight line by a t²/8 at most. The factor keeps a point that is flush with a box
-        // and rounded away from it.
-        const double margin = std::abs(0.125 * t[l] * gain) + 0x1p-21 * std::abs(x);
-        lowest[l] = std::min(x, x1) - margin;
-        highest[l] = std::max(x, x1) + margin;
         P1[l] = static_cast<float>(x1);
         v1[l] = static_cast<float>(u + gain);
+        largest[l] = std::max({largest[l], size_bits(P1[l]), size_bits(v1[l])});
+        if constexpr (Avoids) {
+            // The parabola is off the straight line by a t²/8 at most. The factor keeps a point that is flush with a
+            // box and rounded away from it.
+            const double margin = std::abs(0.125 * t[l] * gain) + 0x1p-21 * std::abs(x);
+            lowest[l] = std::min(x, x1) - margin;
+            highest[l] = std::max(x, x1) + margin;
+        }
+    }
+    if constexpr (!Avoids) {
+        std::copy_n(P1, period, P);
+        std::copy_n(v1, period, v);
+        return;
     }
 
     double clear[points_a_period];
@@ -66,18 +91,74 @@ void Fall::advance_period(float* P, float* v, const Period& t, const Near& near)
     for (int p = 0; p < points_a_period; ++p) near(p, !(clear[p] > 0));
 }
 
-void Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                   std::vector<std::uint32_t>& near) const
+// Whether all of the points are too far from all boxes to come near one in t seconds: by the boxes around their places
+// and velocities. Not-a-numbers are found later.
+bool Fall::are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t) const
 {
+    using Lanes = Eigen::Array<float, period, 1>;
+    const auto box_around = [](std::span<const Vec3f> values) {
+        const float* x = coordinates(values);
+        const std::size_t size = 3 * values.size();
+        Lanes least, most;
+        for (std::size_t l = 0; l < period; ++l) least[l] = most[l] = x[l % size];
+        std::size_t at = 0;
+        for (; at + period <= size; at += period) {
+            const Eigen::Map<const Lanes> some(x + at);
+            least = least.min(some);
+            most = most.max(some);
+        }
+        for (; at < size; ++at) {
+            least[at % 3] = std::min(least[at % 3], x[at]);
+            most[at % 3] = std::max(most[at % 3], x[at]);
+        }
+        Box3d box;
+        for (int l = 0; l < period; l += 3) {
+            box.extend(least.segment<3>(l).cast<double>().matrix());
+            box.extend(most.segment<3>(l).cast<double>().matrix());
+        }
+        return box;
+    };
+    const Box3d places = box_around(P), speeds = box_around(v);
+    const Vec3d g = Eigen::Map<const Vec3d>(g_.data()), pulled = t * g;
+    const Vec3d slowest = speeds.min().cwiseMin(speeds.min() + pulled).cwiseMin(0.0);
+    const Vec3d fastest = speeds.max().cwiseMax(speeds.max() + pulled).cwiseMax(0.0);
+    const Vec3d rounding = 0x1p-20 * places.min().cwiseAbs().cwiseMax(places.max().cwiseAbs());
+    const Box3d reach(places.min() + t * slowest - rounding, places.max() + t * fastest + rounding);
+    return std::none_of(boxes_.begin(), boxes_.end(), [&](const Box3d& box) { return box.intersects(reach); });
+}
+
+Fall::Way Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                        std::vector<std::uint32_t>& near) const
+{
+    const double longest = std::max(time.h, double(static_cast<float>(time.h)));
+    if (limits_.empty() || are_far(P.subspan(begin, end - begin), v.subspan(begin, end - begin), longest))
+        return advance_all<false>(P, v, time, begin, end, [](std::uint32_t, bool) {});
     std::size_t count = near.size();
     near.resize(count + (end - begin) + points_a_period);
+    const Way way = advance_all<true>(P, v, time, begin, end, [&](std::uint32_t i, bool stays) {
+        near[count] = i;
+        count += stays && i < end;
+    });
+    near.resize(count);
+    return way;
+}
+
+template <bool Avoids, class Near>
+Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
+                            std::size_t end, const Near& near) const
+{
     // Most points move for the whole frame: their periods share one t.
     const float* own = time.own.data && time.own.stride != 0 ? time.own.data : nullptr;
-    bool of_h = true;
+    bool of_h = own != nullptr;
     Period t;
-    t.fill(time(begin));
-    if (own) t.fill(time.h);
-    for (std::size_t at = begin; at < end; at += points_a_period) {
+    t.fill(own ? time.h : time(begin));
+    std::uint32_t largest[period] = {};
+    std::size_t at = begin;
+    for (; at < end; at += points_a_period) {
+        if ((at - begin) % block == 0) {
+            const std::size_t size = std::min(block, end - at);
+            if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) break;
+        }
         const std::size_t n = std::min<std::size_t>(points_a_period, end - at);
         if (own) {
             bool whole = true;
@@ -87,22 +168,20 @@ void Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, 
                 of_h = whole;
             }
         }
-        const auto list = [&](int p, bool stays) {
-            near[count] = static_cast<std::uint32_t>(at + p);
-            count += stays && std::size_t(p) < n;
-        };
+        const auto list = [&](int p, bool stays) { near(static_cast<std::uint32_t>(at + p), stays); };
         if (n == points_a_period) {
-            advance_period(P[at].data(), v[at].data(), t, list);
+            advance_period<Avoids>(P[at].data(), v[at].data(), t, largest, list);
             continue;
         }
         float P_end[period] = {}, v_end[period] = {};
         std::copy_n(P[at].data(), 3 * n, P_end);
         std::copy_n(v[at].data(), 3 * n, v_end);
-        advance_period(P_end, v_end, t, list);
+        advance_period<Avoids>(P_end, v_end, t, largest, list);
         std::copy_n(P_end, 3 * n, P[at].data());
         std::copy_n(v_end, 3 * n, v[at].data());
     }
-    near.resize(count);
+    const bool finite = *std::max_element(largest, largest + period) < infinite;
+    return {std::min(at, end), finite};
 }
 
 }  // namespace rapid

@@ -35,9 +35,15 @@ public:
     // its path, and with what rounding a position to single precision can do.
     void avoid(const Box3d& box, double radius);
 
-    // Advances the points [begin, end). Those that are left as they are, are appended to `near`, in order.
-    void advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                 std::vector<std::uint32_t>& near) const;
+    struct Way {
+        std::size_t end;  // how far it came
+        bool finite;      // whether all states up to there are
+    };
+
+    // Advances the points [begin, end), up to the first few of which one is not finite. Those that are left as they
+    // are, are appended to `near`, in order.
+    Way advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                std::vector<std::uint32_t>& near) const;
 
 private:
     // What belongs to the axes recurs along the packed coordinates: in whole vectors of 8, and whole points.
@@ -49,11 +55,16 @@ private:
     };
 
     static Period by_axis(const Vec3d& x);
-    template <class Near>
-    void advance_period(float* P, float* v, const Period& t, const Near& near) const;
+    template <bool Avoids, class Near>
+    void advance_period(float* P, float* v, const Period& t, std::uint32_t* largest, const Near& near) const;
+    template <bool Avoids, class Near>
+    Way advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                    const Near& near) const;
+    bool are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t) const;
 
     Period g_;
-    std::vector<Limits> limits_;  // of the boxes, widened
+    std::vector<Box3d> boxes_;    // widened
+    std::vector<Limits> limits_;  // of these
 };
 
 }  // namespace rapid

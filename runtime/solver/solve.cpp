@@ -148,20 +148,23 @@ public:
 private:
     void advance(std::size_t begin, std::size_t end)
     {
-        require_finite(begin, end, "is", "before the step; a node before this one made it so");
         std::vector<std::uint32_t> places;
         if (scene_.falls() && !members_.data) {
-            fall(begin, end, places);
+            const Fall::Way way = fall(begin, end, places);
+            if (!way.finite) require_finite(begin, way.end, became);
+            require_finite(way.end, end, is);
+            if (places.empty()) return;
         } else {
+            require_finite(begin, end, is);
             places.resize(end - begin);
             std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
         }
-        if (!places.empty()) advance_by_substeps(places);
-        require_finite(begin, end, "became", "in the step; the frame was not written");
+        advance_by_substeps(places);
+        require_finite(begin, end, became);
     }
 
     // Those that are not near a shape at any time of the frame. The others are listed.
-    void fall(std::size_t begin, std::size_t end, std::vector<std::uint32_t>& near)
+    Fall::Way fall(std::size_t begin, std::size_t end, std::vector<std::uint32_t>& near)
     {
         Fall fall(scene_.uniform);
         for (const Obstacle& obstacle : scene_.obstacles) {
@@ -170,7 +173,7 @@ private:
                 widest = std::max(widest, obstacle.radius[i]);
             fall.avoid(obstacle.bounds, widest);
         }
-        fall.advance(P_, v_, time_, begin, end, near);
+        return fall.advance(P_, v_, time_, begin, end, near);
     }
 
     // Points of one chunk, in order; all of it where forces or actions act.
@@ -404,15 +407,21 @@ private:
         return fmt::format("point {}, frame {}", points_.id()[i], options_.frame);
     }
 
-    void require_finite(std::size_t begin, std::size_t end, const char* verb, const char* when) const
+    struct When {
+        const char *verb, *when;
+    };
+    static constexpr When is{"is", "before the step; a node before this one made it so"};
+    static constexpr When became{"became", "in the step; the frame was not written"};
+
+    void require_finite(std::size_t begin, std::size_t end, const When& when) const
     {
         const std::size_t n = end - begin;
         if (all_finite(P_.subspan(begin, n)) && all_finite(v_.subspan(begin, n))) return;
         for (std::size_t i = begin; i < end; ++i)
             for (const auto& [name, value] : {std::pair("P", P_[i]), std::pair("v", v_[i])})
                 if (!value.allFinite())
-                    throw Error(fmt::format("{}: {} {} {{{:g}, {:g}, {:g}}} {}", name_of(i), name, verb, value.x(),
-                                            value.y(), value.z(), when));
+                    throw Error(fmt::format("{}: {} {} {{{:g}, {:g}, {:g}}} {}", name_of(i), name, when.verb, value.x(),
+                                            value.y(), value.z(), when.when));
     }
 
     PointSet& points_;

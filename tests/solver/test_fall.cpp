@@ -66,12 +66,14 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[fall]")
 TEST_CASE("points that come near a box stay as they are, and are listed in order", "[fall]")
 {
     const double radius = GENERATE(0.0, 0.1);
+    const double away = GENERATE(0.0, 1.0, 1.2, 1.3, 1.34, 1.5, 4.0);  // the fastest come by a third of a metre
+    CAPTURE(radius, away);
     const std::size_t n = 1003;
     const Crowd crowd(n);
     const Box3d boxes[] = {
-        {Vec3d(-0.3, -0.2, -0.4), Vec3d(0.1, 0.3, 0.2)},
+        {Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2)},
         {Vec3d::Constant(-std::numeric_limits<double>::infinity()),
-         Vec3d(std::numeric_limits<double>::infinity(), -0.9, std::numeric_limits<double>::infinity())}};
+         Vec3d(std::numeric_limits<double>::infinity(), -0.9 - away, std::numeric_limits<double>::infinity())}};
     Fall fall(g);
     for (const Box3d& box : boxes) fall.avoid(box, radius);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
@@ -93,8 +95,8 @@ TEST_CASE("points that come near a box stay as they are, and are listed in order
         met += comes;
     }
     // The boxes around paths are larger than paths, but not so much that all were listed.
-    CHECK(met > 100);
-    CHECK(near.size() - 1 < 2 * met);
+    if (away == 0) CHECK(met > 100);
+    CHECK(near.size() - 1 <= 2 * met + 8);
 }
 
 TEST_CASE("what sub-steps are asked for does not change a fall by a bit", "[fall]")

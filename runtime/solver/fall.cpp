@@ -159,6 +159,11 @@ Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTim
             const std::size_t size = std::min(block, end - at);
             if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) break;
         }
+        // What the next block will look at is fetched while this one is computed.
+        for (int line = 0; line < 2; ++line) {
+            __builtin_prefetch(P.data()->data() + 3 * (at + block) + 16 * line);
+            __builtin_prefetch(v.data()->data() + 3 * (at + block) + 16 * line);
+        }
         const std::size_t n = std::min<std::size_t>(points_a_period, end - at);
         if (own) {
             bool whole = true;

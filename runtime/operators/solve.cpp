@@ -12,6 +12,7 @@
 #include "runtime/shapes/level_set.h"
 #include "runtime/shapes/moving.h"
 #include "runtime/solver/interaction.h"
+#include "runtime/solver/shadow.h"
 
 namespace rapid {
 namespace {
@@ -44,6 +45,7 @@ struct Solve {
         Flow flow = std::move(inputs[0]);
         flow.dynamics.clear();
         flow.simulation->state = flow.points;
+        shadows_ = Shadows();
         return flow;
     }
 
@@ -61,17 +63,21 @@ struct Solve {
         options.frame = static_cast<std::int64_t>(now.frame.number);
         options.group = group;
         interact(points, flow.dynamics, options);
-        const PointSet sample = sample_of(points);
-        Tolerated done;
-        if (tolerance)
-            done = solve_within(points, flow.dynamics, options, *tolerance, max_substeps);
-        else
-            done = {solve(points, flow.dynamics, options), substeps, 0,
-                    estimate_errors(sample, flow.dynamics, options)};
+        shadows_.begin(points);
+        const Tolerated done = tolerance ? solve_within(points, flow.dynamics, options, *tolerance, max_substeps)
+                                         : Tolerated{solve(points, flow.dynamics, options), substeps, 0};
+        const std::vector<double> errors = shadows_.advance(points, [&](PointSet& shadows) {
+            SolveOptions finer = options;
+            finer.substeps *= 2;
+            if (tolerance)
+                solve_within(shadows, flow.dynamics, finer, *tolerance / 4, 2 * max_substeps);
+            else
+                solve(shadows, flow.dynamics, finer);
+        });
         interact(points, flow.dynamics, options);
         const SolveResult& result = done.result;
         now.figures.substeps = std::max(now.figures.substeps, done.substeps);
-        now.figures.errors.insert(now.figures.errors.end(), done.errors.begin(), done.errors.end());
+        now.figures.errors.insert(now.figures.errors.end(), errors.begin(), errors.end());
         now.figures.collisions += result.collisions;
         now.figures.died += result.died;
         now.figures.contact_limit += result.contact_limit;
@@ -193,6 +199,7 @@ private:
         return largest;
     }
 
+    Shadows shadows_;
     std::map<ShapePtr, LevelSetPtr> wide_;  // of the frame before
 };
 RAPID_NODE(Solve);

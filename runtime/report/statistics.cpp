@@ -78,10 +78,8 @@ ordered_json to_json(const FrameStatistics& frame)
         {"seconds",
          {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}}};
     if (frame.error)
-        json["error"] = {{"position_p50", frame.error->p50},
-                         {"position_p95", frame.error->p95},
-                         {"position_max", frame.error->max},
-                         {"local", true}};
+        json["error"] = {
+            {"position_p50", frame.error->p50}, {"position_p95", frame.error->p95}, {"position_max", frame.error->max}};
     json["penetration_max"] = frame.penetration_max;
     json["constraint_residual_max"] = frame.constraint_residual_max;
     json["collisions"] = frame.collisions;
@@ -149,7 +147,7 @@ std::string summary(const RunStatistics& run)
     });
     if (worst != run.frames.end() && worst->error) {
         const FrameStatistics::Error& error = *worst->error;
-        text += "error    in a frame, estimated: ";
+        text += "error    since birth, estimated: ";
         text += error.max > 0 ? fmt::format(
                                     "half of the points below {:.1e} m, 95 % below {:.1e}, the worst {:.1e} "
                                     "(frame {})\n",

@@ -28,7 +28,8 @@ struct FrameStatistics {
     std::uint64_t born = 0, died = 0, collisions = 0;
     std::uint64_t contact_limit = 0, trapped = 0;  // points that Solve warned of (FrameFigures)
     int substeps = 0;
-    // Estimated errors of the positions in this frame, m, of a sample of the points; nothing where none was solved.
+    // Estimated errors of the positions, m, accumulated since birth, of a sample of the points; nothing where none was
+    // solved.
     struct Error {
         double p50, p95, max;
     };

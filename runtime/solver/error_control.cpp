@@ -18,11 +18,6 @@ std::vector<std::uint32_t> places_after(const PointSet& before, const PointSet& 
     return places;
 }
 
-double estimate(const Vec3f& coarse, const Vec3f& fine)
-{
-    return 2 * (coarse.cast<double>() - fine.cast<double>()).norm();
-}
-
 SolveOptions with_substeps(SolveOptions options, int substeps)
 {
     options.substeps = substeps;
@@ -30,28 +25,6 @@ SolveOptions with_substeps(SolveOptions options, int substeps)
 }
 
 }  // namespace
-
-PointSet sample_of(const PointSet& points)
-{
-    const std::size_t n = std::min(points.size(), error_sample);
-    std::vector<std::uint32_t> places(n);
-    for (std::size_t k = 0; k < n; ++k) places[k] = static_cast<std::uint32_t>(k * points.size() / n);
-    return points.select(places);
-}
-
-std::vector<double> estimate_errors(const PointSet& sample, std::span<const DynamicPtr> dynamics,
-                                    const SolveOptions& options)
-{
-    PointSet coarse = sample, fine = sample;
-    solve(coarse, dynamics, options);
-    solve(fine, dynamics, with_substeps(options, 2 * options.substeps));
-    const std::vector<std::uint32_t> a = places_after(sample, coarse), b = places_after(sample, fine);
-    const Strided<Vec3f> P = std::as_const(coarse).P().read(), Q = std::as_const(fine).P().read();
-    std::vector<double> errors;
-    for (std::size_t i = 0; i < sample.size(); ++i)
-        if (a[i] != gone && b[i] != gone) errors.push_back(estimate(P[a[i]], Q[b[i]]));
-    return errors;
-}
 
 Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
                        double tolerance, int max_substeps)
@@ -83,31 +56,26 @@ Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, c
         PointSet fine = begin;
         const SolveResult result = solve(fine, dynamics, with_substeps(options, substeps));
         done.result.penetration_max = std::max(done.result.penetration_max, result.penetration_max);
+        if (substeps <= max_substeps) {
+            accept(begin, fine, places);
+            done.substeps = substeps;
+        }
         const std::vector<std::uint32_t> a = places_after(begin, coarse), b = places_after(begin, fine);
         const Strided<Vec3f> P = std::as_const(coarse).P().read(), Q = std::as_const(fine).P().read();
-        std::vector<std::uint32_t> again, still;  // in this round's set, and in `start`
+        std::vector<std::uint32_t> again, still, finished;  // places in this round's set, in `start`, in `fine`
         for (std::size_t i = 0; i < places.size(); ++i) {
             const bool both = a[i] != gone && b[i] != gone;
-            const double error = both ? estimate(P[a[i]], Q[b[i]]) : 0;
-            const bool good = both ? error <= tolerance : a[i] == b[i];
-            if (both && (good || substeps > max_substeps)) done.errors.push_back(error);
-            if (good) continue;
+            if (both ? (P[a[i]].cast<double>() - Q[b[i]].cast<double>()).norm() <= tolerance : a[i] == b[i]) continue;
             again.push_back(static_cast<std::uint32_t>(i));
             still.push_back(places[i]);
+            if (b[i] != gone) finished.push_back(b[i]);
         }
-        if (substeps > max_substeps) {
+        if (2 * substeps > max_substeps) {
             done.beyond = again.size();
             break;
         }
-        if (again.empty()) break;
-        done.substeps = substeps;
-        PointSet begun = begin.select(again);
-        std::vector<std::uint32_t> finished;
-        for (const std::uint32_t i : again)
-            if (b[i] != gone) finished.push_back(b[i]);
+        begin = begin.select(again);
         coarse = fine.select(finished);
-        accept(begun, coarse, still);
-        begin = std::move(begun);
         places = std::move(still);
     }
     points.keep(alive);

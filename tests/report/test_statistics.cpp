@@ -104,7 +104,6 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
     CHECK(error["position_p50"] == 50 * 1e-4);
     CHECK(error["position_p95"] == 95 * 1e-4);
     CHECK(error["position_max"] == 100 * 1e-4);
-    CHECK(error["local"] == true);
     CHECK_THAT(summary(run),
                Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
 }

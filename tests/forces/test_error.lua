@@ -1,0 +1,66 @@
+-- The error that a run reports, accumulated since birth, against the true one: that from a run of many sub-steps, of
+-- all points, on scenes of different kinds.
+local scene = require "testing.scene"
+local command = require "testing.command"
+local json = require "dkjson"
+
+local last = 25 -- a second
+local grid = "local start = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2, center = {0, 1, 0} } "
+
+-- Each with the sub-steps of its run; %d stands for them.
+local scenes = {
+  orbit = { 2, [[
+local P, v = {}, {}
+for i = 1, 100 do P[i] = {1 + i / 100, 0, 0} v[i] = {0, 0, 2 / math.sqrt(1 + i / 100)} end
+return rapid.create { points = rapid.points.from { P = P, v = v } } :attract { strength = 4 }
+  :solve { substeps = %d }]] },
+  turbulence = { 2, grid .. [[
+return rapid.create { points = start } :turbulence { amplitude = 5, size = 1, octaves = 2 } :drag { linear = 1 }
+  :solve { substeps = %d }]] },
+  ["an action of first order"] = { 4, grid .. [[
+return rapid.create { points = start } :gravity {}
+  :action("slow", function(p, step) p.v = p.v * (1 - 3 * step.dt) end) :solve { substeps = %d }]] },
+  ["edits between the frames"] = { 2, grid .. [[
+return rapid.create { points = start } :vortex { strength = 3 } :attract { strength = 2, core = 0.2 }
+  :points("edit", function(p)
+    p.v = p.v * 0.97 + vec3(0.1, 0, 0)
+    p.P = p.P + vec3(0, 0.01, 0)
+  end) :solve { substeps = %d }]] },
+  births = { 2, [[
+return rapid.create { seed = 3 }
+  :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 300, speed = 1, life = {0.3, 2} }
+  :attract { strength = 6, core = 0.3 } :solve { substeps = %d }]] },
+  ["contacts found after the step"] = { 2, grid .. [[
+return rapid.create { points = start } :gravity {} :turbulence { amplitude = 2, octaves = 1 }
+  :collide { shape = rapid.shape.plane {}, method = "project", bounce = 0.4 } :solve { substeps = %d }]] },
+}
+
+local function p95(values)
+  table.sort(values)
+  return values[math.ceil(0.95 * #values)]
+end
+
+local function estimated(text)
+  local folder = command.folder()
+  folder:write("scene.lua", "local rapid = require 'rapid'\n" .. text)
+  local ran = command.rapid(("run scene.lua -f 1-%d --quiet --stats stats.json"):format(last), { cwd = folder.path })
+  assert.equal(0, ran.status, ran.stderr)
+  return json.decode(folder:read "stats.json").frames[last].error.position_p95
+end
+
+describe("the p95 error of a run since birth is within a factor of four of the true one:", function()
+  for name, entry in pairs(scenes) do
+    it(name, function()
+      local substeps, text = entry[1], entry[2]
+      local function run(steps) return scene.run(text:format(steps), { frames = {last, last} })[last] end
+      local points, right, off = run(substeps), run(32 * substeps), {}
+      for i = 1, #points do
+        local reference = right:by_id(points[i].id)
+        if reference then off[#off + 1] = (points[i].P - reference.P):length() end
+      end
+      local true_error, told = p95(off), estimated(text:format(substeps))
+      assert.truthy(told < 4 * true_error and told > true_error / 4,
+        ("it is told as %g m, and is %g m"):format(told, true_error))
+    end)
+  end
+end)

@@ -553,6 +553,17 @@ function Node:attribute(params) end
 ---@return rapid.Node
 function Node:avoid(params) end
 
+---@class rapid.params.clump
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
+---@field strength? number|fun(frame: rapid.Frame): number  the pull that a bond bears [number, N, at least 0, default 1]
+---@field name? string  what the node is called in messages [string]
+
+---Sticks points together that touch, until they are torn apart.
+---@param params? rapid.params.clump
+---@return rapid.Node
+function Node:clump(params) end
+
 ---@class rapid.params.collide
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  what the points collide with [shape, required]
@@ -582,6 +593,20 @@ function Node:collide(params) end
 ---@param params? rapid.params.color_by_speed
 ---@return rapid.Node
 function Node:color_by_speed(params) end
+
+---@class rapid.params.contact
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
+---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution; of two points that differ the larger [number, from 0 to 1, default 0, takes rapid.attr]
+---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient; of two points that differ the geometric mean [number, at least 0, default 0, takes rapid.attr]
+---@field max_difference? number|fun(frame: rapid.Frame): number  of the radii in one grid; where not given, a quarter of the largest [number, m, at least 0]
+---@field max_grids? integer|fun(frame: rapid.Frame): integer  the most grids for different radii [integer, from 1 to 254, default 8]
+---@field name? string  what the node is called in messages [string]
+
+---Points collide with each other, as spheres: sand, rubble, balls.
+---@param params? rapid.params.contact
+---@return rapid.Node
+function Node:contact(params) end
 
 ---@class rapid.params.create
 ---@field fps? number  frames a second [number, 1/s, above 0, default 24]
@@ -614,6 +639,20 @@ function Node:delete(params) end
 ---@param params rapid.params.detail
 ---@return rapid.Node
 function Node:detail(params) end
+
+---@class rapid.params.distance
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field pairs? any[]  {{i, j}, ...}: by place, from 1, in the set that first enters the node [list]
+---@field within? number  in place of pairs: all that are as near in the set that first enters the node [number, m, above 0]
+---@field rest? number  the distance; where not given, that at first [number, m, at least 0]
+---@field compliance? number  stretch by force; 0: rigid [number, m/N, at least 0, default 0]
+---@field strain? number  breaks a pair that is longer than its distance by more than this part of it [number, above 0]
+---@field name? string  what the node is called in messages [string]
+
+---Keeps pairs of points at a distance: rods, ropes, springs.
+---@param params? rapid.params.distance
+---@return rapid.Node
+function Node:distance(params) end
 
 ---@class rapid.params.drag
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
@@ -797,6 +836,18 @@ function Node:limit_speed(params) end
 ---@return rapid.Node
 function Node:merge(...) end
 
+---@class rapid.params.pin
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field target? any  a place, rapid.attr "NAME" for each point's own, or a moving shape that carries them; where not given, where each point is first pinned [vec3, attribute or moving shape, m]
+---@field transform? rapid.Motion|fun(frame: rapid.Frame): rapid.Motion  carries the points: a motion, a function of the frame that returns one, or keys by frame [motion]
+---@field compliance? number  give by force; 0: rigid [number, m/N, at least 0, default 0]
+---@field name? string  what the node is called in messages [string]
+
+---Holds points where they are, at a place, or on a body that moves.
+---@param params? rapid.params.pin
+---@return rapid.Node
+function Node:pin(params) end
+
 ---@class rapid.params.points
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field kernel fun(p: rapid.Point, frame: rapid.Frame)  function(p, frame) [function of a point, required]
@@ -838,6 +889,7 @@ function Node:randomize(params) end
 ---@class rapid.params.solve
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, at least 1, default 1]
+---@field iterations? integer|fun(frame: rapid.Frame): integer  of the constraints, a sub-step [integer, at least 1, default 1]
 ---@field tolerance? number|fun(frame: rapid.Frame): number  each point takes as many sub-steps, twice as many and so on, as its own estimated error needs [number, m a frame, above 0]
 ---@field max_substeps? integer|fun(frame: rapid.Frame): integer  the most, with a tolerance [integer, at least 1, default 64]
 ---@field name? string  what the node is called in messages [string]

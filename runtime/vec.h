@@ -3,7 +3,10 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 namespace rapid {
@@ -33,6 +36,18 @@ inline void cast(std::span<const Vec3d> from, std::span<Vec3f> to)
     const double* x = coordinates(from);
     float* y = coordinates(to);
     for (std::size_t l = 0; l < 3 * from.size(); ++l) y[l] = static_cast<float>(x[l]);
+}
+
+// |x| as bits, which order as it does: those of infinity and NaN are at least `infinity_bits`, all others below.
+inline std::uint32_t magnitude_bits(float x) { return std::bit_cast<std::uint32_t>(x) & 0x7fffffffu; }
+constexpr std::uint32_t infinity_bits = 0x7f800000u;
+
+inline bool all_finite(std::span<const Vec3f> values)
+{
+    const float* x = coordinates(values);
+    std::uint32_t largest = 0;
+    for (std::size_t l = 0; l < 3 * values.size(); ++l) largest = std::max(largest, magnitude_bits(x[l]));
+    return largest < infinity_bits;
 }
 
 // An axis-aligned box; empty until something extends it. An unbounded shape has infinite corners.

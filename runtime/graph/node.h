@@ -80,6 +80,7 @@ struct FrameFigures {
     std::uint64_t trapped = 0;           // points deep in a shape, with no way out known
     int substeps = 0;
     double penetration_max = 0;
+    double constraint_residual_max = 0;  // m
     std::vector<double> errors;  // estimated, of the positions of a sample of the points, m
     double script_seconds = 0, solve_seconds = 0;
 };

@@ -1,7 +1,5 @@
 // solve: advances the points by one frame under all that is upstream, lets them age and die, and hands them to the next
 // frame's Create (paper §2.1).
-#include "runtime/solver/error_control.h"
-
 #include <fmt/format.h>
 
 #include <map>
@@ -13,12 +11,13 @@
 #include "runtime/shapes/moving.h"
 #include "runtime/solver/interaction.h"
 #include "runtime/solver/shadow.h"
+#include "runtime/solver/shape_contacts.h"
 
 namespace rapid {
 namespace {
 
 struct Solve {
-    int substeps = 1, max_substeps = 64;
+    int substeps = 1, iterations = 1, max_substeps = 64;
     std::optional<double> tolerance;
     std::string group;
 
@@ -32,6 +31,7 @@ struct Solve {
             .takes("mass")
             .takes("life")
             .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
+            .param(&Solve::iterations, "iterations", 1.0, at_least(1), "", "of the constraints, a sub-step")
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
                    "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")
             .param(&Solve::max_substeps, "max_substeps", 64.0, at_least(1), "", "the most, with a tolerance")
@@ -62,18 +62,28 @@ struct Solve {
         options.h = now.frame.dt;
         options.frame = static_cast<std::int64_t>(now.frame.number);
         options.group = group;
+        options.iterations = iterations;
+        options.loads = &loads_;
+        const bool coupled = couples(flow.dynamics);
+        if (tolerance && coupled)
+            throw Error(
+                "a tolerance is for points that do not depend on one another, and there are constraints; give "
+                "substeps instead");
+
         interact(points, flow.dynamics, options);
-        shadows_.begin(points);
+        if (!coupled) shadows_.begin(points);
         const Tolerated done = tolerance ? solve_within(points, flow.dynamics, options, *tolerance, max_substeps)
                                          : Tolerated{solve(points, flow.dynamics, options), substeps, 0};
-        const std::vector<double> errors = shadows_.advance(points, [&](PointSet& shadows) {
-            SolveOptions finer = options;
-            finer.substeps *= 2;
-            if (tolerance)
-                solve_within(shadows, flow.dynamics, finer, *tolerance / 4, 2 * max_substeps);
-            else
-                solve(shadows, flow.dynamics, finer);
-        });
+        std::vector<double> errors;
+        if (!coupled)  // a part of the points alone would tell nothing: the residual is what says how wrong they are
+            errors = shadows_.advance(points, [&](PointSet& shadows) {
+                SolveOptions finer = options;
+                finer.substeps *= 2;
+                if (tolerance)
+                    solve_within(shadows, flow.dynamics, finer, *tolerance / 4, 2 * max_substeps);
+                else
+                    solve(shadows, flow.dynamics, finer);
+            });
         interact(points, flow.dynamics, options);
         const SolveResult& result = done.result;
         now.figures.substeps = std::max(now.figures.substeps, done.substeps);
@@ -82,6 +92,7 @@ struct Solve {
         now.figures.died += result.died;
         now.figures.contact_limit += result.contact_limit;
         now.figures.trapped += result.trapped;
+        now.figures.constraint_residual_max = std::max(now.figures.constraint_residual_max, result.residual.worst);
         now.figures.penetration_max = std::max(now.figures.penetration_max, result.penetration_max);
 
         if (result.contact_limit > 0)
@@ -200,6 +211,7 @@ private:
     }
 
     Shadows shadows_;
+    ShapeLoads loads_;                      // of coupled points, at the frame before
     std::map<ShapePtr, LevelSetPtr> wide_;  // of the frame before
 };
 RAPID_NODE(Solve);

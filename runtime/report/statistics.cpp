@@ -43,6 +43,7 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.error = error_of(result.figures.errors);
     frame.substeps = result.figures.substeps;
     frame.penetration_max = result.figures.penetration_max;
+    frame.constraint_residual_max = result.figures.constraint_residual_max;
     frame.seconds.script = result.figures.script_seconds;
     frame.seconds.solve = result.figures.solve_seconds;
     // The stages are timed apart from the whole: rounding of the clock must not make the rest negative.

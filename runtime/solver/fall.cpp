@@ -14,18 +14,6 @@ float chosen(std::uint32_t bits, float a, float b)
     return std::bit_cast<float>((std::bit_cast<std::uint32_t>(a) & bits) | (std::bit_cast<std::uint32_t>(b) & ~bits));
 }
 
-// Without its sign, as bits: those of infinity and NaN are at least `infinite`, those of all others below.
-std::uint32_t size_bits(float x) { return std::bit_cast<std::uint32_t>(x) & 0x7fffffffu; }
-constexpr std::uint32_t infinite = 0x7f800000u;
-
-bool all_finite(std::span<const Vec3f> values)
-{
-    const float* x = coordinates(values);
-    std::uint32_t largest = 0;
-    for (std::size_t l = 0; l < 3 * values.size(); ++l) largest = std::max(largest, size_bits(x[l]));
-    return largest < infinite;
-}
-
 // Points that are looked at, and then advanced, while they are in the first-level cache.
 constexpr std::size_t block = 256;
 
@@ -59,7 +47,7 @@ void Fall::advance_period(float* P, float* v, const Period& t, std::uint32_t* la
         const double x1 = x + t[l] * (u + 0.5 * gain);
         P1[l] = static_cast<float>(x1);
         v1[l] = static_cast<float>(u + gain);
-        largest[l] = std::max({largest[l], size_bits(P1[l]), size_bits(v1[l])});
+        largest[l] = std::max({largest[l], magnitude_bits(P1[l]), magnitude_bits(v1[l])});
         if constexpr (Avoids) {
             // The parabola is off the straight line by a t²/8 at most. The factor keeps a point that is flush with a
             // box and rounded away from it.
@@ -185,7 +173,7 @@ Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTim
         std::copy_n(P_end, 3 * n, P[at].data());
         std::copy_n(v_end, 3 * n, v[at].data());
     }
-    const bool finite = *std::max_element(largest, largest + period) < infinite;
+    const bool finite = *std::max_element(largest, largest + period) < infinity_bits;
     return {std::min(at, end), finite};
 }
 

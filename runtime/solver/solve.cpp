@@ -13,6 +13,7 @@
 #include "runtime/solver/collide.h"
 #include "runtime/solver/damped_motion.h"
 #include "runtime/solver/fall.h"
+#include "runtime/solver/projection.h"
 
 namespace rapid {
 namespace {
@@ -42,6 +43,7 @@ struct Scene {
     Vec3d uniform = Vec3d::Zero();  // acceleration of all points, m/s²
     std::vector<LocalForce> forces;
     std::vector<Obstacle> obstacles;
+    std::vector<LocalConstraint> constraints;
     bool kills = false, records = false;  // one of them does
     const Column<Vec3f>* force = nullptr;
     Strided<float> mass{&unit_mass, 0};
@@ -63,7 +65,7 @@ void at_node(const Dynamic& dynamic, const F& f)
 
 const std::uint8_t nobody = 0;
 
-Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics)
+Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
 {
     Scene scene;
     // First those that make columns writable: what is read below is then at its place.
@@ -79,6 +81,9 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics)
                 scene.obstacles.emplace_back(*collider, points);
                 scene.kills |= collider->response == Response::Die;
                 scene.records |= collider->record.has_value();
+            } else if (const auto* constraint = dynamic_cast<const Constraint*>(dynamic.get())) {
+                if (auto coupling = constraint->begin(points, h))
+                    scene.constraints.push_back({constraint, std::move(coupling)});
             } else if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
                 const std::optional<Vec3d> uniform = force->uniform_acceleration();
                 if (uniform && !uniform->allFinite())
@@ -100,23 +105,12 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics)
     return scene;
 }
 
-// The largest absolute value of a range of floats, as bits: those of infinity and NaN are at least 0x7f800000.
-std::uint32_t largest_bits(std::span<const Vec3f> values)
-{
-    const float* x = values.empty() ? nullptr : values.front().data();
-    std::uint32_t largest = 0;
-    for (std::size_t j = 0; j < 3 * values.size(); ++j)
-        largest = std::max(largest, std::bit_cast<std::uint32_t>(x[j]) & 0x7fffffffu);
-    return largest;
-}
-bool all_finite(std::span<const Vec3f> values) { return largest_bits(values) < 0x7f800000u; }
-
 class Step {
 public:
     Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
         : points_(points),
           options_(options),
-          scene_(scene_of(points, dynamics)),
+          scene_(scene_of(points, dynamics, options.h)),
           P_(points.P().write()),
           v_(points.v().write()),
           dead_(scene_.actions.empty() && !scene_.kills ? 0 : points.size())
@@ -132,20 +126,30 @@ public:
 
     SolveResult run()
     {
+        if (scene_.constraints.empty())
+            for_all([&](std::size_t begin, std::size_t end) { advance(begin, end); });
+        else
+            advance_coupled();
+        bury();
+        return result_;
+    }
+
+private:
+    // Chunk by chunk. Of several errors that of the first chunk is thrown.
+    template <class F>
+    void for_all(const F& f)
+    {
         for_each_chunk(points_.size(), [&](std::size_t begin, std::size_t end) {
             try {
-                advance(begin, end);
+                f(begin, end);
             } catch (...) {
                 const std::scoped_lock lock(mutex_);
                 if (!error_ || begin < failed_) error_ = std::current_exception(), failed_ = begin;
             }
         });
         if (error_) std::rethrow_exception(error_);
-        bury();
-        return result_;
     }
 
-private:
     void advance(std::size_t begin, std::size_t end)
     {
         std::vector<std::uint32_t> places;
@@ -179,36 +183,13 @@ private:
     // Points of one chunk, in order; all of it where forces or actions act.
     void advance_by_substeps(std::span<const std::uint32_t> places)
     {
-        Collisions collisions(scene_.obstacles,
-                              {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time, options_.h});
+        Collisions collisions(scene_.obstacles, consequences());
         Block block;
         double deepest = 0;
         for (std::size_t begin = 0; begin < places.size(); begin += block_size) {
             block.begin(*this, places.subspan(begin, std::min(block_size, places.size() - begin)));
             if (!scene_.obstacles.empty()) collisions.begin(block.places);
-            for (int substep = 0; substep < options_.substeps; ++substep) {
-                const Strided<Vec3d> a = accelerations(block, substep);
-                const auto drift = [&](std::span<const double> dt, double halves_after) {
-                    if (!block.linear.empty()) block.drag(a, dt);
-                    if (!scene_.obstacles.empty())
-                        collisions.advance(block.P, block.v, {a, dt, block.until_end(halves_after), block.damped});
-                    else if (!block.linear.empty())
-                        block.drift_damped();
-                    else
-                        block.drift(a, dt);
-                };
-                if (scene_.kills) stop_dead(block);
-                const double halves_after = 2.0 * (options_.substeps - substep - 1);
-                if (scene_.actions.empty()) {
-                    drift(block.dt, halves_after);
-                } else {
-                    // Half a drift, all actions at once, half a drift: of second order (numerics.md, Motion).
-                    block.halve();
-                    drift(block.half, halves_after + 1);
-                    act(block, substep);
-                    drift(block.half, halves_after);
-                }
-            }
+            for (int substep = 0; substep < options_.substeps; ++substep) take(block, collisions, substep);
             if (members_.data) block.restore_others(*this);
             if (!scene_.obstacles.empty())
                 deepest = std::max(deepest, collisions.round(block.P, block.rounded));
@@ -219,6 +200,11 @@ private:
                 v_[block.places[i]] = block.v[i].cast<float>();
             }
         }
+        count(collisions, deepest);
+    }
+
+    void count(const Collisions& collisions, double deepest)
+    {
         const std::scoped_lock lock(mutex_);
         result_.collisions += collisions.contacts;
         result_.contact_limit += collisions.limited;
@@ -226,9 +212,135 @@ private:
         result_.penetration_max = std::max(result_.penetration_max, deepest);
     }
 
+    Consequences consequences() { return {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time, options_.h}; }
+
+    // All points take a sub-step, each by itself; then what couples them is projected.
+    void advance_coupled()
+    {
+        const std::size_t n = points_.size();
+        std::vector<Place> at(n);
+        std::vector<Vec3d> v(n), begin(n);
+        std::vector<double> weight(n);  // inverse masses, 1/kg
+        for_all([&](std::size_t first, std::size_t last) {
+            require_finite(first, last, is);
+            for (std::size_t i = first; i < last; ++i) {
+                weight[i] = at[i].w = inverse_mass(i);
+                at[i].P = P_[i].cast<double>();
+                v[i] = v_[i].cast<double>();
+            }
+        });
+
+        const Column<std::int64_t>& ids = std::as_const(points_).id();
+        Projection projection(scene_.constraints, scene_.obstacles, n);
+        Substep now;
+        now.at = at;
+        now.v = v;
+        now.begin = begin;
+        now.dead = dead_;
+        now.dt = options_.h / options_.substeps;
+        now.iterations = options_.iterations;
+        std::vector<Yield> yields;
+        if (!scene_.forces.empty()) {
+            yields.assign(n, {now.dt, 0.5 * now.dt * now.dt});
+            now.yields = yields;
+        }
+        projection.open(now, options_.loads, ids);
+        for (int substep = 0; substep < options_.substeps; ++substep) {
+            now.index = substep;
+            now.time = options_.time - now.dt * (options_.substeps - substep - 1);
+            now.pull = 0;
+            for_all([&](std::size_t first, std::size_t last) { take_all(now, begin, yields, weight, first, last); });
+            projection.advance(now);
+        }
+        result_.residual = projection.close(now, options_.loads, ids);
+        for_all([&](std::size_t first, std::size_t last) { round(now, first, last); });
+    }
+
+    // A point of no weight goes where it is bound to.
+    void take_all(Substep& now, std::span<Vec3d> begin, std::span<Yield> yields, std::span<const double> weight,
+                  std::size_t first, std::size_t last)
+    {
+        Collisions collisions(scene_.obstacles, consequences());
+        Block block;
+        double pull = 0;
+        for (; first < last; first += block_size) {
+            const std::size_t size = std::min(block_size, last - first);
+            block.begin(*this, first, size);
+            for (std::size_t i = 0; i < size; ++i) {
+                block.P[i] = begin[first + i] = now.at[first + i].P;
+                block.v[i] = now.v[first + i];
+            }
+            if (!scene_.obstacles.empty()) collisions.begin(block.places);
+            take(block, collisions, now.index);
+            for (std::size_t i = 0; i < size; ++i) {
+                Place& at = now.at[first + i];
+                at.w = weight[first + i];
+                if (!(at.w > 0)) {
+                    if (!members_.data || members_[first + i]) at.P += block.dt[i] * now.v[first + i];
+                    continue;
+                }
+                at.P = block.P[i];
+                now.v[first + i] = block.v[i];
+                if (block.linear.empty()) continue;
+                const Propagator by = respond(block.damped[i].k, block.damped[i].w2, now.dt);
+                yields[first + i] = {by.v_of_G, by.x_of_G};
+                at.w *= by.v_of_G / now.dt;
+            }
+            const Strided<Vec3d> a =
+                scene_.is_uniform() ? Strided<Vec3d>{&scene_.uniform, 0} : Strided<Vec3d>{block.a.data(), 1};
+            for (std::size_t i = 0; i < (a.stride ? size : 1); ++i) pull = std::max(pull, a[i].norm());
+        }
+        count(collisions, 0);
+        const std::scoped_lock lock(mutex_);
+        now.pull = std::max(now.pull, pull);
+    }
+
+    // A drift that takes no time finds what each point lies on, to round it to the outer side of that.
+    void round(const Substep& now, std::size_t first, std::size_t last)
+    {
+        Collisions collisions(scene_.obstacles, consequences());
+        Block block;
+        double deepest = 0;
+        const std::size_t start = first;
+        for (; first < last; first += block_size) {
+            const std::size_t size = std::min(block_size, last - first);
+            block.begin(*this, first, size);
+            for (std::size_t i = 0; i < size; ++i) {
+                block.P[i] = now.at[first + i].P;
+                block.v[i] = now.v[first + i];
+            }
+            cast(std::span<const Vec3d>(block.v), v_.subspan(first, size));
+            if (!scene_.obstacles.empty()) {
+                block.dt.assign(size, 0);
+                block.a.assign(size, scene_.uniform);
+                collisions.begin(block.places);
+                collisions.advance(block.P, block.v, {{block.a.data(), 1}, block.dt, block.dt, {}});
+                deepest = std::max(deepest, collisions.round(block.P, P_.subspan(first, size)));
+            } else {
+                cast(std::span<const Vec3d>(block.P), P_.subspan(first, size));
+            }
+        }
+        require_finite(start, last, became);
+        const std::scoped_lock lock(mutex_);
+        result_.penetration_max = std::max(result_.penetration_max, deepest);
+    }
+
+    double inverse_mass(std::size_t i) const
+    {
+        if (members_.data && !members_[i]) return 0;
+        const float mass = scene_.mass[i];
+        if (!(mass > 0))
+            throw Error(
+                fmt::format("{}: its mass is {:g}; with constraints it must be above 0, or math.huge for a "
+                            "point that they do not move",
+                            name_of(i), mass));
+        return 1.0 / mass;
+    }
+
     // The state of a block within the frame.
     struct Block {
         std::span<const std::uint32_t> places;  // in the set
+        std::vector<std::uint32_t> run;         // these, where they follow one another
         std::vector<Vec3d> P, v, middle, a;
         std::vector<Vec3f> rounded;  // P at the beginning of the frame, and at its end
         std::vector<double> dt, time, half, after;
@@ -236,6 +348,13 @@ private:
         std::vector<Linear> linear;  // empty where no force has such a part
         std::vector<Damped> damped;  // the way of each point with it
         Forces one;
+
+        void begin(const Step& step, std::size_t first, std::size_t size)
+        {
+            run.resize(size);
+            std::iota(run.begin(), run.end(), static_cast<std::uint32_t>(first));
+            begin(step, run);
+        }
 
         void begin(const Step& step, std::span<const std::uint32_t> at)
         {
@@ -309,6 +428,32 @@ private:
                 time[i] = options.time - dt[i] * (options.substeps - substep - 0.5);
         }
     };
+
+    // One sub-step of a block.
+    void take(Block& block, Collisions& collisions, int substep)
+    {
+        const Strided<Vec3d> a = accelerations(block, substep);
+        const auto drift = [&](std::span<const double> dt, double halves_after) {
+            if (!block.linear.empty()) block.drag(a, dt);
+            if (!scene_.obstacles.empty())
+                collisions.advance(block.P, block.v, {a, dt, block.until_end(halves_after), block.damped});
+            else if (!block.linear.empty())
+                block.drift_damped();
+            else
+                block.drift(a, dt);
+        };
+        if (scene_.kills) stop_dead(block);
+        const double halves_after = 2.0 * (options_.substeps - substep - 1);
+        if (scene_.actions.empty()) {
+            drift(block.dt, halves_after);
+        } else {
+            // Half a drift, all actions at once, half a drift: of second order (numerics.md, Motion).
+            block.halve();
+            drift(block.half, halves_after + 1);
+            act(block, substep);
+            drift(block.half, halves_after);
+        }
+    }
 
     // Of the sub-step, constant within it: forces that are not the same everywhere are asked at its middle, half a
     // drift on, which makes them right to second order.
@@ -440,6 +585,13 @@ private:
 };
 
 }  // namespace
+
+bool couples(std::span<const DynamicPtr> dynamics)
+{
+    return std::any_of(dynamics.begin(), dynamics.end(), [](const DynamicPtr& dynamic) {
+        return dynamic_cast<const Constraint*>(dynamic.get()) != nullptr;
+    });
+}
 
 SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
 {

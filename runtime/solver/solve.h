@@ -5,9 +5,12 @@
 #include <span>
 
 #include "runtime/points/point_set.h"
+#include "runtime/solver/constraint.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
+
+struct ShapeLoads;
 
 struct SolveOptions {
     int substeps = 1;
@@ -15,6 +18,9 @@ struct SolveOptions {
     double h = 0;            // s, the frame's length
     std::int64_t frame = 0;  // its number, for messages
     std::string group;       // only these points are advanced; all when empty
+
+    int iterations = 1;           // of the constraints, a sub-step
+    ShapeLoads* loads = nullptr;  // kept from frame to frame where points are coupled; null: each begins anew
 };
 
 struct SolveResult {
@@ -23,15 +29,23 @@ struct SolveResult {
     std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     double penetration_max = 0;       // m, the deepest at the end of the frame
     std::uint64_t died = 0;           // points that actions killed
+    Residual residual;                // of the constraints, at the end of the frame
 };
 
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age
 // at the end of the frame), else h; and where they have a `force` (N), by force / mass besides, which is then cleared.
 // Points that an action kills are removed. Ages, other deaths and ids are the caller's.
 //
-// Same bits for any number of threads, any chunk, and whichever other points there are. Error: a velocity or position
-// that is not finite before or after, with the point's id, or a force that is not, with its node; a collider or force
-// whose attribute is missing. Of several points the one nearest to the beginning of the set is named.
+// With constraints the sub-step is the barrier: all points take it, and then their couplings are projected. A point of
+// infinite mass is moved by its own velocity alone, and so is one that is not of the group.
+//
+// Same bits for any number of threads, any chunk, and whichever other points there are that it is not coupled to.
+// Error: a velocity or position that is not finite before or after, with the point's id, or a force that is not, with
+// its node; a collider or force whose attribute is missing. Of several points the one nearest to the beginning of the
+// set is named.
 SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
+
+// Whether one of them makes the way of a point depend on others.
+bool couples(std::span<const DynamicPtr> dynamics);
 
 }  // namespace rapid

@@ -1,0 +1,152 @@
+// clump: points that have touched stick together, until they are torn apart (paper, figure 7: wet sand, snow, dirt).
+//
+//   C = |P_i - P_j| - rest, with the distance that the two had when they first touched; breaks where it pulls with more
+//   than `strength` (N)
+//
+// A bond that breaks is gone; the points stick again when they have been apart and touch anew. Points that are pressed
+// together further are contact's matter, not that of bonds: a bond only pulls.
+#include "runtime/graph/node.h"
+#include "runtime/solver/contact_search.h"
+#include "runtime/solver/rows.h"
+
+#include <set>
+
+namespace rapid {
+namespace {
+
+struct Bond {
+    static constexpr int points = 2;
+    static constexpr bool one_sided = true;  // C = rest - distance >= 0: pulls only
+
+    double rest = 0;  // m
+
+    double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
+    {
+        const Vec3d d = P[0] - P[1];
+        const double length = d.norm();
+        gradient[1] = length > 0 ? Vec3d(d / length) : Vec3d(Vec3d::UnitY());
+        gradient[0] = -gradient[1];
+        return rest - length;
+    }
+};
+
+// The bonds of a node, over a run. New ones are looked for once a frame, where it begins.
+struct Bonds {
+    Rows<Bond> rows;
+    std::set<std::array<std::int64_t, 2>> parted;  // broken, and not yet apart: by id, the smaller first
+};
+
+class ClumpCoupling : public Coupling {
+public:
+    ClumpCoupling(std::shared_ptr<Bonds> bonds, double strength) : bonds_(std::move(bonds)), strength_(strength) {}
+
+    void resume(Substep& now) override { bonds_->rows.resume(now); }
+    void prepare(Substep& now) override { bonds_->rows.prepare(now); }
+    void project(Substep& now) override { bonds_->rows.project(now); }
+    void settle(Substep& now) override
+    {
+        bonds_->rows.settle(now);
+        bonds_->rows.break_above(strength_, now, [&](const Rows<Bond>::Ids& ids) { bonds_->parted.insert(ids); });
+    }
+    Residual close(Substep& now) override { return bonds_->rows.close(now); }
+
+private:
+    std::shared_ptr<Bonds> bonds_;
+    double strength_;  // N
+};
+
+class ClumpConstraint : public Constraint {
+public:
+    std::shared_ptr<Bonds> bonds;
+    std::optional<PerPoint<float>> radius;
+    double strength = 0;
+
+    std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
+    {
+        bonds->rows.follow(points, group);
+        bond(points);
+        return std::make_shared<ClumpCoupling>(bonds, strength);
+    }
+
+private:
+    // All pairs that touch and are not bonded yet. Of a bond that has broken nothing is left once its points are apart.
+    void bond(const PointSet& points) const
+    {
+        const std::size_t n = points.size();
+        const float none = 0;
+        Strided<float> given{&none, 0};
+        if (radius)
+            given = radius->read(points);
+        else if (const auto* pscale = points.find<float>("pscale"))
+            given = pscale->read();
+        const Strided<std::uint8_t> members = members_of(points, group);
+        // What rests on another touches it within rounding, and what solving leaves.
+        constexpr float touch = 1.02f;
+        std::vector<float> reach(n);
+        std::vector<Vec3d> at(n);
+        float largest = 0;
+        for (std::size_t i = 0; i < n; ++i) {
+            reach[i] = members[i] ? touch * given[i] : 0;
+            at[i] = points.P()[i].cast<double>();
+            largest = std::max(largest, reach[i]);
+        }
+        Pairs near;
+        ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, largest / 4, 8), near);
+
+        const Strided<std::int64_t> id = points.id().read();
+        std::set<std::array<std::int64_t, 2>> touching;
+        bool any = false;
+        for (std::size_t i = 0; i < n; ++i)
+            for (const std::uint32_t j : near.of(i)) {
+                const std::array<std::int64_t, 2> pair{std::min(id[i], id[j]), std::max(id[i], id[j])};
+                if (bonds->parted.count(pair)) {
+                    touching.insert(pair);
+                } else if (!bonds->rows.has(pair)) {
+                    bonds->rows.add(pair, {(at[i] - at[j]).norm()}, 0);
+                    any = true;
+                }
+            }
+        bonds->parted = std::move(touching);
+        if (any) bonds->rows.follow(points, group);
+    }
+};
+
+struct Clump {
+    std::optional<PerPoint<float>> radius;
+    double strength = 1;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Clump>("clump", "Sticks points together that touch, until they are torn apart.")
+            .kind(NodeKind::Dynamic)
+            .stage(Stage::ContactGrid)
+            .stage(Stage::Constraints)
+            .takes("pscale")
+            .takes("mass")
+            .param(&Clump::radius, "radius", Value(), at_least(0), "m",
+                   "of the points; the attribute pscale where they have it, else 0")
+            .param(&Clump::strength, "strength", 1.0, at_least(0), "N", "the pull that a bond bears");
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        auto constraint = std::make_shared<ClumpConstraint>();
+        constraint->node = now.node;
+        constraint->location = now.location;
+        constraint->group = group;
+        constraint->bonds = bonds_;
+        constraint->radius = radius;
+        constraint->strength = strength;
+        flow.dynamics.push_back(std::move(constraint));
+        return flow;
+    }
+
+private:
+    std::shared_ptr<Bonds> bonds_ = std::make_shared<Bonds>();
+};
+RAPID_NODE(Clump);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,66 @@
+// contact: points are spheres that keep each other out, rub and bounce (paper §5.1, §5.2).
+//
+// Pairs are found in sparse grids of cells, one for each cluster of radii: `max_difference` and `max_grids` trade the
+// time of many grids for that of wide cells (Algorithm 1; solver/contact_search.h).
+#include "runtime/graph/node.h"
+#include "runtime/solver/contacts.h"
+
+namespace rapid {
+namespace {
+
+class ContactConstraint : public Constraint {
+public:
+    std::shared_ptr<Contacts> contacts;
+    ContactOptions options;
+
+    std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
+    {
+        contacts->follow(points, options, group);
+        return contacts;
+    }
+};
+
+struct ContactNode {
+    std::optional<PerPoint<float>> radius;
+    PerPoint<float> bounce, friction;
+    std::optional<double> max_difference;
+    int max_grids = 8;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<ContactNode>("contact", "Points collide with each other, as spheres: sand, rubble, balls.")
+            .stage(Stage::ContactGrid)
+            .stage(Stage::Constraints)
+            .takes("pscale")
+            .takes("mass")
+            .param(&ContactNode::radius, "radius", Value(), at_least(0), "m",
+                   "of the points; the attribute pscale where they have it, else 0")
+            .param(&ContactNode::bounce, "bounce", 0.0, between(0, 1), "",
+                   "restitution; of two points that differ the larger")
+            .param(&ContactNode::friction, "friction", 0.0, at_least(0), "",
+                   "Coulomb's coefficient; of two points that differ the geometric mean")
+            .param(&ContactNode::max_difference, "max_difference", Value(), at_least(0), "m",
+                   "of the radii in one grid; where not given, a quarter of the largest")
+            .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "",
+                   "the most grids for different radii");
+    }
+
+    DynamicPtr dynamic(const Evaluation& now) const
+    {
+        auto constraint = std::make_shared<ContactConstraint>();
+        constraint->node = now.node;
+        constraint->location = now.location;
+        constraint->group = group;
+        constraint->contacts = contacts_;
+        constraint->options = {radius, bounce, friction, max_difference, max_grids};
+        return constraint;
+    }
+
+private:
+    std::shared_ptr<Contacts> contacts_ = std::make_shared<Contacts>();
+};
+RAPID_NODE(ContactNode);
+
+}  // namespace
+}  // namespace rapid

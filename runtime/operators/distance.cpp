@@ -1,0 +1,159 @@
+// distance: keeps pairs of points apart and together, as rods or as springs.
+//
+//   C = |P_i - P_j| - rest >= and <= 0        compliance in m/N: 0 for a rod, 1 / stiffness for a spring
+//
+// Chains and trees of pairs are solved directly (solver/forest.h), whatever their length.
+#include "runtime/graph/node.h"
+#include "runtime/solver/contact_search.h"
+#include "runtime/solver/rows.h"
+
+#include <fmt/format.h>
+
+namespace rapid {
+
+// Two points by their places, from 1, in the set that first enters the node.
+struct PointPair {
+    int i = 0, j = 0;
+};
+
+void read_value(const Param& param, const Value& value, PointPair& pair)
+{
+    std::vector<int> places;
+    read_value(param, value, places);
+    if (places.size() != 2)
+        throw Error(
+            fmt::format("{} has an entry of {} numbers; each must be two places, {{i, j}}", param.name, places.size()));
+    pair = {places[0], places[1]};
+}
+
+namespace {
+
+struct Tie {
+    static constexpr int points = 2;
+
+    double rest = 0;                                        // m
+    double most = std::numeric_limits<double>::infinity();  // m, at which it breaks
+
+    double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
+    {
+        const Vec3d d = P[0] - P[1];
+        const double length = d.norm();
+        // Of two points in one place any direction parts them.
+        gradient[0] = length > 0 ? Vec3d(d / length) : Vec3d(Vec3d::UnitY());
+        gradient[1] = -gradient[0];
+        return length - rest;
+    }
+    Eigen::Matrix3d curvature(const std::array<Vec3d, 2>& P) const
+    {
+        const Vec3d d = P[0] - P[1];
+        const double length = d.norm();
+        if (!(length > 0)) return Eigen::Matrix3d::Zero();
+        return (Eigen::Matrix3d::Identity() - d * d.transpose() / (length * length)) / length;
+    }
+    bool breaks(double residual) const { return residual > most; }
+};
+
+class TieConstraint : public Constraint {
+public:
+    explicit TieConstraint(std::shared_ptr<Rows<Tie>> rows) : rows_(std::move(rows)) {}
+
+    std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
+    {
+        rows_->follow(points, group);
+        return rows_->size() > 0 ? rows_ : nullptr;
+    }
+
+private:
+    std::shared_ptr<Rows<Tie>> rows_;
+};
+
+struct Distance {
+    std::vector<PointPair> pairs;
+    std::optional<double> within, rest, strain;
+    double compliance = 0;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Distance>("distance", "Keeps pairs of points at a distance: rods, ropes, springs.")
+            .kind(NodeKind::Dynamic)
+            .stage(Stage::Constraints)
+            .takes("mass")
+            .param(&Distance::pairs, "pairs", Value(), any_number(), "",
+                   "{{i, j}, ...}: by place, from 1, in the set that first enters the node")
+            .constant()
+            .param(&Distance::within, "within", Value(), above(0), "m",
+                   "in place of pairs: all that are as near in the set that first enters the node")
+            .constant()
+            .param(&Distance::rest, "rest", Value(), at_least(0), "m", "the distance; where not given, that at first")
+            .constant()
+            .param(&Distance::compliance, "compliance", 0.0, at_least(0), "m/N", "stretch by force; 0: rigid")
+            .constant()
+            .param(&Distance::strain, "strain", Value(), above(0), "",
+                   "breaks a pair that is longer than its distance by more than this part of it")
+            .constant();
+    }
+
+    void check() const
+    {
+        if (pairs.empty() == !within.has_value())
+            throw Error(pairs.empty() ? "it has neither pairs nor within; give one of them"
+                                      : "it has both pairs and within; give one of them");
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        if (!rows_ && !flow.points.empty()) rows_ = tie(flow.points);
+        if (!rows_) return flow;
+        auto constraint = std::make_shared<TieConstraint>(rows_);
+        constraint->node = now.node;
+        constraint->location = now.location;
+        constraint->group = group;
+        flow.dynamics.push_back(std::move(constraint));
+        return flow;
+    }
+
+private:
+    std::shared_ptr<Rows<Tie>> tie(const PointSet& points) const
+    {
+        auto rows = std::make_shared<Rows<Tie>>();
+        const Strided<Vec3f> P = points.P().read();
+        const auto add = [&](std::size_t i, std::size_t j) {
+            Tie made;
+            made.rest = rest ? *rest : (P[i].cast<double>() - P[j].cast<double>()).norm();
+            if (strain) made.most = *strain * made.rest;
+            rows->add({points.id()[i], points.id()[j]}, made, compliance);
+        };
+        const int n = static_cast<int>(points.size());
+        for (const PointPair& pair : pairs) {
+            for (const int k : {pair.i, pair.j})
+                if (k < 1 || k > n)
+                    throw Error(
+                        fmt::format("pairs names point {}; of the set that first enters the node there are "
+                                    "points 1 to {}",
+                                    k, n));
+            if (pair.i == pair.j) throw Error(fmt::format("pairs ties point {} to itself; give two points", pair.i));
+            add(static_cast<std::size_t>(pair.i - 1), static_cast<std::size_t>(pair.j - 1));
+        }
+        if (!within) return rows;
+
+        std::vector<Vec3d> at(points.size());
+        cast(std::span(P.data, P.stride ? points.size() : 0), at);
+        if (P.stride == 0) std::fill(at.begin(), at.end(), P[0].cast<double>());
+        const float reach = static_cast<float>(*within / 2);
+        const Strided<std::uint8_t> members = members_of(points, group);
+        Pairs near;
+        ContactSearch().find(at, {&reach, 0}, RadiusGrids({&reach, 0}, at.size(), 0, 1), near);
+        for (std::size_t i = 0; i < at.size(); ++i)
+            for (const std::uint32_t j : near.of(i))
+                if (members[i] && members[j]) add(i, j);
+        return rows;
+    }
+
+    std::shared_ptr<Rows<Tie>> rows_;  // null until points have entered
+};
+RAPID_NODE(Distance);
+
+}  // namespace
+}  // namespace rapid

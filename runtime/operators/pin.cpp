@@ -1,0 +1,184 @@
+// pin: holds points at a place, at the place that each has by an attribute, or on a body that moves.
+//
+// Rigid, a pinned point has its place and velocity given, and no other constraint moves it: what hangs from it hangs
+// from a wall. With a compliance it is three springs, one along each axis.
+#include "runtime/graph/node.h"
+#include "runtime/shapes/animated.h"
+#include "runtime/shapes/motion.h"
+#include "runtime/solver/rows.h"
+
+#include <map>
+
+namespace rapid {
+namespace {
+
+struct PinTarget {
+    static constexpr std::string_view param_type = "vec3, attribute or moving shape";
+
+    std::optional<PerPoint<Vec3f>> place;
+    MotionPtr motion;
+};
+
+void read_value(const Param& param, const Value& value, PinTarget& target)
+{
+    target = {};
+    if (value.is_nil()) return;
+    if (auto shape = value.object<AnimatedShape>())
+        target.motion = shape->motion();
+    else
+        read_value(param, value, target.place.emplace());
+}
+
+// Where points are held; by id, over a run.
+struct Pin {
+    Vec3d from = Vec3d::Zero(), to = Vec3d::Zero();  // at the frame's beginning and end, m
+    Vec3d rest = Vec3d::Zero();                      // on a body that moves: in its rest frame
+    Vec3d now = Vec3d::Zero();
+    bool taken = false;
+};
+
+struct Along {
+    static constexpr int points = 1;
+    const Pin* pin;
+    int axis;
+
+    double residual(const std::array<Vec3d, 1>& P, std::array<Vec3d, 1>& gradient) const
+    {
+        gradient[0] = Vec3d::Unit(axis);
+        return P[0][axis] - pin->now[axis];
+    }
+};
+
+struct Pins {
+    std::map<std::int64_t, Pin> by_id;  // a pin stays where it is in memory
+    Rows<Along> springs;                // of all, where they have a compliance
+};
+
+class PinCoupling : public Coupling {
+public:
+    PinCoupling(std::shared_ptr<Pins> pins, std::shared_ptr<const MotionTrack> track, bool rigid, double h)
+        : pins_(std::move(pins)), track_(std::move(track)), rigid_(rigid), h_(h)
+    {
+    }
+
+    void hold_at(std::size_t i, Pin& pin) { held_.push_back({i, &pin}); }
+
+    void hold(Substep& now) override
+    {
+        const double since = (now.index + 1) * now.dt;
+        aim(since);
+        if (!rigid_) return;
+        for (const auto& [i, pin] : held_) {
+            now.at[i] = {pin->now, 0};
+            now.v[i] = track_ ? track_->velocity_at(since).at(pin->now) : Vec3d((pin->to - pin->from) / h_);
+        }
+    }
+
+    void resume(Substep& now) override { pins_->springs.resume(now); }
+    void prepare(Substep& now) override { pins_->springs.prepare(now); }
+    void project(Substep& now) override { pins_->springs.project(now); }
+    void settle(Substep& now) override { pins_->springs.settle(now); }
+    Residual close(Substep& now) override { return pins_->springs.close(now); }
+
+private:
+    void aim(double since)
+    {
+        for (const auto& [i, pin] : held_)
+            pin->now = track_ ? track_->at(since) * pin->rest : Vec3d(pin->from + since / h_ * (pin->to - pin->from));
+    }
+
+    std::shared_ptr<Pins> pins_;
+    std::shared_ptr<const MotionTrack> track_;
+    bool rigid_;
+    double h_;  // s, the frame's length
+    std::vector<std::pair<std::size_t, Pin*>> held_;
+};
+
+class PinConstraint : public Constraint {
+public:
+    std::shared_ptr<Pins> pins;
+    std::optional<PerPoint<Vec3f>> place;
+    std::shared_ptr<const MotionTrack> track;
+    double compliance = 0;
+
+    std::shared_ptr<Coupling> begin(const PointSet& points, double h) const override
+    {
+        auto coupling = std::make_shared<PinCoupling>(pins, track, compliance == 0, h);
+        const Strided<std::uint8_t> members = members_of(points, group);
+        const Strided<Vec3f> P = points.P().read();
+        const Strided<std::int64_t> id = points.id().read();
+        const Strided<Vec3f> target = place ? place->read(points) : P;
+        bool any = false;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (!members[i]) continue;
+            any = true;
+            Pin& pin = pins->by_id[id[i]];
+            const Vec3d to = target[i].cast<double>();
+            if (!pin.taken) {
+                pin.from = pin.to = to;
+                if (track) pin.rest = track->at(0).inverse() * to;
+                for (int axis = 0; compliance > 0 && axis < 3; ++axis)
+                    pins->springs.add({id[i]}, {&pin, axis}, compliance);
+                pin.taken = true;
+            } else if (place) {
+                pin.from = pin.to;
+                pin.to = to;
+            }
+            coupling->hold_at(i, pin);
+        }
+        pins->springs.follow(points, group);
+        return any ? coupling : nullptr;
+    }
+};
+
+struct PinNode {
+    PinTarget target;
+    MotionPtr transform;
+    double compliance = 0;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<PinNode>("pin", "Holds points where they are, at a place, or on a body that moves.")
+            .kind(NodeKind::Dynamic)
+            .stage(Stage::Constraints)
+            .takes("mass")
+            .param(&PinNode::target, "target", Value(), any_number(), "m",
+                   "a place, rapid.attr \"NAME\" for each point's own, or a moving shape that carries them; where not "
+                   "given, where each point is first pinned")
+            .param(&PinNode::transform, "transform", Value(), any_number(), "",
+                   "carries the points: a motion, a function of the frame that returns one, or keys by frame")
+            .param(&PinNode::compliance, "compliance", 0.0, at_least(0), "m/N", "give by force; 0: rigid")
+            .constant();
+    }
+
+    void check() const
+    {
+        if (transform && (target.place || target.motion))
+            throw Error("it has both target and transform; give one of them");
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        auto pin = std::make_shared<PinConstraint>();
+        pin->node = now.node;
+        pin->location = now.location;
+        pin->group = group;
+        pin->pins = pins_;
+        pin->place = target.place;
+        pin->compliance = compliance;
+        if (const MotionPtr motion = transform ? transform : target.motion)
+            pin->track = std::make_shared<MotionTrack>(*motion, flow.simulation->clock(), now.frame.number - 1,
+                                                       now.frame.number);
+        flow.dynamics.push_back(std::move(pin));
+        return flow;
+    }
+
+private:
+    std::shared_ptr<Pins> pins_ = std::make_shared<Pins>();
+};
+RAPID_NODE(PinNode);
+
+}  // namespace
+}  // namespace rapid

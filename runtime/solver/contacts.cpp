@@ -1,0 +1,378 @@
+#include "runtime/solver/contacts.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "runtime/parallel.h"
+#include "runtime/solver/rows.h"
+
+namespace rapid {
+namespace {
+
+// How far points may move before pairs are looked for again, as a part of their radius: at least, at most, and between
+// these as far as they go in so many sub-steps. More pairs to look at, or more searches: a column that falls is
+// searched three or four times a frame of 16 sub-steps, a pile that rests once.
+constexpr double least_slack = 0.1, most_slack = 0.4, slack_substeps = 4;
+
+// Of an overlap, what is taken away in a sub-step, and what is left as it is, as a part of the sum of the radii:
+// contact that is just lost is gained anew in the next sub-step, and that is jitter.
+constexpr double recovery = 0.8, left_over = 1e-4;
+
+// Pairs that are as near as this, in parts of the sum of their radii, may come to touch in the projection.
+constexpr double near = 1.02;
+
+// A contact that closes by less than this many times what a point at rest is pressed by in a sub-step does not bounce.
+constexpr double resting = 2;
+
+// Rows a task: tens of microseconds.
+constexpr std::size_t worth_a_task = 2048;
+
+// Points in one place are parted somewhere, each pair elsewhere.
+Vec3d direction(std::uint32_t i, std::uint32_t j, const Vec3d& d)
+{
+    const double length = d.norm();
+    if (length > 0) return d / length;
+    const std::uint32_t mixed = (i * 0x9e3779b9u) ^ (j * 0x85ebca6bu);
+    return Vec3d(1.0 + (mixed & 255), 1.0 + (mixed >> 8 & 255), 1.0 + (mixed >> 16 & 255)).normalized();
+}
+
+}  // namespace
+
+void Contacts::follow(const PointSet& points, const ContactOptions& options, const std::string& group)
+{
+    const std::size_t n = points.size();
+    const float none = 0;
+    Strided<float> radius{&none, 0};
+    if (options.radius)
+        radius = options.radius->read(points);
+    else if (const auto* pscale = points.find<float>("pscale"))
+        radius = pscale->read();
+    const Strided<float> friction = options.friction.read(points), bounce = options.bounce.read(points);
+    const Strided<std::uint8_t> members = members_of(points, group);
+
+    std::vector<float> before = std::move(radius_);
+    radius_.resize(n);
+    friction_.resize(n);
+    bounce_.resize(n);
+    largest_ = 0, least_ = std::numeric_limits<float>::infinity();
+    bounces_ = false;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!(radius[i] >= 0) || !std::isfinite(radius[i]))
+            throw Error(fmt::format("point {}: its radius is {:g}; it must be finite and at least 0", points.id()[i],
+                                    radius[i]));
+        radius_[i] = members[i] ? radius[i] : 0;
+        friction_[i] = friction[i];
+        bounce_[i] = bounce[i];
+        bounces_ |= bounce[i] > 0;
+        largest_ = std::max(largest_, radius_[i]);
+        if (radius_[i] > 0) least_ = std::min(least_, radius_[i]);
+    }
+    if (radius_ != before)
+        grids_ = RadiusGrids({radius_.data(), 1}, n, options.max_difference.value_or(largest_ / 4), options.max_grids);
+    search_seconds_ = 0;
+    fresh_ = true;
+
+    // Pairs of points that are not there any more are forgotten; the others are known at their new places.
+    const Strided<std::int64_t> id = points.id().read();
+    if (ids_.size() == n && std::equal(ids_.begin(), ids_.end(), id.data)) return;
+    const PlacesById place(points.id());
+    std::vector<std::uint32_t> now(ids_.size());
+    for (std::size_t i = 0; i < ids_.size(); ++i) now[i] = place[ids_[i]];
+    ids_.assign(id.data, id.data + n);
+    std::vector<std::array<std::uint32_t, 3>> kept;  // i, j, slot
+    for (const std::uint32_t s : slot_) {
+        const std::uint32_t i = now[pairs_[s][0]], j = now[pairs_[s][1]];
+        if (!(impulses_[s].pressed > 0) || i == PlacesById::none || j == PlacesById::none) continue;
+        kept.push_back({std::min(i, j), std::max(i, j), s});
+        if (i > j) impulses_[s].rubbed = -impulses_[s].rubbed;
+    }
+    std::sort(kept.begin(), kept.end());
+    near_.begin.assign(n + 1, 0);
+    near_.other.clear();
+    slot_.clear();
+    for (const auto& [i, j, s] : kept) {
+        ++near_.begin[i + 1];
+        near_.other.push_back(j);
+        slot_.push_back(s);
+    }
+    std::partial_sum(near_.begin.begin(), near_.begin.end(), near_.begin.begin());
+}
+
+// Since pairs were looked for. What all points move by together brings nobody closer.
+bool Contacts::has_moved(const Substep& now) const
+{
+    Vec3d mean = Vec3d::Zero();
+    for (std::size_t i = 0; i < now.size(); ++i) mean += now.at[i].P - searched_at_[i];
+    mean /= static_cast<double>(now.size());
+    for (std::size_t i = 0; i < now.size(); ++i) {
+        const double most = double(reach_[i]) - double(radius_[i]);
+        if ((now.at[i].P - searched_at_[i] - mean).squaredNorm() > most * most && radius_[i] > 0) return true;
+    }
+    return false;
+}
+
+void Contacts::search(const Substep& now)
+{
+    const auto begun = std::chrono::steady_clock::now();
+    const std::size_t n = now.size();
+    Vec3d mean = Vec3d::Zero();
+    for (const Vec3d& v : now.v) mean += v / static_cast<double>(n);
+    searched_at_.resize(n);
+    reach_.resize(n);
+    for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            searched_at_[i] = now.at[i].P;
+            const double way = slack_substeps * now.dt * (now.v[i] - mean).norm();
+            reach_[i] = radius_[i] + std::clamp(static_cast<float>(way), static_cast<float>(least_slack) * radius_[i],
+                                                static_cast<float>(most_slack) * radius_[i]);
+        }
+    });
+    std::swap(near_, near_before_);
+    std::swap(slot_, slot_before_);
+    std::swap(impulses_, impulses_before_);
+    search_.find(searched_at_, {reach_.data(), 1}, grids_, near_);
+    schedule();
+    search_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+// Pairs go to the block of space that their points are in, or the least of the blocks along each axis: it then
+// touches points of that block and of those after it. Blocks of the same colour, two apart along some axis, share none.
+// Blocks that are 32 apart along an axis are taken as one.
+void Contacts::schedule()
+{
+    const std::size_t n = radius_.size(), m = near_.size();
+    // Wider than any pair is apart, and of some hundred pairs where all radii are alike.
+    const double edge = std::max(2.001 * (1 + most_slack) * largest_, 8.0 * least_);
+    block_.resize(n);
+    for (std::size_t i = 0; i < n; ++i)
+        for (int k = 0; k < 3; ++k)
+            block_[i][k] = static_cast<std::int32_t>(
+                std::clamp(std::floor(searched_at_[i][k] / edge), double(INT32_MIN / 2), double(INT32_MAX / 2)));
+
+    // In each block the first pairs of all points, then the second, and so on: pairs that follow each other then seldom
+    // share a point, and the processor need not wait for one to begin the next.
+    turn_.clear();
+    going_.resize(n);
+    std::iota(going_.begin(), going_.end(), 0u);
+    for (std::uint32_t rank = 0; !going_.empty(); ++rank) {
+        std::size_t left = 0;
+        for (const std::uint32_t i : going_) {
+            const std::uint32_t k = near_.begin[i] + rank;
+            if (k >= near_.begin[i + 1]) continue;
+            turn_.push_back({i, k});
+            going_[left++] = i;
+        }
+        going_.resize(left);
+    }
+
+    constexpr std::size_t blocks = 8 * 16 * 16 * 16;
+    owner_.resize(m);
+    std::vector<std::uint32_t> next(blocks + 1);
+    for (const auto& [i, k] : turn_) {
+        const auto &a = block_[i], &b = block_[near_.other[k]];
+        std::uint32_t colour = 0, place = 0;
+        for (int axis = 2; axis >= 0; --axis) {
+            const auto least = static_cast<std::uint32_t>(std::min(a[axis], b[axis]));
+            colour = colour << 1 | (least & 1);
+            place = place << 4 | (least >> 1 & 15);
+        }
+        owner_[k] = static_cast<std::uint16_t>(colour << 12 | place);
+        ++next[owner_[k] + 1];
+    }
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    batches_.clear();
+    colours_.clear();
+    for (std::size_t b = 0; b < blocks; ++b) {
+        if (b % 4096 == 0) colours_.push_back(static_cast<std::uint32_t>(batches_.size()));
+        if (next[b] < next[b + 1]) batches_.push_back(next[b]);
+    }
+    colours_.push_back(static_cast<std::uint32_t>(batches_.size()));
+    batches_.push_back(static_cast<std::uint32_t>(m));
+
+    pairs_.resize(m);
+    slot_.resize(m);
+    impulses_.assign(m, {});
+    rows_.resize(m);
+    touching_in_.assign(batches_.size() - 1, 0);
+    for (const auto& [i, k] : turn_) {
+        const std::uint32_t j = near_.other[k];
+        slot_[k] = next[owner_[k]]++;
+        pairs_[slot_[k]] = {i, j};
+        if (near_before_.begin.empty()) continue;
+        const auto old = near_before_.of(i);
+        const auto found = std::lower_bound(old.begin(), old.end(), j);
+        if (found == old.end() || *found != j) continue;
+        impulses_[slot_[k]] =
+            impulses_before_[slot_before_[near_before_.begin[i] + static_cast<std::size_t>(found - old.begin())]];
+    }
+}
+
+// Calls f(block) for all blocks: at the same time for those of a colour, or for all.
+template <class F>
+void Contacts::each_batch(bool in_colours, const F& f)
+{
+    const std::size_t colours = colours_.empty() ? 0 : colours_.size() - 1;
+    const auto run = [&](std::size_t from, std::size_t to) {
+        const std::size_t pairs = batches_[to] - batches_[from];
+        if (pairs < worth_a_task) {
+            for (std::size_t b = from; b < to; ++b) f(b);
+            return;
+        }
+        const std::size_t grain = std::max<std::size_t>(1, (to - from) * worth_a_task / (2 * pairs));
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(from, to, grain),
+                          [&](const tbb::blocked_range<std::size_t>& range) {
+                              for (std::size_t b = range.begin(); b < range.end(); ++b) f(b);
+                          });
+    };
+    if (!in_colours && colours > 0) return run(colours_.front(), colours_.back());
+    for (std::size_t k = 0; k < colours; ++k) {
+        const std::size_t c = backwards_ ? colours - 1 - k : k;
+        run(colours_[c], colours_[c + 1]);
+    }
+}
+
+// Forwards and backwards by turns: always in the same order, what a sweep leaves undone would add up on one side.
+template <class F>
+void Contacts::sweep(const F& f)
+{
+    each_batch(true, [&](std::size_t b) {
+        Row* rows = rows_.data() + batches_[b];
+        const std::size_t count = touching_in_[b];
+        if (backwards_)
+            for (std::size_t r = count; r-- > 0;) f(rows[r]);
+        else
+            for (std::size_t r = 0; r < count; ++r) f(rows[r]);
+    });
+}
+
+// The pairs that touch where their own ways end, or have pressed each other until now, become rows.
+void Contacts::touch(const Substep& now)
+{
+    each_batch(false, [&](std::size_t b) {
+        std::uint32_t count = 0;
+        for (std::uint32_t k = batches_[b]; k < batches_[b + 1]; ++k) {
+            const auto [i, j] = pairs_[k];
+            const Place &a = now.at[i], &c = now.at[j];
+            const Vec3d d = a.P - c.P;
+            const double reach = double(radius_[i]) + double(radius_[j]), d2 = d.squaredNorm();
+            const Impulse& before = impulses_[k];
+            if (d2 > near * near * reach * reach && before.pressed <= 0) continue;
+            if (!(a.w + c.w > 0) || !now.lives(i) || !now.lives(j)) continue;
+            const Vec3d apart = now.begin[i] - now.begin[j];
+            Row& row = rows_[batches_[b] + count++];
+            row.i = i;
+            row.j = j;
+            row.pair = k;
+            row.reach = static_cast<float>(reach);
+            row.allowed = std::min(0.0f, static_cast<float>(apart.norm() - reach));
+            row.n = direction(i, j, d);
+            row.pressed = row.held = 0.5f * before.pressed;
+            row.rubbed = before.rubbed - (row.n.dot(before.rubbed.cast<double>()) * row.n).cast<float>();
+            row.friction = std::sqrt(friction_[i] * friction_[j]);
+            row.bounce = std::max(bounce_[i], bounce_[j]);
+            row.approach = bounces_ ? static_cast<float>(direction(i, j, apart).dot(now.v[i] - now.v[j])) : 0;
+        }
+        touching_in_[b] = count;
+    });
+}
+
+void Contacts::prepare(Substep& now)
+{
+    if (per_dt_ > 0 && per_dt_ * now.dt != 1)
+        for (Impulse& impulse : impulses_) {  // forces stay
+            impulse.pressed *= static_cast<float>(now.dt * per_dt_);
+            impulse.rubbed *= static_cast<float>(now.dt * per_dt_);
+        }
+    per_dt_ = 1 / now.dt;
+    if (fresh_ || has_moved(now)) search(now);
+    fresh_ = false;
+    touch(now);
+    const double dt = now.dt;
+    sweep([&](Row& row) {
+        if (!(row.pressed > 0)) return;
+        Place &a = now.at[row.i], &b = now.at[row.j];
+        const Vec3d half = double(row.pressed) * row.n + 0.5 * row.rubbed.cast<double>();
+        a.P += a.w * dt * half;
+        b.P -= b.w * dt * half;
+        now.v[row.i] += a.w * half;
+        now.v[row.j] -= b.w * half;
+    });
+}
+
+void Contacts::project(Substep& now)
+{
+    const double dt = now.dt, per_dt = per_dt_;
+    sweep([&](Row& row) {
+        Place &a = now.at[row.i], &b = now.at[row.j];
+        const Vec3d& n = row.n;
+        const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
+        const double pressed = std::max(0.0, row.pressed - C * per_dt / (a.w + b.w));
+        const double change = dt * (pressed - row.pressed);
+        row.pressed = static_cast<float>(pressed);
+        a.P += a.w * change * n;
+        b.P -= b.w * change * n;
+    });
+}
+
+// Normal velocities first: none into the other, or what bounces; then friction, by all that presses. What friction does
+// it does throughout the sub-step, and so half of it to the places: else a point that is held would creep.
+void Contacts::settle(Substep& now)
+{
+    backwards_ = !backwards_;
+    const double dt = now.dt, at_rest = resting * now.pull * dt;
+    sweep([&](Row& row) {
+        Impulse& kept = impulses_[row.pair];
+        kept.pressed = 0;
+        Place &a = now.at[row.i], &b = now.at[row.j];
+        const Vec3d& n = row.n;
+        const double before = double(row.pressed) + double(row.held);
+        const double overlap = row.reach - n.dot(a.P - b.P);
+        if (!(before > 0) && !(overlap > 0)) return;
+        const double W = a.w + b.w;
+        Vec3d &va = now.v[row.i], &vb = now.v[row.j];
+
+        const double wanted = row.approach < -at_rest ? -double(row.bounce) * row.approach : 0;
+        const double p = std::max(0.0, before + (wanted - n.dot(va - vb)) / W);
+        va += a.w * (p - before) * n;
+        vb -= b.w * (p - before) * n;
+        kept.pressed = static_cast<float>(p);
+        if (row.friction > 0) {
+            const Vec3d relative = va - vb, had = row.rubbed.cast<double>();
+            Vec3d rubbed = had - (relative - n.dot(relative) * n) / W;
+            const double most = row.friction * p, size = rubbed.norm();
+            if (size > most) rubbed *= most / size;
+            const Vec3d change = rubbed - had;
+            va += a.w * change;
+            vb -= b.w * change;
+            a.P += 0.5 * dt * a.w * change;
+            b.P -= 0.5 * dt * b.w * change;
+            kept.rubbed = rubbed.cast<float>();
+        }
+        const double out = recovery * std::max(0.0, overlap - left_over * row.reach) / W;
+        a.P += a.w * out * n;
+        b.P -= b.w * out * n;
+    });
+}
+
+Residual Contacts::close(Substep& now)
+{
+    Residual result;
+    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
+        for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
+            const Row& row = rows_[r];
+            const double overlap = row.reach - (now.at[row.i].P - now.at[row.j].P).norm();
+            if (!(overlap > 0) && !(impulses_[row.pair].pressed > 0)) continue;
+            ++result.rows;
+            result.worst = std::max(result.worst, overlap);
+        }
+    touching_ = result.rows;
+    return result;
+}
+
+}  // namespace rapid

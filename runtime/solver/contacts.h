@@ -1,0 +1,109 @@
+// Contacts between points: spheres that keep each other out, rub and bounce (paper §5.1; Macklin et al. 2014).
+//
+//   C = |P_i - P_j| - (r_i + r_j) >= 0
+//
+// A row is satisfied by Gauss-Seidel from where the sub-step before has left it: its impulse, along the normal and by
+// friction, is applied at once, and what the sweeps do is only what has changed. A pile at rest is then solved before
+// it is iterated, by one sweep a sub-step, however high it is; without that it would sink by 2 N g dt².
+//
+// An overlap that was there at the sub-step's beginning is not to be made deeper; what there is of it is taken away
+// without giving speed. So points that are born in one another part, and do not fly.
+//
+// Rows are ordered by blocks of space, of which every eighth is solved at the same time: neighbours never are, so that
+// the result is the same bits on any number of threads, and momentum is kept.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "runtime/solver/constraint.h"
+#include "runtime/solver/contact_search.h"
+
+namespace rapid {
+
+struct ContactOptions {
+    std::optional<PerPoint<float>> radius;  // the attribute pscale where the points have it, else 0
+    PerPoint<float> bounce{0.0f};           // ε in [0, 1]; of two points the larger
+    PerPoint<float> friction{0.0f};         // μ >= 0; of two points the geometric mean
+    std::optional<double> max_difference;   // m; a quarter of the largest radius
+    int max_grids = 8;
+};
+
+class Contacts : public Coupling {
+public:
+    // Takes over what it knows of the points that it has met before, by id. Error: a radius that is negative or not
+    // finite, with the point's id; an attribute is missing.
+    void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
+
+    void prepare(Substep& now) override;
+    void project(Substep& now) override;
+    void settle(Substep& now) override;
+    Residual close(Substep& now) override;
+
+    // Of the frame that is over.
+    const RadiusGrids& grids() const { return grids_; }
+    double search_seconds() const { return search_seconds_; }
+    std::size_t touching() const { return touching_; }
+
+private:
+    using Pair = std::array<std::uint32_t, 2>;
+
+    // What a pair does to each other, as it is kept from sub-step to sub-step.
+    struct Impulse {
+        float pressed = 0;             // N s along the normal
+        Vec3f rubbed = Vec3f::Zero();  // N s across it
+    };
+
+    // A pair that touches in this sub-step.
+    struct Row {
+        std::uint32_t i, j, pair;
+        float reach;             // m: r_i + r_j
+        float allowed;           // m: the overlap at the beginning of the sub-step, at most 0
+        float pressed, held;     // N s along n: by places, by velocities
+        float friction, bounce;  // μ, ε
+        float approach;          // m/s, before the sub-step's contacts; below 0 where the points close in
+        Vec3d n;                 // from j to i, unit
+        Vec3f rubbed;            // N s, across n
+    };
+
+    template <class F>
+    void each_batch(bool in_colours, const F& f);
+    template <class F>
+    void sweep(const F& f);
+    void touch(const Substep& now);
+    void search(const Substep& now);
+    void schedule();
+    bool has_moved(const Substep& now) const;
+
+    std::vector<float> radius_, friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
+    float largest_ = 0, least_ = 0;
+    bool bounces_ = false, fresh_ = true, backwards_ = false;
+    RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};
+    ContactSearch search_;
+    std::vector<std::int64_t> ids_;
+    std::vector<Vec3d> searched_at_;
+    std::vector<float> reach_;  // m: how far each was looked from, its radius and what it may move
+
+    Pairs near_, near_before_;                       // of this search, and of that before
+    std::vector<std::uint32_t> slot_, slot_before_;  // of each of them, its place in the order of the sweeps:
+    std::vector<Pair> pairs_;                        // colour by colour, block by block
+    std::vector<Impulse> impulses_, impulses_before_;
+    std::vector<std::uint32_t> batches_;      // the beginning of each block's pairs, and the end
+    std::vector<std::uint32_t> colours_;      // the beginning of each colour's blocks, and the end
+    std::vector<Row> rows_;                   // of each block, at the place of its pairs
+    std::vector<std::uint32_t> touching_in_;  // of each block, how many
+
+    // Of a search.
+    std::vector<std::array<std::int32_t, 3>> block_;  // of each point
+    std::vector<Pair> turn_;                          // point and pair, in the order in which a block has them
+    std::vector<std::uint16_t> owner_;                // of each pair, its block
+    std::vector<std::uint32_t> going_;
+
+    double search_seconds_ = 0, per_dt_ = 0;
+    std::size_t touching_ = 0;
+};
+
+}  // namespace rapid

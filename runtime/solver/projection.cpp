@@ -1,0 +1,68 @@
+#include "runtime/solver/projection.h"
+
+#include <algorithm>
+
+#include "runtime/parallel.h"
+
+namespace rapid {
+
+Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
+                       std::size_t size)
+    : constraints_(constraints), free_(size)
+{
+    if (!obstacles.empty()) shapes_.emplace(obstacles, size);
+}
+
+template <class F>
+void Projection::each(const F& f)
+{
+    for (const LocalConstraint& local : constraints_) {
+        try {
+            f(*local.coupling);
+        } catch (Error& error) {
+            error.in_node(local.constraint->node).at(local.constraint->location);
+            throw;
+        }
+    }
+}
+
+void Projection::open(const Substep& now, const ShapeLoads* loads, const Column<std::int64_t>& ids)
+{
+    if (shapes_ && loads && now.dt > 0) shapes_->recall(*loads, ids, now.dt);
+}
+
+void Projection::advance(Substep& now)
+{
+    if (!(now.dt > 0)) return;
+    each([&](Coupling& coupling) { coupling.resume(now); });
+    each([&](Coupling& coupling) { coupling.hold(now); });
+    for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) free_[i] = now.at[i].P;
+    });
+    each([&](Coupling& coupling) { coupling.prepare(now); });
+    if (shapes_) shapes_->prepare(now, free_);
+    for (int k = 0; k < now.iterations; ++k) {
+        each([&](Coupling& coupling) { coupling.project(now); });
+        if (shapes_) shapes_->project(now);
+    }
+    for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) now.v[i] += (now.at[i].P - free_[i]) / now.dt;
+    });
+    each([&](Coupling& coupling) { coupling.settle(now); });
+    if (shapes_) shapes_->settle(now);
+}
+
+Residual Projection::close(Substep& now, ShapeLoads* loads, const Column<std::int64_t>& ids)
+{
+    Residual all;
+    if (!(now.dt > 0)) return all;
+    each([&](Coupling& coupling) {
+        const Residual residual = coupling.close(now);
+        all.worst = std::max(all.worst, residual.worst);
+        all.rows += residual.rows;
+    });
+    if (shapes_ && loads) shapes_->remember(*loads, ids, now.dt);
+    return all;
+}
+
+}  // namespace rapid

@@ -1,0 +1,191 @@
+#include "runtime/solver/shape_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/parallel.h"
+#include "runtime/solver/rows.h"
+
+namespace rapid {
+namespace {
+
+// How far a point may be pushed within a sub-step and still be kept out of a shape that it was not near: this part of
+// its radius, and its own way once more. One that is pushed farther is found inside at the next sub-step.
+constexpr double push = 0.5;
+
+}  // namespace
+
+ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size)
+    : obstacles_(obstacles),
+      size_(size),
+      rows_((size + chunk_size - 1) / chunk_size),
+      before_(rows_.size()),
+      clearance_(obstacles.size() * size, -1.0f)
+{
+}
+
+void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt)
+{
+    const PlacesById place(ids);
+    for (const ShapeLoads::Load& load : loads.loads) {
+        const std::uint32_t i = place[load.id];
+        if (i == PlacesById::none || load.obstacle >= obstacles_.size()) continue;
+        Row row{};
+        row.i = i;
+        row.obstacle = load.obstacle;
+        row.pressed = row.held = 0.5 * dt * load.normal;
+        row.rubbed = dt * load.tangent.cast<double>();
+        rows_[i / chunk_size].push_back(row);
+    }
+    for (Batch& rows : rows_)
+        std::sort(rows.begin(), rows.end(),
+                  [](const Row& a, const Row& b) { return std::pair(a.obstacle, a.i) < std::pair(b.obstacle, b.i); });
+}
+
+void ShapeContacts::remember(ShapeLoads& loads, const Column<std::int64_t>& ids, double dt) const
+{
+    loads.loads.clear();
+    for (const Batch& rows : rows_)
+        for (const Row& row : rows)
+            if (row.pressed + row.held > 0)
+                loads.loads.push_back({ids[row.i], row.obstacle, static_cast<float>((row.pressed + row.held) / dt),
+                                       (row.rubbed / dt).cast<float>()});
+}
+
+void ShapeContacts::prepare(Substep& now, std::span<const Vec3d> free)
+{
+    if (asked_at_.empty()) asked_at_.assign(free.begin(), free.end());
+    std::swap(rows_, before_);
+    for_each_chunk(size_, [&](std::size_t begin, std::size_t end) {
+        Batch& rows = rows_[begin / chunk_size];
+        find(rows, before_[begin / chunk_size], now, free, begin, end);
+        for (Row& row : rows) {
+            if (!(row.pressed > 0)) continue;
+            const double w = now.at[row.i].w;
+            const Vec3d half = 0.5 * ((row.pressed + row.held) * row.n + row.rubbed);
+            now.at[row.i].P += w * now.dt * half;
+            now.v[row.i] += w * half;
+        }
+    });
+}
+
+void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::span<const Vec3d> free, std::size_t begin,
+                         std::size_t end)
+{
+    thread_local std::vector<std::uint32_t> asked;
+    thread_local std::vector<Vec3d> P, gradient;
+    thread_local std::vector<double> phi, time;
+    const double since = (now.index + 1) * now.dt;  // s, since the frame began
+
+    rows.clear();
+    std::size_t old = 0;
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+        const Obstacle& obstacle = obstacles_[o];
+        if (obstacle.response == Response::Die) continue;
+        float* clearance = clearance_.data() + o * size_;
+        asked.clear();
+        P.clear();
+        const auto reach = [&](std::size_t i) { return push * obstacle.radius[i] + (free[i] - now.begin[i]).norm(); };
+        for (std::size_t i = begin; i < end; ++i) {
+            if (!(now.at[i].w > 0) || !obstacle.members[i] || !now.lives(i)) continue;
+            const double far = obstacle.radius[i] + reach(i);
+            if (((free[i] - obstacle.bounds.max()).array() > far).any()) continue;
+            if (((obstacle.bounds.min() - free[i]).array() > far).any()) continue;
+            if (!obstacle.moves && clearance[i] >= (free[i] - asked_at_[i]).norm() + reach(i)) continue;
+            asked.push_back(static_cast<std::uint32_t>(i));
+            P.push_back(free[i]);
+        }
+        if (asked.empty()) continue;
+        phi.resize(P.size());
+        gradient.resize(P.size());
+        time.assign(P.size(), since);
+        obstacle.shape->distance_at(P, time, phi, gradient);
+        for (std::size_t k = 0; k < asked.size(); ++k) {
+            const std::uint32_t i = asked[k];
+            const double slope = gradient[k].norm(), gap = phi[k] - obstacle.radius[i];
+            // Measured from where the point is now: what it was off asked_at_ is taken off.
+            clearance[i] = static_cast<float>(gap - (free[i] - asked_at_[i]).norm());
+            if (gap > reach(i) || !(slope > 0)) continue;
+            Row row{};
+            row.i = i;
+            row.obstacle = static_cast<std::uint32_t>(o);
+            row.n = gradient[k] / slope;
+            row.vc = obstacle.shape->velocity_at(P[k], since);
+            row.level = row.n.dot(P[k]) - std::max(0.0, gap);
+            row.friction = obstacle.response == Response::Stick ? std::numeric_limits<double>::max()
+                                                                : double(obstacle.friction[i]);
+            while (old < before.size() && std::pair(before[old].obstacle, before[old].i) < std::pair(row.obstacle, i))
+                ++old;
+            if (old < before.size() && before[old].obstacle == row.obstacle && before[old].i == i) {
+                row.pressed = row.held = 0.5 * (before[old].pressed + before[old].held);
+                row.rubbed = before[old].rubbed - row.n.dot(before[old].rubbed) * row.n;
+            }
+            rows.push_back(row);
+        }
+    }
+}
+
+void ShapeContacts::project(Substep& now)
+{
+    tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t c) {
+        for (Row& row : rows_[c]) {
+            Place& at = now.at[row.i];
+            const double C = row.n.dot(at.P) - row.level;
+            const double change = std::max(-row.pressed, -C / (at.w * now.dt));
+            row.pressed += change;
+            at.P += at.w * now.dt * change * row.n;
+        }
+    });
+}
+
+// The velocity that is left into the shape is taken off, and friction acts by all that presses. What friction does it
+// does throughout the sub-step, and so half of it to the place: else a point that is held would creep.
+void ShapeContacts::settle(Substep& now)
+{
+    tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t c) {
+        for (Row& row : rows_[c]) {
+            const double p = row.pressed + row.held;
+            row.held = 0;
+            row.pressed = p;
+            if (!(p > 0)) continue;
+            const double w = now.at[row.i].w;
+            Vec3d& v = now.v[row.i];
+            const double pressed = std::max(0.0, p - (v - row.vc).dot(row.n) / w);
+            v += w * (pressed - p) * row.n;
+            row.pressed = pressed;
+            if (row.friction == 0) continue;
+            const Vec3d relative = v - row.vc;
+            Vec3d rubbed = row.rubbed - (relative - relative.dot(row.n) * row.n) / w;
+            const double most = row.friction * pressed, size = rubbed.norm();
+            if (size > most) rubbed *= most / size;
+            const Vec3d change = w * (rubbed - row.rubbed);
+            v += change;
+            now.at[row.i].P += 0.5 * now.dt * change;
+            row.rubbed = rubbed;
+        }
+        put_out(rows_[c], now);
+    });
+}
+
+void ShapeContacts::put_out(Batch& rows, Substep& now) const
+{
+    thread_local std::vector<Vec3d> P, gradient;
+    thread_local std::vector<double> phi, time;
+    for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
+        const Obstacle& obstacle = obstacles_[rows[begin].obstacle];
+        P.clear();
+        for (; end < rows.size() && rows[end].obstacle == rows[begin].obstacle; ++end)
+            P.push_back(now.at[rows[end].i].P);
+        phi.resize(P.size());
+        gradient.resize(P.size());
+        time.assign(P.size(), (now.index + 1) * now.dt);
+        obstacle.shape->distance_at(P, time, phi, gradient);
+        for (std::size_t k = 0; k < P.size(); ++k) {
+            const double slope2 = gradient[k].squaredNorm(), depth = obstacle.radius[rows[begin + k].i] - phi[k];
+            if (depth > 0 && slope2 > 0) now.at[rows[begin + k].i].P += depth / slope2 * gradient[k];
+        }
+    }
+}
+
+}  // namespace rapid

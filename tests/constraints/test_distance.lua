@@ -1,0 +1,109 @@
+-- distance and pin, as scenes use them: pairs by place and by nearness, rest, breaking, what holds; and wrong input.
+local scene = require "testing.scene"
+
+local function points_of(result, frame)
+  return result[frame or #result]
+end
+
+describe("distance", function()
+  it("keeps named pairs at the distance that they had at first, and a pin holds one end", function()
+    local result = scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.3, -0.4, 0}, {0.6, -0.8, 0}} } }
+  :gravity {} :distance { pairs = {{1, 2}, {2, 3}} }
+  :group { name = "top", where = function(p) return p.id == 0 end }
+  :pin { group = "top" } :solve { substeps = 8 }]], { frames = {1, 48} })
+    for f = 2, 48 do
+      local p = points_of(result, f)
+      assert.near({0, 0, 0}, p[1].P, 1e-6)
+      assert.near(0.5, (p[1].P - p[2].P):length(), 1e-4)
+      assert.near(0.5, (p[2].P - p[3].P):length(), 1e-4)
+    end
+  end)
+
+  it("ties all that are near at first, to the distance that is asked for", function()
+    local p = points_of(scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {3, 0, 0}} } }
+  :distance { within = 1.5, rest = 0.5 } :solve { iterations = 4 }]], { frames = {1, 4} }), 4)
+    assert.near(0.5, (p[1].P - p[2].P):length(), 1e-6)
+    assert.near({3, 0, 0}, p[3].P, 0)
+  end)
+
+  it("breaks what is stretched by more than its strain, and for good", function()
+    -- A weight on a spring: drawn out by 2 compliance m g at the lowest point of its swing.
+    local stretched = 2 * 0.01 * 9.81
+    local function lowest(strain)
+      local least = 0
+      local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0, -1, 0}} } }
+  :gravity {} :distance { pairs = {{1, 2}}, compliance = 0.01, strain = %g }
+  :group { name = "top", where = function(p) return p.id == 0 end } :pin { group = "top" }
+  :solve { substeps = 20 }]]):format(strain), { frames = {1, 48} })
+      for f = 1, 48 do least = math.min(least, result[f][2].P.y) end
+      return least
+    end
+    assert.near(-1 - stretched, lowest(1.05 * stretched), 0.01)
+    assert.truthy(lowest(0.5 * stretched) < -10)
+  end)
+
+  it("follows its points by id when others die", function()
+    local p = points_of(scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{9, 9, 9}, {0, 0, 0}, {1, 0, 0}} } }
+  :distance { pairs = {{2, 3}} } :delete { where = function(p, frame) return p.id == 0 and frame.number == 5 end }
+  :action("pull", function(p) if p.id == 2 then p.v = p.v + vec3(1, 0, 0) end end)
+  :solve {}]], { frames = {1, 24} }), 24)
+    assert.equal(2, #p)
+    assert.near(1, (p[1].P - p[2].P):length(), 1e-4)
+  end)
+
+  it("says what is wrong with its pairs", function()
+    local function wrong(arguments)
+      return scene.error(("return rapid.create { points = two } :distance { %s } :solve {}"):format(arguments))
+    end
+    assert.matches("it has neither pairs nor within; give one of them", wrong "", 1, true)
+    assert.matches("it has both pairs and within; give one of them", wrong "pairs = {{1, 2}}, within = 1", 1, true)
+    assert.matches("pairs names point 3; of the set that first enters the node there are points 1 to 2",
+      wrong "pairs = {{1, 3}}", 1, true)
+    assert.matches("pairs ties point 2 to itself; give two points", wrong "pairs = {{2, 2}}", 1, true)
+    assert.matches("pairs has an entry of 3 numbers; each must be two places, {i, j}", wrong "pairs = {{1, 2, 1}}", 1,
+      true)
+  end)
+end)
+
+describe("pin", function()
+  it("takes a point along a motion, with its velocity", function()
+    local result = scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}} } }
+  :gravity {}
+  :pin { transform = function(frame) return rapid.rotate({0, 1, 0}, 15 * (frame.number - 1)) end }
+  :solve { substeps = 4 }]], { frames = {1, 13} })
+    local angle = math.rad(15 * 12)
+    assert.near({math.cos(angle), 0, -math.sin(angle)}, result[13][1].P, 1e-5)
+    local speed = math.rad(15) * 24
+    assert.near({-speed * math.sin(angle), 0, -speed * math.cos(angle)}, result[13][1].v, 1e-3)
+  end)
+
+  it("is drawn to a place by an attribute", function()
+    local p = points_of(scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}, {2, 0, 0}},
+    home = {{5, 5, 5}, {6, 6, 6}} } } :gravity {} :pin { target = rapid.attr "home" } :solve {}]],
+      { frames = {1, 3} }), 3)
+    assert.near({5, 5, 5}, p[1].P, 0)
+    assert.near({6, 6, 6}, p[2].P, 0)
+    assert.near({0, 0, 0}, p[2].v, 0)
+  end)
+
+  it("gives by its compliance: a weight of m g hangs compliance m g below", function()
+    local p = points_of(scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, mass = {2} } }
+  :gravity {} :drag { linear = 20 } :pin { compliance = 1e-3 } :solve { substeps = 2 }]], { frames = {1, 96} }), 96)
+    assert.near({0, -2 * 9.81 * 1e-3, 0}, p[1].P, 1e-6)
+  end)
+end)
+
+describe("a tolerance", function()
+  it("is refused where points are coupled", function()
+    local errors = scene.error "return rapid.create { points = two } :contact {} :solve { tolerance = 1e-3 }"
+    assert.matches("a tolerance is for points that do not depend on one another, and there are constraints; give " ..
+      "substeps instead", errors, 1, true)
+  end)
+end)

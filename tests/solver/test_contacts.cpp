@@ -1,0 +1,310 @@
+// Contacts between points: the closed forms of impacts, stacks that rest, overlaps that part without speed, extremes;
+// the search against all pairs.
+#include "runtime/solver/contacts.h"
+
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <set>
+
+#include "runtime/solver/shape_contacts.h"
+#include "tests/solver/scene.h"
+
+namespace rapid {
+namespace {
+
+using test::close_to;
+using test::points;
+using test::Scene;
+
+constexpr double g = 9.81;
+
+class Spheres : public Constraint {
+public:
+    ContactOptions options;
+    std::shared_ptr<Contacts> contacts = std::make_shared<Contacts>();
+
+    std::shared_ptr<Coupling> begin(const PointSet& set, double) const override
+    {
+        contacts->follow(set, options, group);
+        return contacts;
+    }
+};
+
+// A scene whose points touch each other.
+class Granular : public Scene {
+public:
+    ShapeLoads loads;
+    std::shared_ptr<Spheres> spheres = std::make_shared<Spheres>();
+
+    explicit Granular(PointSet set, float bounce = 0, float friction = 0) : Scene(std::move(set))
+    {
+        options.loads = &loads;
+        spheres->node = "contact1";
+        spheres->options.bounce = bounce;
+        spheres->options.friction = friction;
+        dynamics.push_back(spheres);
+    }
+
+    Vec3d momentum() const
+    {
+        Vec3d sum = Vec3d::Zero();
+        const auto* mass = points.find<float>("mass");
+        for (std::size_t i = 0; i < points.size(); ++i) sum += (mass ? (*mass)[i] : 1.0) * v(i);
+        return sum;
+    }
+    double deepest() const  // overlap of two points, m
+    {
+        const auto& r = points.column<float>("pscale");
+        double worst = 0;
+        for (std::size_t i = 0; i < points.size(); ++i)
+            for (std::size_t j = 0; j < i; ++j)
+                worst = std::max(worst, double(r[i]) + double(r[j]) - (P(i) - P(j)).norm());
+        return worst;
+    }
+};
+
+std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
+
+TEST_CASE("a head-on impact keeps the momentum, and bounces back by its restitution", "[contacts]")
+{
+    const float bounce = GENERATE(0.0f, 0.5f, 1.0f);
+    const int substeps = GENERATE(1, 4, 9);
+    CAPTURE(bounce, substeps);
+    Granular scene(points({{-1, 0, 0}, {1, 0, 0}})
+                       .v({{4, 0, 0}, {-1, 0, 0}})
+                       .set<float>("mass", {1, 3})
+                       .set<float>("pscale", alike(2, 0.2f)),
+                   bounce);
+    scene.substeps(substeps).run(24);
+
+    // v = (4 - 3)/4 of both together, and -+ bounce (4 + 1) shared by the masses of the other.
+    CHECK_THAT(scene.v(0), close_to(Vec3d(0.25 - bounce * 5 * 0.75, 0, 0), 2e-6));
+    CHECK_THAT(scene.v(1), close_to(Vec3d(0.25 + bounce * 5 * 0.25, 0, 0), 2e-6));
+    CHECK(scene.deepest() < 1e-4);
+}
+
+TEST_CASE("a row of points of unequal masses that collide keeps its momentum", "[contacts]")
+{
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> in(-1, 1);
+    std::vector<Vec3f> at, v;
+    std::vector<float> mass;
+    double size = 0;
+    for (int k = 0; k < 40; ++k) {
+        at.emplace_back(0.11f * static_cast<float>(k), 0.02f * in(random), 0.02f * in(random));
+        v.emplace_back(in(random), in(random), in(random));
+        mass.push_back(std::pow(10.0f, 2 * in(random)));
+        size += mass.back() * v.back().norm();
+    }
+    Granular scene(points(at).v(v).set<float>("mass", mass).set<float>("pscale", alike(40, 0.05f)), 0.5f, 0.4f);
+    const Vec3d before = scene.momentum();
+    scene.substeps(5).run(24);
+    CHECK((scene.momentum() - before).norm() < 1e-5 * size);
+}
+
+TEST_CASE("a stack of points rests on the ground: no overlap, no creep, no jitter", "[contacts]")
+{
+    const std::size_t n = 10;
+    const int substeps = GENERATE(8, 16);
+    CAPTURE(substeps);
+    const float r = 0.02f;
+    std::vector<Vec3f> at;
+    for (std::size_t k = 0; k < n; ++k) at.emplace_back(0.0f, r * static_cast<float>(2 * k + 1), 0.0f);
+    Granular scene(points(at).set<float>("pscale", alike(n, r)), 0, 0.5f);
+    scene.gravity().floor(0, 0.5f).substeps(substeps).run(200);
+    const std::vector<Vec3f> settled(scene.points.P().read().data, scene.points.P().read().data + n);
+    scene.run(800);
+    for (std::size_t k = 0; k < n; ++k) {
+        CHECK(scene.P(k).y() == Approx(r * static_cast<double>(2 * k + 1)).margin(0.01 * r * static_cast<double>(n)));
+        CHECK((scene.P(k) - settled[k].cast<double>()).norm() < 1e-3 * r);
+        CHECK(scene.v(k).norm() < 1e-3);
+    }
+    CHECK(scene.deepest() < 0.01 * r);
+    CHECK(scene.P(0).y() >= r);
+}
+
+TEST_CASE("points that are born in each other part, and fly nowhere", "[contacts]")
+{
+    Granular scene(points({{0, 0, 0}, {0.01f, 0, 0}, {0.05f, 0.02f, 0}}).set<float>("pscale", alike(3, 0.1f)));
+    scene.substeps(4).run(12);
+    CHECK(scene.deepest() < 1e-3);
+    for (std::size_t i = 0; i < 3; ++i) CHECK(scene.v(i).norm() < 1e-4);
+    CHECK(scene.momentum().norm() < 1e-6);
+}
+
+TEST_CASE("points that are all in one place part", "[contacts][extreme]")
+{
+    Granular scene(points(std::vector<Vec3f>(20, Vec3f(1, 2, 3))).set<float>("pscale", alike(20, 0.1f)));
+    scene.substeps(8).run(96);
+    CHECK(scene.deepest() < 0.01);
+    for (std::size_t i = 0; i < 20; ++i) CHECK(scene.v(i).norm() < 0.01);
+}
+
+TEST_CASE("a point that slides over others is slowed by friction, v = v0 - friction g t", "[contacts]")
+{
+    const float infinite = std::numeric_limits<float>::infinity();
+    Granular scene(points({{0, 1, 0}, {0, -999, 0}})
+                       .v({{2, 0, 0}, {0, 0, 0}})
+                       .set<float>("mass", {1, infinite})
+                       .set<float>("pscale", {1, 999}),
+                   0, 0.1f);
+    scene.gravity().substeps(8).run(12);
+    // Nearly flat: a sphere of 999 m. Its curve takes off v²/R of the weight.
+    CHECK(scene.v(0).x() == Approx(2 - 0.1 * g * 0.5).epsilon(0.01));
+    CHECK(scene.P(0).y() == Approx(1 - scene.P(0).x() * scene.P(0).x() / 2000).margin(1e-3));
+}
+
+// A heap of n points of several sizes in a box.
+Granular heap(std::size_t n, float smallest, float largest, unsigned seed = 1)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> in(0, 1);
+    std::vector<Vec3f> at;
+    std::vector<float> radius, mass;
+    for (std::size_t k = 0; k < n; ++k) {
+        radius.push_back(smallest * std::pow(largest / smallest, in(random)));
+        mass.push_back(1e3f * radius.back() * radius.back() * radius.back());
+        at.emplace_back(in(random), largest + 2 * in(random), in(random));
+    }
+    Granular scene(points(at).set<float>("pscale", radius).set<float>("mass", mass), 0, 0.3f);
+    scene.gravity().floor(0, 0.3f).substeps(8);
+    scene.collide(make_plane({1, 0, 0}, 0), 0.0f).collide(make_plane({-1, 0, 0}, -1), 0.0f);
+    scene.collide(make_plane({0, 0, 1}, 0), 0.0f).collide(make_plane({0, 0, -1}, -1), 0.0f);
+    return scene;
+}
+
+bool same_bits(const PointSet& a, const PointSet& b)
+{
+    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
+           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
+}
+
+TEST_CASE("a heap comes to the same bits on any number of threads, and with any grids", "[contacts][threads]")
+{
+    const auto run = [](int threads, int max_grids) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                        static_cast<std::size_t>(threads));
+        Granular scene = heap(6000, 0.01f, 0.04f);
+        scene.spheres->options.max_grids = max_grids;
+        scene.spheres->options.max_difference = 0.004;
+        scene.run(5);
+        return scene.points;
+    };
+    const PointSet one = run(1, 8);
+    CHECK(same_bits(one, run(4, 8)));
+    CHECK(same_bits(one, run(2, 1)));
+}
+
+TEST_CASE("radii of 1 : 1,000 and masses of 1 : 10^6 in one heap stay finite, and apart", "[contacts][extreme]")
+{
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> in(0, 1);
+    std::vector<Vec3f> at{{0.5f, 1.6f, 0.5f}};
+    std::vector<float> radius{0.4f}, mass{1e3f};
+    for (int k = 0; k < 400; ++k) {
+        at.emplace_back(0.3f + 0.4f * in(random), 0.02f + 0.8f * in(random), 0.3f + 0.4f * in(random));
+        radius.push_back(k % 2 ? 4e-4f : 0.02f);
+        mass.push_back(1e-3f);
+    }
+    Granular scene(points(at).set<float>("pscale", radius).set<float>("mass", mass), 0, 0.3f);
+    scene.gravity().floor(0, 0.3f).substeps(16).run(48);
+    for (std::size_t i = 0; i < scene.points.size(); ++i) {
+        CHECK(scene.v(i).norm() < 10);  // a fall from 1.6 m is of 5.6 m/s
+        CHECK(scene.P(i).y() >= radius[i] * 0.999);
+    }
+}
+
+TEST_CASE("a heap comes to rest, and its energy does not grow", "[contacts]")
+{
+    Granular scene = heap(400, 0.04f, 0.05f);
+    const auto energy = [&] {
+        double sum = 0;
+        const auto& mass = scene.points.column<float>("mass");
+        for (std::size_t i = 0; i < scene.points.size(); ++i)
+            sum += double(mass[i]) * (0.5 * scene.v(i).squaredNorm() + g * scene.P(i).y());
+        return sum;
+    };
+    scene.run(24);  // what overlapped at birth has parted
+    double before = energy();
+    for (int second = 0; second < 4; ++second) {
+        scene.run(24);
+        const double now = energy();
+        CHECK(now <= before * (1 + 1e-4));
+        before = now;
+    }
+    double fastest = 0;
+    for (std::size_t i = 0; i < scene.points.size(); ++i) fastest = std::max(fastest, scene.v(i).norm());
+    CHECK(fastest < 0.1);
+    CHECK(scene.deepest() < 0.05 * 0.04);
+}
+
+TEST_CASE("the search finds each pair that touches once, whatever the radii, grids and places", "[contacts]")
+{
+    const auto [smallest, scatter, spread] =
+        GENERATE(table<double, double, double>({{0.05, 1, 0}, {0.002, 1, 0}, {0.05, 1, 1e7}, {0.05, 0, 0}}));
+    const int max_grids = GENERATE(1, 2, 8);
+    CAPTURE(smallest, scatter, spread, max_grids);
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> in(0, 1);
+    std::vector<Vec3d> at;
+    std::vector<float> radius;
+    for (int k = 0; k < 500; ++k) {
+        at.emplace_back(scatter * in(random), scatter * in(random), scatter * in(random));
+        radius.push_back(static_cast<float>(smallest * std::pow(0.1 / smallest, in(random))));
+        if (k % 17 == 0) radius.back() = 0;
+        if (k % 50 == 1) at.back() *= spread;  // far from all others, or where they are
+    }
+    const RadiusGrids grids({radius.data(), 1}, radius.size(), 0.02, max_grids);
+    Pairs pairs;
+    ContactSearch().find(at, {radius.data(), 1}, grids, pairs);
+
+    std::set<std::pair<std::uint32_t, std::uint32_t>> found, touching;
+    for (std::uint32_t i = 0; i < at.size(); ++i)
+        for (const std::uint32_t j : pairs.of(i)) CHECK(found.insert({i, j}).second);
+    for (std::uint32_t i = 0; i < at.size(); ++i)
+        for (std::uint32_t j = i + 1; j < at.size(); ++j)
+            if (radius[i] > 0 && radius[j] > 0 && (at[i] - at[j]).norm() < double(radius[i]) + double(radius[j]))
+                touching.insert({i, j});
+    CHECK(found == touching);
+    CHECK(grids.grids.size() <= static_cast<std::size_t>(max_grids));
+}
+
+TEST_CASE("grids are those of Algorithm 1, and their quality that of equation 5", "[contacts]")
+{
+    const std::vector<float> radius = {0.1f, 1, 0.95f, 0.45f, 0.5f, 0.1f};
+    const RadiusGrids grids({radius.data(), 1}, radius.size(), 0.25, 8);
+    REQUIRE(grids.grids.size() == 3);
+    CHECK(grids.grids[0].radius == 1);
+    CHECK(grids.grids[1].radius == 0.5);
+    CHECK(grids.grids[2].radius == 0.1f);
+    for (const auto& grid : grids.grids) CHECK(grid.points == 2);
+    const double cells = 2 * (8 + 1 + std::pow(2 * double(0.1f), 3));
+    double spheres = 0, cut = 0;
+    for (const double r : radius) {
+        spheres += 4.0 / 3 * EIGEN_PI * r * r * r;
+        cut += 8 * r * r * r;
+    }
+    CHECK(grids.error == Approx(cells - spheres));
+    CHECK(grids.excess == Approx((cells - cut) / cut));
+
+    const float same = 0.5f;
+    CHECK(RadiusGrids({&same, 0}, 10, 0, 8).excess == 0);
+}
+
+TEST_CASE("a radius that is no length is refused, with the point", "[contacts]")
+{
+    Granular scene(points({{0, 0, 0}, {1, 0, 0}}).set<float>("pscale", {1, -1}));
+    std::string text;
+    try {
+        scene.run(1);
+    } catch (const Error& error) {
+        text = error.what();
+    }
+    CHECK(text == "node \"contact1\": point 1: its radius is -1; it must be finite and at least 0");
+}
+
+}  // namespace
+}  // namespace rapid

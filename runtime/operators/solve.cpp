@@ -9,6 +9,7 @@
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set.h"
 #include "runtime/shapes/moving.h"
+#include "runtime/solver/error_control.h"
 #include "runtime/solver/interaction.h"
 #include "runtime/solver/shadow.h"
 #include "runtime/solver/shape_contacts.h"

@@ -838,7 +838,7 @@ function Node:merge(...) end
 
 ---@class rapid.params.pin
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field target? any  a place, rapid.attr "NAME" for each point's own, or a moving shape that carries them; where not given, where each point is first pinned [vec3, attribute or moving shape, m]
+---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a moving shape that carries them; where not given, where each point is first pinned [vec3, attribute or moving shape, m]
 ---@field transform? rapid.Motion|fun(frame: rapid.Frame): rapid.Motion  carries the points: a motion, a function of the frame that returns one, or keys by frame [motion]
 ---@field compliance? number  give by force; 0: rigid [number, m/N, at least 0, default 0]
 ---@field name? string  what the node is called in messages [string]

@@ -305,6 +305,7 @@ std::string lua_type(const Param& param)
         {"number", "number"},
         {"false or number", "number|boolean"},
         {"vec3, attribute or shape", "rapid.Place|rapid.Attribute|rapid.Shape"},
+        {"vec3, attribute or moving shape", "rapid.Place|rapid.Attribute|rapid.Shape"},
         {"number or {min, max}", "number|number[]"},
         {"number, {min, max} or rapid.attr", "number|number[]|rapid.Attribute"},
         {"numbers by frame", "table<integer, number>"},

@@ -3,10 +3,12 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <new>
 
 #include "bindings/commands/command.h"
+#include "runtime/graph/plugin.h"
 
 namespace rapid {
 namespace {
@@ -100,6 +102,11 @@ int run(Arguments arguments)
                },
                "threads to use; 0, the default, is all that the machine has")
             ->type_name("N");
+        sub->add_option_function<std::vector<std::string>>(
+               "--plugin", [&](const std::vector<std::string>& files) { common.plugins = files; },
+               "loads nodes from a library built against Rapid; so does RAPID_PLUGIN_PATH, a list of files and folders")
+            ->type_name("FILE")
+            ->allow_extra_args(false);
         sub->add_flag("--verbose", common.verbose, "with the script's call stack, where an error has one");
         sub->allow_extras();
     }
@@ -135,6 +142,8 @@ int run(Arguments arguments)
     for (const auto& command : commands) {
         if (!app.got_subcommand(command->name())) continue;
         try {
+            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
+            for (const std::string& file : common.plugins) load_plugin(file);
             return finish(command->run(common));
         } catch (const Error& error) {
             print_error(error, common.verbose);

@@ -23,7 +23,7 @@ target_compile_options(rapid_public INTERFACE -ffp-contract=off -fno-math-errno 
 target_link_libraries(rapid_public INTERFACE Eigen3::Eigen TBB::tbb fmt::fmt Random123::Random123 Threads::Threads)
 
 add_library(rapid_private INTERFACE)
-target_include_directories(rapid_private INTERFACE ${PROJECT_SOURCE_DIR})
+target_include_directories(rapid_private INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/include)
 target_link_libraries(rapid_private INTERFACE rapid_public)
 target_compile_definitions(rapid_private INTERFACE $<$<NOT:$<CONFIG:Release>>:RAPID_ASSERTIONS>)
 target_compile_options(rapid_private INTERFACE

@@ -13,6 +13,8 @@ foreach(header ${own})
   list(APPEND excluded PATTERN ${header} EXCLUDE)
 endforeach()
 install(DIRECTORY runtime DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid FILES_MATCHING PATTERN "*.h" ${excluded})
+install(FILES ${PROJECT_BINARY_DIR}/include/runtime/graph/abi.h
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid/runtime/graph)
 install(DIRECTORY lua graphs DESTINATION ${CMAKE_INSTALL_DATADIR}/rapid)
 
 install(EXPORT rapidTargets NAMESPACE rapid:: DESTINATION ${package_dir})

@@ -21,6 +21,7 @@ enum ExitStatus : int { status_done = 0, status_failed = 1, status_refused = 2 }
 struct CommonOptions {
     int threads = 0;  // 0: all that the machine has
     bool verbose = false;
+    std::vector<std::string> plugins;  // files
 };
 
 class Command {

@@ -34,6 +34,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -43,6 +44,7 @@
 #include "runtime/graph/adopted_ids.h"
 #include "runtime/graph/param.h"
 #include "runtime/random.h"
+#include "runtime/solver/constraint.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
@@ -80,7 +82,10 @@ struct FrameFigures {
     std::uint64_t trapped = 0;           // points deep in a shape, with no way out known
     int substeps = 0;
     double penetration_max = 0;
-    double constraint_residual_max = 0;  // m
+    double constraint_residual_max = 0;   // m
+    std::uint64_t constraint_rows = 0;    // that were active at the end of the frame
+    std::uint64_t loose_constraints = 0;  // of them, those that were off by more than a tenth of their size
+    std::optional<Residual::Search> contact_search;
     std::vector<double> errors;  // estimated, of the positions of a sample of the points, m
     double script_seconds = 0, solve_seconds = 0;
 };

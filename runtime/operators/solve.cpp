@@ -93,6 +93,9 @@ struct Solve {
         now.figures.died += result.died;
         now.figures.contact_limit += result.contact_limit;
         now.figures.trapped += result.trapped;
+        now.figures.constraint_rows += result.residual.rows;
+        now.figures.loose_constraints += result.residual.loose;
+        if (result.residual.search) now.figures.contact_search = result.residual.search;
         now.figures.constraint_residual_max = std::max(now.figures.constraint_residual_max, result.residual.worst);
         now.figures.penetration_max = std::max(now.figures.penetration_max, result.penetration_max);
 
@@ -100,6 +103,11 @@ struct Solve {
             now.warnings.push_back(
                 fmt::format("node \"{}\": points reached the limit of contacts in a step, and the rest of it was "
                             "dropped; take more substeps",
+                            now.node));
+        if (result.residual.loose > 0)
+            now.warnings.push_back(
+                fmt::format("node \"{}\": constraints are off by more than a tenth of their size; take more substeps, "
+                            "or more iterations",
                             now.node));
         if (result.trapped > 0)
             now.warnings.push_back(

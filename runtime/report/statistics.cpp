@@ -1,6 +1,7 @@
 #include "runtime/report/statistics.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -43,6 +44,9 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.error = error_of(result.figures.errors);
     frame.substeps = result.figures.substeps;
     frame.penetration_max = result.figures.penetration_max;
+    frame.constraint_rows = result.figures.constraint_rows;
+    frame.loose_constraints = result.figures.loose_constraints;
+    frame.contact_search = result.figures.contact_search;
     frame.constraint_residual_max = result.figures.constraint_residual_max;
     frame.seconds.script = result.figures.script_seconds;
     frame.seconds.solve = result.figures.solve_seconds;
@@ -83,6 +87,13 @@ ordered_json to_json(const FrameStatistics& frame)
             {"position_p50", frame.error->p50}, {"position_p95", frame.error->p95}, {"position_max", frame.error->max}};
     json["penetration_max"] = frame.penetration_max;
     json["constraint_residual_max"] = frame.constraint_residual_max;
+    if (frame.constraint_rows > 0) json["constraint_rows"] = frame.constraint_rows;
+    if (frame.constraint_rows > 0) json["loose_constraints"] = frame.loose_constraints;
+    if (frame.contact_search)
+        json["contact_grids"] = {{"points", frame.contact_search->grids},
+                                 {"error", frame.contact_search->error},
+                                 {"excess", frame.contact_search->excess},
+                                 {"search_seconds", frame.contact_search->seconds}};
     json["collisions"] = frame.collisions;
     json["contact_limit"] = frame.contact_limit;
     json["trapped"] = frame.trapped;
@@ -106,6 +117,27 @@ std::string doubtful_frames(const RunStatistics& run, std::uint64_t FrameStatist
     const std::string where = frames == 1 ? fmt::format("in frame {}", first)
                                           : fmt::format("in {} frames from {} to {}", frames, first, last);
     return fmt::format("warning  {} {}, {}\n", what, points == 1 ? "once" : with_separators(points) + " times", where);
+}
+
+// What is left of the constraints, where there are any, and in how many grids contacts were looked for.
+std::string constraint_text(const RunStatistics& run)
+{
+    const auto worst = std::max_element(run.frames.begin(), run.frames.end(), [](const auto& a, const auto& b) {
+        return a.constraint_residual_max < b.constraint_residual_max;
+    });
+    if (worst == run.frames.end() || worst->constraint_rows == 0) return "";
+    std::string text =
+        fmt::format("residual of constraints: {:.1e} m at most (frame {}), {:.1e} m in the last\n",
+                    worst->constraint_residual_max, worst->frame, run.frames.back().constraint_residual_max);
+    if (const auto& search = run.frames.back().contact_search) {
+        double seconds = 0;
+        for (const FrameStatistics& frame : run.frames)
+            seconds += frame.contact_search ? frame.contact_search->seconds : 0;
+        text += fmt::format("contacts in {} {} of {} points, cells {:.2g} times too large, searched in {:.3f} s\n",
+                            search->grids.size(), search->grids.size() == 1 ? "grid" : "grids",
+                            fmt::join(search->grids, ", "), search->excess, seconds);
+    }
+    return text;
 }
 
 }  // namespace
@@ -155,8 +187,10 @@ std::string summary(const RunStatistics& run)
                                     error.p50, error.p95, error.max, worst->frame)
                               : "none above rounding\n";
     }
+    text += constraint_text(run);
     text += doubtful_frames(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");
     text += doubtful_frames(run, &FrameStatistics::trapped, "points were deep in a shape");
+    text += doubtful_frames(run, &FrameStatistics::loose_constraints, "constraints were off by a tenth of their size");
     text += doubtful_frames(run, &FrameStatistics::beyond_tolerance, "points needed more than max_substeps");
     return text;
 }

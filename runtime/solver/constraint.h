@@ -18,7 +18,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "runtime/points/point_set.h"
 #include "runtime/solver/dynamics.h"
@@ -55,10 +57,18 @@ struct Substep {
     bool lives(std::size_t i) const { return dead.empty() || !dead[i]; }
 };
 
-// How well a frame's rows are satisfied.
+// How well a frame's rows are satisfied; and of contacts, how their pairs were found.
 struct Residual {
-    double worst = 0;        // m
-    std::uint64_t rows = 0;  // that are active
+    double worst = 0;         // m
+    std::uint64_t rows = 0;   // that are active
+    std::uint64_t loose = 0;  // of them, those that are off by more than a tenth of their size
+
+    struct Search {
+        std::vector<std::size_t> grids;  // the points in each, from coarse to fine
+        double error = 0, excess = 0;    // of their cells (RadiusGrids)
+        double seconds = 0;
+    };
+    std::optional<Search> search;
 };
 
 // The rows of one constraint, over the sub-steps of a frame. Called from one thread; may use others, and must come to

@@ -324,7 +324,14 @@ void Contacts::project(Substep& now)
 // it does throughout the sub-step, and so half of it to the places: else a point that is held would creep.
 void Contacts::settle(Substep& now)
 {
-    backwards_ = !backwards_;
+    for (int k = 1; k <= now.iterations; ++k) {
+        backwards_ = !backwards_;
+        settle_once(now, k == now.iterations);
+    }
+}
+
+void Contacts::settle_once(Substep& now, bool last)
+{
     const double dt = now.dt, at_rest = resting * now.pull * dt;
     sweep([&](Row& row) {
         Impulse& kept = impulses_[row.pair];
@@ -341,7 +348,8 @@ void Contacts::settle(Substep& now)
         const double p = std::max(0.0, before + (wanted - n.dot(va - vb)) / W);
         va += a.w * (p - before) * n;
         vb -= b.w * (p - before) * n;
-        kept.pressed = static_cast<float>(p);
+        kept.pressed = row.pressed = static_cast<float>(p);
+        row.held = 0;
         if (row.friction > 0) {
             const Vec3d relative = va - vb, had = row.rubbed.cast<double>();
             Vec3d rubbed = had - (relative - n.dot(relative) * n) / W;
@@ -352,8 +360,9 @@ void Contacts::settle(Substep& now)
             vb -= b.w * change;
             a.P += 0.5 * dt * a.w * change;
             b.P -= 0.5 * dt * b.w * change;
-            kept.rubbed = rubbed.cast<float>();
+            kept.rubbed = row.rubbed = rubbed.cast<float>();
         }
+        if (!last) return;
         const double out = recovery * std::max(0.0, overlap - left_over * row.reach) / W;
         a.P += a.w * out * n;
         b.P -= b.w * out * n;
@@ -370,8 +379,11 @@ Residual Contacts::close(Substep& now)
             if (!(overlap > 0) && !(impulses_[row.pair].pressed > 0)) continue;
             ++result.rows;
             result.worst = std::max(result.worst, overlap);
+            result.loose += overlap > 0.1 * std::min(radius_[row.i], radius_[row.j]);
         }
-    touching_ = result.rows;
+    Residual::Search search{{}, grids_.error, grids_.excess, search_seconds_};
+    for (const RadiusGrids::Grid& grid : grids_.grids) search.grids.push_back(grid.points);
+    result.search = std::move(search);
     return result;
 }
 

@@ -43,11 +43,6 @@ public:
     void settle(Substep& now) override;
     Residual close(Substep& now) override;
 
-    // Of the frame that is over.
-    const RadiusGrids& grids() const { return grids_; }
-    double search_seconds() const { return search_seconds_; }
-    std::size_t touching() const { return touching_; }
-
 private:
     using Pair = std::array<std::uint32_t, 2>;
 
@@ -76,6 +71,7 @@ private:
     void touch(const Substep& now);
     void search(const Substep& now);
     void schedule();
+    void settle_once(Substep& now, bool last);
     bool has_moved(const Substep& now) const;
 
     std::vector<float> radius_, friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
@@ -103,7 +99,6 @@ private:
     std::vector<std::uint32_t> going_;
 
     double search_seconds_ = 0, per_dt_ = 0;
-    std::size_t touching_ = 0;
 };
 
 }  // namespace rapid

@@ -60,6 +60,8 @@ Residual Projection::close(Substep& now, ShapeLoads* loads, const Column<std::in
         const Residual residual = coupling.close(now);
         all.worst = std::max(all.worst, residual.worst);
         all.rows += residual.rows;
+        all.loose += residual.loose;
+        if (residual.search) all.search = residual.search;
     });
     if (shapes_ && loads) shapes_->remember(*loads, ids, now.dt);
     return all;

@@ -57,7 +57,11 @@ public:
     using Places = std::array<std::uint32_t, arity>;
 
     // compliance: m/N, 0 for a rigid row.
-    void add(const Ids& ids, const Kind& kind, double compliance) { rows_.push_back({kind, compliance, ids}); }
+    void add(const Ids& ids, const Kind& kind, double compliance)
+    {
+        rows_.push_back({kind, compliance, ids});
+        listed_ = false;
+    }
 
     std::size_t size() const { return rows_.size(); }
     // Whether there is a row of these points, in this order. Of rows that follow() has seen.
@@ -81,6 +85,7 @@ public:
             row.acted = row.acts;
         }
         drop([](const Row& row) { return std::find(row.at.begin(), row.at.end(), PlacesById::none) != row.at.end(); });
+        if (std::exchange(listed_, true)) return;
         known_.clear();
         for (const Row& row : rows_) known_.push_back(row.ids);
         std::sort(known_.begin(), known_.end());
@@ -167,6 +172,8 @@ public:
             double C = evaluate(row, now, gradient) + row.compliance * per_dt2 * row.lambda;
             if (one_sided) C = std::min(C, 0.0);
             result.worst = std::max(result.worst, std::abs(C));
+            if constexpr (arity > 1)
+                result.loose += std::abs(C) > 0.1 * (now.at[row.at[0]].P - now.at[row.at[1]].P).norm();
         }
         return result;
     }
@@ -295,7 +302,7 @@ private:
     template <class F>
     void drop(const F& gone)
     {
-        changed_ |= std::erase_if(rows_, gone) > 0;
+        if (std::erase_if(rows_, gone) > 0) changed_ = true, listed_ = false;
     }
 
     // Anew where rows have come or gone, or points have become fixed or free.
@@ -326,6 +333,7 @@ private:
 
     std::vector<Row> rows_;
     std::vector<Ids> known_;  // sorted
+    bool listed_ = false;     // all rows are in known_
     bool changed_ = true;
     std::vector<std::uint8_t> fixed_;
     Forest forest_;

@@ -1,0 +1,76 @@
+#include "runtime/graph/plugin.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "runtime/graph/registry.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What RAPID_PLUGIN has left in a file; empty where it has not.
+std::string mark_of(const std::string& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    if (!in) throw Error(fmt::format("{}: the plugin can't be read: {}", file, std::strerror(errno)));
+    const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    const std::size_t at = bytes.find(RAPID_PLUGIN_MARK);
+    if (at == std::string::npos) return "";
+    const std::size_t begin = at + std::strlen(RAPID_PLUGIN_MARK);
+    return bytes.substr(begin, std::min<std::size_t>(bytes.find('\0', begin) - begin, 256));
+}
+
+}  // namespace
+
+void load_plugin(const std::string& file)
+{
+    const std::string built = mark_of(file);
+    if (built.empty())
+        throw Error(
+            fmt::format("{}: it is no plugin of Rapid; one of its sources must have RAPID_PLUGIN "
+                        "(runtime/graph/plugin.h)",
+                        file));
+    if (built != RAPID_ABI)
+        throw Error(fmt::format("{}: the plugin was built for Rapid {}; this is Rapid {}: build it again", file, built,
+                                RAPID_ABI));
+    // With its folder, or the loader would look for it where libraries are.
+    if (!dlopen(fs::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL)) {
+        const char* why = dlerror();
+        throw Error(fmt::format("{}: the plugin can't be loaded: {}", file, why ? why : "no reason given"));
+    }
+    try {
+        Registry();
+    } catch (const Error& error) {
+        throw Error(fmt::format("{}: {}", file, error.message()));
+    }
+}
+
+void load_plugins(const std::string& path)
+{
+    for (std::size_t begin = 0; begin <= path.size();) {
+        const std::size_t end = std::min(path.find(':', begin), path.size());
+        const std::string part = path.substr(begin, end - begin);
+        begin = end + 1;
+        if (part.empty()) continue;
+        if (!fs::is_directory(part)) {
+            load_plugin(part);
+            continue;
+        }
+        std::vector<std::string> files;
+        for (const auto& entry : fs::directory_iterator(part))
+            if (entry.path().extension() == ".so") files.push_back(entry.path().string());
+        std::sort(files.begin(), files.end());
+        for (const std::string& file : files) load_plugin(file);
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,78 @@
+// Nodes from outside: a shared library, built against the installed package, whose nodes register themselves as it is
+// loaded (`--plugin FILE`, RAPID_PLUGIN_PATH) and are then as good as the native ones.
+//
+//   #include "runtime/graph/plugin.h"
+//   RAPID_PLUGIN;          once, in one of its sources
+//   RAPID_NODE(MyNode);
+//
+// C++ has no stable layout across versions: a library that was built with other headers would crash in its first call.
+// RAPID_PLUGIN leaves a mark in the file that says which they were, and the file is read before it is loaded.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "runtime/graph/abi.h"
+#include "runtime/graph/node.h"
+#include "runtime/solver/constraint.h"
+
+#define RAPID_PLUGIN_MARK "rapid plugin, built with "
+#define RAPID_PLUGIN                                                                        \
+    extern "C" __attribute__((used, visibility("default"))) const char rapid_plugin_mark[]; \
+    const char rapid_plugin_mark[] = RAPID_PLUGIN_MARK RAPID_ABI
+
+namespace rapid {
+
+// Before the first Registry is made. Error: the file can't be read or loaded, is no plugin, was built with other
+// headers, or has a node of a name that is taken.
+void load_plugin(const std::string& file);
+
+// Of each part of a list that colons separate: a plugin, or a folder, of which all *.so are taken, in order of name.
+void load_plugins(const std::string& path);
+
+// A constraint from a function of the points, asked before each frame, that gives its rows (solver/rows.h).
+template <class F>
+DynamicPtr constrain(const Evaluation& now, const std::string& group, F rows_of)
+{
+    struct Made : Constraint {
+        F rows_of;
+        explicit Made(F f) : rows_of(std::move(f)) {}
+        std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
+        {
+            auto rows = rows_of(points);
+            rows->follow(points, group);
+            return rows;
+        }
+    };
+    auto made = std::make_shared<Made>(std::move(rows_of));
+    made->node = now.node;
+    made->location = now.location;
+    made->group = group;
+    return made;
+}
+
+// An action from a function of a point's P (m) and v (m/s), called at every sub-step from any thread.
+template <class F>
+DynamicPtr act(const Evaluation& now, F edit)
+{
+    struct Pass : ActionPass {
+        F edit;
+        explicit Pass(F f) : edit(std::move(f)) {}
+        void act(const Chunk& chunk, std::span<Vec3d>, std::span<std::uint8_t>) override
+        {
+            for (std::size_t i = 0; i < chunk.size(); ++i) edit(chunk.P[i], chunk.v[i]);
+        }
+    };
+    struct Made : Action {
+        F edit;
+        explicit Made(F f) : edit(std::move(f)) {}
+        std::unique_ptr<ActionPass> begin(PointSet&) const override { return std::make_unique<Pass>(edit); }
+    };
+    auto made = std::make_shared<Made>(std::move(edit));
+    made->node = now.node;
+    made->location = now.location;
+    return made;
+}
+
+}  // namespace rapid

@@ -7,7 +7,7 @@
 -- Run:    rapid run graphs/debris.lua -f 1-96 -o /tmp/debris.####.png
 local rapid = require "rapid"
 
--- Radius, count and colour of each cluster; a radius varies by a fifth.
+-- Radius, count and colour of each cluster; a radius varies by a tenth.
 local sizes = {
   { 0.12, 24, {0.55, 0.5, 0.45} }, { 0.05, 220, {0.7, 0.62, 0.5} }, { 0.02, 1400, {0.8, 0.75, 0.65} },
 }
@@ -25,7 +25,7 @@ end
 return chain
   :points  ("vary", function(p)
       if p.fresh > 0 then
-        p.pscale = p.pscale * (0.8 + 0.4 * p:rand(1))
+        p.pscale = p.pscale * (0.9 + 0.2 * p:rand(1))
         p.mass = 1e4 * p.pscale ^ 3
         p.fresh = 0
       end

@@ -18,7 +18,6 @@ describe("hourglass", function()
     local first = passed(result[48]) - passed(result[36])
     for f = 60, 72, 12 do
       local now = passed(result[f]) - passed(result[f - 12])
-      print("PASS", f, first, now, passed(result[f]), #result[f])
       assert.truthy(now > 0.75 * first and now < 1.3 * first, ("%d, then %d"):format(first, now))
     end
   end)

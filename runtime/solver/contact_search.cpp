@@ -219,11 +219,18 @@ void ContactSearch::within(const Cells& cells, std::span<const Vec3d> P, Strided
                     count += dx * dx + dy * dy + dz * dz < d * d;
                 }
             }
+            // Only what single precision can't decide is asked of the points themselves, which lie anywhere.
             const std::uint32_t a = cells.place[m];
+            const float sure = (2 - rounding) * cells.r[m] - blur;
             for (std::size_t c = 0; c < count; ++c) {
-                const std::uint32_t b = cells.place[near[c]];
-                const double d = double(reach[a]) + double(reach[b]);
-                if ((P[a] - P[b]).squaredNorm() < d * d) pairs.emplace_back(std::min(a, b), std::max(a, b));
+                const std::uint32_t o = near[c], b = cells.place[o];
+                const float dx = cells.x[o] - x, dy = cells.y[o] - y, dz = cells.z[o] - z;
+                const float within_sum = (2 - rounding) * cells.r[o] + sure;
+                if (!(within_sum > 0 && dx * dx + dy * dy + dz * dz < within_sum * within_sum)) {
+                    const double d = double(reach[a]) + double(reach[b]);
+                    if (!((P[a] - P[b]).squaredNorm() < d * d)) continue;
+                }
+                pairs.emplace_back(std::min(a, b), std::max(a, b));
             }
         });
     });

@@ -1,8 +1,8 @@
 -- column: a column of grain collapses, spreads over the floor and comes to rest as a heap.
 --
 -- Shows:  :contact with friction, one of Rapid's constraints; what sub-steps and iterations are for.
--- Proves: no grain overlaps another by more than a tenth of its radius at the end, none moves any more, and more
---         friction makes a steeper heap (tests/graphs/test_column.lua).
+-- Proves: no grain overlaps another by more than a tenth of its radius at the end, at most one in a thousand still
+--         tumbles, and more friction makes a steeper heap (tests/graphs/test_column.lua).
 -- Run:    rapid run graphs/column.lua -f 1-72 -o /tmp/column.####.png
 local rapid = require "rapid"
 

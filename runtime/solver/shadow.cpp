@@ -78,30 +78,36 @@ void Shadows::begin(const PointSet& points)
 
     const Strided<std::int64_t> id = points.id().read();
     std::vector<std::pair<std::int64_t, std::uint32_t>> born;
+    // Leaves the first of the random order, as soon as there are many more: of ten million births at once no list is
+    // made.
+    const auto thin = [&] {
+        std::vector<std::uint64_t> order;
+        for (const std::int64_t number : ids_) order.push_back(place_in_order(number));
+        for (const auto& [number, place] : born) order.push_back(place_in_order(number));
+        std::nth_element(order.begin(), order.begin() + fewest, order.end());
+        threshold_ = order[fewest];
+        for (std::size_t k = 0; k < ids_.size(); ++k)
+            if (place_in_order(ids_[k]) >= threshold_) places[k] = gone;
+        keep_found(places, ids_, dP_, dv_);
+        std::erase_if(born, [&](const auto& point) { return place_in_order(point.first) >= threshold_; });
+    };
     std::int64_t next = next_id_;
     // Newborn are at the end; of a set that a script has sorted they may be anywhere, and are then looked for no
     // farther.
     for (std::size_t i = points.size(); i-- > 0 && id[i] >= next_id_;) {
         next = std::max(next, id[i] + 1);
-        if (place_in_order(id[i]) < threshold_) born.emplace_back(id[i], static_cast<std::uint32_t>(i));
+        if (place_in_order(id[i]) >= threshold_) continue;
+        born.emplace_back(id[i], static_cast<std::uint32_t>(i));
+        if (ids_.size() + born.size() > 4 * most) thin();
     }
     next_id_ = next;
+    if (ids_.size() + born.size() > most) thin();
     std::sort(born.begin(), born.end());
     for (const auto& [number, place] : born) {
         ids_.push_back(number);
         places.push_back(place);
         dP_.push_back(Vec3d::Zero());
         dv_.push_back(Vec3d::Zero());
-    }
-
-    if (ids_.size() > most) {
-        std::vector<std::uint64_t> order;
-        for (const std::int64_t number : ids_) order.push_back(place_in_order(number));
-        std::nth_element(order.begin(), order.begin() + fewest, order.end());
-        threshold_ = order[fewest];
-        for (std::size_t k = 0; k < ids_.size(); ++k)
-            if (place_in_order(ids_[k]) >= threshold_) places[k] = gone;
-        keep_found(places, ids_, dP_, dv_);
     }
 
     set_ = points.select(places);

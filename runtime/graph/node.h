@@ -110,6 +110,17 @@ struct Evaluation {
     bool keeps_group(const std::string& name) const { return keeps(group_prefix + name); }
 };
 
+// What a node adds to its chain: a D, made of the arguments, that knows whose it is.
+template <class D, class... Arguments>
+std::shared_ptr<D> dynamic_of(const Evaluation& now, const std::string& group, Arguments&&... arguments)
+{
+    auto made = std::make_shared<D>(std::forward<Arguments>(arguments)...);
+    made->node = now.node;
+    made->location = now.location;
+    made->group = group;
+    return made;
+}
+
 // Attributes and groups that a node reads, writes, or brings into being.
 struct Uses {
     std::vector<std::string> reads, writes;
@@ -266,11 +277,9 @@ private:
         if constexpr (has_dynamic<T>) {
             return fields_.dynamic(now);
         } else {
-            auto force = std::make_shared<ForceOf<T>>(fields_);
-            force->node = now.node;
-            force->location = now.location;
-            if constexpr (requires { fields_.group; }) force->group = fields_.group;
-            return force;
+            std::string group;
+            if constexpr (requires { fields_.group; }) group = fields_.group;
+            return dynamic_of<ForceOf<T>>(now, group, fields_);
         }
     }
 

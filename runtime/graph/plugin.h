@@ -45,10 +45,7 @@ DynamicPtr constrain(const Evaluation& now, const std::string& group, F rows_of)
             return rows;
         }
     };
-    auto made = std::make_shared<Made>(std::move(rows_of));
-    made->node = now.node;
-    made->location = now.location;
-    made->group = group;
+    auto made = dynamic_of<Made>(now, group, std::move(rows_of));
     return made;
 }
 
@@ -69,9 +66,7 @@ DynamicPtr act(const Evaluation& now, F edit)
         explicit Made(F f) : edit(std::move(f)) {}
         std::unique_ptr<ActionPass> begin(PointSet&) const override { return std::make_unique<Pass>(edit); }
     };
-    auto made = std::make_shared<Made>(std::move(edit));
-    made->node = now.node;
-    made->location = now.location;
+    auto made = dynamic_of<Made>(now, {}, std::move(edit));
     return made;
 }
 

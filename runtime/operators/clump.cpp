@@ -73,12 +73,7 @@ private:
     void bond(const PointSet& points) const
     {
         const std::size_t n = points.size();
-        const float none = 0;
-        Strided<float> given{&none, 0};
-        if (radius)
-            given = radius->read(points);
-        else if (const auto* pscale = points.find<float>("pscale"))
-            given = pscale->read();
+        const Strided<float> given = radii_of(radius, points);
         const Strided<std::uint8_t> members = members_of(points, group);
         // What rests on another touches it within rounding, and what solving leaves.
         constexpr float touch = 1.02f;
@@ -119,7 +114,6 @@ struct Clump {
     static NodeType declare()
     {
         return node<Clump>("clump", "Sticks points together that touch, until they are torn apart.")
-            .kind(NodeKind::Dynamic)
             .stage(Stage::ContactGrid)
             .stage(Stage::Constraints)
             .takes("pscale")
@@ -129,18 +123,13 @@ struct Clump {
             .param(&Clump::strength, "strength", 1.0, at_least(0), "N", "the pull that a bond bears");
     }
 
-    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    DynamicPtr dynamic(const Evaluation& now) const
     {
-        Flow flow = std::move(inputs[0]);
-        auto constraint = std::make_shared<ClumpConstraint>();
-        constraint->node = now.node;
-        constraint->location = now.location;
-        constraint->group = group;
+        auto constraint = dynamic_of<ClumpConstraint>(now, group);
         constraint->bonds = bonds_;
         constraint->radius = radius;
         constraint->strength = strength;
-        flow.dynamics.push_back(std::move(constraint));
-        return flow;
+        return constraint;
     }
 
 private:

@@ -86,10 +86,7 @@ struct Collide {
 
     DynamicPtr dynamic(const Evaluation& now) const
     {
-        auto collider = std::make_shared<Collider>();
-        collider->node = now.node;
-        collider->location = now.location;
-        collider->group = group;
+        auto collider = dynamic_of<Collider>(now, group);
         collider->shape = shape.rest;
         collider->motion = !shape.motion ? transform : !transform ? shape.motion : product(transform, shape.motion);
         collider->bounce = bounce;

@@ -48,10 +48,7 @@ struct ContactNode {
 
     DynamicPtr dynamic(const Evaluation& now) const
     {
-        auto constraint = std::make_shared<ContactConstraint>();
-        constraint->node = now.node;
-        constraint->location = now.location;
-        constraint->group = group;
+        auto constraint = dynamic_of<ContactConstraint>(now, group);
         constraint->contacts = contacts_;
         constraint->options = {radius, bounce, friction, max_difference, max_grids};
         return constraint;

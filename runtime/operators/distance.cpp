@@ -106,10 +106,7 @@ struct Distance {
         Flow flow = std::move(inputs[0]);
         if (!rows_ && !flow.points.empty()) rows_ = tie(flow.points);
         if (!rows_) return flow;
-        auto constraint = std::make_shared<TieConstraint>(rows_);
-        constraint->node = now.node;
-        constraint->location = now.location;
-        constraint->group = group;
+        auto constraint = dynamic_of<TieConstraint>(now, group, rows_);
         flow.dynamics.push_back(std::move(constraint));
         return flow;
     }

@@ -29,10 +29,7 @@ struct Interact {
 
     DynamicPtr dynamic(const Evaluation& now) const
     {
-        auto interaction = std::make_shared<Interaction>();
-        interaction->node = now.node;
-        interaction->location = now.location;
-        interaction->group = group;
+        auto interaction = dynamic_of<Interaction>(now, group);
         interaction->radius = radius;
         interaction->separation = separation;
         interaction->cohesion = cohesion;

@@ -161,10 +161,7 @@ struct PinNode {
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
     {
         Flow flow = std::move(inputs[0]);
-        auto pin = std::make_shared<PinConstraint>();
-        pin->node = now.node;
-        pin->location = now.location;
-        pin->group = group;
+        auto pin = dynamic_of<PinConstraint>(now, group);
         pin->pins = pins_;
         pin->place = target.place;
         pin->compliance = compliance;

@@ -207,15 +207,9 @@ private:
 
     static double largest_radius(const Collider& collider, const PointSet& points)
     {
-        Strided<float> radius{nullptr, 0};
-        if (collider.radius)
-            radius = collider.radius->read(points);
-        else if (const auto* pscale = points.find<float>("pscale"))
-            radius = pscale->read();
+        const Strided<float> radius = radii_of(collider.radius, points);
         float largest = 0;
-        if (radius.data)
-            for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i)
-                largest = std::max(largest, radius[i]);
+        for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i) largest = std::max(largest, radius[i]);
         return largest;
     }
 

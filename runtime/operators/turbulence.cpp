@@ -52,10 +52,7 @@ struct Turbulence {
 
     DynamicPtr dynamic(const Evaluation& now) const
     {
-        auto force = std::make_shared<TurbulentForce>();
-        force->node = now.node;
-        force->location = now.location;
-        force->group = group;
+        auto force = dynamic_of<TurbulentForce>(now, group);
         force->amplitude = amplitude;
         force->size = size;
         force->speed = speed;

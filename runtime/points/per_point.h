@@ -1,6 +1,7 @@
 // A parameter that is one number for all points, or an attribute that gives each point its own.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "runtime/points/point_set.h"
@@ -28,5 +29,15 @@ struct PerPoint {
         return points.column<T>(attribute).read();
     }
 };
+
+// The radii of points, m: those that are given, else the attribute pscale where the points have it, else 0. Valid as
+// PerPoint::read() is.
+inline Strided<float> radii_of(const std::optional<PerPoint<float>>& given, const PointSet& points)
+{
+    static constexpr float none = 0;
+    if (given) return given->read(points);
+    if (points.has("pscale")) return points.column<float>("pscale").read();
+    return {&none, 0};
+}
 
 }  // namespace rapid

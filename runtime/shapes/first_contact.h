@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/shapes/last_outside.h"
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
@@ -125,36 +126,6 @@ Contact start_inside(const Sampler& sampler, const Path& path, double f, const V
             return contact;
         }
     }
-}
-
-// The last time at which the path is outside, of a step at whose beginning it is (f >= 0) and at whose end it is not:
-// regula falsi with Illinois' halving, down to the rounding of the field, or of the time.
-template <class Sampler>
-double refine(const Sampler& sampler, const Path& path, double level, double before, double f_before, double after,
-              double f_after, double close)
-{
-    const double speed = path.v.norm() + after * path.a.norm();  // the largest on the way
-    double ahead = f_before;   // as sampled: f_before and f_after are halved on the way
-    int kept = 0;              // how often in a row the same end was kept: +1, +2, ... before, -1, -2, ... after
-    constexpr int most = 200;  // far above what bisection alone needs for 53 bits
-    for (int i = 0; i < most && ahead > close; ++i) {
-        if (after - before <= 0x1p-52 * after || speed * (after - before) <= close) break;
-        // Every fourth step is bisection: a field with a kink can hold regula falsi up, and nothing holds that up.
-        double s = i % 4 == 3 ? 0.5 * (before + after) : before + (after - before) * f_before / (f_before - f_after);
-        if (!(s > before && s < after)) s = 0.5 * (before + after);
-        if (!(s > before && s < after)) break;
-        const double f = sampler.distance(place(path, s)) - level;
-        if (f >= 0) {
-            before = s, f_before = ahead = f;
-            kept = kept < 0 ? kept - 1 : -1;
-            if (kept < -1) f_after *= 0.5;
-        } else {
-            after = s, f_after = f;
-            kept = kept > 0 ? kept + 1 : 1;
-            if (kept > 1) f_before *= 0.5;
-        }
-    }
-    return before;
 }
 
 // How the normal turns towards the velocity, a short way ahead along the surface.
@@ -303,7 +274,9 @@ private:
     void meet(int k, double next, double f)
     {
         const Path& path = paths_[path_[k]];
-        const double s = refine(sampler_, path, level_[k], s_[k], f_[k], next, f, close_[k]);
+        const double speed = path.v.norm() + next * path.a.norm();  // the largest on the way
+        const auto height = [&](double s) { return sampler_.distance(place(path, s)) - level_[k]; };
+        const double s = last_outside(height, s_[k], f_[k], next, f, speed, close_[k]);
         contacts_[path_[k]] = contact_at(sampler_, path, s);
     }
 

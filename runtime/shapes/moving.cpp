@@ -387,33 +387,12 @@ private:
         return approaching > 0 ? 2 * w.f / (approaching + root) : (root - approaching) / acceleration;
     }
 
-    // The last time at which the path is outside, of a step at whose end it is not: regula falsi with Illinois'
-    // halving.
+    // The last time at which the path is outside, of a step at whose end it is not.
     double refine(const Walker& w, double after, double f_after, double close) const
     {
-        double before = w.s, f_before = w.f, ahead = w.f;
-        const double speed = w.seen.at(before).velocity.norm() + (after - before) * w.seen.acceleration(w.level);
-        int kept = 0;
-        constexpr int most = 200;  // far above what bisection alone needs for 53 bits
+        const double speed = w.seen.at(w.s).velocity.norm() + (after - w.s) * w.seen.acceleration(w.level);
         Vec3d gradient;
-        for (int i = 0; i < most && ahead > close; ++i) {
-            if (after - before <= 0x1p-52 * after || speed * (after - before) <= close) break;
-            double s =
-                i % 4 == 3 ? 0.5 * (before + after) : before + (after - before) * f_before / (f_before - f_after);
-            if (!(s > before && s < after)) s = 0.5 * (before + after);
-            if (!(s > before && s < after)) break;
-            const double f = height(w, s, gradient);
-            if (f >= 0) {
-                before = s, f_before = ahead = f;
-                kept = kept < 0 ? kept - 1 : -1;
-                if (kept < -1) f_after *= 0.5;
-            } else {
-                after = s, f_after = f;
-                kept = kept > 0 ? kept + 1 : 1;
-                if (kept > 1) f_before *= 0.5;
-            }
-        }
-        return before;
+        return last_outside([&](double s) { return height(w, s, gradient); }, w.s, w.f, after, f_after, speed, close);
     }
 
     ShapePtr rest_;

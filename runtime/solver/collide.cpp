@@ -41,7 +41,6 @@ constexpr double held = 1e-6;
 // smallest feature does.
 constexpr double least_turning = 1.0 / 256, least_bending = 1.0 / 4096;
 
-const float no_radius = 0;
 const std::uint8_t everybody = 1, nobody = 0;
 
 // s, of a piece along a curved surface
@@ -83,13 +82,9 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points)
       record(collider.record),
       bounce(collider.bounce.read(points)),
       friction(collider.friction.read(points)),
-      radius{&no_radius, 0},
+      radius(radii_of(collider.radius, points)),
       members{&everybody, 0}
 {
-    if (collider.radius)
-        radius = collider.radius->read(points);
-    else if (points.has("pscale"))
-        radius = points.column<float>("pscale").read();
     if (!collider.group.empty()) {
         const Column<std::uint8_t>* group = points.find_group(collider.group);
         members = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};

@@ -47,12 +47,7 @@ Vec3d direction(std::uint32_t i, std::uint32_t j, const Vec3d& d)
 void Contacts::follow(const PointSet& points, const ContactOptions& options, const std::string& group)
 {
     const std::size_t n = points.size();
-    const float none = 0;
-    Strided<float> radius{&none, 0};
-    if (options.radius)
-        radius = options.radius->read(points);
-    else if (const auto* pscale = points.find<float>("pscale"))
-        radius = pscale->read();
+    const Strided<float> radius = radii_of(options.radius, points);
     const Strided<float> friction = options.friction.read(points), bounce = options.bounce.read(points);
     const Strided<std::uint8_t> members = members_of(points, group);
 

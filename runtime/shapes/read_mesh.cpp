@@ -13,6 +13,10 @@
 #include <bit>
 #include <cctype>
 #include <cmath>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
 #include <unordered_map>
 
 #include "runtime/error.h"
@@ -56,10 +60,40 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_pare
     for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, corners);
 }
 
+std::string lower_case(std::string text)
+{
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+// Assimp takes a byte at the beginning of a binary file's data that could end a line for a part of the header, reads
+// all that follows from one byte too late, and falls over the faces. Such a file comes back with one more element in
+// front of its own, an edge, whose bytes cannot be mistaken; nothing where the file is none of these.
+std::optional<std::string> with_safe_beginning(const std::filesystem::path& path)
+{
+    std::ifstream file(path, std::ios::binary);
+    std::string header, line;
+    std::size_t elements = 0;
+    while (std::getline(file, line)) {
+        if (header.empty() && !line.starts_with("ply")) return {};
+        if (elements == 0 && line.starts_with("element ")) elements = header.size();
+        if (line.starts_with("format ascii")) return {};
+        header += line + '\n';
+        if (line.starts_with("end_header")) break;
+    }
+    const int first = file.peek();
+    if (!(elements > 0 && (first == '\n' || first == '\r'))) return {};
+    header.insert(elements, "element edge 1\nproperty int vertex1\n");
+    return header + "edge" + std::string(std::istreambuf_iterator<char>(file), {});
+}
+
 MeshFile import(const std::filesystem::path& path)
 {
     Assimp::Importer importer;
-    const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
+    const std::optional<std::string> safe =
+        lower_case(path.extension().string()) == ".ply" ? with_safe_beginning(path) : std::nullopt;
+    const aiScene* scene = safe ? importer.ReadFileFromMemory(safe->data(), safe->size(), aiProcess_Triangulate, "ply")
+                                : importer.ReadFile(path.string(), aiProcess_Triangulate);
     if (!scene)
         throw Error(fmt::format("cannot read the mesh \"{}\": {}; it must be an OBJ, PLY, STL or glTF file",
                                 path.string(), importer.GetErrorString()));
@@ -70,12 +104,6 @@ MeshFile import(const std::filesystem::path& path)
         corners.alphas.resize(corners.positions.size(), 1.0f);
     }
     return corners;
-}
-
-std::string lower_case(std::string text)
-{
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include <array>
+#include <bit>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -251,6 +253,28 @@ TEST_CASE("vertices that a file splits or repeats are joined by place", "[mesh][
         CHECK(cube->signed_volume() == 1);
         CHECK(cube->values.empty());
         CHECK(cube->name == path.string());
+    }
+}
+
+TEST_CASE("a binary PLY may begin with any byte", "[mesh][read]")
+{
+    const Folder folder;
+    for (int byte = 0; byte < 256; ++byte) {
+        std::array<float, 9> P{0, 0, 0, 1, 0, 0, 0, 1, 0};
+        P[0] = std::bit_cast<float>(0xBE969600u + byte);
+        std::string text =
+            "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+            "float "
+            "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+        text.append(reinterpret_cast<const char*>(P.data()), sizeof P);
+        const std::array<std::int32_t, 3> face{0, 1, 2};
+        text += '\3';
+        text.append(reinterpret_cast<const char*>(face.data()), sizeof face);
+        const MeshPtr mesh = read_mesh(folder.file("byte.ply", text));
+        CAPTURE(byte);
+        REQUIRE(mesh->positions.size() == 3);
+        CHECK(mesh->positions[0].x() == P[0]);
+        CHECK(mesh->positions[2] == Vec3f(0, 1, 0));
     }
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <lua.hpp>
 #include <optional>
 
@@ -12,6 +11,7 @@
 #include "bindings/script_host.h"
 #include "bindings/state.h"
 #include "runtime/parallel.h"
+#include "runtime/stopwatch.h"
 
 extern "C" {
 #include "lua/chunk.h"
@@ -433,24 +433,21 @@ void Kernel::run_pass(Pass& pass) const
 namespace {
 
 // Adds what a pass takes to the frame's figures.
-class Stopwatch {
+class ScriptTime {
 public:
-    explicit Stopwatch(FrameFigures& figures) : figures_(figures), begin_(std::chrono::steady_clock::now()) {}
-    ~Stopwatch()
-    {
-        figures_.script_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-    }
+    explicit ScriptTime(FrameFigures& figures) : figures_(figures) {}
+    ~ScriptTime() { figures_.script_seconds += stopwatch_.seconds(); }
 
 private:
     FrameFigures& figures_;
-    std::chrono::steady_clock::time_point begin_;
+    Stopwatch stopwatch_;
 };
 
 }  // namespace
 
 void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const
 {
-    const Stopwatch watch(now.figures);
+    const ScriptTime timed(now.figures);
     const KernelArguments nothing;
     const Layout layout = layout_for(points, nothing, true, false);
     const Caller caller(now);
@@ -487,7 +484,7 @@ std::optional<Kernel::Layout> Kernel::prepare(PointSet& points, const std::strin
 void Kernel::run(PointSet& points, const std::string& group, const Evaluation& now,
                  const KernelArguments& arguments) const
 {
-    const Stopwatch watch(now.figures);
+    const ScriptTime timed(now.figures);
     Column<std::uint8_t> chosen;
     const std::optional<Layout> layout = prepare(points, group, arguments, chosen, false);
     if (!layout) return;

@@ -276,7 +276,7 @@ function rapid.levelset.box(options) end
 ---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
 
----The distance to a closed mesh.
+---The distance to a closed mesh; where that moves or deforms, a collider that does.
 ---@param mesh rapid.Mesh  closed [mesh, required]
 ---@param options? rapid.options.levelset_from_mesh
 ---@return rapid.LevelSet
@@ -566,8 +566,9 @@ function Node:clump(params) end
 
 ---@class rapid.params.collide
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  what the points collide with [shape, required]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  what the points collide with; a function of the frame may return nil, where there is nothing [shape, required]
 ---@field transform? rapid.Motion|fun(frame: rapid.Frame): rapid.Motion  moves the shape: a motion, a function of the frame that returns one, or keys by frame [motion]
+---@field cut? integer[]|fun(frame: rapid.Frame): integer[]  frames to which the shape jumps: nothing is swept along on the way; found where not given [list of frames]
 ---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution: the part of the speed that is kept [number, from 0 to 1, default 0.5, takes rapid.attr]
 ---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient [number, at least 0, default 0, takes rapid.attr]
 ---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]

@@ -256,7 +256,8 @@ local function make(native, load_node, numeric, shapes, studies)
     value_methods[kind] = {}
     for name, query in pairs(shapes.queries) do value_methods[kind][name] = query end
   end
-  for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape" } do
+  for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape",
+    "deforming level set" } do
     value_methods[kind] = value_methods[kind] or {}
     value_methods[kind].transform = transformed
   end

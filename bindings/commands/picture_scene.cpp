@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "runtime/shapes/animated.h"
+#include "runtime/shapes/deforming.h"
 
 namespace rapid {
 namespace {
@@ -79,6 +79,9 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
             } else if (const auto shape = given.object<AnimatedShape>()) {
                 moves = true;
                 add(*scene, shape->rest(), place * shape->motion()->at(now).affine(), role);
+            } else if (const auto deforming = given.object<DeformingLevelSet>()) {
+                moves = true;
+                add(*scene, deforming->mesh().at(clock, frame), place, role);
             } else if (const ObjectPtr* object = given.get<ObjectPtr>()) {
                 add(*scene, *object, place, role);
             }

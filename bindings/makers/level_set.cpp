@@ -5,6 +5,7 @@
 
 #include "bindings/maker.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/shapes/deforming.h"
 #include "runtime/shapes/level_set_tools.h"
 
 namespace rapid {
@@ -25,17 +26,39 @@ struct Grid {
     }
 };
 
+// A mesh, at rest, moving or deforming.
+struct AnyMesh {
+    static constexpr std::string_view param_type = "mesh";
+
+    MeshPtr still;
+    std::shared_ptr<const AnimatedMesh> moving;
+};
+
+void read_value(const Param& param, const Value& value, AnyMesh& mesh)
+{
+    mesh = {};
+    if (!(mesh.moving = value.object<AnimatedMesh>())) rapid::read_value(param, value, mesh.still);
+}
+
 struct FromMesh : Grid {
-    MeshPtr mesh;
+    AnyMesh mesh;
 
     static Maker declare()
     {
-        auto declaration = maker<FromMesh>("levelset.from_mesh", "The distance to a closed mesh.");
+        auto declaration = maker<FromMesh>(
+            "levelset.from_mesh", "The distance to a closed mesh; where that moves or deforms, a collider that does.");
         declaration.param(&FromMesh::mesh, "mesh", Value(), any_number(), "", "closed").required();
         Grid::declare(declaration);
         return declaration;
     }
-    ObjectPtr make(MakeContext& context) const { return level_set_from_mesh(mesh, options(), context.warnings); }
+    ObjectPtr make(MakeContext& context) const
+    {
+        if (!mesh.moving) return level_set_from_mesh(mesh.still, options(), context.warnings);
+        if (mesh.moving->deforms())
+            return std::make_shared<DeformingLevelSet>(mesh.moving, options(), context.warnings);
+        return std::make_shared<AnimatedShape>(level_set_from_mesh(mesh.moving->rest(), options(), context.warnings),
+                                               mesh.moving->motion());
+    }
 };
 RAPID_MAKER(FromMesh);
 

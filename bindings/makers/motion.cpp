@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "bindings/maker.h"
-#include "runtime/shapes/animated.h"
+#include "runtime/shapes/deforming.h"
 #include "runtime/shapes/level_set_tools.h"
 #include "runtime/shapes/placed.h"
 
@@ -92,6 +92,8 @@ struct Transform {
             return moving->transformed(motion);
         if (const auto moving = std::dynamic_pointer_cast<const AnimatedShape>(object))
             return std::make_shared<AnimatedShape>(moving->rest(), product(motion, moving->motion()));
+        if (const auto deforming = std::dynamic_pointer_cast<const DeformingLevelSet>(object))
+            return deforming->transformed(motion);
         if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) {
             if (motion->varies()) return std::make_shared<AnimatedMesh>(mesh, motion);
             return transformed(mesh, motion->at({}).affine());

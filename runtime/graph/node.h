@@ -45,6 +45,7 @@
 #include "runtime/graph/param.h"
 #include "runtime/random.h"
 #include "runtime/solver/constraint.h"
+#include "runtime/solver/contact_energy.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
@@ -74,6 +75,16 @@ struct Flow {
 // What goes before a group's name where attributes and groups are listed together, as in a .csv file's header.
 inline const std::string group_prefix = "group:";
 
+// A level set's band as a frame's collisions needed it (paper §4.3).
+struct BandFigures {
+    std::string node;
+    double width = 0;  // m, on each side of the surface
+    std::uint64_t voxels = 0;
+    double seconds = 0;  // spent on it in this frame: 0 where it was there
+
+    bool operator==(const BandFigures&) const = default;
+};
+
 // Counted while a frame runs (see `--stats`).
 struct FrameFigures {
     std::uint64_t born = 0, died = 0, collisions = 0;
@@ -82,11 +93,13 @@ struct FrameFigures {
     std::uint64_t trapped = 0;           // points deep in a shape, with no way out known
     int substeps = 0;
     double penetration_max = 0;
-    double constraint_residual_max = 0;   // m
+    double constraint_residual_max = 0;  // m
+    ContactEnergy contact_energy;
     std::uint64_t constraint_rows = 0;    // that were active at the end of the frame
     std::uint64_t loose_constraints = 0;  // of them, those that were off by more than a tenth of their size
     std::optional<Residual::Search> contact_search;
-    std::vector<double> errors;  // estimated, of the positions of a sample of the points, m
+    std::vector<BandFigures> bands;  // by collide node, of those with a level set
+    std::vector<double> errors;      // estimated, of the positions of a sample of the points, m
     double script_seconds = 0, solve_seconds = 0;
 };
 
@@ -244,7 +257,7 @@ public:
             fields_.edit(inputs[0].points, now);
             return std::move(inputs[0]);
         } else if constexpr (is_force<T> || has_dynamic<T>) {
-            inputs[0].dynamics.push_back(dynamic(now));
+            if (DynamicPtr made = dynamic(now)) inputs[0].dynamics.push_back(std::move(made));
             return std::move(inputs[0]);
         } else {
             return fields_.evaluate(inputs, now);
@@ -329,6 +342,7 @@ public:
     // These speak of the parameter declared last.
     Declaration& required() { return last().required = true, *this; }
     Declaration& constant() { return last().of_the_frame = false, *this; }  // takes no function of the frame
+    Declaration& or_nothing() { return last().may_be_nil = true, *this; }   // a function may return nil
     Declaration& choices(std::vector<std::string> names) { return last().choices = std::move(names), *this; }
     Declaration& of_type(std::string words) { return last().type = std::move(words), *this; }
 

@@ -45,6 +45,7 @@ struct Param {
     bool required = false;
     bool per_point = false;       // takes rapid.attr
     bool of_the_frame = true;     // takes a function of the frame
+    bool may_be_nil = false;      // at some frames, where it is a function
     bool keeps_function = false;  // a function is itself the value: a motion asks it between frames too
     bool internal = false;        // given by the host of the scripting language, not by users; not shown
 

@@ -57,7 +57,7 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
 {
     try {
         const Value result = function.call(frame);
-        if (result.is_nil()) wrong_type(param, result);
+        if (result.is_nil() && !param.may_be_nil) wrong_type(param, result);
         if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
         param.assign(param, op.fields(), result);
     } catch (const Error& error) {

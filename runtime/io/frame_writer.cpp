@@ -1,8 +1,9 @@
 #include "runtime/io/frame_writer.h"
 
-#include <chrono>
 #include <system_error>
 #include <utility>
+
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 
@@ -119,7 +120,7 @@ void FrameWriter::write_waiting(Pictures& pictures, const std::shared_ptr<const 
 
 void FrameWriter::write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view)
 {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     const std::string path = target.pattern.expand(job.frame.number, job.output);
     FrameInfo frame = job.frame;
     frame.view = std::move(view);
@@ -128,11 +129,11 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     } catch (Error& error) {
         throw error.at({path, 0});
     }
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+    const double spent = stopwatch.seconds();
     std::error_code ignored;
     const std::uintmax_t bytes = std::filesystem::file_size(path, ignored);
     const std::lock_guard lock(mutex_);
-    written_.push_back({job.frame.number, path, spent.count(), bytes});
+    written_.push_back({job.frame.number, path, spent, bytes});
 }
 
 }  // namespace rapid

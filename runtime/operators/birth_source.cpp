@@ -6,6 +6,7 @@
 
 #include "runtime/graph/points_object.h"
 #include "runtime/graph/value.h"
+#include "runtime/shapes/deforming.h"
 
 namespace rapid {
 namespace {
@@ -63,6 +64,8 @@ BirthSource::BirthSource(ObjectPtr object, std::string from) : object_(std::move
         take_shape(moving_shape_->rest());
     } else if (const auto shape = std::dynamic_pointer_cast<const Shape>(object_)) {
         take_shape(shape);
+    } else if (std::dynamic_pointer_cast<const DeformingLevelSet>(object_)) {
+        throw Error("source = a deforming level set can't bear points; give the mesh that it was made from");
     } else {
         throw Error(fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape or points",
                                 describe(object_)));

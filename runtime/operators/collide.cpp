@@ -3,9 +3,11 @@
 //   v+ = vt max(0, 1 - μ (1 + ε) |vn| / |vt|) - ε vn        ε = bounce, μ = friction
 //
 // at the time of impact on the point's path, where its distance from the shape is its radius.
-#include "runtime/graph/node.h"
+#include <fmt/format.h>
 
-#include "runtime/shapes/animated.h"
+#include "runtime/graph/frame_set.h"
+#include "runtime/graph/node.h"
+#include "runtime/shapes/deforming.h"
 #include "runtime/solver/hits.h"
 
 namespace rapid {
@@ -26,19 +28,27 @@ void read_value(const Param& param, const Value& value, LeastSpeed& least)
         rapid::read_value(param, value, least.speed);
 }
 
-// A shape, or one that moves already.
+// A shape, one that moves already, or, at some frames, none.
 struct ColliderShape {
     static constexpr std::string_view param_type = "shape";
 
     ShapePtr rest;
+    DeformingLevelSetPtr deforming;
     MotionPtr motion;
 };
 
 void read_value(const Param& param, const Value& value, ColliderShape& shape)
 {
     shape = {};
+    if (value.is_nil()) return;
     if (const auto animated = value.object<AnimatedShape>())
-        shape = {animated->rest(), animated->motion()};
+        shape = {animated->rest(), nullptr, animated->motion()};
+    else if (const auto deforming = value.object<DeformingLevelSet>())
+        shape.deforming = deforming;
+    else if (value.object<AnimatedMesh>() || value.object<Mesh>())
+        throw Error(
+            fmt::format("{} = {} has no inside to keep out of; take rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
+                        param.name, describe(value)));
     else
         rapid::read_value(param, value, shape.rest);
 }
@@ -50,6 +60,7 @@ struct Collide {
     LeastSpeed record;
     PerPoint<float> bounce, friction;
     std::optional<PerPoint<float>> radius;
+    std::optional<FrameSet> cut;
     std::string group;
 
     static NodeType declare()
@@ -57,10 +68,14 @@ struct Collide {
         return node<Collide>("collide", "Keeps points out of a shape: they bounce, slide and come to rest on it.")
             .stage(Stage::Collision)
             .takes("pscale")
-            .param(&Collide::shape, "shape", Value(), any_number(), "", "what the points collide with")
+            .param(&Collide::shape, "shape", Value(), any_number(), "",
+                   "what the points collide with; a function of the frame may return nil, where there is nothing")
             .required()
+            .or_nothing()
             .param(&Collide::transform, "transform", Value(), any_number(), "",
                    "moves the shape: a motion, a function of the frame that returns one, or keys by frame")
+            .param(&Collide::cut, "cut", Value(), any_number(), "",
+                   "frames to which the shape jumps: nothing is swept along on the way; found where not given")
             .param(&Collide::bounce, "bounce", 0.5, between(0, 1), "",
                    "restitution: the part of the speed that is kept")
             .param(&Collide::friction, "friction", 0.0, at_least(0), "", "Coulomb's coefficient")
@@ -86,8 +101,11 @@ struct Collide {
 
     DynamicPtr dynamic(const Evaluation& now) const
     {
+        if (!shape.rest && !shape.deforming) return nullptr;
         auto collider = dynamic_of<Collider>(now, group);
         collider->shape = shape.rest;
+        collider->deforming = shape.deforming;
+        if (cut) collider->cuts = cut->frames;
         collider->motion = !shape.motion ? transform : !transform ? shape.motion : product(transform, shape.motion);
         collider->bounce = bounce;
         collider->friction = friction;

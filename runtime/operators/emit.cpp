@@ -19,8 +19,8 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <set>
 
+#include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
 #include "runtime/operators/birth_source.h"
 #include "runtime/operators/births.h"
@@ -94,23 +94,6 @@ void read_value(const Param& param, const Value& value, Age& field)
         field = {{}, reference->name};
     else
         read_value(param, value, field.interval), field.attribute.clear();
-}
-
-struct FrameSet {
-    static constexpr std::string_view param_type = "list of frames";
-    std::set<std::int64_t> frames;
-};
-
-void read_value(const Param& param, const Value& value, FrameSet& field)
-{
-    std::vector<double> numbers;
-    read_value(param, value, numbers);
-    field.frames.clear();
-    for (const double number : numbers) {
-        if (number != std::floor(number))
-            throw Error(fmt::format("{} has the frame {}; frames are whole", param.name, number));
-        field.frames.insert(static_cast<std::int64_t>(number));
-    }
 }
 
 // The vectors that `turn` needs of a cone of the half angle θ: 1 - cos α is uniform in [0, 1 - cos θ] where directions
@@ -400,14 +383,11 @@ void Emit::move(const Simulation& simulation, const Evaluation& now)
     const BirthSource::Moved moved = source_.go_to(simulation.clock(), frame, options);
     at_beginning_ = moved.at_beginning;
     if (moved.jump)
-        now.warnings.push_back(fmt::format(
-            "{}:{}: node \"{}\": the source jumps by {:.3g} m to frame {}, {}; nothing is born on the way "
-            "(cut = {{{}}} says so, cut = {{}} that it is no jump)",
-            now.location.file, now.location.line, now.node, moved.jump->way, frame,
-            moved.jump->usual > 0
-                ? fmt::format("{:.3g} times as far as in the frames around", moved.jump->way / moved.jump->usual)
-                : std::string("and is at rest in the frames around"),
-            frame));
+        now.warnings.push_back(
+            fmt::format("{}:{}: node \"{}\": the source {}; nothing is born on the way (cut = {{{}}} says so, cut = "
+                        "{{}} that it is "
+                        "no jump)",
+                        now.location.file, now.location.line, now.node, describe(*moved.jump, frame), frame));
 }
 
 void Emit::bear(Flow& flow, const Births& births, const Evaluation& now)

@@ -2,17 +2,20 @@
 // frame's Create (paper §2.1).
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 
 #include "runtime/graph/node.h"
 #include "runtime/operators/aging.h"
 #include "runtime/parallel.h"
+#include "runtime/shapes/deforming.h"
 #include "runtime/shapes/level_set.h"
 #include "runtime/shapes/moving.h"
 #include "runtime/solver/error_control.h"
 #include "runtime/solver/interaction.h"
 #include "runtime/solver/shadow.h"
 #include "runtime/solver/shape_contacts.h"
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {
@@ -54,8 +57,8 @@ struct Solve {
     {
         Flow flow = std::move(inputs[0]);
         PointSet& points = flow.points;
-        widen(points, flow.dynamics);
-        set_in_motion(flow.dynamics, flow.simulation->clock(), now.frame.number);
+        widen(points, flow.dynamics, now);
+        set_in_motion(points, flow.dynamics, flow.simulation->clock(), now);
 
         SolveOptions options;
         options.substeps = substeps;
@@ -97,6 +100,7 @@ struct Solve {
         now.figures.loose_constraints += result.residual.loose;
         if (result.residual.search) now.figures.contact_search = result.residual.search;
         now.figures.constraint_residual_max = std::max(now.figures.constraint_residual_max, result.residual.worst);
+        now.figures.contact_energy += result.contact_energy;
         now.figures.penetration_max = std::max(now.figures.penetration_max, result.penetration_max);
 
         if (result.contact_limit > 0)
@@ -163,22 +167,43 @@ private:
         now.figures.died += before - points.size();
     }
 
-    // A level set's band must be as wide as the largest radius, and two voxels more for the cells at its edge (§4.3).
-    // Widened once for each shape, and only as far as it takes.
-    void widen(const PointSet& points, std::vector<DynamicPtr>& dynamics)
+    // How far from its surface a level set is asked (§4.3): two voxels beyond the largest radius, for the cells at the
+    // band's edge; and where points are put back after their steps, as deep as a step takes them.
+    double needed_band(const Collider& collider, const PointSet& points, double voxel, const Box3d& bounds,
+                       double h) const
+    {
+        // As single precision has it, in which a grid keeps its half width.
+        const double needed = (largest_radius(collider, points) + 2 * voxel) * (1 - 0x1p-20);
+        if (collider.method == Method::Continuous) return needed;
+        float fastest2 = 0;
+        const Strided<Vec3f> v = points.v().read();
+        for (std::size_t i = 0; i < points.size(); ++i) fastest2 = std::max(fastest2, v[i].squaredNorm());
+        // In steps of a factor of two, so that points that gather speed do not have it built in every frame.
+        const double way = std::sqrt(fastest2) * h / (tolerance ? 1 : substeps);
+        double deep = voxel;
+        while (deep < way) deep *= 2;
+        return needed + std::min(deep, 0.5 * bounds.sizes().minCoeff());
+    }
+
+    // Level sets are widened once for each shape, and only as far as it takes.
+    void widen(const PointSet& points, std::vector<DynamicPtr>& dynamics, const Evaluation& now)
     {
         std::map<ShapePtr, LevelSetPtr> wide;
         for (DynamicPtr& dynamic : dynamics) {
             const auto collider = std::dynamic_pointer_cast<const Collider>(dynamic);
             const auto level_set = collider ? std::dynamic_pointer_cast<const LevelSet>(collider->shape) : nullptr;
             if (!level_set) continue;
-            const double needed = largest_radius(*collider, points) + 2 * level_set->voxel();
+            const double needed = needed_band(*collider, points, level_set->voxel(), level_set->bounds(), now.frame.dt);
             const auto known = wide_.find(collider->shape);
             LevelSetPtr shape = known == wide_.end() ? level_set : known->second;
-            if (shape->band() < needed) shape = shape->with_band(needed);
+            const Stopwatch stopwatch;
             if (const auto other = wide.find(collider->shape); other != wide.end() && other->second->band() >= needed)
                 shape = other->second;
+            const bool builds = shape->band() < needed;
+            if (builds) shape = shape->with_band(needed);
             wide[collider->shape] = shape;
+            now.figures.bands.push_back(
+                {collider->node, shape->band(), shape->active_voxels(), builds ? stopwatch.seconds() : 0});
             if (shape == level_set) continue;
             auto widened = std::make_shared<Collider>(*collider);
             widened->shape = shape;
@@ -188,21 +213,61 @@ private:
     }
 
     // Shapes that move, in their way through this frame.
-    static void set_in_motion(std::vector<DynamicPtr>& dynamics, const FrameClock& clock, double frame)
+    void set_in_motion(const PointSet& points, std::vector<DynamicPtr>& dynamics, const FrameClock& clock,
+                       const Evaluation& now)
     {
+        std::map<std::string, Deformation> deforming;
         for (DynamicPtr& dynamic : dynamics) {
             const auto collider = std::dynamic_pointer_cast<const Collider>(dynamic);
-            if (!collider || !collider->motion) continue;
+            if (!collider || !(collider->motion || collider->deforming)) continue;
             auto going = std::make_shared<Collider>(*collider);
+            PathOptions options;
+            options.cuts = collider->cuts;
+            const double to = now.frame.number, from = to - 1;
+            std::optional<Jump> jump;
             try {
-                going->shape = moving(collider->shape, *collider->motion, clock, frame - 1, frame);
+                if (collider->deforming) {
+                    const auto known = deforming_.find(collider->node);
+                    const bool same = known != deforming_.end() && known->second.body() == collider->deforming;
+                    Deformation& body =
+                        deforming.emplace(collider->node, same ? known->second : Deformation(collider->deforming))
+                            .first->second;
+                    const double band = needed_band(*collider, points, collider->deforming->voxel(),
+                                                    collider->deforming->bounds(), now.frame.dt);
+                    const Stopwatch stopwatch;
+                    Deformation::Interval interval = body.over(clock, from, to, collider->motion, options, band);
+                    const LevelSet& built = *body.at_end();
+                    now.figures.bands.push_back(
+                        {collider->node, built.band(), built.active_voxels(), stopwatch.seconds()});
+                    going->shape = std::move(interval.shape);
+                    jump = interval.jump;
+                } else {
+                    const auto frame = static_cast<std::int64_t>(std::ceil(to));
+                    const AnimatedShape body(collider->shape, collider->motion);
+                    const FramePath path = path_of(body, clock, frame, options);
+                    jump = path.jump;
+                    going->shape =
+                        path.kind == FramePath::AfterCut
+                            ? moving(collider->shape, *going_back(collider->motion, clock, frame, path.after), clock,
+                                     from, to)
+                            : moving(collider->shape, *collider->motion, clock, from, to);
+                }
             } catch (Error& error) {
                 error.in_node(collider->node).at(collider->location);
                 throw;
             }
+            if (jump)
+                now.warnings.push_back(fmt::format(
+                    "{}:{}: node \"{}\": the shape {}; nothing is swept along on the way (cut = {{{}}} says "
+                    "so, cut = {{}} that it is no jump)",
+                    collider->location.file, collider->location.line, collider->node,
+                    describe(*jump, static_cast<std::int64_t>(std::ceil(to))),
+                    static_cast<std::int64_t>(std::ceil(to))));
             going->motion = nullptr;
+            going->deforming = nullptr;
             dynamic = std::move(going);
         }
+        deforming_ = std::move(deforming);
     }
 
     static double largest_radius(const Collider& collider, const PointSet& points)
@@ -214,8 +279,10 @@ private:
     }
 
     Shadows shadows_;
-    ShapeLoads loads_;                      // of coupled points, at the frame before
-    std::map<ShapePtr, LevelSetPtr> wide_;  // of the frame before
+    // Of the frame before.
+    ShapeLoads loads_;  // of coupled points
+    std::map<ShapePtr, LevelSetPtr> wide_;
+    std::map<std::string, Deformation> deforming_;  // by collide node
 };
 RAPID_NODE(Solve);
 

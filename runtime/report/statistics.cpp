@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace rapid {
@@ -48,6 +49,8 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.loose_constraints = result.figures.loose_constraints;
     frame.contact_search = result.figures.contact_search;
     frame.constraint_residual_max = result.figures.constraint_residual_max;
+    frame.contact_energy = result.figures.contact_energy;
+    frame.bands = result.figures.bands;
     frame.seconds.script = result.figures.script_seconds;
     frame.seconds.solve = result.figures.solve_seconds;
     // The stages are timed apart from the whole: rounding of the clock must not make the rest negative.
@@ -95,10 +98,50 @@ ordered_json to_json(const FrameStatistics& frame)
                                  {"excess", frame.contact_search->excess},
                                  {"search_seconds", frame.contact_search->seconds}};
     json["collisions"] = frame.collisions;
+    json["contact_energy"] = {{"added", frame.contact_energy.added}, {"lost", frame.contact_energy.lost}};
+    for (const BandFigures& band : frame.bands)
+        json["bands"].push_back(
+            {{"node", band.node}, {"width", band.width}, {"voxels", band.voxels}, {"seconds", band.seconds}});
     json["contact_limit"] = frame.contact_limit;
     json["trapped"] = frame.trapped;
     json["beyond_tolerance"] = frame.beyond_tolerance;
     return json;
+}
+
+// What it took to make bands as wide as the largest radius, or of shapes that deform, by node: a line each.
+std::string bands_of(const RunStatistics& run)
+{
+    std::map<std::string, BandFigures> bands;
+    for (const FrameStatistics& frame : run.frames)
+        for (const BandFigures& band : frame.bands) {
+            BandFigures& sum = bands[band.node];
+            sum.width = std::max(sum.width, band.width);
+            sum.voxels = std::max(sum.voxels, band.voxels);
+            sum.seconds += band.seconds;
+        }
+    std::string text;
+    for (const auto& [node, band] : bands)
+        if (band.seconds > 0)
+            text += fmt::format("band     of {}: {:.3g} m, {} voxels at most, {} to build\n", node, band.width,
+                                with_separators(band.voxels), duration_text(band.seconds));
+    return text;
+}
+
+// The audit of the collisions of all frames; nothing where there were none.
+std::string contacts_of(const RunStatistics& run)
+{
+    std::uint64_t contacts = 0;
+    double deepest = 0;
+    ContactEnergy energy;
+    for (const FrameStatistics& frame : run.frames) {
+        contacts += frame.collisions;
+        deepest = std::max(deepest, frame.penetration_max);
+        energy += frame.contact_energy;
+    }
+    if (contacts == 0 && !(deepest > 0)) return {};
+    return fmt::format("contacts {}, deepest {} at a frame's end; they took {:.3g} J, and added {:.3g} J\n",
+                       with_separators(contacts), deepest > 0 ? fmt::format("{:.1e} m", deepest) : "0 m", energy.lost,
+                       energy.added);
 }
 
 // "warning  points did so 5 times, in 3 frames from 7 to 48"; nothing where no frame counted any.
@@ -180,14 +223,17 @@ std::string summary(const RunStatistics& run)
     });
     if (worst != run.frames.end() && worst->error) {
         const FrameStatistics::Error& error = *worst->error;
+        const auto within = [](double e, std::string_view unit) {
+            return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : "within rounding";
+        };
         text += "error    since birth, estimated: ";
-        text += error.max > 0 ? fmt::format(
-                                    "half of the points below {:.1e} m, 95 % below {:.1e}, the worst {:.1e} "
-                                    "(frame {})\n",
-                                    error.p50, error.p95, error.max, worst->frame)
+        text += error.max > 0 ? fmt::format("half of the points {}, 95 % {}, the worst {:.1e} (frame {})\n",
+                                            within(error.p50, " m"), within(error.p95, ""), error.max, worst->frame)
                               : "none above rounding\n";
     }
+    text += contacts_of(run);
     text += constraint_text(run);
+    text += bands_of(run);
     text += doubtful_frames(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");
     text += doubtful_frames(run, &FrameStatistics::trapped, "points were deep in a shape");
     text += doubtful_frames(run, &FrameStatistics::loose_constraints, "constraints were off by a tenth of their size");

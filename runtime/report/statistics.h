@@ -35,7 +35,9 @@ struct FrameStatistics {
     };
     std::optional<Error> error;
     std::uint64_t beyond_tolerance = 0;
-    double penetration_max = 0;           // m
+    double penetration_max = 0;  // m
+    ContactEnergy contact_energy;
+    std::vector<BandFigures> bands;
     double constraint_residual_max = 0;   // m; 0 where nothing is constrained
     std::uint64_t constraint_rows = 0;    // that were active at the frame's end
     std::uint64_t loose_constraints = 0;  // of them, those that were off by more than a tenth of their size

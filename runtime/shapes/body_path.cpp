@@ -1,5 +1,7 @@
 #include "runtime/shapes/body_path.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -51,12 +53,9 @@ private:
 // The ways of all vertices of a mesh.
 class DeformingPath final : public BodyPath {
 public:
-    DeformingPath(const std::array<MeshPtr, 4>& meshes, const FramePath& path, PlacesOn on) : mesh_(meshes[2]), on_(on)
+    DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> ways, PlacesOn on)
+        : mesh_(std::move(mesh)), on_(on), ways_(std::move(ways))
     {
-        ways_.reserve(mesh_->positions.size());
-        const auto place = [&](int k, std::size_t i) -> Vec3d { return meshes[k]->positions[i].cast<double>(); };
-        for (std::size_t i = 0; i < mesh_->positions.size(); ++i)
-            ways_.push_back(path.through<Vec3d>(place(0, i), place(1, i), place(2, i), place(3, i)));
         if (on == PlacesOn::Volume) crossings_.emplace(mesh_);
     }
 
@@ -184,6 +183,14 @@ double root_mean_square(const Mesh& a, const Mesh& b)
 
 }  // namespace
 
+std::string describe(const Jump& jump, std::int64_t frame)
+{
+    return fmt::format("jumps by {:.3g} m to frame {}, {}", jump.way, frame,
+                       jump.usual > 0
+                           ? fmt::format("{:.3g} times as far as in the frames around", jump.way / jump.usual)
+                           : std::string("and is at rest in the frames around"));
+}
+
 FramePath FramePath::find(std::int64_t frame, const FrameRange& range, const PathOptions& options, double size,
                           const std::function<double(std::int64_t)>& way)
 {
@@ -221,12 +228,22 @@ BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
                            PlacesOn on)
 {
+    return std::make_shared<DeformingPath>(mesh.at(clock, frame), vertex_ways(mesh, clock, frame, path), on);
+}
+
+std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
+                                      const FramePath& path)
+{
     const MeshPtr now = mesh.at(clock, frame);
-    return std::make_shared<DeformingPath>(
-        std::array<MeshPtr, 4>{path.before ? mesh.at(clock, frame - 2) : now,
-                               path.kind == FramePath::Still ? now : mesh.at(clock, frame - 1), now,
-                               path.after ? mesh.at(clock, frame + 1) : now},
-        path, on);
+    const MeshPtr at[] = {path.before ? mesh.at(clock, frame - 2) : now,
+                          path.kind == FramePath::Still ? now : mesh.at(clock, frame - 1), now,
+                          path.after ? mesh.at(clock, frame + 1) : now};
+    const auto place = [&](int k, std::size_t i) -> Vec3d { return at[k]->positions[i].cast<double>(); };
+    std::vector<Cubic<Vec3d>> ways;
+    ways.reserve(now->positions.size());
+    for (std::size_t i = 0; i < now->positions.size(); ++i)
+        ways.push_back(path.through<Vec3d>(place(0, i), place(1, i), place(2, i), place(3, i)));
+    return ways;
 }
 
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options)

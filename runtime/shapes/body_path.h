@@ -17,6 +17,8 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "runtime/shapes/animated.h"
 #include "runtime/shapes/scatter.h"
@@ -35,6 +37,9 @@ struct PathOptions {
 struct Jump {
     double way, usual;
 };
+
+// As a message has it: "jumps by 3 m to frame 12, 40 times as far as in the frames around".
+std::string describe(const Jump& jump, std::int64_t frame);
 
 // A cubic in t.
 template <class T>
@@ -113,6 +118,10 @@ enum class PlacesOn {
 };
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
                            PlacesOn on);
+
+// Of each vertex of a mesh that deforms.
+std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
+                                      const FramePath& path);
 
 // How a body goes in a frame's interval. On one thread, as the motions are asked.
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options);

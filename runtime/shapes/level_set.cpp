@@ -70,7 +70,10 @@ openvdb::math::Transform::Ptr make_transform(double voxel, const Box3d& bounds)
 }
 
 GridLevelSet::GridLevelSet(openvdb::FloatGrid::ConstPtr grid, Rebuild rebuild)
-    : grid_(std::move(grid)), rebuild_(std::move(rebuild)), baked_(std::make_shared<BakedGrid>(bake(*grid_)))
+    : grid_(std::move(grid)),
+      rebuild_(std::move(rebuild)),
+      baked_(std::make_shared<BakedGrid>(bake(*grid_))),
+      active_voxels_(grid_->activeVoxelCount())
 {
 }
 

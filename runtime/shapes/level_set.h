@@ -42,6 +42,8 @@ using LevelSetPtr = std::shared_ptr<const LevelSet>;
 // would be left of it), an empty mesh.
 LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options,
                                 std::vector<std::string>& warnings);
+// Another shape of a mesh of which that has been made before: its faces and what holds of them, `open`, are known.
+LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open);
 LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetOptions& options);
 LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options);
 LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options);

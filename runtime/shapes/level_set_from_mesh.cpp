@@ -69,14 +69,8 @@ void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& o
 
 }  // namespace
 
-LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
+LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)
 {
-    require_legal(options);
-    if (mesh->triangles.empty())
-        throw Error(fmt::format("mesh \"{}\" has no faces; a level set needs a closed surface", mesh->name));
-    initialize_openvdb();
-
-    const Mesh::Openness open = mesh->openness();
     const bool balanced = open.unbalanced_edges == 0;
     const auto rebuild = [mesh, balanced, voxel = options.voxel](double half_width) {
         return build(*mesh, balanced, {voxel, half_width / voxel});
@@ -94,6 +88,18 @@ LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& opti
                         "of at most {:.3g} m",
                         mesh->name, options.voxel, size.x(), size.y(), size.z(), size.minCoeff() / 3));
     }
+    return level_set;
+}
+
+LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
+{
+    require_legal(options);
+    if (mesh->triangles.empty())
+        throw Error(fmt::format("mesh \"{}\" has no faces; a level set needs a closed surface", mesh->name));
+    initialize_openvdb();
+
+    const Mesh::Openness open = mesh->openness();
+    LevelSetPtr level_set = level_set_from_mesh(mesh, options, open);
     warn(*mesh, open, options, warnings);
     return level_set;
 }

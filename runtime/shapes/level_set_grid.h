@@ -33,7 +33,7 @@ public:
     double slope_bound() const override { return baked_->slope; }
 
     double voxel() const override { return baked_->voxel; }
-    std::uint64_t active_voxels() const override { return grid_->activeVoxelCount(); }
+    std::uint64_t active_voxels() const override { return active_voxels_; }
     MeshPtr surface() const override;
     LevelSetPtr with_band(double metres) const override;
     void write(const std::filesystem::path& path, const std::string& grid) const override;
@@ -50,6 +50,7 @@ private:
     openvdb::FloatGrid::ConstPtr grid_;
     Rebuild rebuild_;
     std::shared_ptr<const BakedGrid> baked_;  // shared with the scatters made from this
+    std::uint64_t active_voxels_;
     mutable std::once_flag surface_once_;
     mutable MeshPtr surface_;
 };

@@ -37,6 +37,27 @@ private:
     MotionPtr first_, second_;
 };
 
+class BackwardMotion final : public Motion {
+public:
+    BackwardMotion(MotionPtr motion, const FrameClock& clock, double frame)
+        : motion_(std::move(motion)), clock_(clock), frame_(frame)
+    {
+    }
+
+    Pose at(const Frame& frame) const override
+    {
+        const Pose there = motion_->at(clock_.at(frame_));
+        const Pose ahead = motion_->at(clock_.at(2 * frame_ - frame.number));
+        return there * ahead.inverse() * there;
+    }
+    FrameRange range() const override { return motion_->range(); }
+
+private:
+    MotionPtr motion_;
+    FrameClock clock_;
+    double frame_;
+};
+
 class KeyedMotion final : public Motion {
 public:
     explicit KeyedMotion(std::map<std::int64_t, Pose> keys) : keys_(std::move(keys)) {}
@@ -166,6 +187,13 @@ MotionPtr product(const MotionPtr& first, const MotionPtr& second)
 {
     if (!first->varies() && !second->varies()) return constant_motion(first->at({}) * second->at({}));
     return std::make_shared<ProductMotion>(first, second);
+}
+
+MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, std::int64_t frame, bool goes_on)
+{
+    const auto to = static_cast<double>(frame);
+    if (!goes_on) return constant_motion(motion->at(clock.at(to)));
+    return std::make_shared<BackwardMotion>(motion, clock, to);
 }
 
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys)

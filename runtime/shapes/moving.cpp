@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/shapes/first_contact.h"
+#include "runtime/shapes/last_outside.h"
 #include "runtime/shapes/mesh.h"
 #include "runtime/shapes/placed.h"
 

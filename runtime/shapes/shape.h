@@ -36,8 +36,8 @@ struct Contact {
 
     // Above 0 for a path that starts inside (time is then 0): as far away, in m, is the surface of the points that the
     // radius keeps out, along n. Where the field has no gradient n is zero; `back` is then the time by which the point
-    // went in along a straight line, or farther than it went where that time is not known, and infinite for a point
-    // without a velocity.
+    // went in along a straight line as the surface sees it, or farther than it went where that time is not known, and
+    // infinite for a point that has the surface's velocity.
     double depth = 0;
     double back = none;
 };

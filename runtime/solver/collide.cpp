@@ -57,6 +57,11 @@ Vec3d tangential_to(const Support& on, const Vec3d& v)
     return on.vc + (relative - relative.dot(on.n) * on.n);
 }
 
+bool is_clear_of(const Box3d& box, const Vec3d& P, double radius)
+{
+    return ((P - box.max()).array() > radius).any() || ((box.min() - P).array() > radius).any();
+}
+
 // Moves one coordinate, the one along which the normal is longest, by the least that lifts the point by `height`.
 Vec3f lifted(Vec3f P, const Vec3d& n, double height)
 {
@@ -101,6 +106,7 @@ void Collisions::begin(std::span<const std::uint32_t> places)
     stuck_.assign(size, 0);
     held_.clear();
     touched_.clear();
+    lost_.clear();
     travellers_.resize(size);
     paths_.resize(size);
     bends_.resize(size);
@@ -142,9 +148,21 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     hold_stuck(dt);
     fly(a_, dt);
     while (!going_.empty()) round_of_travellers(a_, dt);
-    if (!steps_back) return;
-    for (std::size_t o = 0; o < obstacles_.size(); ++o)
+    for (std::size_t o = 0; steps_back && o < obstacles_.size(); ++o)
         if (obstacles_[o].method != Method::Continuous) correct(static_cast<int>(o), dt);
+    if (damped_.empty()) audit_energy();
+}
+
+// A free path keeps v²/2 - a·P, so all that has changed of it is the doing of contacts.
+void Collisions::audit_energy()
+{
+    for (const std::uint32_t i : touched_) {
+        const double mass = consequences_.mass[places_[i]];
+        if (stuck_[i] || std::isinf(mass)) continue;
+        const Vec3d begun = flight_.P(i), v = flight_.v(i);  // as they were, since exchange()
+        const double change = 0.5 * (v_[i] - v).dot(v_[i] + v) - a_[i].dot(P_[i] - begun);
+        energy.take(mass * change);
+    }
 }
 
 void Collisions::touch(std::size_t i)
@@ -781,8 +799,7 @@ void Collisions::correct(int o, std::span<const double> dt)
     for (std::size_t i = 0; i < size_; ++i) {
         const double radius = obstacle.radius[places_[i]];
         if (!obstacle.members[places_[i]] || stuck_[i]) continue;
-        if (((P_[i] - obstacle.bounds.max()).array() > radius).any()) continue;
-        if (((obstacle.bounds.min() - P_[i]).array() > radius).any()) continue;
+        if (is_clear_of(obstacle.bounds, P_[i], radius)) continue;
         asked_.push_back(i);
         asked_P_.push_back(P_[i]);
         asked_time_.push_back(since_begin(i, 0));
@@ -894,21 +911,22 @@ void Collisions::leave_shape(Traveller& t, const Contact& contact, int o, const 
 {
     t.supports = 0;
     if (++t.rescues > most_rescues) {
-        ++trapped;
+        lost_.push_back(t.i);
         t.left = 0;
     } else if (!contact.n.isZero()) {
         P_[t.i] += contact.depth * contact.n;
     } else if (contact.back != Contact::none) {
-        P_[t.i] -= contact.back * v_[t.i];
+        P_[t.i] -= contact.back * (v_[t.i] - contact.vc);
     } else {
         // It has not come in by itself: out against what pulls, or upwards.
         const double pull = a.norm();
         const Vec3d down = pull > 0 ? Vec3d(a / pull) : Vec3d(-Vec3d::UnitY());
-        const Path fall{P_[t.i], down, Vec3d::Zero(), 0, obstacles_[o].radius[places_[t.i]], since_begin(t.i, t.left)};
+        const Path fall{
+            P_[t.i], contact.vc + down, Vec3d::Zero(), 0, obstacles_[o].radius[places_[t.i]], since_begin(t.i, t.left)};
         Contact above;
         obstacles_[o].shape->first_contact({&fall, 1}, {&above, 1});
         if (above.back == Contact::none) {
-            ++trapped;
+            lost_.push_back(t.i);
             t.left = 0;
         } else {
             P_[t.i] -= above.back * down;
@@ -988,12 +1006,76 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
                      const double drawn = obstacle.moves ? h * (speed(0) + speed(h)) : 0;
                      if (std::abs(f) <= flush + drawn) P[i] -= f * surface.n;
                  });
+    const bool moves = std::any_of(obstacles_.begin(), obstacles_.end(), [](const Obstacle& o) { return o.moves; });
+    std::sort(lost_.begin(), lost_.end());
+    lost_.erase(std::unique(lost_.begin(), lost_.end()), lost_.end());
+    take_out(P, moves ? touched_ : lost_);
     cast(std::span<const Vec3d>(P), rounded);
     ask_surfaces([&](std::size_t i) { return Vec3d(rounded[i].cast<double>()); },
                  [&](std::size_t i, const Surface& surface, double f, double flush) {
                      if (f < 0 && f >= -flush) rounded[i] = lifted(rounded[i], surface.n, -f);
                  });
     return deepest(rounded);
+}
+
+// A place outside a shape, not much farther away than the nearest in any of 26 directions; P where there is none.
+Vec3d place_outside(const Obstacle& obstacle, const Vec3d& P, double radius)
+{
+    const double size = obstacle.bounds.sizes().maxCoeff() + 2 * radius;
+    if (!std::isfinite(size)) return P;
+    std::array<Vec3d, 26> places;
+    std::array<double, 26> phi;
+    for (double reach = std::max(obstacle.feature, 0x1p-10 * size); reach < 2 * size; reach *= 1.25) {
+        for (int k = 0, direction = 0; k < 27; ++k) {
+            const Vec3d d(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
+            if (!d.isZero()) places[direction++] = P + reach * d.normalized();
+        }
+        obstacle.shape->distance(places, phi, {});
+        const auto highest = std::max_element(phi.begin(), phi.end());
+        if (*highest >= radius) return places[highest - phi.begin()];
+    }
+    return P;
+}
+
+// Parts of a body that meet one another, or two bodies, leave no place to a point between them: at the end of the frame
+// it is brought out of both, with the velocity that it has. By the nearest way; and where that leads from one side of a
+// closed gap to the other, to the nearest place that is free.
+void Collisions::take_out(std::span<Vec3d> P, std::vector<std::uint32_t> inside)
+{
+    std::vector<std::uint32_t> still;
+    for (int tries = 0; !inside.empty() && tries < most_rescues; ++tries) {
+        const bool closed = tries >= most_rescues / 2;
+        still.clear();
+        for (const Obstacle& obstacle : obstacles_) {
+            if (obstacle.method != Method::Continuous) continue;
+            asked_.clear();
+            asked_P_.clear();
+            for (const std::uint32_t i : inside) {
+                if (!obstacle.members[places_[i]]) continue;
+                if (is_clear_of(obstacle.bounds, P[i], obstacle.radius[places_[i]])) continue;
+                asked_.push_back(i);
+                asked_P_.push_back(P[i]);
+            }
+            if (asked_.empty()) continue;
+            phi_.resize(asked_.size());
+            gradients_.resize(asked_.size());
+            obstacle.shape->distance(asked_P_, phi_, gradients_);
+            for (std::size_t j = 0; j < asked_.size(); ++j) {
+                const std::size_t i = asked_[j];
+                const double f = phi_[j] - obstacle.radius[places_[i]], slope2 = gradients_[j].squaredNorm();
+                if (f >= -flush_within(P[i], obstacle.radius[places_[i]], obstacle.feature * 0x1p-21)) continue;
+                if (slope2 > 0 && !closed)
+                    P[i] -= f / slope2 * gradients_[j];
+                else
+                    P[i] = place_outside(obstacle, P[i], obstacle.radius[places_[i]]);
+                still.push_back(static_cast<std::uint32_t>(i));
+            }
+        }
+        std::sort(still.begin(), still.end());
+        still.erase(std::unique(still.begin(), still.end()), still.end());
+        inside.swap(still);
+    }
+    trapped += inside.size();
 }
 
 double Collisions::deepest(std::span<const Vec3f> P)
@@ -1006,8 +1088,7 @@ double Collisions::deepest(std::span<const Vec3f> P)
             if (!obstacle.members[places_[i]]) continue;
             const double radius = obstacle.radius[places_[i]];
             const Vec3d at = P[i].cast<double>();
-            if (((at - obstacle.bounds.max()).array() > radius).any()) continue;
-            if (((obstacle.bounds.min() - at).array() > radius).any()) continue;
+            if (is_clear_of(obstacle.bounds, at, radius)) continue;
             asked_.push_back(i);
             asked_P_.push_back(at);
         }

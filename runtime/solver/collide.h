@@ -16,6 +16,7 @@
 
 #include "runtime/points/column.h"
 #include "runtime/shapes/shape.h"
+#include "runtime/solver/contact_energy.h"
 #include "runtime/solver/damped_motion.h"
 #include "runtime/solver/dynamics.h"
 #include "runtime/solver/flight.h"
@@ -81,7 +82,8 @@ public:
 
     std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
     std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
-    std::uint64_t trapped = 0;   // points that found no way out of a shape
+    std::uint64_t trapped = 0;   // points that are in a shape at the end of the frame, with no way out
+    ContactEnergy energy;        // of points without linear forces, which take energy all the time
 
 private:
     // A point that has met something in this sub-step.
@@ -157,10 +159,12 @@ private:
     void count(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double speed, const Vec3d& change,
                double time, int obstacle);
     void correct(int obstacle, std::span<const double> dt);
+    void audit_energy();
     void proceed(Traveller& t, const Path& path, const Bend& bend);
     void finish(const Traveller& t);
     template <class Place, class Use>
     void ask_surfaces(const Place& place, const Use& use);
+    void take_out(std::span<Vec3d> P, std::vector<std::uint32_t> inside);
     double deepest(std::span<const Vec3f> P);
 
     std::span<const Obstacle> obstacles_;
@@ -199,6 +203,7 @@ private:
     // Of these, those that are elsewhere on a surface than at the beginning of the frame, by the surface's side and
     // obstacle.
     std::array<std::vector<std::vector<std::uint32_t>>, 2> moved_on_;
+    std::vector<std::uint32_t> lost_;              // those that found no way out in their step
     std::vector<std::uint32_t> held_;              // those that are stuck
     std::vector<std::uint32_t> meeting_;           // those whose free path meets a shape
     std::vector<std::uint32_t> going_, going_on_;  // those whose sub-step is not over

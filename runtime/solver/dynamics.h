@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -161,10 +162,15 @@ enum class Method {
 };
 enum class Response { Bounce, Slide, Stick, Die };
 
+class DeformingLevelSet;
+
 class Collider : public Dynamic {
 public:
+    // What does not move is a shape. Of the rest Solve makes the shape in its way through the frame.
     ShapePtr shape;
-    MotionPtr motion;  // of the shape, where it moves: then Solve asks for its way through the frame
+    std::shared_ptr<const DeformingLevelSet> deforming;  // in place of a shape
+    MotionPtr motion;                                    // null where it does not move as a whole
+    std::optional<std::set<std::int64_t>> cuts;          // frames to which it jumps; found where not given
     Method method = Method::Continuous;
     Response response = Response::Bounce;
     std::optional<double> record;    // m/s: contacts at least as fast are written to the hit attributes

@@ -131,6 +131,10 @@ public:
         else
             advance_coupled();
         bury();
+        // Of doubles the order of a sum matters.
+        std::stable_sort(energies_.begin(), energies_.end(),
+                         [](const auto& a, const auto& b) { return a.first < b.first; });
+        for (const auto& [begin, energy] : energies_) result_.contact_energy += energy;
         return result_;
     }
 
@@ -200,16 +204,18 @@ private:
                 v_[block.places[i]] = block.v[i].cast<float>();
             }
         }
-        count(collisions, deepest);
+        count(collisions, deepest, places.front());
     }
 
-    void count(const Collisions& collisions, double deepest)
+    // begin: a point of the chunk.
+    void count(const Collisions& collisions, double deepest, std::size_t begin)
     {
         const std::scoped_lock lock(mutex_);
         result_.collisions += collisions.contacts;
         result_.contact_limit += collisions.limited;
         result_.trapped += collisions.trapped;
         result_.penetration_max = std::max(result_.penetration_max, deepest);
+        if (collisions.energy != ContactEnergy()) energies_.emplace_back(begin, collisions.energy);
     }
 
     Consequences consequences() { return {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time, options_.h}; }
@@ -263,6 +269,7 @@ private:
         Collisions collisions(scene_.obstacles, consequences());
         Block block;
         double pull = 0;
+        const std::size_t start = first;
         for (; first < last; first += block_size) {
             const std::size_t size = std::min(block_size, last - first);
             block.begin(*this, first, size);
@@ -290,7 +297,7 @@ private:
                 scene_.is_uniform() ? Strided<Vec3d>{&scene_.uniform, 0} : Strided<Vec3d>{block.a.data(), 1};
             for (std::size_t i = 0; i < (a.stride ? size : 1); ++i) pull = std::max(pull, a[i].norm());
         }
-        count(collisions, 0);
+        count(collisions, 0, start);
         const std::scoped_lock lock(mutex_);
         now.pull = std::max(now.pull, pull);
     }
@@ -580,6 +587,7 @@ private:
 
     std::mutex mutex_;
     SolveResult result_;
+    std::vector<std::pair<std::size_t, ContactEnergy>> energies_;  // by the chunk's first point
     std::exception_ptr error_;
     std::size_t failed_ = 0;  // the beginning of the chunk that the error is of
 };

@@ -6,6 +6,7 @@
 
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraint.h"
+#include "runtime/solver/contact_energy.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
@@ -28,8 +29,9 @@ struct SolveResult {
     std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
     std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     double penetration_max = 0;       // m, the deepest at the end of the frame
-    std::uint64_t died = 0;           // points that actions killed
-    Residual residual;                // of the constraints, at the end of the frame
+    ContactEnergy contact_energy;
+    std::uint64_t died = 0;  // points that actions killed
+    Residual residual;       // of the constraints, at the end of the frame
 };
 
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age

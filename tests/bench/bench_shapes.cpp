@@ -2,17 +2,24 @@
 // of 188,000 active voxels (radius 1 m, voxel 0.02 m), points within a voxel of its surface in random order, or far
 // outside. Items per second are points; compare the ratios of one run, not figures of different ones.
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 #include <openvdb/math/Stencils.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
+#include <openvdb/tools/MeshToVolume.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <random>
 #include <vector>
 
 #include "runtime/parallel.h"
-#include "runtime/shapes/level_set.h"
+#include "runtime/shapes/deforming.h"
 #include "runtime/shapes/scatter.h"
 
 namespace rapid {
@@ -32,6 +39,21 @@ const std::vector<Vec3d>& points_near()
             P = Vec3d(normal(random), normal(random), normal(random));
             P *= (radius + offset(random)) / P.norm();
         }
+        return made;
+    }();
+    return points;
+}
+
+// The same points, those of a block of 8 voxels after one another: what it would bring to keep points in such an order.
+const std::vector<Vec3d>& points_in_order()
+{
+    static const auto points = [] {
+        auto made = points_near();
+        const auto block = [](const Vec3d& P) {
+            const Vec3i at = (P / (8 * voxel)).array().floor().cast<int>();
+            return std::array{at.x(), at.y(), at.z()};
+        };
+        std::sort(made.begin(), made.end(), [&](const Vec3d& a, const Vec3d& b) { return block(a) < block(b); });
         return made;
     }();
     return points;
@@ -125,6 +147,10 @@ void near_surface_rapid(benchmark::State& state)
 {
     run(state, points_near(), [](auto P, auto phi, auto gradient) { sphere()->distance(P, phi, gradient); });
 }
+void near_surface_rapid_in_order(benchmark::State& state)
+{
+    run(state, points_in_order(), [](auto P, auto phi, auto gradient) { sphere()->distance(P, phi, gradient); });
+}
 void near_surface_box_stencil(benchmark::State& state) { ask_stencil(state, points_near()); }
 void near_surface_dense_array(benchmark::State& state)
 {
@@ -155,6 +181,60 @@ void build_from_mesh(benchmark::State& state)
     for (auto _ : state) benchmark::DoNotOptimize(level_set_from_mesh(mesh, {voxel, 3}, warnings));
 }
 
+// A body of 5,000 vertices in 0.02 m voxels that deforms and turns, frame by frame; and what OpenVDB alone takes for a
+// band of that width.
+MeshPtr body() { return make_torus(0.6, 0.2, 120, Vec3d::Zero()); }
+
+void deform_rapid(benchmark::State& state)
+{
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
+    const auto folder = std::filesystem::temp_directory_path() / fmt::format("rapid_bench_{}", getpid());
+    std::filesystem::create_directories(folder);
+    std::map<int, std::filesystem::path> files;
+    for (int frame = 1; frame <= 2; ++frame) {
+        std::string text;
+        for (const Vec3f& P : body()->positions)
+            text += fmt::format("v {} {} {}\n", P.x(), P.y() * (1 + 0.05 * frame), P.z());
+        for (const Mesh::Triangle& t : body()->triangles)
+            text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+        files[frame] = folder / fmt::format("{}.obj", frame);
+        std::ofstream(files[frame]) << text;
+    }
+    const auto sequence = std::make_shared<MeshSequence>(files, "#.obj");
+    sequence->at(2);
+    std::filesystem::remove_all(folder);
+
+    const auto turned = [](double angle) {
+        return Pose{Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3d::UnitX()))};
+    };
+    const auto mesh = std::make_shared<AnimatedMesh>(sequence, keyed_motion({{0, turned(0)}, {100000, turned(3)}}));
+    std::vector<std::string> warnings;
+    Deformation deformation(std::make_shared<DeformingLevelSet>(mesh, LevelSetOptions{voxel, 3}, warnings));
+    double frame = 1;
+    deformation.over({24, 1}, frame, frame + 1, nullptr, {}, 0);
+    for (auto _ : state) {
+        ++frame;
+        benchmark::DoNotOptimize(deformation.over({24, 1}, frame, frame + 1, nullptr, {}, 0));
+    }
+    state.counters["vertices"] = double(body()->positions.size());
+    state.counters["voxels"] = double(deformation.at_end()->active_voxels());
+}
+
+void deform_mesh_to_volume(benchmark::State& state)
+{
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
+    openvdb::initialize();
+    const MeshPtr mesh = body();
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> faces;
+    for (const Vec3f& P : mesh->positions) points.emplace_back(P.x() / voxel, P.y() / voxel, P.z() / voxel);
+    for (const Mesh::Triangle& t : mesh->triangles) faces.emplace_back(t[0], t[1], t[2]);
+    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, faces);
+    const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+    for (auto _ : state)
+        benchmark::DoNotOptimize(openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, *transform, 3, 3));
+}
+
 void births(benchmark::State& state, const ScatterPtr& scatter)
 {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
@@ -175,12 +255,15 @@ void births_in_level_set(benchmark::State& state) { births(state, scatter_in_vol
 
 #define ON_1_AND_2_THREADS Arg(1)->Arg(2)->ArgName("threads")->UseRealTime()->Unit(benchmark::kMillisecond)
 BENCHMARK(near_surface_rapid)->ON_1_AND_2_THREADS;
+BENCHMARK(near_surface_rapid_in_order)->ON_1_AND_2_THREADS;
 BENCHMARK(near_surface_box_stencil)->ON_1_AND_2_THREADS;
 BENCHMARK(near_surface_dense_array)->ON_1_AND_2_THREADS;
 BENCHMARK(far_outside_rapid)->ON_1_AND_2_THREADS;
 BENCHMARK(far_outside_box_stencil)->ON_1_AND_2_THREADS;
 BENCHMARK(build_sphere)->ON_1_AND_2_THREADS;
 BENCHMARK(build_from_mesh)->ON_1_AND_2_THREADS;
+BENCHMARK(deform_rapid)->ON_1_AND_2_THREADS;
+BENCHMARK(deform_mesh_to_volume)->ON_1_AND_2_THREADS;
 BENCHMARK(births_on_mesh)->ON_1_AND_2_THREADS;
 BENCHMARK(births_in_mesh)->ON_1_AND_2_THREADS;
 BENCHMARK(births_on_level_set)->ON_1_AND_2_THREADS;

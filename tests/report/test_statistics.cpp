@@ -21,6 +21,8 @@ FrameResult frame_result()
     result.figures.trapped = 2;
     result.figures.substeps = 2;
     result.figures.penetration_max = 0.25;
+    result.figures.contact_energy = {0.5, 3};
+    result.figures.bands = {{"collide1", 0.125, 5000, 0.5}};
     result.figures.script_seconds = 0.125;
     result.figures.solve_seconds = 0.5;
     result.total_seconds = 1;
@@ -91,6 +93,8 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
         "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12,
+        "contact_energy": { "added": 0.5, "lost": 3.0 },
+        "bands": [ { "node": "collide1", "width": 0.125, "voxels": 5000, "seconds": 0.5 } ],
         "contact_limit": 3, "trapped": 2, "beyond_tolerance": 0 })"));
 }
 
@@ -151,6 +155,15 @@ TEST_CASE("the summary adds up what solve warned of, and in which frames", "[rep
                Catch::EndsWith("at the peak\n"
                                "warning  points reached the limit of contacts 1,234 times, in 2 frames from 2 to 4\n"
                                "warning  points were deep in a shape once, in frame 3\n"));
+}
+
+TEST_CASE("the summary says what bands took that were built in the run, and nothing of others", "[report]")
+{
+    RunStatistics run = run_of({1, 1});
+    run.frames[0].bands = {{"collide1", 0.06, 4000, 0}, {"collide2", 0.1, 5000, 0.25}};
+    run.frames[1].bands = {{"collide1", 0.06, 4000, 0}, {"collide2", 0.2, 9000, 0.5}};
+    CHECK_THAT(summary(run), Catch::EndsWith("at the peak\n"
+                                             "band     of collide2: 0.2 m, 9,000 voxels at most, 0.750 s to build\n"));
 }
 
 TEST_CASE("the summary of an empty scene is one of no points, not of none run", "[report]")

@@ -1,0 +1,35 @@
+-- graphs/radius.lua: what its head promises.
+describe("graphs/radius.lua", function()
+  local size = 0.1
+  local result = rapid.run("graphs/radius.lua", { frames = {1, 48}, set = { size = size } })
+
+  -- How far a middle is from a ring about the y axis through (x, 0.3, 0).
+  local function from_ring(P, x)
+    local around = math.sqrt((P.x - x) ^ 2 + P.z ^ 2) - 0.55
+    return math.sqrt(around ^ 2 + (P.y - 0.3) ^ 2) - 0.16
+  end
+
+  it("lets middles to the surface without a radius, and surfaces with pscale", function()
+    local points = result[48]
+    assert.equal(28, #points)
+    for i = 1, #points do
+      local p = points[i]
+      local right = p:within "side2"
+      -- The level set of a tube is off by about voxel² / tube: 6 mm at most.
+      assert.near(right and size or 0, from_ring(p.P, right and 2 or 0), 0.006)
+    end
+  end)
+
+  it("widens the narrowest band to what the radius needs, and says so", function()
+    local command = require "testing.command"
+    local folder = command.folder()
+    local graph = command.shell("pwd").stdout:match "%S+" .. "/graphs/radius.lua"
+    local ran = command.rapid(("run %s -f 1-8 --stats stats.json"):format(graph), { cwd = folder.path })
+    assert.equal("", ran.stderr)
+    assert.truthy(ran.stdout:find "band     of collide2: 0%.16 m, %d+,%d+ voxels at most, [%d.]+ s to build",
+      ran.stdout)
+    assert.falsy(ran.stdout:find("of collide1", 1, true))
+    assert.truthy(folder:read "stats.json":find('"node":"collide1","width":0.05999', 1, true)
+      or folder:read "stats.json":find('"node":"collide1","width":0.06', 1, true))
+  end)
+end)

@@ -613,6 +613,7 @@ function Node:contact(params) end
 ---@field fps? number  frames a second [number, 1/s, above 0, default 24]
 ---@field start? integer  first frame: the initial state, at time 0 [integer, default 1]
 ---@field seed? integer  of all random numbers of this simulation [integer, at least 0, default 0]
+---@field subframes? integer  times a frame that the whole graph is evaluated, scripts, emitters and colliders included; not the solver's sub-steps [integer, at least 1, default 1]
 ---@field points? rapid.Points  initial points; their ids count from 0 [points]
 ---@field name? string  what the node is called in messages [string]
 

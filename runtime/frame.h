@@ -1,24 +1,44 @@
 // Frames and their times.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace rapid {
 
-// The instant that a parameter, kernel, node or motion is asked for. time = (number - start) / fps, dt = 1 / fps, from
-// the frame's number, never from a sum.
+// The instant that a parameter, kernel, node or motion is asked for. time = (number - start) / fps, dt = 1 / fps (of a
+// sub-frame, its part), from the frame's number, never from a sum.
 struct Frame {
     double number = 1;  // whole except where a motion is asked between frames
     double time = 0;    // s
     double dt = 0;      // s
 };
 
-// Which time a simulation's frames have.
+// Which time a simulation's frames have, and its steps: a frame has `subframes` of them, each of which evaluates the
+// whole graph. They are counted from `start` on, so that with one a frame a step is a frame.
 struct FrameClock {
     double fps = 24;
-    std::int64_t start = 1;  // the frame at time 0
+    std::int64_t start = 1;  // the frame, and the step, at time 0
+    int subframes = 1;
 
-    Frame at(double number) const { return {number, (number - static_cast<double>(start)) / fps, 1 / fps}; }
+    double steps_per_second() const { return fps * subframes; }
+    Frame at(double number) const
+    {
+        return {number, (number - static_cast<double>(start)) / fps, 1 / steps_per_second()};
+    }
+    // What ends with a step. Time is that of a whole number of steps.
+    Frame at_step(std::int64_t step) const
+    {
+        const auto passed = static_cast<double>(step - start);
+        return {static_cast<double>(start) + passed / subframes, passed / steps_per_second(), 1 / steps_per_second()};
+    }
+    std::int64_t step_at(const Frame& frame) const
+    {
+        return start + std::llround((frame.number - static_cast<double>(start)) * subframes);
+    }
+    // The step that ends with a frame.
+    std::int64_t step_of(std::int64_t frame) const { return start + (frame - start) * subframes; }
+    bool is_whole(std::int64_t step) const { return (step - start) % subframes == 0; }
 };
 
 }  // namespace rapid

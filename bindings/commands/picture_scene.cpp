@@ -58,7 +58,7 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
         const auto role =
             planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
         const PlannedSimulation& simulation = plan_.simulations[planned.simulation];
-        const FrameClock clock{simulation.fps, simulation.start};
+        const FrameClock clock{simulation.fps, simulation.start, simulation.subframes};
         const Frame now = clock.at(static_cast<double>(frame));
         Eigen::Affine3d place = Eigen::Affine3d::Identity();
         if (const auto transform = planned.node->arguments.find("transform");

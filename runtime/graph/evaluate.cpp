@@ -4,6 +4,7 @@
 #include <chrono>
 #include <new>
 #include <optional>
+#include <utility>
 
 namespace rapid {
 namespace {
@@ -15,6 +16,20 @@ double seconds_since(std::chrono::steady_clock::time_point begin)
 
 }  // namespace
 
+void FrameFigures::go_on(FrameFigures later)
+{
+    later.born += born;
+    later.died += died;
+    later.collisions += collisions;
+    later.contact_limit += contact_limit;
+    later.beyond_tolerance = std::max(later.beyond_tolerance, beyond_tolerance);
+    later.trapped = std::max(later.trapped, trapped);
+    later.substeps = std::max(later.substeps, substeps);
+    later.script_seconds += script_seconds;
+    later.solve_seconds += solve_seconds;
+    *this = std::move(later);
+}
+
 Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
     : plan_(plan),
       write_(std::move(write)),
@@ -22,10 +37,12 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
       next_(plan.first_frame()),
       kept_(plan.nodes.size())
 {
+    subframes_ = plan.simulations.front().subframes;
     for (const PlannedSimulation& planned : plan.simulations) {
         auto simulation = std::make_shared<Simulation>();
         simulation->fps = planned.fps;
         simulation->start = planned.start;
+        simulation->subframes = planned.subframes;
         simulation->seed = planned.seed;
         simulations_.push_back(std::move(simulation));
     }
@@ -37,13 +54,36 @@ FrameResult Evaluator::advance()
     FrameResult result;
     result.frame = next_;
 
+    std::vector<Flow> results;
+    std::vector<std::size_t> readers;
+    // The first frame has no interval before it.
+    for (int left = next_ <= plan_.first_frame() ? 0 : subframes_ - 1; left >= 0; --left)
+        take(left, results, readers, result);
+
+    for (const auto& [name, i] : plan_.outputs) {
+        const Simulation& simulation = *simulations_[plan_.nodes[i].simulation];
+        PointSet& points = results[i].points;
+        result.outputs[name] = --readers[i] == 0 ? std::move(points) : points;
+        result.outputs[name].remove("dt");
+        result.fps[name] = simulation.fps;
+        result.time[name] = simulation.clock().at(static_cast<double>(next_)).time;
+    }
+    ++next_;
+    result.total_seconds = seconds_since(begin);
+    return result;
+}
+
+void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame)
+{
+    const auto takes_part = [&](const PlannedNode& planned) { return left == 0 || planned.in_loop; };
+
     // Functions of the frame are asked first, on this thread; what a column's fallback is may depend on them.
     for (const PlannedNode& planned : plan_.nodes) {
-        if (planned.once && next_ > plan_.first_frame()) continue;
+        if (!takes_part(planned) || (planned.once && next_ > plan_.first_frame())) continue;
         const Simulation& simulation = *simulations_[planned.simulation];
-        const Frame frame = simulation.frame(next_);
+        const Frame now = simulation.frame(simulation.clock().step_of(next_) - left);
         try {
-            bind_arguments(*planned.node, *planned.op, frame, true);
+            bind_arguments(*planned.node, *planned.op, now, true);
             planned.op->check();
         } catch (Error& error) {
             error.in_node(planned.node->name).at(planned.node->location);
@@ -55,25 +95,17 @@ FrameResult Evaluator::advance()
         simulations_[s]->groups = plan_.groups_of(s);
     }
 
-    std::vector<Flow> results(plan_.nodes.size());
-    std::vector<std::size_t> readers(plan_.nodes.size());
+    FrameFigures before = std::exchange(frame.figures, {});
+    results.assign(plan_.nodes.size(), {});
+    readers.assign(plan_.nodes.size(), 0);
     for (std::size_t i = 0; i < plan_.nodes.size(); ++i) readers[i] = plan_.nodes[i].consumers;
-    for (std::size_t i = 0; i < plan_.nodes.size(); ++i) results[i] = evaluate(i, results, readers, result);
-
-    for (const auto& [name, i] : plan_.outputs) {
-        const Simulation& simulation = *simulations_[plan_.nodes[i].simulation];
-        PointSet& points = results[i].points;
-        result.outputs[name] = --readers[i] == 0 ? std::move(points) : points;
-        result.outputs[name].remove("dt");
-        result.fps[name] = simulation.fps;
-        result.time[name] = simulation.frame(next_).time;
-    }
-    ++next_;
-    result.total_seconds = seconds_since(begin);
-    return result;
+    for (std::size_t i = 0; i < plan_.nodes.size(); ++i)
+        if (takes_part(plan_.nodes[i])) results[i] = evaluate(i, left, results, readers, frame);
+    before.go_on(std::move(frame.figures));
+    frame.figures = std::move(before);
 }
 
-Flow Evaluator::evaluate(std::size_t i, std::vector<Flow>& results, std::vector<std::size_t>& readers,
+Flow Evaluator::evaluate(std::size_t i, int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,
                          FrameResult& frame)
 {
     const PlannedNode& planned = plan_.nodes[i];
@@ -86,17 +118,20 @@ Flow Evaluator::evaluate(std::size_t i, std::vector<Flow>& results, std::vector<
     if (node.type->kind == NodeKind::Source) inputs.push_back({PointSet(), {}, simulations_[planned.simulation]});
 
     const Simulation& simulation = *simulations_[planned.simulation];
-    const Frame now = simulation.frame(std::max(next_, simulation.start));
+    const std::int64_t step = simulation.clock().step_of(next_) - left;
+    const Frame now = simulation.frame(std::max(step, simulation.start));
     const std::function<void(const std::string&, const PointSet&)> write =
-        write_
+        write_ && left == 0
             ? [&](const std::string& pattern, const PointSet& points) { write_(pattern, points, now, simulation.fps); }
             : std::function<void(const std::string&, const PointSet&)>();
+    // A simulation that begins at this frame's end, or later, has begun once.
+    FrameFigures again;
     const Evaluation evaluation{now,
-                                next_ <= simulation.start,
+                                step <= simulation.start,
                                 node.name,
                                 node.location,
                                 RandomKey(simulation.seed, node.name),
-                                frame.figures,
+                                left > 0 && step <= simulation.start ? again : frame.figures,
                                 frame.warnings,
                                 write,
                                 &plan_.simulations[planned.simulation].left_out};

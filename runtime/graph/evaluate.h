@@ -1,7 +1,9 @@
 // Runs a plan, frame by frame.
 //
 // At each frame the nodes are evaluated in the order of the plan; a result goes to its last reader without a copy, and
-// what never changes is evaluated once. At the first frame the nodes between Create and Solve do not run.
+// what never changes is evaluated once. At the first frame the nodes between Create and Solve do not run. With
+// sub-frames all that is upstream of a Solve is evaluated so many times a frame, and what comes after it once, at the
+// frame's end.
 #pragma once
 
 #include <functional>
@@ -43,12 +45,16 @@ public:
     FrameResult advance();
 
 private:
-    Flow evaluate(std::size_t i, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);
+    // A step of the next frame, `left` steps before its end. The results of the nodes, and who has not read them yet.
+    void take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);
+    Flow evaluate(std::size_t i, int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,
+                  FrameResult& frame);
 
     const Plan& plan_;
     WriteHook write_;
     ResultHook result_;
     std::int64_t next_;
+    int subframes_ = 1;  // of all simulations
     std::vector<std::shared_ptr<Simulation>> simulations_;
     std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once
 };

@@ -100,12 +100,16 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
 {
     Explanation result;
     for (const PlannedNode& planned : plan.nodes) {
+        const int times = planned.in_loop ? plan.simulations[planned.simulation].subframes : 1;
         const std::string why = plan.outputs.size() == 1 ? "reached from the output"
                                                          : fmt::format("reached from the output{} {}",
                                                                        planned.reached_from.size() == 1 ? "" : "s",
                                                                        fmt::join(planned.reached_from, ", "));
         result.nodes.push_back({planned.node->name, planned.node->type->name, true,
-                                planned.once ? "once" : "every frame", why, planned.changes});
+                                planned.once ? "once"
+                                : times > 1  ? fmt::format("{} times a frame", times)
+                                             : "every frame",
+                                why, planned.changes});
     }
     for (const NodePtr& node : plan.left_out)
         result.nodes.push_back({node->name, node->type->name, false, "never", "no output comes from it", ""});

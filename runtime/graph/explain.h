@@ -15,7 +15,7 @@ struct Explanation {
     struct ExplainedNode {
         std::string name, type;
         bool kept;
-        std::string evaluated;  // "once", "every frame", "never"
+        std::string evaluated;  // "once", "every frame", "4 times a frame", "never"
         std::string why;        // it is kept or left out
         std::string changes;    // why it is evaluated every frame; empty for the others
     };

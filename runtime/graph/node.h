@@ -54,6 +54,7 @@ namespace rapid {
 struct Simulation {
     double fps = 24;
     std::int64_t start = 1;
+    int subframes = 1;
     std::uint64_t seed = 0;
     std::int64_t next_id = 0;            // ids count all births from 0
     std::vector<AttributeSpec> columns;  // what the plan knows: these exist from the first frame on
@@ -61,8 +62,8 @@ struct Simulation {
     PointSet state;                                   // as Solve left it at the frame before
     std::map<const Simulation*, AdoptedIds> adopted;  // the ids here of points that came from other simulations
 
-    FrameClock clock() const { return {fps, start}; }
-    Frame frame(std::int64_t number) const { return clock().at(static_cast<double>(number)); }
+    FrameClock clock() const { return {fps, start, subframes}; }
+    Frame frame(std::int64_t step) const { return clock().at_step(step); }
 };
 
 // What travels along an edge of the graph.
@@ -101,6 +102,9 @@ struct FrameFigures {
     std::vector<BandFigures> bands;  // by collide node, of those with a level set
     std::vector<double> errors;      // estimated, of the positions of a sample of the points, m
     double script_seconds = 0, solve_seconds = 0;
+
+    // Those of a frame's next part: what happens adds up, the worst stays, what holds at the end is the later's.
+    void go_on(FrameFigures later);
 };
 
 // What a node is told when it is evaluated.

@@ -188,7 +188,8 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     for (const PlannedNode& planned : nodes)
         at_node(*planned.node, [&] {
             const PlannedSimulation& simulation = simulations[planned.simulation];
-            const Frame start{static_cast<double>(simulation.start), 0, 1 / simulation.fps};
+            const Frame start =
+                FrameClock{simulation.fps, simulation.start, simulation.subframes}.at_step(simulation.start);
             bind_arguments(*planned.node, *planned.op, start, false);
             planned.op->check();
         });
@@ -230,7 +231,14 @@ void Plan::find_simulations()
             at_node(node, [&] { bind_arguments(node, *planned.op, {}, false); });
             simulation.fps = constant_argument(node, "fps");
             simulation.start = static_cast<std::int64_t>(constant_argument(node, "start"));
+            simulation.subframes = static_cast<int>(constant_argument(node, "subframes"));
             simulation.seed = static_cast<std::uint64_t>(constant_argument(node, "seed"));
+            if (!simulations.empty() && simulations.front().subframes != simulation.subframes)
+                throw Error(fmt::format("subframes = {}, and {} at \"{}\"; all simulations of a graph have the same",
+                                        simulation.subframes, simulations.front().subframes,
+                                        simulations.front().create->name))
+                    .in_node(node.name)
+                    .at(node.location);
             planned.simulation = simulations.size();
             planned.carries.insert(simulations.size());
             simulations.push_back(simulation);

@@ -56,6 +56,7 @@ struct PlannedSimulation {
     NodePtr create, solve;  // solve may be null
     double fps = 24;
     std::int64_t start = 1;
+    int subframes = 1;
     std::uint64_t seed = 0;
     std::vector<PlannedAttribute> attributes;  // in order of name; all that are known or made
     std::set<std::string> left_out;            // of them, those that are not kept

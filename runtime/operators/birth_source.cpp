@@ -83,24 +83,28 @@ void BirthSource::take_shape(const ShapePtr& shape)
     scatter_ = from_ == "volume" ? scatter_in_volume(shape) : scatter_on_surface(shape);
 }
 
-FramePath BirthSource::path_at(const FrameClock& clock, std::int64_t frame, const PathOptions& options) const
+FramePath BirthSource::path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const
 {
-    return moving_mesh_ ? path_of(*moving_mesh_, clock, frame, options)
-                        : path_of(*moving_shape_, clock, frame, options);
+    return moving_mesh_ ? path_of(*moving_mesh_, clock, step, options) : path_of(*moving_shape_, clock, step, options);
 }
 
-BirthSource::Moved BirthSource::go_to(const FrameClock& clock, std::int64_t frame, const PathOptions& options)
+BirthSource::Moved BirthSource::go_to(const FrameClock& simulation, std::int64_t step, const PathOptions& options)
 {
     if (!moving_mesh_ && !moving_shape_) return {std::nullopt, false};
+    const bool deforms = moving_mesh_ && moving_mesh_->deforms();
+    FrameClock clock = simulation;
+    if (deforms) clock.subframes = 1;
     // At the start there is no interval yet: what happens there is the beginning of the next one, unless that jumps.
-    bool at_beginning = frame <= clock.start;
-    FramePath path = path_at(clock, at_beginning ? frame + 1 : frame, options);
+    bool at_beginning = step <= clock.start;
+    const std::int64_t last = at_beginning ? step + 1 : step, parts = deforms ? simulation.subframes : 1;
+    std::int64_t end = clock.start + (last - clock.start + parts - 1) / parts;
+    FramePath path = path_at(clock, end, options);
     if (at_beginning && (path.kind == FramePath::Still || path.kind == FramePath::AfterCut)) {
         at_beginning = false;
+        end = step;
         path = FramePath();
     }
-    const std::int64_t end = at_beginning ? frame + 1 : frame;
-    if (!moving_mesh_ || !moving_mesh_->deforms()) {
+    if (!deforms) {
         path_ = rigid_path(moving_mesh_ ? *moving_mesh_->motion() : *moving_shape_->motion(), clock, end, path);
     } else {
         const PlacesOn on = from_ == "volume"   ? PlacesOn::Volume
@@ -108,6 +112,10 @@ BirthSource::Moved BirthSource::go_to(const FrameClock& clock, std::int64_t fram
                                                 : PlacesOn::Faces;
         take_mesh(moving_mesh_->at(clock, end));
         path_ = deforming_path(*moving_mesh_, clock, end, path, on);
+        if (parts > 1) {
+            const double length = 1.0 / static_cast<double>(parts);
+            path_ = part_of(path_, static_cast<double>((last - 1 - clock.start) % parts) * length, length);
+        }
     }
     return {at_beginning ? std::nullopt : path.jump, at_beginning};
 }

@@ -25,13 +25,14 @@ public:
 
     bool is(const ObjectPtr& object, const std::string& from) const { return object_ == object && from_ == from; }
 
-    // Makes it what it is in the interval that ends with a frame; at the simulation's start, what it is there. Once a
-    // frame, before births are placed, and on one thread.
+    // Makes it what it is in the interval that ends with a step; at the simulation's start, what it is there. Once a
+    // step, before births are placed, and on one thread. What deforms is known at frames: there it goes the same way
+    // whatever the steps.
     struct Moved {
         std::optional<Jump> jump;  // found in this interval
         bool at_beginning;         // births are at t = 0 of an interval: of the one that begins at the start
     };
-    Moved go_to(const FrameClock& clock, std::int64_t frame, const PathOptions& options);
+    Moved go_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
     // Whether births have ways to go along: places are then to be carried.
     bool moves() const { return path_ != nullptr; }
     const BodyPath& path() const { return *path_; }
@@ -67,7 +68,7 @@ private:
     void take_mesh(const MeshPtr& mesh);
     void take_shape(const ShapePtr& shape);
     void take_points(PointSet points);
-    FramePath path_at(const FrameClock& clock, std::int64_t frame, const PathOptions& options) const;
+    FramePath path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const;
 
     ObjectPtr object_;
     std::string from_;

@@ -49,10 +49,13 @@ Births BirthClock::at_rate(double rate, std::int64_t frame, double fps)
     return births;
 }
 
-Births BirthClock::at_once(std::size_t count, double fps)
+Births BirthClock::at_once(std::size_t count, double fps, int part, int parts)
 {
-    const Births births{total_, count, static_cast<double>(count), static_cast<double>(count) * fps};
-    total_ += count;
+    const auto n = static_cast<std::size_t>(parts), k = static_cast<std::size_t>(part);
+    const std::size_t before = count * k / n, born = count * (k + 1) / n - before;
+    const double reached = static_cast<double>(count * (k + 1)) / parts - static_cast<double>(before);
+    const Births births{total_, born, reached, static_cast<double>(count) * fps};
+    total_ += born;
     return births;
 }
 

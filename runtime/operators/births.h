@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// The births of one frame. They are numbered over the emitter's whole life, from 0.
+// The births of one frame, or of a part of it. They are numbered over the emitter's whole life, from 0.
 struct Births {
     std::uint64_t first = 0;
     std::size_t count = 0;
@@ -30,8 +30,8 @@ public:
 
     // The births of `frame` at `rate` (1/s, finite, at least 0). Called for the frames in their order.
     Births at_rate(double rate, std::int64_t frame, double fps);
-    // `count` births in a frame, however many others have.
-    Births at_once(std::size_t count, double fps);
+    // Of `count` births in a frame, however many others have, those of its part number `part`, from 0, of so many.
+    Births at_once(std::size_t count, double fps, int part = 0, int parts = 1);
 
 private:
     double due(std::int64_t frame, double fps) const;

@@ -18,7 +18,7 @@ namespace {
 struct Create {
     double fps = 24;
     int start_frame = 1;
-    int seed = 0;
+    int seed = 0, subframes = 1;
     std::shared_ptr<const PointsObject> points;
 
     static NodeType declare()
@@ -30,6 +30,10 @@ struct Create {
             .param(&Create::start_frame, "start", 1.0, any_number(), "", "first frame: the initial state, at time 0")
             .constant()
             .param(&Create::seed, "seed", 0.0, at_least(0), "", "of all random numbers of this simulation")
+            .constant()
+            .param(&Create::subframes, "subframes", 1.0, at_least(1), "",
+                   "times a frame that the whole graph is evaluated, scripts, emitters and colliders included; not the "
+                   "solver's sub-steps")
             .constant()
             .param(&Create::points, "points", Value(), any_number(), "", "initial points; their ids count from 0")
             .constant();

@@ -270,7 +270,7 @@ struct Emit {
         if (now.at_start) return start(inputs, now);
         Flow flow = std::move(inputs[0]);
         move(*flow.simulation, now);
-        bear(flow, births(static_cast<std::int64_t>(now.frame.number), flow.simulation->fps), now);
+        bear(flow, births(flow.simulation->clock().step_at(now.frame), flow.simulation->clock()), now);
         return flow;
     }
 
@@ -281,13 +281,25 @@ private:
         return found == impulse->end() ? 0 : static_cast<std::size_t>(found->second);
     }
 
-    Births births(std::int64_t frame, double fps)
+    Births births(std::int64_t step, const FrameClock& clock)
     {
-        if (!rate) return clock_.at_once(count ? static_cast<std::size_t>(*count) : impulse_at(frame), fps);
-        if (*rate / fps > most_births)
-            throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", *rate, *rate / fps,
-                                    most_births));
-        return clock_.at_rate(*rate, frame, fps);
+        if (!rate) return births_of_frame(step, clock);
+        const double steps = clock.steps_per_second();
+        if (*rate / steps > most_births)
+            throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", *rate,
+                                    *rate / steps, most_births));
+        return clock_.at_rate(*rate, step, steps);
+    }
+
+    // Points are as old at the frame's end as without sub-frames: what is born at one time is so in one of them.
+    Births births_of_frame(std::int64_t step, const FrameClock& clock)
+    {
+        const std::int64_t parts = clock.subframes, before = step - 1 - clock.start, part = before % parts;
+        const auto n = static_cast<std::size_t>(count ? *count : impulse_at(clock.start + 1 + before / parts));
+        if (!age && (birth == "random" || birth == "even"))
+            return clock_.at_once(n, clock.fps, static_cast<int>(part), clock.subframes);
+        const bool here = part == (age || birth == "end" ? parts - 1 : 0);
+        return clock_.at_once(here ? n : 0, clock.fps);
     }
 
     // The source's attributes that `attributes` does not replace.
@@ -379,8 +391,8 @@ void Emit::move(const Simulation& simulation, const Evaluation& now)
                                         : PathOptions::None;
     options.alpha = alpha;
     if (cut) options.cuts = cut->frames;
-    const auto frame = static_cast<std::int64_t>(now.frame.number);
-    const BirthSource::Moved moved = source_.go_to(simulation.clock(), frame, options);
+    const auto frame = static_cast<std::int64_t>(std::ceil(now.frame.number));
+    const BirthSource::Moved moved = source_.go_to(simulation.clock(), simulation.clock().step_at(now.frame), options);
     at_beginning_ = moved.at_beginning;
     if (moved.jump)
         now.warnings.push_back(

@@ -166,8 +166,9 @@ struct PinNode {
         pin->place = target.place;
         pin->compliance = compliance;
         if (const MotionPtr motion = transform ? transform : target.motion)
-            pin->track = std::make_shared<MotionTrack>(*motion, flow.simulation->clock(), now.frame.number - 1,
-                                                       now.frame.number);
+            pin->track =
+                std::make_shared<MotionTrack>(*motion, flow.simulation->clock(),
+                                              now.frame.number - 1.0 / flow.simulation->subframes, now.frame.number);
         flow.dynamics.push_back(std::move(pin));
         return flow;
     }

@@ -57,15 +57,17 @@ struct Solve {
     {
         Flow flow = std::move(inputs[0]);
         PointSet& points = flow.points;
+        const FrameClock clock = flow.simulation->clock();
         widen(points, flow.dynamics, now);
-        set_in_motion(points, flow.dynamics, flow.simulation->clock(), now);
+        set_in_motion(points, flow.dynamics, clock, now);
 
         SolveOptions options;
         options.substeps = substeps;
         options.time = now.frame.time;
         options.h = now.frame.dt;
-        options.frame = static_cast<std::int64_t>(now.frame.number);
+        options.frame = static_cast<std::int64_t>(std::ceil(now.frame.number));
         options.group = group;
+        options.begins_frame = clock.is_whole(clock.step_at(now.frame) - 1);
         options.iterations = iterations;
         options.loads = &loads_;
         const bool coupled = couples(flow.dynamics);
@@ -74,9 +76,10 @@ struct Solve {
                 "a tolerance is for points that do not depend on one another, and there are constraints; give "
                 "substeps instead");
 
+        const double allowed = tolerance ? *tolerance / clock.subframes : 0;  // m, in this step
         interact(points, flow.dynamics, options);
         if (!coupled) shadows_.begin(points);
-        const Tolerated done = tolerance ? solve_within(points, flow.dynamics, options, *tolerance, max_substeps)
+        const Tolerated done = tolerance ? solve_within(points, flow.dynamics, options, allowed, max_substeps)
                                          : Tolerated{solve(points, flow.dynamics, options), substeps, 0};
         std::vector<double> errors;
         if (!coupled)  // a part of the points alone would tell nothing: the residual is what says how wrong they are
@@ -84,7 +87,7 @@ struct Solve {
                 SolveOptions finer = options;
                 finer.substeps *= 2;
                 if (tolerance)
-                    solve_within(shadows, flow.dynamics, finer, *tolerance / 4, 2 * max_substeps);
+                    solve_within(shadows, flow.dynamics, finer, allowed / 4, 2 * max_substeps);
                 else
                     solve(shadows, flow.dynamics, finer);
             });
@@ -223,7 +226,8 @@ private:
             auto going = std::make_shared<Collider>(*collider);
             PathOptions options;
             options.cuts = collider->cuts;
-            const double to = now.frame.number, from = to - 1;
+            const std::int64_t step = clock.step_at(now.frame);
+            const double to = now.frame.number, from = clock.at_step(step - 1).number;
             std::optional<Jump> jump;
             try {
                 if (collider->deforming) {
@@ -235,21 +239,21 @@ private:
                     const double band = needed_band(*collider, points, collider->deforming->voxel(),
                                                     collider->deforming->bounds(), now.frame.dt);
                     const Stopwatch stopwatch;
-                    Deformation::Interval interval = body.over(clock, from, to, collider->motion, options, band);
+                    Deformation::Interval interval =
+                        body.over({clock.fps, clock.start}, from, to, collider->motion, options, band);
                     const LevelSet& built = *body.at_end();
                     now.figures.bands.push_back(
                         {collider->node, built.band(), built.active_voxels(), stopwatch.seconds()});
                     going->shape = std::move(interval.shape);
                     jump = interval.jump;
                 } else {
-                    const auto frame = static_cast<std::int64_t>(std::ceil(to));
                     const AnimatedShape body(collider->shape, collider->motion);
-                    const FramePath path = path_of(body, clock, frame, options);
+                    const FramePath path = path_of(body, clock, step, options);
                     jump = path.jump;
                     going->shape =
                         path.kind == FramePath::AfterCut
-                            ? moving(collider->shape, *going_back(collider->motion, clock, frame, path.after), clock,
-                                     from, to)
+                            ? moving(collider->shape, *going_back(collider->motion, clock, to, path.after), clock, from,
+                                     to)
                             : moving(collider->shape, *collider->motion, clock, from, to);
                 }
             } catch (Error& error) {

@@ -18,7 +18,7 @@ using Map = Eigen::Matrix<double, 3, 4>;
 
 Map map_at(const Motion& motion, const FrameClock& clock, std::int64_t frame)
 {
-    return motion.at(clock.at(static_cast<double>(frame))).affine().matrix().topRows<3>();
+    return motion.at(clock.at_step(frame)).affine().matrix().topRows<3>();
 }
 
 // The normal of a surface after a linear map: by its cofactors, as a normal turns otherwise than the surface.
@@ -152,11 +152,43 @@ private:
     std::optional<RayCrossings> crossings_;
 };
 
-// A script's motion has no frames before the first.
-FrameRange within(FrameRange range, const FrameClock& clock)
+class PartOfPath final : public BodyPath {
+public:
+    PartOfPath(BodyPathPtr path, double begin, double length) : path_(std::move(path)), begin_(begin), length_(length)
+    {
+    }
+
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+               std::span<Vec3d> velocity) const override
+    {
+        std::vector<double> of_whole(t.size());
+        for (std::size_t i = 0; i < t.size(); ++i) of_whole[i] = begin_ + length_ * t[i];
+        path_->carry(of_whole, normals, places, velocity);
+        for (Vec3d& v : velocity.first(places.size())) v *= length_;
+    }
+
+private:
+    BodyPathPtr path_;
+    double begin_, length_;
+};
+
+// The same in steps. A script's motion has none before the first.
+FrameRange in_steps(FrameRange range, const FrameClock& clock)
 {
-    if (std::isinf(range.first) && range.first < 0) range.first = static_cast<double>(clock.start);
+    const auto start = static_cast<double>(clock.start);
+    if (std::isinf(range.first) && range.first < 0) range.first = start;
+    for (double* frame : {&range.first, &range.last}) *frame = start + (*frame - start) * clock.subframes;
     return range;
+}
+
+// Cuts are those of frames: what jumps to a frame does so in its last step.
+PathOptions in_steps(PathOptions options, const FrameClock& clock)
+{
+    if (!options.cuts) return options;
+    std::set<std::int64_t> steps;
+    for (const std::int64_t frame : *options.cuts) steps.insert(clock.step_of(frame));
+    options.cuts = std::move(steps);
+    return options;
 }
 
 FramePath path_of_rigid(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
@@ -169,8 +201,9 @@ FramePath path_of_rigid(const Motion& motion, const Box3d& rest, const FrameCloc
             sum += (step * Vec3d(rest.corner(static_cast<Box3d::CornerType>(k))).homogeneous()).squaredNorm();
         return std::sqrt(sum / 8);
     };
-    const double scale = motion.at(clock.at(static_cast<double>(frame))).scale;
-    return FramePath::find(frame, within(motion.range(), clock), options, scale * rest.diagonal().norm(), way);
+    const double scale = motion.at(clock.at_step(frame)).scale;
+    return FramePath::find(frame, in_steps(motion.range(), clock), in_steps(options, clock),
+                           scale * rest.diagonal().norm(), way);
 }
 
 double root_mean_square(const Mesh& a, const Mesh& b)
@@ -246,12 +279,17 @@ std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock
     return ways;
 }
 
+BodyPathPtr part_of(BodyPathPtr path, double begin, double length)
+{
+    return std::make_shared<PartOfPath>(std::move(path), begin, length);
+}
+
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options)
 {
     const Box3d rest = mesh.rest()->bounds().cast<double>();
     if (!mesh.deforms()) return path_of_rigid(*mesh.motion(), rest, clock, frame, options);
     const auto way = [&](std::int64_t i) { return root_mean_square(*mesh.at(clock, i - 1), *mesh.at(clock, i)); };
-    return FramePath::find(frame, within(mesh.range(), clock), options,
+    return FramePath::find(frame, in_steps(mesh.range(), clock), in_steps(options, clock),
                            mesh.at(clock, frame)->bounds().diagonal().norm(), way);
 }
 

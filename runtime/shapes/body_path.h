@@ -6,6 +6,7 @@
 //
 // with t from 0 at frame f-1 to 1 at frame f. Where the motion begins or ends, or jumps, a tangent is one-sided:
 // m0 = α (-3 p_{f-1} + 4 p_f - p_{f+1}), and mirrored; beyond its ends the body is at rest.
+// Frames are the steps of the clock that is given.
 //
 // The paper prints the first term of the derivative as 6t³, the last pair of indices as t+1 and t-1, and leaves out
 // that the derivative is per frame. A body at rest has the velocity 0 to the bit: all is made of differences of places.
@@ -122,6 +123,9 @@ BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, st
 // Of each vertex of a mesh that deforms.
 std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
                                       const FramePath& path);
+
+// A part of a way as one of its own, from t = begin on and `length` of it long.
+BodyPathPtr part_of(BodyPathPtr path, double begin, double length);
 
 // How a body goes in a frame's interval. On one thread, as the motions are asked.
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options);

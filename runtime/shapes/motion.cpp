@@ -189,11 +189,10 @@ MotionPtr product(const MotionPtr& first, const MotionPtr& second)
     return std::make_shared<ProductMotion>(first, second);
 }
 
-MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, std::int64_t frame, bool goes_on)
+MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on)
 {
-    const auto to = static_cast<double>(frame);
-    if (!goes_on) return constant_motion(motion->at(clock.at(to)));
-    return std::make_shared<BackwardMotion>(motion, clock, to);
+    if (!goes_on) return constant_motion(motion->at(clock.at(frame)));
+    return std::make_shared<BackwardMotion>(motion, clock, frame);
 }
 
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys)

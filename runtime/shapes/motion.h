@@ -75,7 +75,7 @@ MotionPtr constant_motion(const Pose& pose);
 MotionPtr product(const MotionPtr& first, const MotionPtr& second);
 // Up to a frame by way of what `motion` does after it, backwards: how a body comes that has jumped to there. At rest
 // there where it does not go on.
-MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, std::int64_t frame, bool goes_on);
+MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on);
 // Interpolated between the frames given, and at rest outside of them. Error: no keys.
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys);
 

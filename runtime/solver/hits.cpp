@@ -4,7 +4,7 @@
 
 namespace rapid {
 
-Hits::Hits(PointSet& points)
+Hits::Hits(PointSet& points, bool begins_frame)
     : impulse_(points.column<float>("hitimpulse").write()),
       time_(points.column<float>("hittime").write()),
       nml_(points.column<Vec3f>("hitnml").write()),
@@ -14,7 +14,7 @@ Hits::Hits(PointSet& points)
       path_(points.column<std::int32_t>("hitpath").write()),
       total_(points.column<std::int32_t>("hittotal").write())
 {
-    std::fill(num_.begin(), num_.end(), 0);
+    if (begins_frame) std::fill(num_.begin(), num_.end(), 0);
 }
 
 void Hits::record(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double time, double impulse,

@@ -19,8 +19,8 @@ public:
     static constexpr const char* names[] = {"hitimpulse", "hitnml",  "hitnum",   "hitpath",
                                             "hitpos",     "hittime", "hittotal", "hitv"};
 
-    // Makes the columns writable, on one thread, and begins a frame. They must exist.
-    explicit Hits(PointSet& points);
+    // Makes the columns writable, on one thread. They must exist.
+    Hits(PointSet& points, bool begins_frame);
 
     void record(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double time, double impulse,
                 int collider);

@@ -115,7 +115,7 @@ public:
           v_(points.v().write()),
           dead_(scene_.actions.empty() && !scene_.kills ? 0 : points.size())
     {
-        if (scene_.records) hits_.emplace(points);
+        if (scene_.records) hits_.emplace(points, options.begins_frame);
         if (!options.group.empty()) {
             const Column<std::uint8_t>* group = points.find_group(options.group);
             members_ = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};

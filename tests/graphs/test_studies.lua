@@ -79,9 +79,15 @@ describe("the study", function()
     assert.near(1, lines["of v"].order, 0.1)
   end)
 
+  it("subframes is of first order by sub-frames, and no better by sub-steps, which a script does not see", function()
+    local lines = lines_of "subframes"
+    assert.near(1, lines.subframes.order, 0.15)
+    assert.near(0, lines.substeps.order, 0.01)
+  end)
+
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
     assert.equal("action.lua ball.lua drag.lua emitter.lua floor.lua kepler.lua orbit.lua spring.lua stiff.lua " ..
-      "turbulence.lua ", names)
+      "subframes.lua turbulence.lua ", names)
   end)
 end)

@@ -104,4 +104,24 @@ TEST_CASE("births of a count are evenly spaced within their frame", "[emit]")
         CHECK(births.even_age(i) == Approx(0.04 * (1 - static_cast<double>(i + 1) / 4)).margin(1e-17));
 }
 
+TEST_CASE("births of a count are at the same times, in whatever parts the frame is taken", "[emit]")
+{
+    const std::size_t count = GENERATE(0, 1, 4, 7, 1000);
+    const int parts = GENERATE(1, 3, 4, 16);
+    CAPTURE(count, parts);
+    BirthClock clock(1);
+    std::size_t born = 0;
+    for (int part = 0; part < parts; ++part) {
+        const Births births = clock.at_once(count, 25, part, parts);
+        CHECK(births.first == born);
+        for (std::size_t i = 0; i < births.count; ++i, ++born) {
+            const double end = 0.04 * (part + 1) / parts;  // s, of this part
+            CHECK(births.even_age(i) < 0.04 / parts);
+            CHECK(end - births.even_age(i) ==
+                  Approx(0.04 * static_cast<double>(born + 1) / static_cast<double>(count)).margin(1e-15));
+        }
+    }
+    CHECK(born == count);
+}
+
 }  // namespace rapid

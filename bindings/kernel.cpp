@@ -11,6 +11,7 @@
 #include "bindings/script_host.h"
 #include "bindings/state.h"
 #include "runtime/parallel.h"
+#include "runtime/points/point_text.h"
 #include "runtime/stopwatch.h"
 
 extern "C" {
@@ -19,6 +20,9 @@ extern "C" {
 
 namespace rapid {
 namespace {
+
+// By what a number is refused that is none (lua/kernel.lua): what the point has is told then.
+constexpr std::string_view not_finite_text = "a float is finite";
 
 // Names on a point that are no attributes.
 bool is_method(const std::string& name)
@@ -394,9 +398,13 @@ void Kernel::call_runner(State& state, const Pass& pass, const Call& call) const
         state.call(0, 0);
     } catch (Error& error) {
         const int place = std::exchange(runner.chunk->at, -1);
-        const auto id = [&] { return pass.points.id()[static_cast<std::size_t>(call.chunk.first + place)]; };
-        const std::string at = place < 0 ? fmt::format("frame {}", pass.caller.frame.number)
-                                         : fmt::format("point id {}, frame {}", id(), pass.caller.frame.number);
+        const auto at_point = [&] { return static_cast<std::size_t>(call.chunk.first + place); };
+        const auto id = [&] { return pass.points.id()[at_point()]; };
+        const bool not_finite = error.message().find(not_finite_text) != std::string::npos;
+        const std::string at =
+            place < 0 ? fmt::format("frame {}", pass.caller.frame.number)
+                      : fmt::format("point id {}, frame {}{}", id(), pass.caller.frame.number,
+                                    not_finite ? "; " + text_of_point(pass.points, at_point()) : std::string());
         const Location where = error.location().file.empty() ? location : error.location();
         Error placed(fmt::format("{} ({})", error.message(), at));
         placed.at(where).in_node(pass.caller.node).with_trace(error.trace());

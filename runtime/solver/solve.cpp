@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/points/point_text.h"
 #include "runtime/solver/collide.h"
 #include "runtime/solver/damped_motion.h"
 #include "runtime/solver/fall.h"
@@ -159,7 +160,7 @@ private:
         std::vector<std::uint32_t> places;
         if (scene_.falls() && !members_.data) {
             const Fall::Way way = fall(begin, end, places);
-            if (!way.finite) require_finite(begin, way.end, became);
+            if (!way.finite) require_finite(begin, way.end, fell);
             require_finite(way.end, end, is);
             if (places.empty()) return;
         } else {
@@ -168,7 +169,6 @@ private:
             std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
         }
         advance_by_substeps(places);
-        require_finite(begin, end, became);
     }
 
     // Those that are not near a shape at any time of the frame. The others are listed.
@@ -199,10 +199,7 @@ private:
                 deepest = std::max(deepest, collisions.round(block.P, block.rounded));
             else
                 cast(std::span<const Vec3d>(block.P), block.rounded);
-            for (std::size_t i = 0; i < block.places.size(); ++i) {
-                P_[block.places[i]] = block.rounded[i];
-                v_[block.places[i]] = block.v[i].cast<float>();
-            }
+            store(block);
         }
         count(collisions, deepest, places.front());
     }
@@ -308,7 +305,6 @@ private:
         Collisions collisions(scene_.obstacles, consequences());
         Block block;
         double deepest = 0;
-        const std::size_t start = first;
         for (; first < last; first += block_size) {
             const std::size_t size = std::min(block_size, last - first);
             block.begin(*this, first, size);
@@ -316,18 +312,17 @@ private:
                 block.P[i] = now.at[first + i].P;
                 block.v[i] = now.v[first + i];
             }
-            cast(std::span<const Vec3d>(block.v), v_.subspan(first, size));
             if (!scene_.obstacles.empty()) {
                 block.dt.assign(size, 0);
                 block.a.assign(size, scene_.uniform);
                 collisions.begin(block.places);
                 collisions.advance(block.P, block.v, {{block.a.data(), 1}, block.dt, block.dt, {}});
-                deepest = std::max(deepest, collisions.round(block.P, P_.subspan(first, size)));
+                deepest = std::max(deepest, collisions.round(block.P, block.rounded));
             } else {
-                cast(std::span<const Vec3d>(block.P), P_.subspan(first, size));
+                cast(std::span<const Vec3d>(block.P), block.rounded);
             }
+            store(block);
         }
-        require_finite(start, last, became);
         const std::scoped_lock lock(mutex_);
         result_.penetration_max = std::max(result_.penetration_max, deepest);
     }
@@ -436,6 +431,18 @@ private:
         }
     };
 
+    // Until what became of it is known to be finite, a point has what it had before: for the message.
+    void store(const Block& block)
+    {
+        for (std::size_t i = 0; i < block.places.size(); ++i) {
+            const Vec3f v = block.v[i].cast<float>();
+            if (!block.rounded[i].allFinite() || !v.allFinite())
+                not_finite(block.places[i], block.rounded[i], v, became);
+            P_[block.places[i]] = block.rounded[i];
+            v_[block.places[i]] = v;
+        }
+    }
+
     // One sub-step of a block.
     void take(Block& block, Collisions& collisions, int substep)
     {
@@ -489,8 +496,10 @@ private:
                 const Vec3d a = block.one.acceleration(i);
                 if (!a.allFinite())
                     throw Error(
-                        fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written",
-                                    name_of(block.places[i]), a.x(), a.y(), a.z()))
+                        fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written; it "
+                                    "had {}",
+                                    name_of(block.places[i]), a.x(), a.y(), a.z(),
+                                    text_of_point(points_, block.places[i])))
                         .in_node(local.force->node)
                         .at(local.force->location);
                 block.a[i] += a;
@@ -560,20 +569,25 @@ private:
     }
 
     struct When {
-        const char *verb, *when;
+        const char *verb, *when, *had;
     };
-    static constexpr When is{"is", "before the step; a node before this one made it so"};
-    static constexpr When became{"became", "in the step; the frame was not written"};
+    static constexpr When is{"is", "before the step; a node before this one made it so", "it has"};
+    static constexpr When became{"became", "in the step; the frame was not written", "it had"};
+    static constexpr When fell{"became", "in the step; the frame was not written", "it has"};  // what was is gone
 
     void require_finite(std::size_t begin, std::size_t end, const When& when) const
     {
         const std::size_t n = end - begin;
         if (all_finite(P_.subspan(begin, n)) && all_finite(v_.subspan(begin, n))) return;
         for (std::size_t i = begin; i < end; ++i)
-            for (const auto& [name, value] : {std::pair("P", P_[i]), std::pair("v", v_[i])})
-                if (!value.allFinite())
-                    throw Error(fmt::format("{}: {} {} {{{:g}, {:g}, {:g}}} {}", name_of(i), name, when.verb, value.x(),
-                                            value.y(), value.z(), when.when));
+            if (!P_[i].allFinite() || !v_[i].allFinite()) not_finite(i, P_[i], v_[i], when);
+    }
+
+    [[noreturn]] void not_finite(std::size_t i, const Vec3f& P, const Vec3f& v, const When& when) const
+    {
+        const auto [name, value] = P.allFinite() ? std::pair("v", v) : std::pair("P", P);
+        throw Error(fmt::format("{}: {} {} {{{:g}, {:g}, {:g}}} {}; {} {}", name_of(i), name, when.verb, value.x(),
+                                value.y(), value.z(), when.when, when.had, text_of_point(points_, i)));
     }
 
     PointSet& points_;

@@ -97,7 +97,7 @@ return rapid.create { points = points }
     local result = folder:run "-f 1-4 -o a.####.csv"
     assert.equal(1, result.status)
     assert.truthy(result.stderr:find('^scene.lua:4: node "zero": v became vec3%(nan'), result.stderr)
-    assert.truthy(result.stderr:find("(point id 1, frame 3)", 1, true), result.stderr)
+    assert.truthy(result.stderr:find("(point id 1, frame 3; P = {1, 1, 0}, v = {0, 0, 0})", 1, true), result.stderr)
     assert.same({ "a.0001.csv", "a.0002.csv", "scene.lua" }, folder:list())
   end)
 end)

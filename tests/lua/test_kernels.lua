@@ -275,9 +275,15 @@ describe("a kernel that writes what can't be kept", function()
       ["p.hitnum = 3e9"] = 'attribute "hitnum" takes a whole number, not 3000000000',
     } do
       -- 0 / 0 may be -nan: the sign is nobody's business.
-      local message = scene.kernel_error(body, "heat = {1, 2}"):gsub("%-nan", "nan")
+      local message = scene.kernel_error(body, "heat = {1, 2}"):gsub("%-nan", "nan"):gsub("; P = .*%)$", ")")
       assert.equal(place .. expected .. at, message)
     end
+  end)
+
+  it("tells of what is not finite with all that the point has", function()
+    assert.equal(place .. "heat became inf; a float is finite, within 3.4e38 either way (point id 0, frame 2; " ..
+      "P = {0, 1, 0}, v = {0, 0, 0}, heat = 3, in \"hot\")",
+      scene.kernel_error("p:join 'hot' p.heat = 3 p.heat = 1 / 0", "heat = {1, 2}"))
   end)
 
   it("keeps the largest float", function()
@@ -292,7 +298,7 @@ return rapid.create { points = rapid.points.grid { size = {40, 40, 40}, spacing 
   :points("k", function(p) if p.id % 1000 == 777 then p.v = p.v / 0 end end) :solve {}]]
     for _, threads in ipairs { 1, 2, 7 } do
       local message = scene.error(text, { threads = threads })
-      assert.truthy(message:find("(point id 777, frame 2)", 1, true), message)
+      assert.truthy(message:find("(point id 777, frame 2; P = {-19.5, -0.5, -2.5}, v = {0, 0, 0})", 1, true), message)
     end
   end)
 end)

@@ -184,22 +184,40 @@ TEST_CASE("a point that is not finite stops the step by name", "[solve]")
     scene.options.frame = 30;
 
     CHECK(error_of(scene) ==
-          "point 4500, frame 31: v is {0, " + text + ", 1} before the step; a node before this one made it so");
+          "point 4500, frame 31: v is {0, " + text +
+              ", 1} before the step; a node before this one made it so; it has P = {0, 1, 0}, v = {0, " + text +
+              ", 1}");
 }
 
 TEST_CASE("a velocity that the step makes infinite stops it by name", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).v({{0, 0, 0}, {3e38f, 0, 0}}));
     scene.gravity({3e38, 0, 0}).frame_length(1);
-    CHECK(error_of(scene) == "point 1, frame 1: P became {inf, 0, 0} in the step; the frame was not written");
+    CHECK(error_of(scene) ==
+          "point 1, frame 1: P became {inf, 0, 0} in the step; the frame was not written; it has P = {inf, 0, 0}, v = "
+          "{inf, 0, 0}");
+}
+
+TEST_CASE("a point that the step makes infinite is named with all that it had before", "[solve]")
+{
+    Scene scene(points({{0, 0, 0}, {5, 0, 0}}).v({{0, 0, 0}, {0, 2, 0}}).set<float>("heat", {1, 7}).group("hot", {1}));
+    scene.force(
+        [](const Chunk& chunk, std::size_t i) { return chunk.P[i].x() > 1 ? Vec3d(0, 1e300, 0) : Vec3d(0, 0, 0); });
+    scene.options.substeps = 3;
+    CHECK(
+        error_of(scene) ==
+        "point 1, frame 1: P became {5, inf, 0} in the step; the frame was not written; it had P = {5, 0, 0}, v = {0, "
+        "2, 0}, heat = 7, in \"hot\"");
 }
 
 TEST_CASE("a force that is not finite is named, with the point", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {1, 0, 0}}));
     scene.force([](const Chunk& chunk, std::size_t i) { return Vec3d(1 / (chunk.P[i].x() - 1), 0, 0); });
-    CHECK(error_of(scene) ==
-          "node \"push1\": point 1, frame 1: its acceleration became {inf, 0, 0}; the frame was not written");
+    CHECK(
+        error_of(scene) ==
+        "node \"push1\": point 1, frame 1: its acceleration became {inf, 0, 0}; the frame was not written; it had P = "
+        "{1, 0, 0}, v = {0, 0, 0}");
 }
 
 TEST_CASE("a force needs a mass above 0", "[solve]")

@@ -1,5 +1,5 @@
-// rapid check: everything that can be wrong before the first frame, without running one; with --races, whether kernels
-// keep something from point to point, by running two.
+// rapid check: everything that can be wrong before the first frame, without running one, and what is stiff; with
+// --races, whether kernels keep something from point to point, by running two.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -8,6 +8,7 @@
 #include "bindings/commands/graph_options.h"
 #include "bindings/commands/races.h"
 #include "bindings/threads.h"
+#include "runtime/report/statistics.h"
 
 namespace rapid {
 namespace {
@@ -44,6 +45,7 @@ public:
             files_.resolve(plan, true);
             if (races_ && !is_free_of_races(plan, options, on_timeout, common.verbose)) return status_failed;
             print(text_of(*session, plan));
+            if (!races_) print(advice_on(plan));
             return status_done;
         });
     }
@@ -59,6 +61,16 @@ private:
         } catch (const Error& error) {  // while a frame ran
             print_error(error, verbose);
             return false;
+        }
+    }
+
+    // The first frame is tried out for it, with a sample of the points. What is wrong there is for the run to tell.
+    static std::string advice_on(const Plan& plan)
+    {
+        try {
+            return advice(Evaluator(plan).try_out());
+        } catch (const Error&) {
+            return "";
         }
     }
 

@@ -30,6 +30,7 @@ void RunReport::frame(const FrameResult& result)
 {
     const std::lock_guard lock(mutex_);
     run_.frames.push_back(statistics_of(result));
+    keep_worst(run_.stiff, result.figures.stiff);
     progress_->frame(run_.frames.back(), now());
 }
 

@@ -25,6 +25,16 @@ void FrameFigures::go_on(FrameFigures later)
     later.beyond_tolerance = std::max(later.beyond_tolerance, beyond_tolerance);
     later.trapped = std::max(later.trapped, trapped);
     later.substeps = std::max(later.substeps, substeps);
+    later.contact_energy += contact_energy;
+    for (const BandFigures& band : bands) {
+        const auto same = std::find_if(later.bands.begin(), later.bands.end(),
+                                       [&](const BandFigures& other) { return other.node == band.node; });
+        if (same == later.bands.end())
+            later.bands.push_back(band);
+        else
+            same->seconds += band.seconds;
+    }
+    later.stiff.insert(later.stiff.begin(), stiff.begin(), stiff.end());
     later.script_seconds += script_seconds;
     later.solve_seconds += solve_seconds;
     *this = std::move(later);
@@ -71,6 +81,13 @@ FrameResult Evaluator::advance()
     ++next_;
     result.total_seconds = seconds_since(begin);
     return result;
+}
+
+std::vector<Stiffness> Evaluator::try_out()
+{
+    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->trial = true;
+    advance();
+    return advance().figures.stiff;
 }
 
 void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame)

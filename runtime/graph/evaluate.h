@@ -44,6 +44,10 @@ public:
     // copy is to be avoided. Error: whatever a node throws, with its name and place; the evaluator is then at its end.
     FrameResult advance();
 
+    // What is stiff in the first frame after the start, of a few births and the initial points, which Solve leaves
+    // where they are. Nothing else is done with the evaluator then. Error: as advance().
+    std::vector<Stiffness> try_out();
+
 private:
     // A step of the next frame, `left` steps before its end. The results of the nodes, and who has not read them yet.
     void take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);

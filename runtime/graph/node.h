@@ -47,6 +47,7 @@
 #include "runtime/solver/constraint.h"
 #include "runtime/solver/contact_energy.h"
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/stiffness.h"
 
 namespace rapid {
 
@@ -61,6 +62,7 @@ struct Simulation {
     std::vector<std::string> groups;
     PointSet state;                                   // as Solve left it at the frame before
     std::map<const Simulation*, AdoptedIds> adopted;  // the ids here of points that came from other simulations
+    bool trial = false;  // only what is stiff is asked for: of births a sample will do, and Solve leaves points alone
 
     FrameClock clock() const { return {fps, start, subframes}; }
     Frame frame(std::int64_t step) const { return clock().at_step(step); }
@@ -101,6 +103,7 @@ struct FrameFigures {
     std::optional<Residual::Search> contact_search;
     std::vector<BandFigures> bands;  // by collide node, of those with a level set
     std::vector<double> errors;      // estimated, of the positions of a sample of the points, m
+    std::vector<Stiffness> stiff;
     double script_seconds = 0, solve_seconds = 0;
 
     // Those of a frame's next part: what happens adds up, the worst stays, what holds at the end is the later's.

@@ -38,6 +38,7 @@ enum Draw { age_draw, life_draw, cone_draw, turn_draw };
 constexpr std::size_t block_size = 256;
 
 constexpr double most_births = 2147483647;  // in a frame
+constexpr std::size_t tried_births = 64;    // of them, where a sample will do
 
 struct EmitSource {
     static constexpr std::string_view param_type = "mesh, level set, shape or points";
@@ -406,7 +407,9 @@ void Emit::bear(Flow& flow, const Births& births, const Evaluation& now)
 {
     PointSet& points = flow.points;
     make_columns(points, now);
-    const std::size_t n = source_.empty() ? 0 : births.count;
+    const std::size_t n = source_.empty()          ? 0
+                          : flow.simulation->trial ? std::min(births.count, tried_births)
+                                                   : births.count;
     if (n == 0) return;
 
     append(points, n, now);

@@ -2,6 +2,7 @@
 // frame's Create (paper §2.1).
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 #include <map>
 
@@ -15,6 +16,7 @@
 #include "runtime/solver/interaction.h"
 #include "runtime/solver/shadow.h"
 #include "runtime/solver/shape_contacts.h"
+#include "runtime/solver/stiffness.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -76,6 +78,11 @@ struct Solve {
                 "a tolerance is for points that do not depend on one another, and there are constraints; give "
                 "substeps instead");
 
+        note_stiffness(points, flow.dynamics, options, now);
+        if (flow.simulation->trial) {
+            flow.simulation->state = points;
+            return flow;
+        }
         const double allowed = tolerance ? *tolerance / clock.subframes : 0;  // m, in this step
         interact(points, flow.dynamics, options);
         if (!coupled) shadows_.begin(points);
@@ -138,6 +145,17 @@ struct Solve {
     }
 
 private:
+    // After 1, 2, 4, 8, ... steps: what is stiff changes as points go on, and is looked for at no cost. With a
+    // tolerance the sub-steps are chosen, and there is nothing to advise.
+    void note_stiffness(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
+                        const Evaluation& now) const
+    {
+        if (!std::has_single_bit(static_cast<std::uint64_t>(std::llround(options.time / options.h)))) return;
+        std::vector<Stiffness> found = find_stiff(points, dynamics, options);
+        if (tolerance) std::erase_if(found, [](const Stiffness& stiffness) { return !stiffness.is_exact(); });
+        now.figures.stiff.insert(now.figures.stiff.end(), found.begin(), found.end());
+    }
+
     void age(PointSet& points, const Evaluation& now) const
     {
         auto* ages = points.find<float>("age");

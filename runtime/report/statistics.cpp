@@ -191,6 +191,11 @@ std::string to_json(const RunStatistics& run)
     const std::string graph = ordered_json(run.graph).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
     std::string text = fmt::format("{{ \"graph\": {}, \"threads\": {}, \"peak_bytes\": {}, \"seconds\": {},\n", graph,
                                    run.threads, run.peak_bytes, ordered_json(run.seconds).dump());
+    if (!run.stiff.empty()) {
+        ordered_json stiff = ordered_json::array();
+        for (const Stiffness& stiffness : run.stiff) stiff.push_back(text_of(stiffness));
+        text += fmt::format("  \"stiff\": {},\n", stiff.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+    }
     text += "  \"frames\": [";
     for (const FrameStatistics& frame : run.frames)
         text += fmt::format("{}\n    {}", &frame == run.frames.data() ? "" : ",", to_json(frame).dump());
@@ -234,10 +239,18 @@ std::string summary(const RunStatistics& run)
     text += contacts_of(run);
     text += constraint_text(run);
     text += bands_of(run);
+    text += advice(run.stiff);
     text += doubtful_frames(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");
     text += doubtful_frames(run, &FrameStatistics::trapped, "points were deep in a shape");
     text += doubtful_frames(run, &FrameStatistics::loose_constraints, "constraints were off by a tenth of their size");
     text += doubtful_frames(run, &FrameStatistics::beyond_tolerance, "points needed more than max_substeps");
+    return text;
+}
+
+std::string advice(const std::vector<Stiffness>& stiff)
+{
+    std::string text;
+    for (const Stiffness& stiffness : stiff) text += fmt::format("stiff    {}\n", text_of(stiffness));
     return text;
 }
 

@@ -54,6 +54,7 @@ struct RunStatistics {
     std::uint64_t peak_bytes = 0;
     double seconds = 0;  // wall time from loading the graph to the last file
     std::vector<FrameStatistics> frames;
+    std::vector<Stiffness> stiff;  // the worst of each node
 
     StageSeconds by_stage() const;
     std::uint64_t point_frames() const;  // the sum of all frames' points
@@ -62,8 +63,11 @@ struct RunStatistics {
 // One frame a line. A run that ended early has the frames that it did.
 std::string to_json(const RunStatistics& run);
 
-// Points, frames, seconds by stage, memory: a line each; and one for what Solve warned of, where it did.
+// Points, frames, seconds by stage, memory: a line each; and one for what is stiff and what Solve warned of.
 std::string summary(const RunStatistics& run);
+
+// A line for each that is stiff.
+std::string advice(const std::vector<Stiffness>& stiff);
 
 // Numbers as people read them: "1,234,567", "3.21 million", "85.2 MiB", "0.042 s", "2 min 05 s".
 std::string with_separators(std::uint64_t count);

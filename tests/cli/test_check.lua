@@ -40,7 +40,7 @@ describe("rapid check", function()
     assert.equal(0, check(scene, "-o a.####.csv:age").status)
   end)
 
-  it("runs no kernel and no frame", function()
+  it("fails by no kernel: what is wrong in a frame is for the run to tell", function()
     local result = check [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }

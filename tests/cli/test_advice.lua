@@ -1,0 +1,103 @@
+-- What is stiff: told by `rapid check` and in the summary of a run, with numbers computed from the points.
+local command = require "testing.command"
+local json = require "dkjson"
+
+local head = [[
+local rapid = require "rapid"
+local one = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 0, 2}} }
+]]
+local omega = 1.9 * 24
+
+-- An orbit of the angle omega a second, by an action; exactly solved no more.
+local sun = head .. [[
+return rapid.create { fps = 24, points = one }
+  :action("sun", function(p) p.force = p.force - 45.6 ^ 2 * p.P end) :solve { %s }
+]]
+
+local function rapid(arguments, text)
+  local folder = command.folder()
+  folder:write("scene.lua", text)
+  return command.rapid(arguments, { cwd = folder.path }), folder
+end
+
+-- The lines on what is stiff.
+local function advice(arguments, text)
+  local result = rapid(arguments, text)
+  assert.equal(0, result.status, result.stderr)
+  local lines = {}
+  for line in result.stdout:gmatch "stiff    ([^\n]+)" do lines[#lines + 1] = line end
+  return lines
+end
+
+describe("advice", function()
+  for _, arguments in ipairs { "check scene.lua", "run scene.lua -f 1-2" } do
+    it("of `" .. arguments .. "` tells of a drag that is solved exactly", function()
+      assert.same({ "drag1: k dt = 16; treated exactly", "spring1: omega dt = 50; treated exactly" },
+        advice(arguments, head .. [[
+return rapid.create { fps = 24, points = one } :attribute { mass = 2 }
+  :drag { linear = 16 * 24 } :spring { stiffness = 2 * 1200 ^ 2 } :gravity {} :solve {}]]))
+    end)
+
+    it("of `" .. arguments .. "` tells what an action would need", function()
+      local lines = advice(arguments, sun:format "")
+      assert.equal(1, #lines)
+      local step, error, substeps, less = lines[1]:match('^action "sun": omega dt = (%S+) at 1 sub%-step; '
+        .. "estimated error (%S+) m; (%d+) sub%-steps would give (%S+) m$")
+      assert.equal("1.9", step, lines[1])
+      assert.equal("8", substeps)
+      -- The errors of the first frame that are true, by the closed form; told with one digit.
+      for n, told in pairs { [1] = tonumber(error), [8] = tonumber(less) } do
+        local folder = command.folder()
+        folder:write("scene.lua", sun:format("substeps = " .. n))
+        assert.equal(0, command.rapid("run scene.lua -f 1-2 -o a.####.csv --quiet", { cwd = folder.path }).status)
+        local file = assert(io.open(folder.path .. "/a.0002.csv"))
+        local x, z = file:read "*a":match "\n%d+,([^,]+),[^,]+,([^,]+)"
+        file:close()
+        local t = omega / 24
+        local wrong = math.sqrt((x - math.cos(t)) ^ 2 + (z - 2 / omega * math.sin(t)) ^ 2)
+        assert.near(1, told / wrong, 0.55)
+      end
+    end)
+  end
+
+  it("is of points that are born, and by what they have", function()
+    assert.same({ "drag1: k dt = 8; treated exactly" }, advice("check scene.lua", head .. [[
+return rapid.create { fps = 24 }
+  :emit { source = rapid.mesh.sphere {}, rate = 1e6, birth = "begin", attributes = { thick = 8 * 24 } }
+  :drag { linear = rapid.attr "thick" } :solve {}]]))
+  end)
+
+  it("is nothing where nothing is stiff, and where a tolerance chooses the sub-steps", function()
+    assert.same({}, advice("check scene.lua", head ..
+      "return rapid.create { points = one } :drag { linear = 1 } :solve {}"))
+    for _, arguments in ipairs { "check scene.lua", "run scene.lua -f 1-3" } do
+      assert.same({}, advice(arguments, sun:format "tolerance = 1e-3"))
+    end
+    assert.equal("", rapid("run scene.lua -f 1-3 --quiet", sun:format "").stdout)
+  end)
+
+  it("is of the worst frame of a run, and in --stats", function()
+    local text = head .. [[
+return rapid.create { fps = 24, points = one }
+  :drag { linear = function(f) return f.number == 5 and 240 or 24 end } :solve {}]]
+    assert.same({ "drag1: k dt = 10; treated exactly" }, advice("run scene.lua -f 1-6", text))
+    local result, folder = rapid("run scene.lua -f 1-6 --stats stats.json --quiet", text)
+    assert.equal(0, result.status)
+    local file = assert(io.open(folder.path .. "/stats.json"))
+    assert.same({ "drag1: k dt = 10; treated exactly" }, json.decode(file:read "*a").stiff)
+    file:close()
+  end)
+
+  it("of coupled points gives no errors, which a sample of them would not have", function()
+    assert.same({ 'action "sun": omega dt = 0.95 at 2 sub-steps' }, advice("run scene.lua -f 1-2", head .. [[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}, {2, 0, 0}} } } :distance { within = 2 }
+  :action("sun", function(p) p.force = p.force - 45.6 ^ 2 * p.P end) :solve { substeps = 2 }]]))
+  end)
+
+  it("of check changes nothing about what is an error: a frame that fails is for the run to tell", function()
+    local result = rapid("check scene.lua", head .. [[
+return rapid.create { points = one } :points("fails", function() error "later" end) :solve {}]])
+    assert.equal(0, result.status)
+    assert.equal("", result.stderr)
+  end)
+end)

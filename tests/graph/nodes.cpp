@@ -10,7 +10,7 @@ namespace {
 // One point at the origin, handed on as the simulation's state.
 struct Source {
     double fps = 24;
-    int start_frame = 1, seed = 0;
+    int start_frame = 1, seed = 0, subframes = 1;
 
     static NodeType declare()
     {
@@ -21,6 +21,8 @@ struct Source {
             .param(&Source::start_frame, "start", 1.0, any_number(), "", "first frame")
             .constant()
             .param(&Source::seed, "seed", 0.0, at_least(0), "", "of random numbers")
+            .constant()
+            .param(&Source::subframes, "subframes", 1.0, at_least(1), "", "evaluations a frame")
             .constant();
     }
 

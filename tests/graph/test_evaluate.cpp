@@ -34,6 +34,56 @@ TEST_CASE("what solve posts is what create yields in the next frame", "[evaluate
     CHECK(starts == std::map<std::string, int>{{"post1", 1}});
 }
 
+TEST_CASE("with sub-frames what solve feeds back is evaluated so many times a frame, what is behind it once",
+          "[evaluate]")
+{
+    GraphUnderTest scene;
+    const NodePtr source = scene.node("source", {}, {{"start", Value(3.0)}, {"subframes", Value(4.0)}});
+    const NodePtr inside = scene.node("shift", {source}, {{"by", Value(Vec3d(1, 0, 0))}}, "inside");
+    const NodePtr post = scene.node("post", {inside});
+    const NodePtr after = scene.node("shift", {post}, {{"by", Value(Vec3d(0, 5, 0))}}, "after");
+    const Plan plan(scene.returning(after), {});
+    Evaluator evaluator(plan);
+    for (int frame = 3; frame < 6; ++frame) {
+        const FrameResult result = evaluator.advance();
+        CHECK(result.frame == frame);
+        CHECK(result.outputs.at("main").P()[0] == Vec3f(static_cast<float>(4 * (frame - 3)), 5, 0));
+        CHECK(result.time.at("main") == (frame - 3) / 24.0);
+    }
+    CHECK(evaluations == std::map<std::string, int>{{"source1", 9}, {"inside", 8}, {"post1", 8}, {"after", 3}});
+}
+
+TEST_CASE("a frame's steps are told by their place in it, the last by the frame's own number and time", "[evaluate]")
+{
+    const FrameClock clock{25, 5, 3};
+    CHECK(clock.at_step(5).number == 5);
+    CHECK(clock.at_step(8).number == 6);
+    CHECK(clock.at_step(8).time == clock.at(6).time);
+    CHECK(clock.at_step(7).number == Approx(5 + 2.0 / 3));
+    CHECK(clock.at_step(7).dt == 1.0 / 75);
+    for (std::int64_t step = 5; step < 40; ++step) {
+        CHECK(clock.step_at(clock.at_step(step)) == step);
+        CHECK(clock.is_whole(step) == ((step - 5) % 3 == 0));
+    }
+    CHECK(clock.step_of(7) == 11);
+}
+
+TEST_CASE("the figures of a frame's parts add up where they count what happens, and are the last where they do not",
+          "[evaluate]")
+{
+    FrameFigures first, second;
+    first.born = 3, first.collisions = 2, first.substeps = 4, first.trapped = 5, first.constraint_rows = 7;
+    first.errors = {1, 2};
+    second.born = 1, second.substeps = 2, second.trapped = 2, second.constraint_rows = 6, second.errors = {3};
+    first.go_on(second);
+    CHECK(first.born == 4);
+    CHECK(first.collisions == 2);
+    CHECK(first.substeps == 4);
+    CHECK(first.trapped == 5);
+    CHECK(first.constraint_rows == 6);
+    CHECK(first.errors == std::vector<double>{3});
+}
+
 TEST_CASE("what never changes is evaluated once, and its result is kept from those that change it", "[evaluate]")
 {
     GraphUnderTest scene;

@@ -10,14 +10,15 @@
 namespace rapid {
 namespace {
 
-// What OpenVDB asks of a list of points.
+// What OpenVDB asks of a list of points. Its maps refuse voxels below 1e-5 m: places are in radii.
 struct PointList {
     using PosType = openvdb::Vec3d;
 
     std::vector<Vec3f> P;
+    double radius;
 
     std::size_t size() const { return P.size(); }
-    void getPos(std::size_t i, PosType& x) const { x = PosType(P[i].x(), P[i].y(), P[i].z()); }
+    void getPos(std::size_t i, PosType& x) const { x = PosType(P[i].x(), P[i].y(), P[i].z()) / radius; }
 };
 
 using openvdb::tools::PointIndexGrid;
@@ -26,7 +27,6 @@ using openvdb::tools::PointIndexGrid;
 
 struct Neighbours::Grid {
     PointList points;
-    double radius;
     PointIndexGrid::Ptr index;
 };
 
@@ -41,8 +41,8 @@ Neighbours::Neighbours(std::span<const Vec3f> P, double radius)
                         radius, largest, largest * 0x1p-30));
     auto grid = std::make_unique<Grid>();
     grid->points.P.assign(P.begin(), P.end());
-    grid->radius = radius;
-    grid->index = openvdb::tools::createPointIndexGrid<PointIndexGrid>(grid->points, radius);
+    grid->points.radius = radius;
+    grid->index = openvdb::tools::createPointIndexGrid<PointIndexGrid>(grid->points, /*voxel=*/1.0);
     grid_ = std::move(grid);
 }
 
@@ -52,15 +52,15 @@ void Neighbours::find(const Vec3d& X, std::vector<std::uint32_t>& places) const
 {
     places.clear();
     auto accessor = grid_->index->getConstAccessor();
-    const openvdb::Vec3d at(X.x(), X.y(), X.z());
+    const double radius = grid_->points.radius;
+    const openvdb::Vec3d at = openvdb::Vec3d(X.x(), X.y(), X.z()) / radius;
     const auto& transform = grid_->index->transform();
-    const openvdb::Vec3d reach(grid_->radius * (1 + 0x1p-20));
+    const openvdb::Vec3d reach(1 + 0x1p-20);
     openvdb::tools::PointIndexIterator<> near(openvdb::CoordBBox(transform.worldToIndexCellCentered(at - reach),
                                                                  transform.worldToIndexCellCentered(at + reach)),
                                               accessor);
     for (; near; ++near)
-        if ((grid_->points.P[*near].cast<double>() - X).squaredNorm() <= grid_->radius * grid_->radius)
-            places.push_back(*near);
+        if ((grid_->points.P[*near].cast<double>() - X).squaredNorm() <= radius * radius) places.push_back(*near);
     std::sort(places.begin(), places.end());
 }
 

@@ -36,4 +36,18 @@ describe("interact", function()
     assert.truthy(scene.error(text, { frames = {1, 2} })
       :find('node "interact1": point 0, frame 2: its mass is 0; with interactions it must be above 0', 1, true))
   end)
+
+  it("finds neighbours within any radius, however small beside the scene", function()
+    for _, radius in ipairs { 1e-9, 1e-6, 1, 1e6 } do
+      -- Two that approach within it, and one a hundred million times as far.
+      local points = scene.run(([[
+local r = %g
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {r / 2, 0, 0}, {1e8 * r, 0, 0}},
+    v = {{r, 0, 0}, {-r, 0, 0}, {r, 0, 0}} } }
+  :interact { radius = r, drag = 1e9 } :solve {}]]):format(radius), { frames = {2, 2} })[2]
+      assert.near({0, 0, 0}, points[1].v / radius, 0.51) -- w is a half at half the radius
+      assert.is_true(points[1].v.x < 0.6 * radius and points[2].v.x > -0.6 * radius)
+      assert.near({1, 0, 0}, points[3].v / radius, 1e-6)
+    end
+  end)
 end)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <new>
 #include <optional>
 #include <utility>
@@ -166,6 +167,8 @@ Flow Evaluator::evaluate(std::size_t i, int left, std::vector<Flow>& results, st
         throw;
     } catch (const std::bad_alloc&) {
         throw Error("out of memory").in_node(node.name).at(node.location);
+    } catch (const std::exception& fault) {  // of a library: what it says is all that is known
+        throw Error(fault.what()).in_node(node.name).at(node.location);
     }
 }
 

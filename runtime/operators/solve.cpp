@@ -22,6 +22,8 @@
 namespace rapid {
 namespace {
 
+constexpr double most_voxels = 0x1p31;  // of a level set
+
 struct Solve {
     int substeps = 1, iterations = 1, max_substeps = 64;
     std::optional<double> tolerance;
@@ -221,7 +223,7 @@ private:
             if (const auto other = wide.find(collider->shape); other != wide.end() && other->second->band() >= needed)
                 shape = other->second;
             const bool builds = shape->band() < needed;
-            if (builds) shape = shape->with_band(needed);
+            if (builds) shape = widened_to(shape, needed, *collider);
             wide[collider->shape] = shape;
             now.figures.bands.push_back(
                 {collider->node, shape->band(), shape->active_voxels(), builds ? stopwatch.seconds() : 0});
@@ -231,6 +233,21 @@ private:
             dynamic = std::move(widened);
         }
         wide_ = std::move(wide);
+    }
+
+    static LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& collider)
+    {
+        // Of the shell that its bounds make.
+        const Eigen::Array3d size = shape->bounds().sizes().array() / shape->voxel();
+        const double band = needed / shape->voxel();
+        const double voxels = (size + 2 * band).prod() - (size - 2 * band).max(0).prod();
+        if (voxels > most_voxels)
+            throw Error(fmt::format("points with a radius of {:g} m need a band of {:.0f} voxels of {:g} m around its "
+                                    "level set, some {:.1e} in all; at most {:.1e} fit: give it a larger voxel",
+                                    needed - 2 * shape->voxel(), band, shape->voxel(), voxels, most_voxels))
+                .in_node(collider.node)
+                .at(collider.location);
+        return shape->with_band(needed);
     }
 
     // Shapes that move, in their way through this frame.

@@ -7,6 +7,10 @@
 #include <bit>
 #include <cmath>
 
+// A cell's corners are one long piece of code without branches: by g++'s own order a third of it is spent on values
+// that no longer fit into registers.
+#pragma GCC optimize("schedule-insns", "sched-pressure")
+
 namespace rapid {
 namespace {
 
@@ -19,6 +23,7 @@ struct One {
     using Words = std::uint64_t;
 
     static Bits low(Words words) { return static_cast<Bits>(words); }
+    static Words wide(Bits bits) { return bits; }
 };
 
 struct Eight {
@@ -28,6 +33,7 @@ struct Eight {
     typedef std::uint64_t Words __attribute__((vector_size(64)));
 
     static Bits low(const Words& words) { return __builtin_convertvector(words, Bits); }
+    static Words wide(const Bits& bits) { return __builtin_convertvector(bits, Words); }
 };
 
 // Wellons' lowbias32: each bit of x changes each bit of the result in close to half of all cases.
@@ -65,18 +71,36 @@ struct Axis {
 
 // A lattice corner's gradient in place and time: three of its four components are 1 or -1, one is 0. Six bits choose
 // it. (In a plane of time that leaves the middles of a cube's edges, as Perlin has them, and its corners.)
-inline void gradient_of(const Eight::Bits& bits, Eight::Real (&g)[4])
+template <int axes>
+inline void gradient_of(const Eight::Words& bits, Eight::Real (&g)[4])
 {
-    constexpr std::uint64_t one = 0x3ff0000000000000, sign = 0x8000000000000000;  // of a double
-    const Eight::Words wide = __builtin_convertvector(bits, Eight::Words);
-    for (std::uint64_t axis = 0; axis < 4; ++axis) {
-        const Eight::Words value = ((wide << (61 - axis)) & sign) ^ (sign | one);
-        g[axis] = std::bit_cast<Eight::Real>((wide & 3) == axis ? value ^ value : value);
+#if defined(__AVX512F__) && !defined(__clang__)
+    // Looked up in registers, by the two bits that choose the 0 and the axis' own.
+    constexpr Eight::Real minus = {-1, -1, -1, -1, 1, 1, 1, 1};
+    const auto with_0_at = [&](int at) {
+        Eight::Real values = minus;
+        values[at] = values[at + 4] = 0;
+        return values;
+    };
+    g[0] = __builtin_shuffle(with_0_at(0), bits);
+    const Eight::Real low = {-1, 0, -1, -1, -1, 0, -1, -1}, high = {1, 0, 1, 1, 1, 0, 1, 1};
+    g[1] = __builtin_shuffle(low, high, bits);
+    for (int axis = 2; axis < axes; ++axis) {
+        const Eight::Words moved = bits >> axis;
+        g[axis] = __builtin_shuffle(with_0_at(axis), ((moved ^ bits) & 4) ^ bits);
     }
+#else
+    constexpr std::uint64_t one = 0x3ff0000000000000, sign = 0x8000000000000000;  // of a double
+    for (std::uint64_t axis = 0; axis < axes; ++axis) {
+        const Eight::Words value = ((bits << (61 - axis)) & sign) ^ (sign | one);
+        g[axis] = std::bit_cast<Eight::Real>((bits & 3) == axis ? value ^ value : value);
+    }
+#endif
 }
 
 // The same; one point looks it up.
-inline void gradient_of(std::uint32_t bits, double (&g)[4])
+template <int axes>
+inline void gradient_of(One::Words bits, double (&g)[4])
 {
     static constexpr auto table = [] {
         std::array<std::array<double, 4>, 64> all{};
@@ -85,43 +109,55 @@ inline void gradient_of(std::uint32_t bits, double (&g)[4])
                 all[k][axis] = (k & 3) == axis ? 0 : (k >> (2 + axis) & 1) != 0 ? 1 : -1;
         return all;
     }();
-    std::copy_n(table[bits & 63].begin(), 4, g);
+    std::copy_n(table[bits & 63].begin(), axes, g);
 }
 
 // Values and gradients of `fields` independent noises on one lattice, at x, w; added to what is there.
-template <class Lane, int fields>
-inline void add_octave(const typename Lane::Real (&x)[3], double w, std::uint32_t seed, double amount,
+template <class Lane, int fields, bool moves>
+inline void add_octave(const typename Lane::Real (&x)[3], const Axis<One>& time, std::uint32_t seed, double amount,
                        typename Lane::Real (&value)[fields], typename Lane::Real (&gradient)[fields][3])
 {
     using Real = typename Lane::Real;
     using Bits = typename Lane::Bits;
-    const Axis<One> time(w);
     const Axis<Lane> axes[3] = {Axis<Lane>(x[0]), Axis<Lane>(x[1]), Axis<Lane>(x[2])};
 
-    for (std::uint32_t dw = 0; dw < (time.f == 0 ? 1u : 2u); ++dw) {
+    for (std::uint32_t dw = 0; dw < (moves ? 2u : 1u); ++dw) {
         const double weight_w = amount * (dw ? time.s : 1 - time.s);
         const std::uint32_t hash_w = mixed(mixed(seed) + time.corner + dw);
+#pragma GCC unroll 2
         for (std::uint32_t dz = 0; dz < 2; ++dz) {
             const Bits hash_z = mixed(axes[2].corner + (hash_w + dz));
-            const Real weight_z = dz ? axes[2].s : 1.0 - axes[2].s;
-            const Real slope_z = dz ? axes[2].slope : -axes[2].slope;
+            Real weight_z = dz ? axes[2].s : 1.0 - axes[2].s;
+            Real slope_z = dz ? axes[2].slope : -axes[2].slope;
+            if constexpr (!moves) {  // then the weight in time is a power of 2: the same bits wherever it comes in
+                weight_z *= weight_w;
+                slope_z *= weight_w;
+            }
+            const auto in_time = [&](const Real& weight) {
+                if constexpr (moves)
+                    return Real(weight * weight_w);
+                else
+                    return weight;
+            };
+#pragma GCC unroll 2
             for (std::uint32_t dy = 0; dy < 2; ++dy) {
                 const Bits hash_y = mixed(axes[1].corner + (hash_z + dy));
                 const Real weight_y = dy ? axes[1].s : 1.0 - axes[1].s;
                 const Real slope_y = dy ? axes[1].slope : -axes[1].slope;
+#pragma GCC unroll 2
                 for (std::uint32_t dx = 0; dx < 2; ++dx) {
-                    Bits bits = mixed(axes[0].corner + (hash_y + dx));
+                    typename Lane::Words bits = Lane::wide(mixed(axes[0].corner + (hash_y + dx)));
                     const Real weight_x = dx ? axes[0].s : 1.0 - axes[0].s;
                     const Real slope_x = dx ? axes[0].slope : -axes[0].slope;
                     const Real to[3] = {axes[0].f - dx, axes[1].f - dy, axes[2].f - dz};
-                    const Real weight = weight_x * weight_y * weight_z * weight_w;
-                    const Real slopes[3] = {slope_x * weight_y * weight_z * weight_w,
-                                            weight_x * slope_y * weight_z * weight_w,
-                                            weight_x * weight_y * slope_z * weight_w};
+                    const Real weight_xy = weight_x * weight_y, weight = in_time(weight_xy * weight_z);
+                    const Real slopes[3] = {in_time(slope_x * weight_y * weight_z),
+                                            in_time(weight_x * slope_y * weight_z), in_time(weight_xy * slope_z)};
                     for (int k = 0; k < fields; ++k, bits >>= 6) {
                         Real g[4];
-                        gradient_of(bits, g);
-                        const Real along = g[0] * to[0] + g[1] * to[1] + g[2] * to[2] + g[3] * (time.f - dw);
+                        gradient_of<moves ? 4 : 3>(bits, g);
+                        Real along = g[0] * to[0] + g[1] * to[1] + g[2] * to[2];
+                        if constexpr (moves) along += g[3] * (time.f - dw);
                         value[k] += weight * along;
                         for (int axis = 0; axis < 3; ++axis)
                             gradient[k][axis] += slopes[axis] * along + weight * g[axis];
@@ -147,7 +183,11 @@ inline void add_octaves(const typename Lane::Real (&P)[3], const NoiseOptions& o
                                           P[2] * fineness + 3 * shift};
         const std::uint32_t seed = options.seed + 0x9e3779b9u * static_cast<std::uint32_t>(octave);
         typename Lane::Real slope[fields][3] = {};
-        add_octave<Lane, fields>(x, options.time * fineness, seed, amount, value, slope);
+        const Axis<One> time(options.time * fineness);
+        if (time.f == 0)
+            add_octave<Lane, fields, false>(x, time, seed, amount, value, slope);
+        else
+            add_octave<Lane, fields, true>(x, time, seed, amount, value, slope);
         for (int k = 0; k < fields; ++k)
             for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += slope[k][axis] * (of_lattice ? 1 : fineness);
         amount *= roughness;

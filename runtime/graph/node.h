@@ -14,19 +14,18 @@
 //
 // What the node does is the member function that its struct has; one of
 //
-//   void edit(PointSet& points, const Evaluation& now)                a point node: changes points at once
-//   void contribute(const Chunk&, Forces&) const                      a force: Solve calls it (solver/dynamics.h)
-//   DynamicPtr dynamic(const Evaluation& now) const                   a collider, a constraint, a force with a state of
-//   its own Flow evaluate(std::span<Flow> inputs, const Evaluation& now)      anything else (Create, Merge, Solve)
+//   void edit(PointSet&, const Evaluation&)                  a point node: changes points at once
+//   void contribute(const Chunk&, Forces&) const             a force: Solve calls it (solver/dynamics.h)
+//   std::optional<Uniform> uniform() const                   a force that is uniform; also besides contribute()
+//   DynamicPtr dynamic(const Evaluation&) const              a collider, a constraint, a force with a state of its own
+//   Flow evaluate(std::span<Flow>, const Evaluation&)        anything else (Create, Merge, Solve)
 //
 // and, where it needs them,
 //
-//   Flow start(std::span<Flow> inputs, const Evaluation& now)         at the first frame, where nodes between Create
-//   and Solve do
-//                                                                     not run; by default the first input passes
-//   void uses(Uses& uses) const                                       names read, written or made, as the arguments say
-//   void check() const                                                arguments that are legal one by one, but not
-//   together
+//   Flow start(std::span<Flow>, const Evaluation&)           at the first frame, where nodes between Create and
+//                                                            Solve do not run; by default the first input passes
+//   void uses(Uses&) const                                   names read, written or made, as the arguments say
+//   void check() const                                       arguments that are legal one by one, but not together
 //
 // Fields are set from the arguments before each evaluation; other members are the node's state over a run. uses() and
 // check() are asked with the fields as they are at the first frame.
@@ -224,11 +223,17 @@ template <class T>
 class ForceOf : public Force {
 public:
     explicit ForceOf(const T& fields) : fields_(fields) {}
-    void contribute(const Chunk& chunk, Forces& forces) const override { fields_.contribute(chunk, forces); }
-    std::optional<Vec3d> uniform_acceleration() const override
+    void contribute(const Chunk& chunk, Forces& forces) const override
     {
-        if constexpr (requires { fields_.uniform_acceleration(); })
-            return fields_.uniform_acceleration();
+        if constexpr (requires { fields_.contribute(chunk, forces); })
+            fields_.contribute(chunk, forces);
+        else
+            forces.add(*fields_.uniform());
+    }
+    std::optional<Uniform> uniform() const override
+    {
+        if constexpr (requires { fields_.uniform(); })
+            return fields_.uniform();
         else
             return std::nullopt;
     }
@@ -241,7 +246,8 @@ template <class T>
 constexpr bool is_force = requires(const T& t, const Chunk& chunk, Forces& forces)
 {
     t.contribute(chunk, forces);
-};
+}
+|| requires(const T& t) { t.uniform(); };
 template <class T>
 constexpr bool has_dynamic = requires(const T& t, const Evaluation& now)
 {

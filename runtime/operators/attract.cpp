@@ -42,9 +42,10 @@ struct Attract {
             for (std::size_t i = 0; i < chunk.size(); ++i) towards[i] = to[i].cast<double>() - chunk.P[i];
         }
         const Strided<float> size = chunk.read(strength);
+        const auto power = [&](double x) { return falloff == 2 ? x * std::sqrt(x) : std::pow(x, 0.5 * (falloff + 1)); };
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             const double d2 = towards[i].squaredNorm();
-            if (d2 > 0) forces.add(i, size[i] / std::pow(d2 + core * core, 0.5 * (falloff + 1)) * towards[i]);
+            if (d2 > 0) forces.add(i, size[i] / power(d2 + core * core) * towards[i]);
         }
     }
 };

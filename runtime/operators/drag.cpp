@@ -19,6 +19,15 @@ struct Drag {
                    "of the drag that grows with the square of the speed");
     }
 
+    std::optional<Uniform> uniform() const
+    {
+        if (!linear.attribute.empty() || !quadratic.attribute.empty()) return std::nullopt;
+        Uniform drag;
+        drag.linear.k = linear.constant;
+        drag.linear.c = quadratic.constant;
+        return drag;
+    }
+
     void contribute(const Chunk& chunk, Forces& forces) const
     {
         const Strided<float> k = chunk.read(linear), c = chunk.read(quadratic);

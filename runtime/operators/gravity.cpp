@@ -16,8 +16,7 @@ struct Gravity {
             .param(&Gravity::g, "g", Vec3d(0, -9.81, 0), any_number(), "m/s²", "acceleration");
     }
 
-    std::optional<Vec3d> uniform_acceleration() const { return g; }
-    void contribute(const Chunk&, Forces& forces) const { forces.add_uniform(g); }
+    std::optional<Uniform> uniform() const { return Uniform{g}; }
 };
 RAPID_NODE(Gravity);
 

@@ -17,7 +17,9 @@ public:
     {
         const Strided<float> strength = chunk.read(amplitude);
         std::vector<Vec3d> places(chunk.size()), curl(chunk.size());
-        for (std::size_t i = 0; i < chunk.size(); ++i) places[i] = chunk.P[i] / size;
+        const double* P = coordinates(chunk.P);
+        double* place = places.data()->data();
+        for (std::size_t l = 0; l < 3 * chunk.size(); ++l) place[l] = P[l] / size;
         // Points of one age have one time, so they are asked for together; newborn ones have their own.
         for (std::size_t begin = 0; begin < chunk.size();) {
             std::size_t end = begin + 1;
@@ -28,7 +30,8 @@ public:
                        std::span(curl).subspan(begin, end - begin));
             begin = end;
         }
-        for (std::size_t i = 0; i < chunk.size(); ++i) forces.add(i, strength[i] * curl[i]);
+        const std::span<Vec3d> a = forces.accelerations();
+        for (std::size_t i = 0; i < chunk.size(); ++i) a[i] += strength[i] * curl[i];
     }
 };
 

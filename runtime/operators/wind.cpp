@@ -18,6 +18,15 @@ struct Wind {
             .param(&Wind::drag, "drag", 1.0, at_least(0), "1/s", "the rate at which points come to its velocity");
     }
 
+    std::optional<Uniform> uniform() const
+    {
+        if (!velocity.attribute.empty() || !drag.attribute.empty()) return std::nullopt;
+        Uniform wind;
+        wind.linear.k = drag.constant;
+        wind.linear.ku = wind.linear.k * velocity.constant.cast<double>();
+        return wind;
+    }
+
     void contribute(const Chunk& chunk, Forces& forces) const
     {
         const Strided<Vec3f> u = chunk.read(velocity);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "runtime/parallel.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/solver/response.h"
 
@@ -1099,6 +1100,34 @@ double Collisions::deepest(std::span<const Vec3f> P)
             depth = std::max(depth, obstacle.radius[places_[asked_[j]]] - phi_[j]);
     }
     return depth;
+}
+
+void keep_outside(std::span<const DynamicPtr> dynamics, const PointSet& points, std::span<const Vec3f> P,
+                  std::span<std::uint8_t> marks)
+{
+    for (const DynamicPtr& dynamic : dynamics) {
+        const auto* collider = dynamic_cast<const Collider*>(dynamic.get());
+        if (!collider) continue;
+        const Obstacle obstacle(*collider, points);
+        for_each_chunk(P.size(), [&](std::size_t begin, std::size_t end) {
+            std::vector<std::size_t> asked;
+            std::vector<Vec3d> at;
+            for (std::size_t i = begin; i < end; ++i) {
+                if (!marks[i] || !obstacle.members[i]) continue;
+                const Vec3d x = P[i].cast<double>();
+                const double radius = obstacle.radius[i];
+                if (((x - obstacle.bounds.max()).array() > radius).any()) continue;
+                if (((obstacle.bounds.min() - x).array() > radius).any()) continue;
+                asked.push_back(i);
+                at.push_back(x);
+            }
+            if (asked.empty()) return;
+            std::vector<double> phi(asked.size());
+            obstacle.shape->distance(at, phi, {});
+            for (std::size_t j = 0; j < asked.size(); ++j)
+                if (!(phi[j] > obstacle.radius[asked[j]])) marks[asked[j]] = 0;
+        });
+    }
 }
 
 }  // namespace rapid

@@ -54,6 +54,11 @@ struct Drift {
     std::span<const Damped> damped;  // where it is not empty, in place of a
 };
 
+// Of the marks of some points of a set, leaves those of points that are outside of all colliders at P, at the end of
+// the frame; shapes [n].
+void keep_outside(std::span<const DynamicPtr> dynamics, const PointSet& points, std::span<const Vec3f> P,
+                  std::span<std::uint8_t> marks);
+
 // What a contact does besides, to points of the whole set.
 struct Consequences {
     Hits* hits = nullptr;          // null where no collider records
@@ -79,6 +84,9 @@ public:
     // surface stays on its outer side. Returns the deepest that a point which has met a shape since begin() is in one
     // of them, m.
     double round(std::span<Vec3d> P, std::span<Vec3f> rounded);
+
+    // Whether a point of the block has met a shape since begin().
+    bool has_met(std::size_t i) const { return met_[i] != 0; }
 
     std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
     std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step

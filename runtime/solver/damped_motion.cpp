@@ -1,10 +1,18 @@
 #include "runtime/solver/damped_motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace rapid {
 namespace {
+
+constexpr int terms = 22;  // of the series, whose last is then below rounding
+constexpr auto one_over = [] {
+    std::array<double, terms + 2> all{};
+    for (int n = 1; n < terms + 2; ++n) all[n] = 1.0 / n;
+    return all;
+}();
 
 // Taylor series of the impulse response h(t), h'' + k h' + w2 h = 0, h(0) = 0, h'(0) = 1; of its integral and its
 // derivative. For k t and w2 t² up to 1 the terms fall as 1/n!.
@@ -13,13 +21,31 @@ Propagator by_series(double k, double w2, double t)
     const double kt = k * t, w2t2 = w2 * t * t;
     double before = 0, term = 1;  // c_n t^(n-1), from n = 0 and 1
     double h = 1, slope = 1, integral = 0.5;
-    for (int n = 2; n <= 22; ++n) {
-        const double next = -(kt * (n - 1) * term + w2t2 * before) / (n * (n - 1));
+    for (int n = 2; n <= terms; ++n) {
+        const double next = -(kt * term + w2t2 * one_over[n - 1] * before) * one_over[n];
         before = term;
         term = next;
         h += term;
         slope += n * term;
-        integral += term / (n + 1);
+        integral += term * one_over[n + 1];
+    }
+    return {t * h, t * t * integral, slope, t * h};
+}
+
+// The same without a spring, for any k: by (e^-x - 1 + x)/x², x = k t; the others follow from it without cancellation.
+Propagator respond_to_drag(double k, double t)
+{
+    const double x = k * t;
+    double slope, h, integral;  // e^-x, (1 - e^-x)/x and the above
+    if (x <= 1) {
+        integral = one_over[terms];
+        for (int n = terms - 1; n >= 2; --n) integral = (1 - x * integral) * one_over[n];
+        h = 1 - x * integral;
+        slope = 1 - x * h;
+    } else {
+        slope = std::exp(-x);
+        h = (1 - slope) / x;
+        integral = (1 - h) / x;
     }
     return {t * h, t * t * integral, slope, t * h};
 }
@@ -31,6 +57,7 @@ double e1(double x) { return x == 0 ? 1 : std::expm1(x) / x; }
 
 Propagator respond(double k, double w2, double t)
 {
+    if (w2 == 0) return respond_to_drag(k, t);
     if (k * t <= 1 && w2 * t * t <= 1) return by_series(k, w2, t);
     const double half = 0.5 * k, discriminant = (half - std::sqrt(w2)) * (half + std::sqrt(w2));
     const double root = std::sqrt(std::abs(discriminant));
@@ -75,26 +102,27 @@ double mean_speed(double speed, double a, double c, double t)
     return std::max(log_ratio, 0.0) / (c * t);
 }
 
-Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t)
+double drag_rate(const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
+{
+    if (!(linear.c > 0)) return linear.k;
+    const auto rate_along = [&](const Vec3d& direction) {
+        const double size = direction.norm();
+        const double along = size > 0 ? G.dot(direction) / size : 0;
+        return linear.k + linear.c * mean_speed(v.norm(), along, linear.c, t);
+    };
+    // The direction of the way is not known before the rate is: a second time with that of the first.
+    const double first = rate_along(v.squaredNorm() > 0 ? v : G);
+    const Propagator r = respond(first, linear.w2, t);
+    return rate_along(v + (v * r.v_of_v + G * r.v_of_G));
+}
+
+Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t, Responder& respond)
 {
     Damped damped;
     damped.w2 = linear.w2;
-    damped.G = a + linear.ku + (linear.w2q - linear.w2 * P);
-    damped.k = linear.k;
-    Propagator r;
-    if (linear.c > 0) {
-        // The direction of the way is not known before the rate is: a second time with that of the first.
-        Vec3d direction = v.squaredNorm() > 0 ? v : damped.G;
-        for (int round = 0; round < 2; ++round) {
-            const double size = direction.norm();
-            const double along = size > 0 ? damped.G.dot(direction) / size : 0;
-            damped.k = linear.k + linear.c * mean_speed(v.norm(), along, linear.c, t);
-            r = respond(damped.k, damped.w2, t);
-            direction = v + (v * r.v_of_v + damped.G * r.v_of_G);
-        }
-    } else {
-        r = respond(damped.k, damped.w2, t);
-    }
+    damped.G = acceleration_at_rest(P, a, linear);
+    damped.k = drag_rate(v, damped.G, linear, t);
+    const Propagator& r = respond(damped.k, damped.w2, t);
     damped.travel = v * r.x_of_v + damped.G * r.x_of_G;
     damped.v = v * r.v_of_v + damped.G * r.v_of_G;
     damped.path_v = t > 0 ? Vec3d(v * (r.x_of_v / t)) : v;

@@ -57,6 +57,13 @@ struct Linear {
         ku += other.ku;
         w2q += other.w2q;
     }
+    bool is_zero() const { return k == 0 && w2 == 0 && c == 0; }
+};
+
+// A force that is the same for all points, at all times within the frame: an acceleration (m/s²) and its linear part.
+struct Uniform {
+    Vec3d a = Vec3d::Zero();
+    Linear linear = {};
 };
 
 // What the forces of one chunk add up to in one sub-step. Accelerations in m/s²; shape [size] once a force needs one a
@@ -91,10 +98,19 @@ public:
     const Linear& linear(std::size_t i) const { return linear_[i]; }
 
     void add_uniform(const Vec3d& a) { uniform_ += a; }
-    void add(std::size_t i, const Vec3d& a)
+    void add(const Uniform& force)
+    {
+        uniform_ += force.a;
+        if (force.linear.is_zero()) return;
+        linear_.resize(size_);
+        for (Linear& linear : linear_) linear.add(force.linear);
+    }
+    void add(std::size_t i, const Vec3d& a) { accelerations()[i] += a; }
+    // The accelerations of all points, to add to.
+    std::span<Vec3d> accelerations()
     {
         if (per_point_.empty()) per_point_.resize(size_, Vec3d::Zero());
-        per_point_[i] += a;
+        return per_point_;
     }
 
     bool is_uniform() const { return per_point_.empty(); }
@@ -130,9 +146,8 @@ class Force : public Dynamic {
 public:
     virtual void contribute(const Chunk& chunk, Forces& forces) const = 0;
 
-    // The acceleration where it is the same for all points, at all times within the frame: then contribute() is not
-    // called.
-    virtual std::optional<Vec3d> uniform_acceleration() const { return std::nullopt; }
+    // The whole of it, where it is uniform: then contribute() is not called.
+    virtual std::optional<Uniform> uniform() const { return std::nullopt; }
 };
 
 // What an action does in one step.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/solver/damped_motion.h"
+
 namespace rapid {
 namespace {
 
@@ -26,7 +28,19 @@ Fall::Period Fall::by_axis(const Vec3d& x)
     return all;
 }
 
-Fall::Fall(const Vec3d& g) : g_(by_axis(g)) {}
+Fall::Fall(const Vec3d& g, double k) : g_(by_axis(g)), k_(k) {}
+
+void Fall::set_times(Times& times, int point, double t) const
+{
+    const Propagator by = k_ == 0 ? Propagator() : respond(k_, 0, t);
+    for (int l = 3 * point; l < 3 * point + 3; ++l) {
+        times.t[l] = t;
+        times.x_of_v[l] = by.x_of_v;
+        times.v_of_v[l] = by.v_of_v;
+        times.fallen[l] = by.x_of_G * g_[l];
+        times.gained[l] = by.v_of_G * g_[l];
+    }
+}
 
 void Fall::avoid(const Box3d& box, double radius)
 {
@@ -37,21 +51,32 @@ void Fall::avoid(const Box3d& box, double radius)
 
 // One period. near(p) is told, for each of its points, whether it stays; `largest`, by coordinate, keeps the size of
 // what is written.
-template <bool Avoids, class Near>
-void Fall::advance_period(float* P, float* v, const Period& t, std::uint32_t* largest, const Near& near) const
+template <bool Dragged, bool Avoids, class Near>
+void Fall::advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const
 {
     float P1[period], v1[period];
     [[maybe_unused]] double lowest[period], highest[period];
     for (int l = 0; l < period; ++l) {
-        const double x = P[l], u = v[l], gain = t[l] * g_[l];
-        const double x1 = x + t[l] * (u + 0.5 * gain);
+        const double x = P[l], u = v[l], t = times.t[l];
+        double x1, u1, bend;  // how far the path is off the straight line at most
+        if constexpr (Dragged) {
+            x1 = x + (times.x_of_v[l] * u + times.fallen[l]);
+            u1 = times.v_of_v[l] * u + times.gained[l];
+            // The velocity goes from u to u1 and not back: a quarter of the difference, for t. And by as much as
+            // another quarter of this are the parabolas of Collisions off the path.
+            bend = 0.25 * (t * std::abs(u1 - u) + std::abs(times.fallen[l]));
+        } else {
+            const double gain = t * g_[l];
+            x1 = x + t * (u + 0.5 * gain);
+            u1 = u + gain;
+            bend = std::abs(0.125 * t * gain);
+        }
         P1[l] = static_cast<float>(x1);
-        v1[l] = static_cast<float>(u + gain);
+        v1[l] = static_cast<float>(u1);
         largest[l] = std::max({largest[l], magnitude_bits(P1[l]), magnitude_bits(v1[l])});
         if constexpr (Avoids) {
-            // The parabola is off the straight line by a t²/8 at most. The factor keeps a point that is flush with a
-            // box and rounded away from it.
-            const double margin = std::abs(0.125 * t[l] * gain) + 0x1p-21 * std::abs(x);
+            // The factor keeps a point that is flush with a box and rounded away from it.
+            const double margin = bend + 0x1p-21 * std::abs(x);
             lowest[l] = std::min(x, x1) - margin;
             highest[l] = std::max(x, x1) + margin;
         }
@@ -108,8 +133,11 @@ bool Fall::are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t)
     };
     const Box3d places = box_around(P), speeds = box_around(v);
     const Vec3d g = Eigen::Map<const Vec3d>(g_.data()), pulled = t * g;
-    const Vec3d slowest = speeds.min().cwiseMin(speeds.min() + pulled).cwiseMin(0.0);
-    const Vec3d fastest = speeds.max().cwiseMax(speeds.max() + pulled).cwiseMax(0.0);
+    // Drag makes less of the velocity and of what the acceleration adds, each by itself.
+    const Vec3d slowest = k_ == 0 ? Vec3d(speeds.min().cwiseMin(speeds.min() + pulled).cwiseMin(0.0))
+                                  : Vec3d(speeds.min().cwiseMin(0.0) + pulled.cwiseMin(0.0));
+    const Vec3d fastest = k_ == 0 ? Vec3d(speeds.max().cwiseMax(speeds.max() + pulled).cwiseMax(0.0))
+                                  : Vec3d(speeds.max().cwiseMax(0.0) + pulled.cwiseMax(0.0));
     const Vec3d rounding = 0x1p-20 * places.min().cwiseAbs().cwiseMax(places.max().cwiseAbs());
     const Box3d reach(places.min() + t * slowest - rounding, places.max() + t * fastest + rounding);
     return std::none_of(boxes_.begin(), boxes_.end(), [&](const Box3d& box) { return box.intersects(reach); });
@@ -120,10 +148,10 @@ Fall::Way Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& t
 {
     const double longest = std::max(time.h, double(static_cast<float>(time.h)));
     if (limits_.empty() || are_far(P.subspan(begin, end - begin), v.subspan(begin, end - begin), longest))
-        return advance_all<false>(P, v, time, begin, end, [](std::uint32_t, bool) {});
+        return advance_any<false>(P, v, time, begin, end, [](std::uint32_t, bool) {});
     std::size_t count = near.size();
     near.resize(count + (end - begin) + points_a_period);
-    const Way way = advance_all<true>(P, v, time, begin, end, [&](std::uint32_t i, bool stays) {
+    const Way way = advance_any<true>(P, v, time, begin, end, [&](std::uint32_t i, bool stays) {
         near[count] = i;
         count += stays && i < end;
     });
@@ -132,14 +160,25 @@ Fall::Way Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& t
 }
 
 template <bool Avoids, class Near>
+Fall::Way Fall::advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
+                            std::size_t end, const Near& near) const
+{
+    return k_ == 0 ? advance_all<false, Avoids>(P, v, time, begin, end, near)
+                   : advance_all<true, Avoids>(P, v, time, begin, end, near);
+}
+
+template <bool Dragged, bool Avoids, class Near>
 Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
                             std::size_t end, const Near& near) const
 {
     // Most points move for the whole frame: their periods share one t.
     const float* own = time.own.data && time.own.stride != 0 ? time.own.data : nullptr;
     bool of_h = own != nullptr;
-    Period t;
-    t.fill(own ? time.h : time(begin));
+    Times times;
+    const auto set_all = [&](double t) {
+        for (int p = 0; p < points_a_period; ++p) set_times(times, p, t);
+    };
+    set_all(own ? time.h : time(begin));
     std::uint32_t largest[period] = {};
     std::size_t at = begin;
     for (; at < end; at += points_a_period) {
@@ -157,19 +196,19 @@ Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTim
             bool whole = true;
             for (std::size_t p = 0; p < n; ++p) whole &= own[at + p] == static_cast<float>(time.h);
             if (!whole || !of_h) {
-                for (int p = 0; p < points_a_period; ++p) std::fill_n(&t[3 * p], 3, time(std::min(at + p, end - 1)));
+                for (int p = 0; p < points_a_period; ++p) set_times(times, p, time(std::min(at + p, end - 1)));
                 of_h = whole;
             }
         }
         const auto list = [&](int p, bool stays) { near(static_cast<std::uint32_t>(at + p), stays); };
         if (n == points_a_period) {
-            advance_period<Avoids>(P[at].data(), v[at].data(), t, largest, list);
+            advance_period<Dragged, Avoids>(P[at].data(), v[at].data(), times, largest, list);
             continue;
         }
         float P_end[period] = {}, v_end[period] = {};
         std::copy_n(P[at].data(), 3 * n, P_end);
         std::copy_n(v[at].data(), 3 * n, v_end);
-        advance_period<Avoids>(P_end, v_end, t, largest, list);
+        advance_period<Dragged, Avoids>(P_end, v_end, times, largest, list);
         std::copy_n(P_end, 3 * n, P[at].data());
         std::copy_n(v_end, 3 * n, v[at].data());
     }

@@ -1,6 +1,6 @@
-// Points that one acceleration moves and nothing else: from single precision to single precision in one go, whatever
-// the sub-steps, because the parabola is exact and they would only repeat it. Points whose way may come near a shape
-// are left as they are, for Collisions.
+// Points that one acceleration moves, and one drag, and nothing else: from single precision to single precision in one
+// go, whatever the sub-steps, because the closed form is exact and they would only repeat it. Points whose way may come
+// near a shape are left as they are, for Collisions.
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ struct OwnTime {
 
 class Fall {
 public:
-    // g in m/s².
-    explicit Fall(const Vec3d& g);
+    // v' = g - k v: m/s², 1/s.
+    Fall(const Vec3d& g, double k);
 
     // No point is advanced that may come within `radius` of the box on its way, or has begun there: by the box around
     // its path, and with what rounding a position to single precision can do.
@@ -54,15 +54,26 @@ private:
         Period least, most;
     };
 
+    // How long the points of a period move; with drag also what becomes of their velocities in this time, and what the
+    // acceleration adds: to their places, m, and to their velocities, m/s.
+    struct Times {
+        Period t, x_of_v, v_of_v, fallen, gained;
+    };
+
     static Period by_axis(const Vec3d& x);
+    void set_times(Times& times, int point, double t) const;
+    template <bool Dragged, bool Avoids, class Near>
+    void advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const;
     template <bool Avoids, class Near>
-    void advance_period(float* P, float* v, const Period& t, std::uint32_t* largest, const Near& near) const;
-    template <bool Avoids, class Near>
+    Way advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                    const Near& near) const;
+    template <bool Dragged, bool Avoids, class Near>
     Way advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
                     const Near& near) const;
     bool are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t) const;
 
     Period g_;
+    double k_;
     std::vector<Box3d> boxes_;    // widened
     std::vector<Limits> limits_;  // of these
 };

@@ -28,7 +28,7 @@ const float unit_mass = 1;
 // A force that has to be asked, or that acts on a group only.
 struct LocalForce {
     const Force* force;
-    std::optional<Vec3d> uniform;
+    std::optional<Uniform> uniform;
     Strided<std::uint8_t> members;
     bool all;
 };
@@ -38,10 +38,21 @@ struct LocalAction {
     std::unique_ptr<ActionPass> pass;
 };
 
+// Whether an acceleration and this have a closed form for the whole frame.
+bool is_closed_form(const Linear& linear) { return linear.w2 == 0 && linear.c == 0; }
+
+// The column `force`, unless it is zero everywhere: then it needs no pass.
+const Column<Vec3f>* forces_of(const PointSet& points)
+{
+    const auto* force = points.find<Vec3f>("force");
+    const bool is_zero = force && force->is_uniform() && !points.empty() && (*force)[0].isZero();
+    return is_zero ? nullptr : force;
+}
+
 // What the dynamics are for this set and frame.
 struct Scene {
     std::vector<LocalAction> actions;
-    Vec3d uniform = Vec3d::Zero();  // acceleration of all points, m/s²
+    Uniform uniform;  // force on all points
     std::vector<LocalForce> forces;
     std::vector<Obstacle> obstacles;
     std::vector<LocalConstraint> constraints;
@@ -50,7 +61,8 @@ struct Scene {
     Strided<float> mass{&unit_mass, 0};
 
     bool is_uniform() const { return forces.empty() && !force; }
-    bool falls() const { return is_uniform() && actions.empty(); }
+    // Whether what moves points that are far from shapes has a closed form for the whole frame.
+    bool falls() const { return is_uniform() && actions.empty() && is_closed_form(uniform.linear); }
 };
 
 template <class F>
@@ -65,6 +77,19 @@ void at_node(const Dynamic& dynamic, const F& f)
 }
 
 const std::uint8_t nobody = 0;
+
+// Adds the values, if all of them are finite; shapes [n].
+bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
+{
+    const double* x = coordinates(values);
+    double* y = coordinates(to);
+    std::uint64_t largest = 0;
+    for (std::size_t l = 0; l < 3 * values.size(); ++l)
+        largest = std::max(largest, std::bit_cast<std::uint64_t>(x[l]) & 0x7fffffffffffffffu);
+    if (largest >= 0x7ff0000000000000u) return false;
+    for (std::size_t l = 0; l < 3 * values.size(); ++l) y[l] += x[l];
+    return true;
+}
 
 Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
 {
@@ -86,12 +111,13 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
                 if (auto coupling = constraint->begin(points, h))
                     scene.constraints.push_back({constraint, std::move(coupling)});
             } else if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
-                const std::optional<Vec3d> uniform = force->uniform_acceleration();
-                if (uniform && !uniform->allFinite())
-                    throw Error(fmt::format("its acceleration is {{{:g}, {:g}, {:g}}}; it must be finite", uniform->x(),
-                                            uniform->y(), uniform->z()));
+                const std::optional<Uniform> uniform = force->uniform();
+                if (uniform && !uniform->a.allFinite())
+                    throw Error(fmt::format("its acceleration is {{{:g}, {:g}, {:g}}}; it must be finite",
+                                            uniform->a.x(), uniform->a.y(), uniform->a.z()));
                 if (uniform && force->group.empty()) {
-                    scene.uniform += *uniform;
+                    scene.uniform.a += uniform->a;
+                    scene.uniform.linear.add(uniform->linear);
                     return;
                 }
                 const Column<std::uint8_t>* group = points.find_group(force->group);
@@ -99,18 +125,17 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
                     {force, uniform, group ? group->read() : Strided<std::uint8_t>{&nobody, 0}, force->group.empty()});
             }
         });
-    // A force that is zero everywhere needs no pass.
-    const Column<Vec3f>* force = points.find<Vec3f>("force");
-    if (force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero())) scene.force = force;
+    scene.force = forces_of(points);
     if (points.has("mass")) scene.mass = points.column<float>("mass").read();
     return scene;
 }
 
 class Step {
 public:
-    Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+    Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Arrivals* arrivals)
         : points_(points),
           options_(options),
+          arrivals_(arrivals),
           scene_(scene_of(points, dynamics, options.h)),
           P_(points.P().write()),
           v_(points.v().write()),
@@ -123,6 +148,10 @@ public:
         }
         time_.h = options.h;
         if (points.has("dt")) time_.own = points.column<float>("dt").read();
+        if (!arrivals_) return;
+        arrivals_->way.assign(points.size(), Way::Exact);
+        arrivals_->P.resize(points.size());
+        arrivals_->v.resize(points.size());
     }
 
     SolveResult run()
@@ -144,14 +173,21 @@ private:
     template <class F>
     void for_all(const F& f)
     {
-        for_each_chunk(points_.size(), [&](std::size_t begin, std::size_t end) {
+        const auto guarded = [&](std::size_t begin, std::size_t end) {
             try {
                 f(begin, end);
             } catch (...) {
                 const std::scoped_lock lock(mutex_);
                 if (!error_ || begin < failed_) error_ = std::current_exception(), failed_ = begin;
             }
-        });
+        };
+        // A few points, as shadows are, are still work for all threads.
+        const std::size_t n = points_.size(), part = block_size * (n / (16 * block_size) + 1);
+        if (part < chunk_size)
+            tbb::parallel_for(std::size_t{0}, (n + part - 1) / part,
+                              [&](std::size_t p) { guarded(p * part, std::min(n, (p + 1) * part)); });
+        else
+            for_each_chunk(n, guarded);
         if (error_) std::rethrow_exception(error_);
     }
 
@@ -174,7 +210,7 @@ private:
     // Those that are not near a shape at any time of the frame. The others are listed.
     Fall::Way fall(std::size_t begin, std::size_t end, std::vector<std::uint32_t>& near)
     {
-        Fall fall(scene_.uniform);
+        Fall fall(scene_.uniform.a + scene_.uniform.linear.ku, scene_.uniform.linear.k);
         for (const Obstacle& obstacle : scene_.obstacles) {
             float widest = 0;
             for (std::size_t i = begin; i < (obstacle.radius.stride ? end : begin + 1); ++i)
@@ -200,6 +236,7 @@ private:
             else
                 cast(std::span<const Vec3d>(block.P), block.rounded);
             store(block);
+            if (arrivals_) tell_arrivals(block, collisions);
         }
         count(collisions, deepest, places.front());
     }
@@ -243,7 +280,7 @@ private:
         now.dt = options_.h / options_.substeps;
         now.iterations = options_.iterations;
         std::vector<Yield> yields;
-        if (!scene_.forces.empty()) {
+        if (!scene_.forces.empty() || !scene_.uniform.linear.is_zero()) {
             yields.assign(n, {now.dt, 0.5 * now.dt * now.dt});
             now.yields = yields;
         }
@@ -285,14 +322,12 @@ private:
                 }
                 at.P = block.P[i];
                 now.v[first + i] = block.v[i];
-                if (block.linear.empty()) continue;
+                if (!block.linear.data) continue;
                 const Propagator by = respond(block.damped[i].k, block.damped[i].w2, now.dt);
                 yields[first + i] = {by.v_of_G, by.x_of_G};
                 at.w *= by.v_of_G / now.dt;
             }
-            const Strided<Vec3d> a =
-                scene_.is_uniform() ? Strided<Vec3d>{&scene_.uniform, 0} : Strided<Vec3d>{block.a.data(), 1};
-            for (std::size_t i = 0; i < (a.stride ? size : 1); ++i) pull = std::max(pull, a[i].norm());
+            for (std::size_t i = 0; i < (block.a.stride ? size : 1); ++i) pull = std::max(pull, block.a[i].norm());
         }
         count(collisions, 0, start);
         const std::scoped_lock lock(mutex_);
@@ -314,9 +349,8 @@ private:
             }
             if (!scene_.obstacles.empty()) {
                 block.dt.assign(size, 0);
-                block.a.assign(size, scene_.uniform);
                 collisions.begin(block.places);
-                collisions.advance(block.P, block.v, {{block.a.data(), 1}, block.dt, block.dt, {}});
+                collisions.advance(block.P, block.v, {{&scene_.uniform.a, 0}, block.dt, block.dt, {}});
                 deepest = std::max(deepest, collisions.round(block.P, block.rounded));
             } else {
                 cast(std::span<const Vec3d>(block.P), block.rounded);
@@ -343,12 +377,17 @@ private:
     struct Block {
         std::span<const std::uint32_t> places;  // in the set
         std::vector<std::uint32_t> run;         // these, where they follow one another
-        std::vector<Vec3d> P, v, middle, a;
+        std::vector<Vec3d> P, v, middle;
         std::vector<Vec3f> rounded;  // P at the beginning of the frame, and at its end
         std::vector<double> dt, time, half, after;
         std::vector<Vec3d> force;
-        std::vector<Linear> linear;  // empty where no force has such a part
-        std::vector<Damped> damped;  // the way of each point with it
+        // Of the sub-step: the accelerations, and the linear parts, null where no force has one. Each is the scene's,
+        // or the points' own.
+        Strided<Vec3d> a{nullptr, 0};
+        Strided<Linear> linear{nullptr, 0};
+        std::vector<Vec3d> own_a;
+        std::vector<Linear> own_linear;
+        std::vector<Damped> damped;  // the ways of points with linear parts among shapes
         Forces one;
 
         void begin(const Step& step, std::size_t first, std::size_t size)
@@ -385,26 +424,30 @@ private:
             }
         }
 
-        void drift(Strided<Vec3d> acceleration, std::span<const double> t)
+        void drift(std::span<const double> t)
         {
             for (std::size_t i = 0; i < P.size(); ++i) {
-                P[i] += t[i] * (v[i] + 0.5 * t[i] * acceleration[i]);
-                v[i] += t[i] * acceleration[i];
+                P[i] += t[i] * (v[i] + 0.5 * t[i] * a[i]);
+                v[i] += t[i] * a[i];
             }
         }
 
-        void drag(Strided<Vec3d> acceleration, std::span<const double> t)
+        void find_ways(std::span<const double> t)
         {
             damped.resize(P.size());
+            Responder responder;
             for (std::size_t i = 0; i < P.size(); ++i)
-                damped[i] = Damped::from(P[i], v[i], acceleration[i], linear[i], t[i]);
+                damped[i] = Damped::from(P[i], v[i], a[i], linear[i], t[i], responder);
         }
 
-        void drift_damped()
+        void drift_damped(std::span<const double> t)
         {
+            Responder responder;
             for (std::size_t i = 0; i < P.size(); ++i) {
-                P[i] += damped[i].travel;
-                v[i] = damped[i].v;
+                const Vec3d G = acceleration_at_rest(P[i], a[i], linear[i]);
+                const Propagator& r = responder(drag_rate(v[i], G, linear[i], t[i]), linear[i].w2, t[i]);
+                P[i] += v[i] * r.x_of_v + G * r.x_of_G;
+                v[i] = v[i] * r.v_of_v + G * r.v_of_G;
             }
         }
 
@@ -446,15 +489,14 @@ private:
     // One sub-step of a block.
     void take(Block& block, Collisions& collisions, int substep)
     {
-        const Strided<Vec3d> a = accelerations(block, substep);
+        add_forces(block, substep);
         const auto drift = [&](std::span<const double> dt, double halves_after) {
-            if (!block.linear.empty()) block.drag(a, dt);
-            if (!scene_.obstacles.empty())
-                collisions.advance(block.P, block.v, {a, dt, block.until_end(halves_after), block.damped});
-            else if (!block.linear.empty())
-                block.drift_damped();
+            if (!scene_.obstacles.empty() || !scene_.constraints.empty())
+                drift_among_others(block, collisions, dt, halves_after);
+            else if (block.linear.data)
+                block.drift_damped(dt);
             else
-                block.drift(a, dt);
+                block.drift(dt);
         };
         if (scene_.kills) stop_dead(block);
         const double halves_after = 2.0 * (options_.substeps - substep - 1);
@@ -469,17 +511,34 @@ private:
         }
     }
 
+    // What the way of a point is known by to shapes and to constraints.
+    void drift_among_others(Block& block, Collisions& collisions, std::span<const double> dt, double halves_after)
+    {
+        block.damped.clear();
+        if (block.linear.data) block.find_ways(dt);
+        if (!scene_.obstacles.empty())
+            collisions.advance(block.P, block.v, {block.a, dt, block.until_end(halves_after), block.damped});
+        else if (block.linear.data)
+            for (std::size_t i = 0; i < block.P.size(); ++i) {
+                block.P[i] += block.damped[i].travel;
+                block.v[i] = block.damped[i].v;
+            }
+        else
+            block.drift(dt);
+    }
+
     // Of the sub-step, constant within it: forces that are not the same everywhere are asked at its middle, half a
     // drift on, which makes them right to second order.
-    Strided<Vec3d> accelerations(Block& block, int substep)
+    void add_forces(Block& block, int substep)
     {
-        if (scene_.is_uniform()) return {&scene_.uniform, 0};  // no linear parts, then
+        block.a = {&scene_.uniform.a, 0};
+        block.linear = {scene_.uniform.linear.is_zero() ? nullptr : &scene_.uniform.linear, 0};
+        if (scene_.is_uniform()) return;
         const std::size_t size = block.P.size();
-        block.linear.clear();
-        block.damped.clear();
-        block.a.assign(size, scene_.uniform);
+        block.own_a.assign(size, scene_.uniform.a);
+        block.a = {block.own_a.data(), 1};
         if (scene_.force) add_force_attribute(block);
-        if (scene_.forces.empty()) return {block.a.data(), 1};
+        if (scene_.forces.empty()) return;
 
         block.middle.resize(size);
         for (std::size_t i = 0; i < size; ++i) block.middle[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
@@ -488,28 +547,47 @@ private:
         for (const LocalForce& local : scene_.forces) {
             block.one.reset(size);
             if (local.uniform)
-                block.one.add_uniform(*local.uniform);
+                block.one.add(*local.uniform);
             else
                 at_node(*local.force, [&] { local.force->contribute(chunk, block.one); });
-            for (std::size_t i = 0; i < size; ++i) {
-                if (!local.all && !local.members[block.places[i]]) continue;
-                const Vec3d a = block.one.acceleration(i);
-                if (!a.allFinite())
-                    throw Error(
-                        fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written; it "
-                                    "had {}",
-                                    name_of(block.places[i]), a.x(), a.y(), a.z(),
-                                    text_of_point(points_, block.places[i])))
-                        .in_node(local.force->node)
-                        .at(local.force->location);
-                block.a[i] += a;
-            }
+            const bool plain = local.all && !block.one.is_uniform() && block.one.uniform().isZero(0);
+            if (!plain || !add_finite(block.one.accelerations(), block.own_a)) add_accelerations(block, local);
             if (!block.one.has_linear()) continue;
-            if (block.linear.empty()) block.linear.resize(size);
+            if (block.linear.stride == 0) {
+                block.own_linear.assign(size, scene_.uniform.linear);
+                block.linear = {block.own_linear.data(), 1};
+            }
             for (std::size_t i = 0; i < size; ++i)
-                if (local.all || local.members[block.places[i]]) block.linear[i].add(block.one.linear(i));
+                if (local.all || local.members[block.places[i]]) block.own_linear[i].add(block.one.linear(i));
         }
-        return {block.a.data(), 1};
+    }
+
+    void tell_arrivals(const Block& block, const Collisions& collisions)
+    {
+        for (std::size_t i = 0; i < block.places.size(); ++i) {
+            const std::uint32_t place = block.places[i];
+            arrivals_->way[place] = !scene_.obstacles.empty() && collisions.has_met(i) ? Way::Broken
+                                    : scene_.actions.empty()                           ? Way::Smooth
+                                                                                       : Way::Acted;
+            arrivals_->P[place] = block.P[i];
+            arrivals_->v[place] = block.v[i];
+        }
+    }
+
+    void add_accelerations(Block& block, const LocalForce& local) const
+    {
+        for (std::size_t i = 0; i < block.places.size(); ++i) {
+            if (!local.all && !local.members[block.places[i]]) continue;
+            const Vec3d a = block.one.acceleration(i);
+            if (!a.allFinite())
+                throw Error(
+                    fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written; it had {}",
+                                name_of(block.places[i]), a.x(), a.y(), a.z(),
+                                text_of_point(points_, block.places[i])))
+                    .in_node(local.force->node)
+                    .at(local.force->location);
+            block.own_a[i] += a;
+        }
     }
 
     // Those that a collider has killed stay where they are.
@@ -539,7 +617,7 @@ private:
     void add_force_attribute(Block& block)
     {
         for (std::size_t i = 0; i < block.P.size(); ++i)
-            block.a[i] += acceleration_by((*scene_.force)[block.places[i]].cast<double>(), block.places[i]);
+            block.own_a[i] += acceleration_by((*scene_.force)[block.places[i]].cast<double>(), block.places[i]);
     }
 
     Vec3d acceleration_by(const Vec3d& force, std::size_t point) const
@@ -592,6 +670,7 @@ private:
 
     PointSet& points_;
     const SolveOptions& options_;
+    Arrivals* const arrivals_;  // null where nobody asks
     const Scene scene_;
     std::span<Vec3f> P_, v_;
     OwnTime time_;
@@ -615,11 +694,26 @@ bool couples(std::span<const DynamicPtr> dynamics)
     });
 }
 
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+bool is_closed_form(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+{
+    if (!options.group.empty() || forces_of(points)) return false;
+    return std::all_of(dynamics.begin(), dynamics.end(), [](const DynamicPtr& dynamic) {
+        if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
+            const std::optional<Uniform> uniform = force->uniform();
+            return uniform && force->group.empty() && is_closed_form(uniform->linear);
+        }
+        // What else Solve takes to its points.
+        return !dynamic_cast<const Action*>(dynamic.get()) && !dynamic_cast<const Collider*>(dynamic.get()) &&
+               !dynamic_cast<const Constraint*>(dynamic.get());
+    });
+}
+
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
+                  Arrivals* arrivals)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
     if (points.empty()) return {};
-    const SolveResult result = Step(points, dynamics, options).run();
+    const SolveResult result = Step(points, dynamics, options, arrivals).run();
     if (auto* force = points.find<Vec3f>("force")) force->fill(Vec3f::Zero());
     return result;
 }

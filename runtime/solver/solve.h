@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraint.h"
@@ -35,6 +36,20 @@ struct SolveResult {
     Residual residual;       // of the constraints, at the end of the frame
 };
 
+// How a point went through the frame.
+enum class Way : std::uint8_t {
+    Exact,   // by a closed form for the whole of it, which sub-steps would only repeat
+    Smooth,  // by forces alone: of second order
+    Acted,   // with actions: of first order, or second
+    Broken,  // it has met a shape
+};
+
+// What the points of a set, as they were before the step, have come to; shapes [n].
+struct Arrivals {
+    std::vector<Way> way;
+    std::vector<Vec3d> P, v;  // before they are rounded to single precision; not of exact ways
+};
+
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age
 // at the end of the frame), else h; and where they have a `force` (N), by force / mass besides, which is then cleared.
 // Points that an action kills are removed. Ages, other deaths and ids are the caller's.
@@ -46,7 +61,11 @@ struct SolveResult {
 // Error: a velocity or position that is not finite before or after, with the point's id, or a force that is not, with
 // its node; a collider or force whose attribute is missing. Of several points the one nearest to the beginning of the
 // set is named.
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
+                  Arrivals* arrivals = nullptr);
+
+// Whether the ways of all points have a closed form for the whole frame, which sub-steps would only repeat.
+bool is_closed_form(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
 
 // Whether one of them makes the way of a point depend on others.
 bool couples(std::span<const DynamicPtr> dynamics);

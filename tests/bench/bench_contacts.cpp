@@ -14,16 +14,12 @@
 #include "runtime/solver/contacts.h"
 #include "runtime/solver/shape_contacts.h"
 #include "runtime/solver/solve.h"
+#include "tests/solver/uniform_force.h"
 
 namespace rapid {
 namespace {
 
-class Gravity : public Force {
-public:
-    void contribute(const Chunk&, Forces& forces) const override { forces.add_uniform(g); }
-    std::optional<Vec3d> uniform_acceleration() const override { return g; }
-    Vec3d g{0, -9.81, 0};
-};
+;
 
 class Spheres : public Constraint {
 public:
@@ -113,7 +109,7 @@ void column(benchmark::State& state)
         PointSet points = start.points;
         const auto spheres = std::make_shared<Spheres>();
         spheres->options.friction = 0.3f;
-        std::vector<DynamicPtr> dynamics = {std::make_shared<Gravity>(), spheres};
+        std::vector<DynamicPtr> dynamics = {std::make_shared<test::UniformForce>(), spheres};
         const double w = start.width;
         for (const auto& [normal, offset] :
              {std::pair(Vec3d(0, 1, 0), 0.0), std::pair(Vec3d(1, 0, 0), 0.0), std::pair(Vec3d(-1, 0, 0), -3 * w),

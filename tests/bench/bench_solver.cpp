@@ -12,16 +12,12 @@
 #include "runtime/shapes/analytic.h"
 #include "runtime/shapes/level_set.h"
 #include "runtime/solver/solve.h"
+#include "tests/solver/uniform_force.h"
 
 namespace rapid {
 namespace {
 
-class Gravity : public Force {
-public:
-    void contribute(const Chunk&, Forces& forces) const override { forces.add_uniform(g); }
-    std::optional<Vec3d> uniform_acceleration() const override { return g; }
-    Vec3d g{0, -9.81, 0};
-};
+;
 
 DynamicPtr collider(const ShapePtr& shape, float bounce, float friction)
 {
@@ -59,7 +55,7 @@ PointSet points(std::size_t n, float height, float spread, float speed)
 void advance(benchmark::State& state, PointSet start, std::vector<DynamicPtr> dynamics, int substeps = 1, int warm = 0)
 {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
-    dynamics.push_back(std::make_shared<Gravity>());
+    dynamics.push_back(std::make_shared<test::UniformForce>());
     SolveOptions options;
     options.h = 1.0 / 24;
     options.substeps = substeps;
@@ -103,7 +99,7 @@ void fall_for(benchmark::State& state, int substeps, bool newborn)
         set.add({"dt", 1.0f / 24});
         set.column<float>("dt").write()[0] = 0.01f;
     }
-    const std::vector<DynamicPtr> dynamics = {std::make_shared<Gravity>()};
+    const std::vector<DynamicPtr> dynamics = {std::make_shared<test::UniformForce>()};
     SolveOptions options;
     options.h = 1.0 / 24;
     options.substeps = substeps;

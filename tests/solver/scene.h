@@ -7,19 +7,10 @@
 
 #include "runtime/shapes/analytic.h"
 #include "runtime/solver/solve.h"
+#include "tests/solver/uniform_force.h"
 #include "tests/test.h"
 
 namespace rapid::test {
-
-class UniformForce : public Force {
-public:
-    explicit UniformForce(const Vec3d& a) : a_(a) {}
-    void contribute(const Chunk&, Forces& forces) const override { forces.add_uniform(a_); }
-    std::optional<Vec3d> uniform_acceleration() const override { return a_; }
-
-private:
-    Vec3d a_;
-};
 
 // An acceleration by place, velocity and time: asked at the middle of every sub-step.
 template <class F>

@@ -53,7 +53,7 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[fall]")
     const Crowd crowd(n);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
-    Fall(g).advance(P, v, crowd.time(own), begin, n, near);
+    Fall(g, 0).advance(P, v, crowd.time(own), begin, n, near);
     CHECK(near.empty());
     for (std::size_t i = 0; i < n; ++i) {
         const double t = i < begin ? 0 : crowd.time(own)(i);
@@ -74,7 +74,7 @@ TEST_CASE("points that come near a box stay as they are, and are listed in order
         {Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2)},
         {Vec3d::Constant(-std::numeric_limits<double>::infinity()),
          Vec3d(std::numeric_limits<double>::infinity(), -0.9 - away, std::numeric_limits<double>::infinity())}};
-    Fall fall(g);
+    Fall fall(g, 0);
     for (const Box3d& box : boxes) fall.avoid(box, radius);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near{42};  // what is there stays
@@ -97,6 +97,98 @@ TEST_CASE("points that come near a box stay as they are, and are listed in order
     // The boxes around paths are larger than paths, but not so much that all were listed.
     if (away == 0) CHECK(met > 100);
     CHECK(near.size() - 1 <= 2 * met + 8);
+}
+
+// v' = g - k v, by its closed form; k t not so small that it cancels.
+struct Dragged {
+    Vec3d P, v;
+
+    Dragged(const Vec3d& from, const Vec3d& speed, double k, double t)
+    {
+        const double decay = std::exp(-k * t);
+        const Vec3d end = g / k;
+        v = end + (speed - end) * decay;
+        P = from + t * end + (speed - end) * ((1 - decay) / k);
+    }
+};
+
+TEST_CASE("points in air go by the closed form, each for its own time", "[fall]")
+{
+    const double k = GENERATE(0.5, 24.0, 1e5);
+    const bool own = GENERATE(false, true);
+    CAPTURE(k, own);
+    const std::size_t n = 1001;
+    const Crowd crowd(n);
+    std::vector<Vec3f> P = crowd.P, v = crowd.v;
+    std::vector<std::uint32_t> near;
+    Fall(g, k).advance(P, v, crowd.time(own), 0, n, near);
+    for (std::size_t i = 0; i < n; ++i) {
+        const Dragged right(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, crowd.time(own)(i));
+        REQUIRE_THAT(P[i], close_to(Vec3f(right.P.cast<float>()), 1e-7));
+        REQUIRE_THAT(v[i], close_to(Vec3f(right.v.cast<float>()), 1e-6));
+    }
+}
+
+TEST_CASE("points in air that come near a box stay as they are", "[fall]")
+{
+    const double k = GENERATE(1.0, 50.0, 1000.0);
+    const double away = GENERATE(0.0, 1.0, 1.1, 1.2);
+    CAPTURE(k, away);
+    const std::size_t n = 1003;
+    const Crowd crowd(n);
+    const Box3d box(Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2));
+    Fall fall(g, k);
+    fall.avoid(box, 0.05);
+    std::vector<Vec3f> P = crowd.P, v = crowd.v;
+    std::vector<std::uint32_t> near;
+    fall.advance(P, v, crowd.time(true), 0, n, near);
+    std::vector<bool> stays(n);
+    for (const std::uint32_t i : near) stays[i] = true;
+    std::size_t met = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        bool comes = false;
+        for (int part = 0; part <= 256; ++part) {
+            const double t = crowd.time(true)(i) * part / 256;
+            const Vec3d at = t > 0 ? Dragged(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, t).P
+                                   : Vec3d(crowd.P[i].cast<double>());
+            comes |= box.exteriorDistance(at) <= 0.05;
+        }
+        if (comes) REQUIRE(stays[i]);
+        if (stays[i]) REQUIRE((P[i] == crowd.P[i] && v[i] == crowd.v[i]));
+        met += comes;
+    }
+    if (away == 0) CHECK(met > 10);
+    CHECK(near.size() <= 3 * met + 30);
+}
+
+TEST_CASE("points in air and points among shapes there go the same way", "[fall]")
+{
+    struct Air : Force {
+        void contribute(const Chunk&, Forces&) const override {}
+        std::optional<Uniform> uniform() const override
+        {
+            Uniform air{g};
+            air.linear.k = 3;
+            air.linear.ku = Vec3d(1, 2, 3);
+            return air;
+        }
+    };
+    const Crowd crowd(500);
+    // A plane out of line with the axes has a box without bounds: no point is far from it, and none comes to it.
+    const auto run = [&](int substeps, const Vec3d& normal) {
+        PointSet set = test::points(crowd.P);
+        std::copy(crowd.v.begin(), crowd.v.end(), set.v().write().begin());
+        Scene scene(std::move(set));
+        scene.dynamics.push_back(std::make_shared<Air>());
+        scene.collide(make_plane(normal, -100)).substeps(substeps);
+        return scene.run(4).points;
+    };
+    const PointSet far = run(1, {0, 1, 0}), many = run(16, {0, 1, 0}), near = run(16, {1, 1, 0});
+    for (std::size_t i = 0; i < 500; ++i) {
+        REQUIRE(far.P()[i] == many.P()[i]);
+        REQUIRE_THAT(near.P()[i], close_to(far.P()[i], 5e-7));
+        REQUIRE_THAT(near.v()[i], close_to(far.v()[i], 2e-6));
+    }
 }
 
 TEST_CASE("what sub-steps are asked for does not change a fall by a bit", "[fall]")

@@ -36,8 +36,11 @@ describe("a tolerance", function()
       assert.equal(all[i].P, alone[1].P)
       assert.equal(all[i].v, alone[1].v)
     end
-    assert.equal(frame_two("substeps = 2", 1, 1)[1].P, all[1].P)
-    assert.not_equal(frame_two("substeps = 2", 4, 4)[1].P, all[4].P)
+    -- What one and two sub-steps tend to is enough for the first, and not for the last.
+    local one, two = frame_two "substeps = 1", frame_two "substeps = 2"
+    local function tends_to(i) return two[i].P + (two[i].P - one[i].P) / 3 end
+    assert.truthy((all[1].P - tends_to(1)):length() < 1e-6)
+    assert.truthy((all[4].P - tends_to(4)):length() > 1e-2)
   end)
 
   it("works with actions, deaths and births, the same bits on 1, 2 and 7 threads", function()

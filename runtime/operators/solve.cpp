@@ -87,7 +87,7 @@ struct Solve {
         }
         const double allowed = tolerance ? *tolerance / clock.subframes : 0;  // m, in this step
         interact(points, flow.dynamics, options);
-        if (!coupled) shadows_.begin(points);
+        if (!coupled) shadows_.begin(points, is_closed_form(points, flow.dynamics, options));
         const Tolerated done = tolerance ? solve_within(points, flow.dynamics, options, allowed, max_substeps)
                                          : Tolerated{solve(points, flow.dynamics, options), substeps, 0};
         std::vector<double> errors;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 
 namespace rapid {
 namespace {
@@ -18,15 +19,30 @@ std::uint64_t place_in_order(std::int64_t id)
     return x ^ (x >> 31);
 }
 
-// For each of the ascending ids its place among the points; `gone` where none has it. Points are in order of their ids
-// but where a script has sorted or merged them.
-std::vector<std::uint32_t> places_of(std::span<const std::int64_t> ids, const PointSet& points)
+// Whether points are in order of their ids, as they are but where a script has sorted or merged them.
+bool are_sorted(Strided<std::int64_t> ids, std::size_t size)
+{
+    if (ids.stride == 0) return size < 2;
+    bool sorted = true;
+    for (std::size_t i = 1; i < size; ++i) sorted &= ids.data[i - 1] < ids.data[i];
+    return sorted;
+}
+
+// For each of the ascending ids its place among the points; `gone` where none has it. `before`: where it was, which is
+// most often where it is.
+std::vector<std::uint32_t> places_of(std::span<const std::int64_t> ids, const PointSet& points,
+                                     std::span<const std::uint32_t> before)
 {
     const Strided<std::int64_t> all = points.id().read();
     std::vector<std::uint32_t> places(ids.size(), gone);
     std::size_t from = 0;
     bool missed = false;
     for (std::size_t k = 0; k < ids.size(); ++k) {
+        if (before[k] < points.size() && all[before[k]] == ids[k]) {
+            places[k] = before[k];
+            from = before[k];
+            continue;
+        }
         std::size_t count = points.size() - from;
         while (count > 0) {  // the first that is not below
             const std::size_t half = count / 2;
@@ -42,10 +58,7 @@ std::vector<std::uint32_t> places_of(std::span<const std::int64_t> ids, const Po
         else
             missed = true;
     }
-    if (!missed) return places;
-    bool sorted = true;
-    for (std::size_t i = 1; i < points.size(); ++i) sorted &= all[i - 1] < all[i];
-    if (sorted) return places;  // they have died
+    if (!missed || are_sorted(all, points.size())) return places;  // those that are missed have died
     std::fill(places.begin(), places.end(), gone);
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto found = std::lower_bound(ids.begin(), ids.end(), all[i]);
@@ -71,10 +84,12 @@ void keep_found(std::vector<std::uint32_t>& places, std::vector<T>&... lists)
 
 }  // namespace
 
-void Shadows::begin(const PointSet& points)
+void Shadows::begin(const PointSet& points, bool is_exact)
 {
-    std::vector<std::uint32_t> places = places_of(ids_, points);
-    keep_found(places, ids_, dP_, dv_);
+    idle_ = is_exact && !off_;
+    if (idle_) return;
+    places_ = places_of(ids_, points, places_);
+    keep_found(places_, ids_, dP_, dv_);
 
     const Strided<std::int64_t> id = points.id().read();
     std::vector<std::pair<std::int64_t, std::uint32_t>> born;
@@ -87,8 +102,8 @@ void Shadows::begin(const PointSet& points)
         std::nth_element(order.begin(), order.begin() + fewest, order.end());
         threshold_ = order[fewest];
         for (std::size_t k = 0; k < ids_.size(); ++k)
-            if (place_in_order(ids_[k]) >= threshold_) places[k] = gone;
-        keep_found(places, ids_, dP_, dv_);
+            if (place_in_order(ids_[k]) >= threshold_) places_[k] = gone;
+        keep_found(places_, ids_, dP_, dv_);
         std::erase_if(born, [&](const auto& point) { return place_in_order(point.first) >= threshold_; });
     };
     std::int64_t next = next_id_;
@@ -105,12 +120,12 @@ void Shadows::begin(const PointSet& points)
     std::sort(born.begin(), born.end());
     for (const auto& [number, place] : born) {
         ids_.push_back(number);
-        places.push_back(place);
+        places_.push_back(place);
         dP_.push_back(Vec3d::Zero());
         dv_.push_back(Vec3d::Zero());
     }
 
-    set_ = points.select(places);
+    set_ = points.select(places_);
     if (ids_.empty()) return;
     const std::span<Vec3f> P = set_.P().write(), v = set_.v().write();
     for (std::size_t k = 0; k < ids_.size(); ++k) {
@@ -121,19 +136,23 @@ void Shadows::begin(const PointSet& points)
 
 std::vector<double> Shadows::compare(const PointSet& solved)
 {
-    std::vector<std::uint32_t> own = places_of(ids_, set_);
-    keep_found(own, ids_);
-    std::vector<std::uint32_t> places = places_of(ids_, solved);
-    keep_found(places, ids_, own);
+    std::vector<std::uint32_t> own(ids_.size());  // in set_, which begins as these
+    std::iota(own.begin(), own.end(), 0u);
+    own = places_of(ids_, set_, own);
+    keep_found(own, ids_, places_);
+    places_ = places_of(ids_, solved, places_);
+    keep_found(places_, ids_, own);
     dP_.resize(ids_.size());
     dv_.resize(ids_.size());
     const Strided<Vec3f> P = solved.P().read(), v = solved.v().read();
     const Strided<Vec3f> shadow_P = std::as_const(set_).P().read(), shadow_v = std::as_const(set_).v().read();
     std::vector<double> errors(ids_.size());
+    off_ = false;
     for (std::size_t k = 0; k < ids_.size(); ++k) {
-        dP_[k] = shadow_P[own[k]].cast<double>() - P[places[k]].cast<double>();
-        dv_[k] = shadow_v[own[k]].cast<double>() - v[places[k]].cast<double>();
+        dP_[k] = shadow_P[own[k]].cast<double>() - P[places_[k]].cast<double>();
+        dv_[k] = shadow_v[own[k]].cast<double>() - v[places_[k]].cast<double>();
         errors[k] = 2 * dP_[k].norm();
+        off_ |= !dP_[k].isZero(0) || !dv_[k].isZero(0);
     }
     set_ = PointSet();
     return errors;

@@ -55,6 +55,7 @@ struct Axis {
     typename Lane::Bits corner;
     typename Lane::Real f, s, slope;
 
+    Axis() = default;
     explicit Axis(const typename Lane::Real& x)
     {
         // Adding 1.5 · 2⁵² leaves the nearest whole number in the low bits; no conversion, so no x is out of range.
@@ -112,18 +113,27 @@ inline void gradient_of(One::Words bits, double (&g)[4])
     std::copy_n(table[bits & 63].begin(), axes, g);
 }
 
+constexpr double roughness = 0.5;  // strength of an octave, in that of the one before
+
+struct Octave {
+    double amount, fineness, shift;
+    std::uint32_t seed;
+    Axis<One> time;
+};
+
 // Values and gradients of `fields` independent noises on one lattice, at x, w; added to what is there.
 template <class Lane, int fields, bool moves>
-inline void add_octave(const typename Lane::Real (&x)[3], const Axis<One>& time, std::uint32_t seed, double amount,
-                       typename Lane::Real (&value)[fields], typename Lane::Real (&gradient)[fields][3])
+inline void add_octave(const typename Lane::Real (&x)[3], const Octave& octave, typename Lane::Real (&value)[fields],
+                       typename Lane::Real (&gradient)[fields][3])
 {
+    const Axis<One>& time = octave.time;
     using Real = typename Lane::Real;
     using Bits = typename Lane::Bits;
     const Axis<Lane> axes[3] = {Axis<Lane>(x[0]), Axis<Lane>(x[1]), Axis<Lane>(x[2])};
 
     for (std::uint32_t dw = 0; dw < (moves ? 2u : 1u); ++dw) {
-        const double weight_w = amount * (dw ? time.s : 1 - time.s);
-        const std::uint32_t hash_w = mixed(mixed(seed) + time.corner + dw);
+        const double weight_w = octave.amount * (dw ? time.s : 1 - time.s);
+        const std::uint32_t hash_w = mixed(mixed(octave.seed) + time.corner + dw);
 #pragma GCC unroll 2
         for (std::uint32_t dz = 0; dz < 2; ++dz) {
             const Bits hash_z = mixed(axes[2].corner + (hash_w + dz));
@@ -168,30 +178,47 @@ inline void add_octave(const typename Lane::Real (&x)[3], const Axis<One>& time,
     }
 }
 
-constexpr double roughness = 0.5;  // strength of an octave, in that of the one before
+// What is the same at all places.
+class Octaves {
+public:
+    explicit Octaves(const NoiseOptions& options) : size_(options.octaves)
+    {
+        double amount = 1, fineness = 1;
+        for (int k = 0; k < size_; ++k) {
+            // Shifted, or all octaves would be 0 at the corners of the first.
+            const double shift = 0.618033988749895 * k;
+            const std::uint32_t seed = options.seed + 0x9e3779b9u * static_cast<std::uint32_t>(k);
+            all_[k] = {amount, fineness, shift, seed, Axis<One>(options.time * fineness)};
+            amount *= roughness;
+            fineness *= 2;
+        }
+    }
+
+    const Octave* begin() const { return all_.data(); }
+    const Octave* end() const { return all_.data() + size_; }
+
+private:
+    int size_;
+    std::array<Octave, NoiseOptions::most_octaves> all_;
+};
 
 // The sum of the octaves. Gradients are of each octave's own lattice where `of_lattice`: all as strong as its values.
 template <class Lane, int fields>
-inline void add_octaves(const typename Lane::Real (&P)[3], const NoiseOptions& options, bool of_lattice,
+inline void add_octaves(const typename Lane::Real (&P)[3], const Octaves& octaves, bool of_lattice,
                         typename Lane::Real (&value)[fields], typename Lane::Real (&gradient)[fields][3])
 {
-    double amount = 1, fineness = 1;
-    for (int octave = 0; octave < options.octaves; ++octave) {
-        // Shifted, or all octaves would be 0 at the corners of the first.
-        const double shift = 0.618033988749895 * octave;
-        const typename Lane::Real x[3] = {P[0] * fineness + shift, P[1] * fineness + 2 * shift,
-                                          P[2] * fineness + 3 * shift};
-        const std::uint32_t seed = options.seed + 0x9e3779b9u * static_cast<std::uint32_t>(octave);
+    for (const Octave& octave : octaves) {
+        const typename Lane::Real x[3] = {P[0] * octave.fineness + octave.shift,
+                                          P[1] * octave.fineness + 2 * octave.shift,
+                                          P[2] * octave.fineness + 3 * octave.shift};
         typename Lane::Real slope[fields][3] = {};
-        const Axis<One> time(options.time * fineness);
-        if (time.f == 0)
-            add_octave<Lane, fields, false>(x, time, seed, amount, value, slope);
+        if (octave.time.f == 0)
+            add_octave<Lane, fields, false>(x, octave, value, slope);
         else
-            add_octave<Lane, fields, true>(x, time, seed, amount, value, slope);
+            add_octave<Lane, fields, true>(x, octave, value, slope);
         for (int k = 0; k < fields; ++k)
-            for (int axis = 0; axis < 3; ++axis) gradient[k][axis] += slope[k][axis] * (of_lattice ? 1 : fineness);
-        amount *= roughness;
-        fineness *= 2;
+            for (int axis = 0; axis < 3; ++axis)
+                gradient[k][axis] += slope[k][axis] * (of_lattice ? 1 : octave.fineness);
     }
 }
 
@@ -203,14 +230,19 @@ constexpr double largest_value = 1.54;
 // Root mean square length of the curl of one octave at whole times, measured over 3 · 10⁶ places.
 constexpr double curl_length = 1.83;
 
+double curl_scale(const NoiseOptions& options)
+{
+    return 1 / (curl_length * std::sqrt(geometric(roughness * roughness, options.octaves)));
+}
+
 // The curl of the octaves' potentials. Each octave's potential is as much weaker as it is finer, so that its curl is
 // `roughness` times that of the one before.
 template <class Lane>
-inline void curl_of(const typename Lane::Real (&P)[3], const NoiseOptions& options, typename Lane::Real (&curl)[3])
+inline void curl_of(const typename Lane::Real (&P)[3], const Octaves& octaves, double scale,
+                    typename Lane::Real (&curl)[3])
 {
     typename Lane::Real potential[3] = {}, d[3][3] = {};
-    add_octaves<Lane, 3>(P, options, true, potential, d);
-    const double scale = 1 / (curl_length * std::sqrt(geometric(roughness * roughness, options.octaves)));
+    add_octaves<Lane, 3>(P, octaves, true, potential, d);
     curl[0] = (d[2][1] - d[1][2]) * scale;
     curl[1] = (d[0][2] - d[2][0]) * scale;
     curl[2] = (d[1][0] - d[0][1]) * scale;
@@ -221,7 +253,7 @@ inline void curl_of(const typename Lane::Real (&P)[3], const NoiseOptions& optio
 double noise(const Vec3d& P, const NoiseOptions& options, Vec3d* gradient)
 {
     double value[1] = {}, d[1][3] = {};
-    add_octaves<One, 1>({P.x(), P.y(), P.z()}, options, false, value, d);
+    add_octaves<One, 1>({P.x(), P.y(), P.z()}, Octaves(options), false, value, d);
     const double scale = 1 / (largest_value * geometric(roughness, options.octaves));
     if (gradient) *gradient = Vec3d(d[0][0], d[0][1], d[0][2]) * scale;
     return value[0] * scale;
@@ -230,20 +262,28 @@ double noise(const Vec3d& P, const NoiseOptions& options, Vec3d* gradient)
 Vec3d curl_noise(const Vec3d& P, const NoiseOptions& options)
 {
     double curl[3];
-    curl_of<One>({P.x(), P.y(), P.z()}, options, curl);
+    curl_of<One>({P.x(), P.y(), P.z()}, Octaves(options), curl_scale(options), curl);
     return {curl[0], curl[1], curl[2]};
 }
 
 void curl_noise(std::span<const Vec3d> P, const NoiseOptions& options, std::span<Vec3d> curl)
 {
-    for (std::size_t first = 0; first < P.size(); first += Eight::size) {
-        const std::size_t count = std::min(Eight::size, P.size() - first);
-        Eight::Real x[3] = {}, result[3];
+    const Octaves octaves(options);
+    const double scale = curl_scale(options);
+    // Axis by axis for some vectors at a time: what has just been written one by one is slow to load as a vector.
+    constexpr std::size_t block = 8 * Eight::size;
+    Eight::Real x[3][8] = {}, result[3][8];
+    for (std::size_t first = 0; first < P.size(); first += block) {
+        const std::size_t count = std::min(block, P.size() - first);
         for (std::size_t i = 0; i < count; ++i)
-            for (int axis = 0; axis < 3; ++axis) x[axis][i] = P[first + i][axis];
-        curl_of<Eight>(x, options, result);
+            for (int axis = 0; axis < 3; ++axis) x[axis][i / Eight::size][i % Eight::size] = P[first + i][axis];
+        for (std::size_t some = 0; some * Eight::size < count; ++some) {
+            Eight::Real of_some[3];
+            curl_of<Eight>({x[0][some], x[1][some], x[2][some]}, octaves, scale, of_some);
+            for (int axis = 0; axis < 3; ++axis) result[axis][some] = of_some[axis];
+        }
         for (std::size_t i = 0; i < count; ++i)
-            for (int axis = 0; axis < 3; ++axis) curl[first + i][axis] = result[axis][i];
+            for (int axis = 0; axis < 3; ++axis) curl[first + i][axis] = result[axis][i / Eight::size][i % Eight::size];
     }
 }
 

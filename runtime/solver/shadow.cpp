@@ -28,6 +28,19 @@ bool are_sorted(Strided<std::int64_t> ids, std::size_t size)
     return sorted;
 }
 
+// Has what is looked at of these points brought near, all of it at once: they are far apart in memory.
+void fetch(const PointSet& points, std::span<const std::uint32_t> places)
+{
+    const Strided<std::int64_t> id = points.id().read();
+    const Strided<Vec3f> P = points.P().read(), v = points.v().read();
+    for (const std::uint32_t place : places) {
+        if (place >= points.size()) continue;
+        __builtin_prefetch(&id[place]);
+        __builtin_prefetch(&P[place]);
+        __builtin_prefetch(&v[place]);
+    }
+}
+
 // For each of the ascending ids its place among the points; `gone` where none has it. `before`: where it was, which is
 // most often where it is.
 std::vector<std::uint32_t> places_of(std::span<const std::int64_t> ids, const PointSet& points,
@@ -88,6 +101,7 @@ void Shadows::begin(const PointSet& points, bool is_exact)
 {
     idle_ = is_exact && !off_;
     if (idle_) return;
+    fetch(points, places_);
     places_ = places_of(ids_, points, places_);
     keep_found(places_, ids_, dP_, dv_);
 
@@ -136,6 +150,7 @@ void Shadows::begin(const PointSet& points, bool is_exact)
 
 std::vector<double> Shadows::compare(const PointSet& solved)
 {
+    fetch(solved, places_);
     std::vector<std::uint32_t> own(ids_.size());  // in set_, which begins as these
     std::iota(own.begin(), own.end(), 0u);
     own = places_of(ids_, set_, own);

@@ -104,6 +104,7 @@ void Collisions::begin(std::span<const std::uint32_t> places)
     places_ = places;
     const std::size_t size = size_ = places.size();
     met_.assign(size, 0);
+    put_off_.assign(size, 0);
     stuck_.assign(size, 0);
     held_.clear();
     touched_.clear();
@@ -835,11 +836,13 @@ void Collisions::correct(int o, std::span<const double> dt)
         } else if (obstacle.method == Method::Project || !(vn < 0)) {
             P_[i] += d * n;
             v_[i] = contact_response(v, vc, n, bounce, friction);
+            put_off_[i] = std::max(put_off_[i], (1 + bounce) * d);
         } else {
             const double back = std::min(d / -vn, dt[i]);
             const Vec3d& a = a_[i];
             const Vec3d after = contact_response(v - back * a, vc, n, bounce, friction);
             P_[i] += back * (after - v + back * a);
+            put_off_[i] = std::max(put_off_[i], 0.5 * (1 + bounce) * back * back * a.norm());
             v_[i] = after + back * a;
             asked_time_[again] = asked_time_[j];
             asked_[again] = i;

@@ -87,6 +87,8 @@ public:
 
     // Whether a point of the block has met a shape since begin().
     bool has_met(std::size_t i) const { return met_[i] != 0; }
+    // How far off a contact that was found at the end of a sub-step, not on the path, may have put it since begin(), m.
+    double put_off(std::size_t i) const { return put_off_[i]; }
 
     std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
     std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
@@ -196,6 +198,7 @@ private:
     std::vector<std::uint8_t> stuck_;    // whether it is held by a shape that it sticks to
     std::vector<Vec3d> start_;           // where it was at the beginning of the sub-step
     std::vector<std::uint8_t> met_;      // whether it has met a shape since begin()
+    std::vector<double> put_off_;        // m
     std::vector<int> near_count_;        // how many shapes it may come near
     std::vector<int> obstacle_;          // the first that the path meets, or -1
     std::vector<Contact> contact_;       // with it

@@ -34,7 +34,7 @@ SolveOptions with_substeps(SolveOptions options, int substeps)
 // Of each point that is solved again: what its runs so far come to.
 class Series {
 public:
-    explicit Series(std::size_t size) : length_(size, 0), died_(size, 0) {}
+    Series(std::size_t size, double h) : h_(h), length_(size, 0), died_(size, 0) {}
 
     void begin_run()
     {
@@ -43,7 +43,8 @@ public:
         v_[column].resize(length_.size());
     }
 
-    // How far apart are, m, the last two runs, and the last two columns of the series.
+    // How far apart are, m, the last two runs, and the last two columns of the series: at the frame's end, or at that
+    // of the next for being too fast.
     struct Difference {
         double run, best;
     };
@@ -56,7 +57,8 @@ public:
         const bool lives = !dies && !died_[i], is_series = !dies && run.way[i] != Way::Broken;
         Difference off{infinity, infinity};
         if (lives)
-            off.run = off.best = (P - P_[0][i]).norm();
+            // Runs that find a contact at the same end of a sub-step agree on what is wrong with it.
+            off.run = off.best = std::max(apart(P - P_[0][i], v - v_[0][i]), run.put_off[i]);
         else if (dies && died_[i])
             off = {0, 0};
         const std::size_t known = lives && is_series ? std::min<std::size_t>(length_[i], most_columns - 1) : 0;
@@ -68,7 +70,7 @@ public:
             v_[c][i] = v;
             P += dP / (power - 1);
             v += dv / (power - 1);
-            off.best = dP.norm() / std::min(power - 1, most_trust);
+            off.best = apart(dP, dv) / std::min(power - 1, most_trust);
         }
         P_[known][i] = P;
         v_[known][i] = v;
@@ -101,6 +103,9 @@ private:
     static constexpr double most_trust = 3;
     static constexpr std::size_t most_columns = 6;  // what higher powers of the step add is rounding
 
+    double apart(const Vec3d& dP, const Vec3d& dv) const { return std::max(dP.norm(), h_ * dv.norm()); }
+
+    const double h_;  // s, of the frame
     std::size_t runs_ = 0;
     std::vector<std::uint8_t> length_;  // how many columns the next run can go on from
     std::vector<std::uint8_t> died_;    // in the last run
@@ -118,7 +123,7 @@ Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, c
     std::vector<std::uint32_t> places(points.size());  // theirs in `points`
     std::iota(places.begin(), places.end(), 0u);
     std::vector<std::uint8_t> alive(points.size(), 1);
-    Series series(points.size());
+    Series series(points.size(), options.h);
     Arrivals run;
 
     bool first = true, last = false;

@@ -5,7 +5,8 @@
 // run takes one more of these out (Romberg 1955): the even powers where forces alone act, from the first on where
 // actions do. (Drag beside forces of place has odd ones too, from the third on; they are then only made less.) That is
 // the result, position and velocity, until the last power has moved it by no more than the tolerance: the error of what
-// stood there before, so that the result is well within.
+// stood there before, so that the result is well within. By a velocity a point is moved in the next frame: it may be
+// off by the tolerance a frame.
 //
 // A way that a shape has broken has no such series, and what would lie in a shape is not used either. Then the result
 // is the last run itself; how far that is from the run before is at least its error where halving the step halves it,

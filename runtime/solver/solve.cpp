@@ -150,6 +150,7 @@ public:
         if (points.has("dt")) time_.own = points.column<float>("dt").read();
         if (!arrivals_) return;
         arrivals_->way.assign(points.size(), Way::Exact);
+        arrivals_->put_off.assign(points.size(), 0);
         arrivals_->P.resize(points.size());
         arrivals_->v.resize(points.size());
     }
@@ -569,6 +570,7 @@ private:
             arrivals_->way[place] = !scene_.obstacles.empty() && collisions.has_met(i) ? Way::Broken
                                     : scene_.actions.empty()                           ? Way::Smooth
                                                                                        : Way::Acted;
+            arrivals_->put_off[place] = scene_.obstacles.empty() ? 0 : collisions.put_off(i);
             arrivals_->P[place] = block.P[i];
             arrivals_->v[place] = block.v[i];
         }

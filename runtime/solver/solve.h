@@ -47,7 +47,8 @@ enum class Way : std::uint8_t {
 // What the points of a set, as they were before the step, have come to; shapes [n].
 struct Arrivals {
     std::vector<Way> way;
-    std::vector<Vec3d> P, v;  // before they are rounded to single precision; not of exact ways
+    std::vector<double> put_off;  // by contacts that were found after a sub-step, m
+    std::vector<Vec3d> P, v;      // before they are rounded to single precision; not of exact ways
 };
 
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age

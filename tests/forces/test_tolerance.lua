@@ -28,6 +28,26 @@ describe("a tolerance", function()
     end
   end)
 
+  -- Runs of 1 and 2 sub-steps find a contact of the second half at the same place, and agree on what is wrong with it.
+  for _, method in ipairs { "project", "backtrack" } do
+    it("holds for contacts that " .. method .. " finds after the step", function()
+      local text = [[
+local P, v = {}, {}
+for i = 1, 50 do P[i], v[i] = {i, 0.13 * i / 50, 0}, {0, -3, 0} end
+return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :gravity {}
+  :collide { shape = rapid.shape.plane {}, bounce = 0.5, method = "%s" } :solve { %s }]]
+      local exact = scene.run(text:format("continuous", ""), { frames = {2, 2} })[2]
+      for _, tolerance in ipairs { 1e-2, 1e-3 } do
+        local options = ("tolerance = %g, max_substeps = 8192"):format(tolerance)
+        local points = scene.run(text:format(method, options), { frames = {2, 2} })[2]
+        for i = 1, #points do
+          local off = (points[i].P - exact[i].P):length()
+          assert.truthy(off <= tolerance, ("point %d is off by %g m"):format(i, off))
+        end
+      end
+    end)
+  end
+
   it("takes the steps that a point needs, whatever other points there are", function()
     local options = "tolerance = 1e-4, max_substeps = 1024"
     local all = frame_two(options)

@@ -40,6 +40,7 @@ class ClumpCoupling : public Coupling {
 public:
     ClumpCoupling(std::shared_ptr<Bonds> bonds, double strength) : bonds_(std::move(bonds)), strength_(strength) {}
 
+    void tie(std::span<std::uint8_t> tied) const override { bonds_->rows.tie(tied); }
     void resume(Substep& now) override { bonds_->rows.resume(now); }
     void prepare(Substep& now) override { bonds_->rows.prepare(now); }
     void project(Substep& now) override { bonds_->rows.project(now); }

@@ -74,6 +74,10 @@ public:
         }
     }
 
+    void tie(std::span<std::uint8_t> tied) const override
+    {
+        for (const auto& [i, pin] : held_) tied[i] = 1;
+    }
     void resume(Substep& now) override { pins_->springs.resume(now); }
     void prepare(Substep& now) override { pins_->springs.prepare(now); }
     void project(Substep& now) override { pins_->springs.project(now); }

@@ -26,6 +26,7 @@ constexpr double most_voxels = 0x1p31;  // of a level set
 
 struct Solve {
     int substeps = 1, iterations = 1, max_substeps = 64;
+    double sleep = 0.25;
     std::optional<double> tolerance;
     std::string group;
 
@@ -40,6 +41,8 @@ struct Solve {
             .takes("life")
             .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
             .param(&Solve::iterations, "iterations", 1.0, at_least(1), "", "of the constraints, a sub-step")
+            .param(&Solve::sleep, "sleep", 0.25, or_infinity(above(0)), "s",
+                   "at rest, after which points with contacts sleep until something acts on them; math.huge: never")
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
                    "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")
             .param(&Solve::max_substeps, "max_substeps", 64.0, at_least(1), "", "the most, with a tolerance")
@@ -74,7 +77,10 @@ struct Solve {
         options.begins_frame = clock.is_whole(clock.step_at(now.frame) - 1);
         options.iterations = iterations;
         options.loads = &loads_;
+        options.sleep = sleep;
+        options.beds = &beds_;
         const bool coupled = couples(flow.dynamics);
+        if (coupled && !points.has("still")) points.add({"still", 0.0f});
         if (tolerance && coupled)
             throw Error(
                 "a tolerance is for points that do not depend on one another, and there are constraints; give "
@@ -141,8 +147,10 @@ struct Solve {
         age(points, now);
         points.remove("dt");
         flow.dynamics.clear();
+        // How long points have been still is the state's own matter.
         // Pointers: the values are the state's alone again as soon as the flow has been used.
         flow.simulation->state = points;
+        points.remove("still");
         return flow;
     }
 
@@ -285,11 +293,10 @@ private:
                     const AnimatedShape body(collider->shape, collider->motion);
                     const FramePath path = path_of(body, clock, step, options);
                     jump = path.jump;
-                    going->shape =
-                        path.kind == FramePath::AfterCut
-                            ? moving(collider->shape, *going_back(collider->motion, clock, to, path.after), clock, from,
-                                     to)
-                            : moving(collider->shape, *collider->motion, clock, from, to);
+                    going->shape = path.kind == FramePath::AfterCut
+                                       ? moving(collider->shape, *going_back(collider->motion, clock, to, path.after),
+                                                clock, from, to)
+                                       : moving(collider->shape, *collider->motion, clock, from, to);
                 }
             } catch (Error& error) {
                 error.in_node(collider->node).at(collider->location);
@@ -320,6 +327,7 @@ private:
     Shadows shadows_;
     // Of the frame before.
     ShapeLoads loads_;  // of coupled points
+    SleepMemory beds_;  // of those that sleep
     std::map<ShapePtr, LevelSetPtr> wide_;
     std::map<std::string, Deformation> deforming_;  // by collide node
 };

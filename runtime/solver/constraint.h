@@ -5,10 +5,12 @@
 // couplings, and knows none by its kind. A sub-step is (numerics.md, Constraints; Macklin et al. 2014, 2016)
 //
 //   x~ = P + v dt + a dt²/2         each point by itself, by all that acts on it: forces, actions, shapes
-//   resume(), hold(), prepare()     points whose place is given; which rows there are
+//   resume(), hold(), rouse()       points whose place is given; which rows there are, and whom they wake
+//   prepare()                       what the rows did before
 //   project()                       P = x~ + Δx, as often as the solve has iterations; Δx = w ∇C Δλ
 //   v+ = v + a dt + Δx/dt           never the difference of stored positions
 //   settle()                        velocities: friction, restitution; v+ + Δx/(2dt) between sub-steps, 0 at rest
+//   take_back()                     what shapes have had the last word on, and has come out too far off
 //
 // w is the inverse mass times v_of_a / dt, with v_of_a what a constant acceleration does to the velocity of a point
 // that drag and springs hold back: so that what hangs from a constraint under drag stretches it as its weight does.
@@ -16,6 +18,7 @@
 // Most constraints need none of this but a residual: rows.h makes a Coupling of it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -24,10 +27,12 @@
 
 #include "runtime/points/point_set.h"
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/sleep.h"
 
 namespace rapid {
 
-// Where a point is, m, and its inverse mass, 1/kg: 0 for one that no constraint moves. A cache line holds two.
+// Where a point is, m, and its inverse mass, 1/kg: 0 for one that no constraint moves, or that sleeps. A cache line
+// holds two.
 struct alignas(32) Place {
     Vec3d P;
     double w;
@@ -51,10 +56,17 @@ struct Substep {
     double pull = 0;  // m/s², the largest acceleration by forces: what a point at rest is pressed by
     int index = 0;    // from 0
     int iterations = 1;
+    Sleepers* sleepers = nullptr;  // null where nobody may sleep
+
+    // How near each is to a shape that bears it: 255 where it touches one, one less for each point between, 0 where
+    // nothing bears it. Of the sub-step before; and of this one, as it is found.
+    std::span<const std::uint8_t> borne;
+    std::span<std::uint8_t> found_borne;
 
     std::size_t size() const { return at.size(); }
     Yield yield_of(std::size_t i) const { return yields.empty() ? Yield{dt, 0.5 * dt * dt} : yields[i]; }
     bool lives(std::size_t i) const { return dead.empty() || !dead[i]; }
+    bool asleep(std::size_t i) const { return sleepers && sleepers->asleep(i); }
 };
 
 // How well a frame's rows are satisfied; and of contacts, how their pairs were found.
@@ -82,9 +94,15 @@ public:
     virtual void resume(Substep&) {}
 
     virtual void hold(Substep&) {}
+    virtual void rouse(Substep&) {}
     virtual void prepare(Substep&) {}
     virtual void project(Substep& now) = 0;
     virtual void settle(Substep&) {}
+    virtual void take_back(Substep&) {}
+
+    // Before the first sub-step: sets to 1 the points that are not to sleep in this frame. All, but where a coupling
+    // knows better.
+    virtual void tie(std::span<std::uint8_t> tied) const { std::fill(tied.begin(), tied.end(), std::uint8_t{1}); }
 
     // The last sub-step is over. What the next frame begins with is kept.
     virtual Residual close(Substep& now) = 0;

@@ -24,11 +24,26 @@ constexpr double least_slack = 0.1, most_slack = 0.4, slack_substeps = 4;
 // contact that is just lost is gained anew in the next sub-step, and that is jitter.
 constexpr double recovery = 0.8, left_over = 1e-4;
 
+// And of an overlap with a sleeper: neither of two that hold a point between them gives way, and it would be pushed to
+// and fro.
+constexpr double recovery_asleep = 0.1;
+
+// Where a sub-step leaves more than this part of the smaller radius, and the lighter of the two is borne, the heavier
+// is taken back: iterations would have to be as many as the ratio of their masses.
+constexpr double too_deep = 0.05;
+
 // Pairs that are as near as this, in parts of the sum of their radii, may come to touch in the projection.
 constexpr double near = 1.02;
 
 // A contact that closes by less than this many times what a point at rest is pressed by in a sub-step does not bounce.
 constexpr double resting = 2;
+
+// A sleeper wakes where what a neighbour does to it has changed by more than this part of its burden.
+constexpr double disturbed = 0.1;
+
+// Points that overlap by more than this part of the smaller radius do not fall asleep, nor do those that they lean on:
+// they have to give way.
+constexpr double too_deep_to_sleep = 0.05;
 
 // Rows a task: tens of microseconds.
 constexpr std::size_t worth_a_task = 2048;
@@ -51,7 +66,8 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     const Strided<float> friction = options.friction.read(points), bounce = options.bounce.read(points);
     const Strided<std::uint8_t> members = members_of(points, group);
 
-    std::vector<float> before = std::move(radius_);
+    roused_.clear();
+    const std::vector<float> before = std::move(radius_), rough_before = std::move(friction_);
     radius_.resize(n);
     friction_.resize(n);
     bounce_.resize(n);
@@ -75,28 +91,47 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
 
     // Pairs of points that are not there any more are forgotten; the others are known at their new places.
     const Strided<std::int64_t> id = points.id().read();
-    if (ids_.size() == n && std::equal(ids_.begin(), ids_.end(), id.data)) return;
-    const PlacesById place(points.id());
+    const bool same = ids_.size() == n && std::equal(ids_.begin(), ids_.end(), id.data);
     std::vector<std::uint32_t> now(ids_.size());
-    for (std::size_t i = 0; i < ids_.size(); ++i) now[i] = place[ids_[i]];
-    ids_.assign(id.data, id.data + n);
-    std::vector<std::array<std::uint32_t, 3>> kept;  // i, j, slot
-    for (const std::uint32_t s : slot_) {
-        const std::uint32_t i = now[pairs_[s][0]], j = now[pairs_[s][1]];
-        if (!(impulses_[s].pressed > 0) || i == PlacesById::none || j == PlacesById::none) continue;
-        kept.push_back({std::min(i, j), std::max(i, j), s});
-        if (i > j) impulses_[s].rubbed = -impulses_[s].rubbed;
+    std::iota(now.begin(), now.end(), 0u);
+    if (!same) {
+        const PlacesById place(points.id());
+        for (std::size_t i = 0; i < ids_.size(); ++i) now[i] = place[ids_[i]];
     }
-    std::sort(kept.begin(), kept.end());
+    for (std::size_t k = 0; k < now.size(); ++k) {
+        const std::uint32_t i = now[k];
+        if (i != PlacesById::none && (radius_[i] != before[k] || friction_[i] != rough_before[k])) roused_.push_back(i);
+    }
+    if (same) return;
+    ids_.assign(id.data, id.data + n);
+    std::vector<std::pair<Pair, Impulse>> kept;
+    for (std::size_t s = 0; s < pairs_.size(); ++s) {
+        Impulse impulse = impulses_[s];
+        if (!(impulse.pressed > 0)) continue;
+        const std::uint32_t i = now[pairs_[s][0]], j = now[pairs_[s][1]];
+        if (i == PlacesById::none && j != PlacesById::none) roused_.push_back(j);
+        if (j == PlacesById::none && i != PlacesById::none) roused_.push_back(i);
+        if (i == PlacesById::none || j == PlacesById::none) continue;
+        if (i > j) impulse.rubbed = -impulse.rubbed, impulse.borne = -impulse.borne;
+        kept.push_back({{std::min(i, j), std::max(i, j)}, impulse});
+    }
+    std::sort(kept.begin(), kept.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     near_.begin.assign(n + 1, 0);
     near_.other.clear();
-    slot_.clear();
-    for (const auto& [i, j, s] : kept) {
-        ++near_.begin[i + 1];
-        near_.other.push_back(j);
-        slot_.push_back(s);
+    pairs_.clear();
+    impulses_.clear();
+    for (const auto& [pair, impulse] : kept) {
+        ++near_.begin[pair[0] + 1];
+        near_.other.push_back(pair[1]);
+        pairs_.push_back(pair);
+        impulses_.push_back(impulse);
     }
     std::partial_sum(near_.begin.begin(), near_.begin.end(), near_.begin.begin());
+    slot_.resize(pairs_.size());
+    std::iota(slot_.begin(), slot_.end(), 0u);
+    batches_.assign(1, 0);
+    colours_.clear();
+    touching_in_.clear();
 }
 
 // Since pairs were looked for. What all points move by together brings nobody closer.
@@ -133,7 +168,20 @@ void Contacts::search(const Substep& now)
     std::swap(impulses_, impulses_before_);
     search_.find(searched_at_, {reach_.data(), 1}, grids_, near_);
     schedule();
+    if (now.sleepers && now.sleepers->any()) wake_parted(now);
     search_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+// Points that have pressed each other, and are nowhere near any more: a node has moved one.
+void Contacts::wake_parted(const Substep& now) const
+{
+    for (std::uint32_t i = 0; i + 1 < near_before_.begin.size(); ++i)
+        for (std::uint32_t k = near_before_.begin[i]; k < near_before_.begin[i + 1]; ++k) {
+            const std::uint32_t j = near_before_.other[k];
+            if (!(impulses_before_[slot_before_[k]].pressed > 0)) continue;
+            const auto here = near_.of(i);
+            if (!std::binary_search(here.begin(), here.end(), j)) now.sleepers->wake(i), now.sleepers->wake(j);
+        }
 }
 
 // Pairs go to the block of space that their points are in, or the least of the blocks along each axis: it then
@@ -254,11 +302,17 @@ void Contacts::touch(const Substep& now)
         for (std::uint32_t k = batches_[b]; k < batches_[b + 1]; ++k) {
             const auto [i, j] = pairs_[k];
             const Place &a = now.at[i], &c = now.at[j];
+            if (!(a.w + c.w > 0) && !now.sleepers) continue;
             const Vec3d d = a.P - c.P;
             const double reach = double(radius_[i]) + double(radius_[j]), d2 = d.squaredNorm();
             const Impulse& before = impulses_[k];
             if (d2 > near * near * reach * reach && before.pressed <= 0) continue;
-            if (!(a.w + c.w > 0) || !now.lives(i) || !now.lives(j)) continue;
+            if (!now.lives(i) || !now.lives(j)) continue;
+            if (!(a.w + c.w > 0)) {
+                // What no constraint moves, and goes its way, wakes a sleeper in it.
+                if (now.v[i] != now.v[j]) now.sleepers->wake(i), now.sleepers->wake(j);
+                continue;
+            }
             const Vec3d apart = now.begin[i] - now.begin[j];
             Row& row = rows_[batches_[b] + count++];
             row.i = i;
@@ -277,17 +331,84 @@ void Contacts::touch(const Substep& now)
     });
 }
 
-void Contacts::prepare(Substep& now)
+void Contacts::rouse(Substep& now)
 {
     if (per_dt_ > 0 && per_dt_ * now.dt != 1)
         for (Impulse& impulse : impulses_) {  // forces stay
-            impulse.pressed *= static_cast<float>(now.dt * per_dt_);
-            impulse.rubbed *= static_cast<float>(now.dt * per_dt_);
+            const auto scale = static_cast<float>(now.dt * per_dt_);
+            impulse.pressed *= scale;
+            impulse.rubbed *= scale;
+            impulse.borne *= scale;
         }
     per_dt_ = 1 / now.dt;
+    if (fresh_) {
+        double most = 0, least = std::numeric_limits<double>::infinity();
+        for (const Place& at : now.at)
+            if (at.w > 0) most = std::max(most, at.w), least = std::min(least, at.w);
+        uneven_ = most > 2 * least;
+    }
     if (fresh_ || has_moved(now)) search(now);
     fresh_ = false;
     touch(now);
+    if (now.sleepers && now.sleepers->any() && shock(now)) touch(now);
+}
+
+// Wakes the sleepers that are hit, and those that the shock reaches through what touches. They go the way that their
+// weight gives them.
+bool Contacts::shock(Substep& now)
+{
+    const double at_rest = resting * now.pull * now.dt;
+    shock_.clear();
+    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
+        for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
+            const Row& row = rows_[r];
+            const bool first = now.asleep(row.i);
+            if (first == now.asleep(row.j)) continue;
+            const double closing = -row.n.dot(now.v[row.i] - now.v[row.j]);
+            if (closing < at_rest || row.n.dot(now.at[row.i].P - now.at[row.j].P) > row.reach) continue;
+            if (shock_.empty()) shock_.assign(now.size(), 0);
+            const std::uint32_t hit = first ? row.i : row.j, by = first ? row.j : row.i;
+            shock_[hit] = std::max(shock_[hit], closing / now.at[by].w);
+        }
+    if (shock_.empty()) return false;
+    const auto moves = [&](std::size_t i) { return shock_[i] * now.sleepers->inverse_mass(i) >= at_rest; };
+    for (bool spreads = true; spreads;) {
+        spreads = false;
+        for (const auto& [i, j] : pairs_) {
+            for (const auto& [from, to] : {std::pair(i, j), std::pair(j, i)}) {
+                if (!(0.5 * shock_[from] > shock_[to]) || !moves(from) || !now.asleep(to)) continue;
+                const double reach = near * (double(radius_[i]) + double(radius_[j]));
+                if ((now.at[i].P - now.at[j].P).squaredNorm() > reach * reach) continue;
+                shock_[to] = 0.5 * shock_[from];
+                spreads |= moves(to);
+            }
+        }
+    }
+    bool any = false;
+    for (std::size_t i = 0; i < now.size(); ++i) {
+        if (!now.asleep(i) || !moves(i)) continue;
+        any = true;
+        now.sleepers->wake(i);
+        now.at[i].w = now.sleepers->inverse_mass(i) * now.yield_of(i).v / now.dt;
+        now.at[i].P += now.yield_of(i).x * now.sleepers->pull(i);
+        now.v[i] += now.yield_of(i).v * now.sleepers->pull(i);
+    }
+    return any;
+}
+
+// Wakes the sleeper of a pair that is pressed otherwise than it was.
+void Contacts::disturb(const Row& row, const Substep& now) const
+{
+    const bool first = now.asleep(row.i);
+    if (first == now.asleep(row.j)) return;
+    const std::uint32_t sleeper = first ? row.i : row.j;
+    const Impulse& impulse = impulses_[row.pair];
+    const Vec3f change = impulse.pressed * row.n.cast<float>() + impulse.rubbed - impulse.borne;
+    if (change.norm() > disturbed * now.dt * now.sleepers->burden(sleeper)) now.sleepers->wake(sleeper);
+}
+
+void Contacts::prepare(Substep& now)
+{
     const double dt = now.dt;
     sweep([&](Row& row) {
         if (!(row.pressed > 0)) return;
@@ -325,17 +446,43 @@ void Contacts::settle(Substep& now)
     }
 }
 
+void Contacts::take_back(Substep& now)
+{
+    if (uneven_) sweep([&](const Row& row) { take_back(row, now); });
+}
+
+// A heavy point on a light one that a shape bears, itself or through others, would go through it: in a sweep the shape
+// gives back no more than the lighter weighs. Where that has left it too deep it is taken back, with the lighter as a
+// wall.
+void Contacts::take_back(const Row& row, Substep& now) const
+{
+    const bool first = now.at[row.i].w < now.at[row.j].w;  // is the heavier
+    const std::uint32_t heavy = first ? row.i : row.j, light = first ? row.j : row.i;
+    if (!(now.at[heavy].w > 0) || now.borne[light] <= now.borne[heavy]) return;
+    const Vec3d d = now.at[heavy].P - now.at[light].P;
+    const double distance = d.norm();
+    const double depth = row.reach - distance - too_deep * std::min(radius_[row.i], radius_[row.j]);
+    if (!(depth > 0) || !(distance > 0)) return;
+    const Vec3d n = d / distance;
+    now.at[heavy].P += depth * n;
+    now.v[heavy] += std::max(0.0, -n.dot(now.v[heavy] - now.v[light])) * n;
+}
+
 void Contacts::settle_once(Substep& now, bool last)
 {
     const double dt = now.dt, at_rest = resting * now.pull * dt;
-    sweep([&](Row& row) {
+    const bool watched = last && now.sleepers && now.sleepers->any();
+    const auto solve = [&](Row& row) {
         Impulse& kept = impulses_[row.pair];
         kept.pressed = 0;
         Place &a = now.at[row.i], &b = now.at[row.j];
         const Vec3d& n = row.n;
         const double before = double(row.pressed) + double(row.held);
         const double overlap = row.reach - n.dot(a.P - b.P);
-        if (!(before > 0) && !(overlap > 0)) return;
+        if (!(before > 0) && !(overlap > 0)) {
+            kept.rubbed.setZero();
+            return;
+        }
         const double W = a.w + b.w;
         Vec3d &va = now.v[row.i], &vb = now.v[row.j];
 
@@ -358,24 +505,69 @@ void Contacts::settle_once(Substep& now, bool last)
             kept.rubbed = row.rubbed = rubbed.cast<float>();
         }
         if (!last) return;
-        const double out = recovery * std::max(0.0, overlap - left_over * row.reach) / W;
+        if (kept.pressed > 0) {
+            const std::uint8_t bi = now.borne[row.i], bj = now.borne[row.j];
+            std::uint8_t &fi = now.found_borne[row.i], &fj = now.found_borne[row.j];
+            fi = std::max<std::uint8_t>(fi, std::max<std::uint8_t>(bj, 1) - 1);
+            fj = std::max<std::uint8_t>(fj, std::max<std::uint8_t>(bi, 1) - 1);
+        }
+        const bool from_sleeper = watched && (now.asleep(row.i) || now.asleep(row.j));
+        const double part = from_sleeper ? recovery_asleep : recovery;
+        const double out = part * std::max(0.0, overlap - left_over * row.reach) / W;
         a.P += a.w * out * n;
         b.P -= b.w * out * n;
-    });
+    };
+    if (watched)
+        sweep([&](Row& row) { solve(row), disturb(row, now); });
+    else
+        sweep(solve);
+}
+
+// These, and all that they touch.
+void Contacts::keep_awake(std::span<const std::uint32_t> deep, const Substep& now) const
+{
+    std::vector<std::uint8_t> is_deep(now.size());
+    for (const std::uint32_t i : deep) is_deep[i] = 1;
+    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
+        for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
+            const Row& row = rows_[r];
+            if (!is_deep[row.i] && !is_deep[row.j]) continue;
+            for (const std::uint32_t i : {row.i, row.j}) now.sleepers->keep_awake(i);
+        }
 }
 
 Residual Contacts::close(Substep& now)
 {
     Residual result;
+    std::vector<std::uint32_t> deep;
+    const auto count = [&](std::uint32_t i, std::uint32_t j, double overlap, bool pressed) {
+        if (!(overlap > 0) && !pressed) return;
+        ++result.rows;
+        result.worst = std::max(result.worst, overlap);
+        result.loose += overlap > 0.1 * std::min(radius_[i], radius_[j]);
+    };
     for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
         for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
             const Row& row = rows_[r];
+            if (now.asleep(row.i) && now.asleep(row.j)) continue;
+            Impulse& impulse = impulses_[row.pair];
             const double overlap = row.reach - (now.at[row.i].P - now.at[row.j].P).norm();
-            if (!(overlap > 0) && !(impulses_[row.pair].pressed > 0)) continue;
-            ++result.rows;
-            result.worst = std::max(result.worst, overlap);
-            result.loose += overlap > 0.1 * std::min(radius_[row.i], radius_[row.j]);
+            count(row.i, row.j, overlap, impulse.pressed > 0);
+            if (!now.sleepers) continue;
+            const Vec3f borne = impulse.pressed * row.n.cast<float>() + impulse.rubbed;
+            for (const std::uint32_t of : {row.i, row.j}) now.sleepers->load(of, borne.norm() * per_dt_);
+            if (overlap > too_deep_to_sleep * std::min(radius_[row.i], radius_[row.j]))
+                deep.insert(deep.end(), {row.i, row.j});
+            if (!now.asleep(row.i) && !now.asleep(row.j)) impulse.borne = borne;
         }
+    if (!deep.empty()) keep_awake(deep, now);
+    // Pairs that sleep have no row.
+    for (std::size_t k = 0; now.sleepers && k < pairs_.size(); ++k) {
+        const auto [i, j] = pairs_[k];
+        if (!now.asleep(i) || !now.asleep(j)) continue;
+        count(i, j, double(radius_[i]) + double(radius_[j]) - (now.at[i].P - now.at[j].P).norm(),
+              impulses_[k].pressed > 0);
+    }
     Residual::Search search{{}, grids_.error, grids_.excess, search_seconds_};
     for (const RadiusGrids::Grid& grid : grids_.grids) search.grids.push_back(grid.points);
     result.search = std::move(search);

@@ -9,6 +9,10 @@
 // An overlap that was there at the sub-step's beginning is not to be made deeper; what there is of it is taken away
 // without giving speed. So points that are born in one another part, and do not fly.
 //
+// A sleeper (sleep.h) that is hit wakes before the sub-step is solved, and so do those that the shock reaches: each
+// passes half of it on to those that it touches. One that is borne or pressed otherwise than when it fell asleep wakes
+// after.
+//
 // Rows are ordered by blocks of space, of which every eighth is solved at the same time: neighbours never are, so that
 // the result is the same bits on any number of threads, and momentum is kept.
 #pragma once
@@ -38,9 +42,15 @@ public:
     // finite, with the point's id; an attribute is missing.
     void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
 
+    void tie(std::span<std::uint8_t> tied) const override
+    {
+        for (const std::uint32_t i : roused_) tied[i] = 1;
+    }
+    void rouse(Substep& now) override;
     void prepare(Substep& now) override;
     void project(Substep& now) override;
     void settle(Substep& now) override;
+    void take_back(Substep& now) override;
     Residual close(Substep& now) override;
 
 private:
@@ -50,6 +60,7 @@ private:
     struct Impulse {
         float pressed = 0;             // N s along the normal
         Vec3f rubbed = Vec3f::Zero();  // N s across it
+        Vec3f borne = Vec3f::Zero();   // N s, both together, at the end of the last frame in which both were awake
     };
 
     // A pair that touches in this sub-step.
@@ -69,14 +80,19 @@ private:
     template <class F>
     void sweep(const F& f);
     void touch(const Substep& now);
+    bool shock(Substep& now);
+    void disturb(const Row& row, const Substep& now) const;
+    void keep_awake(std::span<const std::uint32_t> deep, const Substep& now) const;
     void search(const Substep& now);
     void schedule();
+    void wake_parted(const Substep& now) const;
     void settle_once(Substep& now, bool last);
+    void take_back(const Row& row, Substep& now) const;
     bool has_moved(const Substep& now) const;
 
     std::vector<float> radius_, friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
     float largest_ = 0, least_ = 0;
-    bool bounces_ = false, fresh_ = true, backwards_ = false;
+    bool bounces_ = false, fresh_ = true, backwards_ = false, uneven_ = false;
     RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};
     ContactSearch search_;
     std::vector<std::int64_t> ids_;
@@ -97,6 +113,10 @@ private:
     std::vector<Pair> turn_;                          // point and pair, in the order in which a block has them
     std::vector<std::uint16_t> owner_;                // of each pair, its block
     std::vector<std::uint32_t> going_;
+
+    std::vector<std::uint32_t>
+        roused_;                 // points that are not what they were, or have lost a neighbour that they pressed
+    std::vector<double> shock_;  // N s, of each point
 
     double search_seconds_ = 0, per_dt_ = 0;
 };

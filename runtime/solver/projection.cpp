@@ -36,6 +36,8 @@ void Projection::advance(Substep& now)
     if (!(now.dt > 0)) return;
     each([&](Coupling& coupling) { coupling.resume(now); });
     each([&](Coupling& coupling) { coupling.hold(now); });
+    find_borne(now);
+    each([&](Coupling& coupling) { coupling.rouse(now); });
     for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) free_[i] = now.at[i].P;
     });
@@ -50,6 +52,21 @@ void Projection::advance(Substep& now)
     });
     each([&](Coupling& coupling) { coupling.settle(now); });
     if (shapes_) shapes_->settle(now);
+    each([&](Coupling& coupling) { coupling.take_back(now); });
+}
+
+// What no constraint moves bears, as shapes do.
+void Projection::find_borne(Substep& now)
+{
+    borne_.resize(now.size());
+    found_borne_.resize(now.size());
+    std::swap(borne_, found_borne_);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+        if (!(now.at[i].w > 0)) borne_[i] = 255;
+        found_borne_[i] = 0;
+    }
+    now.borne = borne_;
+    now.found_borne = found_borne_;
 }
 
 Residual Projection::close(Substep& now, ShapeLoads* loads, const Column<std::int64_t>& ids)

@@ -32,7 +32,10 @@ private:
 
     std::span<const LocalConstraint> constraints_;
     std::optional<ShapeContacts> shapes_;
-    std::vector<Vec3d> free_;  // where the points' own ways have ended
+    void find_borne(Substep& now);
+
+    std::vector<Vec3d> free_;                        // where the points' own ways have ended
+    std::vector<std::uint8_t> borne_, found_borne_;  // Substep::borne
 };
 
 }  // namespace rapid

@@ -103,6 +103,12 @@ public:
         });
     }
 
+    void tie(std::span<std::uint8_t> tied) const override
+    {
+        for (const Row& row : rows_)
+            for (int k = 0; row.acts && k < arity; ++k) tied[row.at[k]] = 1;
+    }
+
     void resume(Substep& now) override
     {
         for (const Row& row : rows_)

@@ -14,6 +14,9 @@ namespace {
 // its radius, and its own way once more. One that is pushed farther is found inside at the next sub-step.
 constexpr double push = 0.5;
 
+// A point lies on a shape that is as near to it as this, in radii.
+constexpr double flush = 0.01;
+
 }  // namespace
 
 ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size)
@@ -61,8 +64,8 @@ void ShapeContacts::prepare(Substep& now, std::span<const Vec3d> free)
         Batch& rows = rows_[begin / chunk_size];
         find(rows, before_[begin / chunk_size], now, free, begin, end);
         for (Row& row : rows) {
-            if (!(row.pressed > 0)) continue;
             const double w = now.at[row.i].w;
+            if (!(row.pressed > 0) || !(w > 0)) continue;
             const Vec3d half = 0.5 * ((row.pressed + row.held) * row.n + row.rubbed);
             now.at[row.i].P += w * now.dt * half;
             now.v[row.i] += w * half;
@@ -96,11 +99,11 @@ void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::sp
             asked.push_back(static_cast<std::uint32_t>(i));
             P.push_back(free[i]);
         }
-        if (asked.empty()) continue;
+        const std::size_t rows_before = rows.size();
         phi.resize(P.size());
         gradient.resize(P.size());
         time.assign(P.size(), since);
-        obstacle.shape->distance_at(P, time, phi, gradient);
+        if (!asked.empty()) obstacle.shape->distance_at(P, time, phi, gradient);
         for (std::size_t k = 0; k < asked.size(); ++k) {
             const std::uint32_t i = asked[k];
             const double slope = gradient[k].norm(), gap = phi[k] - obstacle.radius[i];
@@ -123,7 +126,19 @@ void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::sp
             }
             rows.push_back(row);
         }
+        if (now.sleepers) keep_of_sleepers(rows, rows_before, before, o, now);
     }
+}
+
+// The rows of an obstacle on points that sleep: as they were, and out of use.
+void ShapeContacts::keep_of_sleepers(Batch& rows, std::size_t begin, const Batch& before, std::size_t obstacle,
+                                     const Substep& now)
+{
+    const auto middle = static_cast<std::ptrdiff_t>(rows.size());
+    for (const Row& row : before)
+        if (row.obstacle == obstacle && now.asleep(row.i)) rows.push_back(row);
+    std::inplace_merge(rows.begin() + static_cast<std::ptrdiff_t>(begin), rows.begin() + middle, rows.end(),
+                       [](const Row& a, const Row& b) { return a.i < b.i; });
 }
 
 void ShapeContacts::project(Substep& now)
@@ -131,6 +146,7 @@ void ShapeContacts::project(Substep& now)
     tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t c) {
         for (Row& row : rows_[c]) {
             Place& at = now.at[row.i];
+            if (!(at.w > 0)) continue;
             const double C = row.n.dot(at.P) - row.level;
             const double change = std::max(-row.pressed, -C / (at.w * now.dt));
             row.pressed += change;
@@ -145,11 +161,14 @@ void ShapeContacts::settle(Substep& now)
 {
     tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t c) {
         for (Row& row : rows_[c]) {
+            const double w = now.at[row.i].w;
+            if (!(w > 0)) continue;
+            if (row.n.dot(now.at[row.i].P) - row.level < flush * obstacles_[row.obstacle].radius[row.i])
+                now.found_borne[row.i] = 255;
             const double p = row.pressed + row.held;
             row.held = 0;
             row.pressed = p;
             if (!(p > 0)) continue;
-            const double w = now.at[row.i].w;
             Vec3d& v = now.v[row.i];
             const double pressed = std::max(0.0, p - (v - row.vc).dot(row.n) / w);
             v += w * (pressed - p) * row.n;
@@ -183,7 +202,8 @@ void ShapeContacts::put_out(Batch& rows, Substep& now) const
         obstacle.shape->distance_at(P, time, phi, gradient);
         for (std::size_t k = 0; k < P.size(); ++k) {
             const double slope2 = gradient[k].squaredNorm(), depth = obstacle.radius[rows[begin + k].i] - phi[k];
-            if (depth > 0 && slope2 > 0) now.at[rows[begin + k].i].P += depth / slope2 * gradient[k];
+            if (depth > 0 && slope2 > 0 && now.at[rows[begin + k].i].w > 0)
+                now.at[rows[begin + k].i].P += depth / slope2 * gradient[k];
         }
     }
 }

@@ -54,6 +54,8 @@ private:
 
     void find(Batch& rows, Batch& before, const Substep& now, std::span<const Vec3d> free, std::size_t begin,
               std::size_t end);
+    static void keep_of_sleepers(Batch& rows, std::size_t begin, const Batch& before, std::size_t obstacle,
+                                 const Substep& now);
     void put_out(Batch& rows, Substep& now) const;
 
     std::span<const Obstacle> obstacles_;

@@ -286,15 +286,29 @@ private:
             now.yields = yields;
         }
         projection.open(now, options_.loads, ids);
+        std::optional<Sleepers> sleepers;
+        if (options_.beds && std::isfinite(options_.sleep) && points_.has("still")) {
+            std::vector<std::uint8_t> tied(n);
+            for (const LocalConstraint& local : scene_.constraints) local.coupling->tie(tied);
+            sleepers.emplace(points_, *options_.beds, weight, tied, options_.sleep);
+            now.sleepers = &*sleepers;
+        }
         for (int substep = 0; substep < options_.substeps; ++substep) {
             now.index = substep;
             now.time = options_.time - now.dt * (options_.substeps - substep - 1);
             now.pull = 0;
+            if (sleepers) sleepers->begin(now, scene_.obstacles);
             for_all([&](std::size_t first, std::size_t last) { take_all(now, begin, yields, weight, first, last); });
-            projection.advance(now);
+            if (!sleepers || !sleepers->all()) projection.advance(now);
         }
+        if (sleepers) sleepers->unload();
         result_.residual = projection.close(now, options_.loads, ids);
+        if (sleepers) sleepers->close(now, P_, time_);
         for_all([&](std::size_t first, std::size_t last) { round(now, first, last); });
+        if (sleepers) {
+            sleepers->remember(*options_.beds, points_, now, scene_.obstacles);
+            result_.asleep = options_.beds->beds.size();
+        }
     }
 
     // A point of no weight goes where it is bound to.
@@ -305,34 +319,64 @@ private:
         Block block;
         double pull = 0;
         const std::size_t start = first;
+        const bool leaves_out = now.sleepers && scene_.falls() && scene_.uniform.linear.is_zero();
         for (; first < last; first += block_size) {
             const std::size_t size = std::min(block_size, last - first);
-            block.begin(*this, first, size);
-            for (std::size_t i = 0; i < size; ++i) {
-                block.P[i] = begin[first + i] = now.at[first + i].P;
-                block.v[i] = now.v[first + i];
+            for (std::size_t i = first; i < first + size; ++i) begin[i] = now.at[i].P;
+            if (leaves_out)
+                block.begin(*this, first, size, [&](std::size_t i) { return leave_out(now, i); });
+            else
+                block.begin(*this, first, size);
+            if (block.places.empty()) {
+                pull = std::max(pull, scene_.uniform.a.norm());
+                continue;
+            }
+            for (std::size_t k = 0; k < block.places.size(); ++k) {
+                const std::uint32_t i = block.places[k];
+                block.P[k] = now.at[i].P;
+                block.v[k] = now.v[i];
+                if (now.asleep(i)) block.way[k] = 0;
             }
             if (!scene_.obstacles.empty()) collisions.begin(block.places);
             take(block, collisions, now.index);
-            for (std::size_t i = 0; i < size; ++i) {
-                Place& at = now.at[first + i];
-                at.w = weight[first + i];
+            for (std::size_t k = 0; k < block.places.size(); ++k) {
+                const std::uint32_t i = block.places[k];
+                Place& at = now.at[i];
+                at.w = weight[i];
+                if (now.sleepers && !leaves_out) {
+                    const bool asleep = now.asleep(i);
+                    now.sleepers->feel(i, pull_on(block, k, begin[i], asleep));
+                    if (asleep) {
+                        at.w = 0;
+                        continue;
+                    }
+                }
                 if (!(at.w > 0)) {
-                    if (!members_.data || members_[first + i]) at.P += block.dt[i] * now.v[first + i];
+                    if (!members_.data || members_[i]) at.P += block.dt[k] * now.v[i];
                     continue;
                 }
-                at.P = block.P[i];
-                now.v[first + i] = block.v[i];
+                at.P = block.P[k];
+                now.v[i] = block.v[k];
                 if (!block.linear.data) continue;
-                const Propagator by = respond(block.damped[i].k, block.damped[i].w2, now.dt);
-                yields[first + i] = {by.v_of_G, by.x_of_G};
+                const Propagator by = respond(block.damped[k].k, block.damped[k].w2, now.dt);
+                yields[i] = {by.v_of_G, by.x_of_G};
                 at.w *= by.v_of_G / now.dt;
             }
-            for (std::size_t i = 0; i < (block.a.stride ? size : 1); ++i) pull = std::max(pull, block.a[i].norm());
+            for (std::size_t k = 0; k < (block.a.stride ? block.places.size() : 1); ++k)
+                pull = std::max(pull, block.a[k].norm());
         }
         count(collisions, 0, start);
         const std::scoped_lock lock(mutex_);
         now.pull = std::max(now.pull, pull);
+    }
+
+    // A sleeper that only what is the same everywhere pulls.
+    bool leave_out(Substep& now, std::size_t i) const
+    {
+        now.sleepers->feel(i, scene_.uniform.a);
+        if (!now.asleep(i)) return false;
+        now.at[i].w = 0;
+        return true;
     }
 
     // A drift that takes no time finds what each point lies on, to round it to the outer side of that.
@@ -381,6 +425,7 @@ private:
         std::vector<Vec3d> P, v, middle;
         std::vector<Vec3f> rounded;  // P at the beginning of the frame, and at its end
         std::vector<double> dt, time, half, after;
+        std::vector<double> way;  // s of dt that each is moved for: 0 for those that sleep
         std::vector<Vec3d> force;
         // Of the sub-step: the accelerations, and the linear parts, null where no force has one. Each is the scene's,
         // or the points' own.
@@ -395,6 +440,15 @@ private:
         {
             run.resize(size);
             std::iota(run.begin(), run.end(), static_cast<std::uint32_t>(first));
+            begin(step, run);
+        }
+
+        template <class F>
+        void begin(const Step& step, std::size_t first, std::size_t size, const F& leave_out)
+        {
+            run.clear();
+            for (std::size_t i = first; i < first + size; ++i)
+                if (!leave_out(i)) run.push_back(static_cast<std::uint32_t>(i));
             begin(step, run);
         }
 
@@ -413,6 +467,7 @@ private:
                 v[i] = step.v_[at[i]].cast<double>();
                 dt[i] = step.time_(at[i]) / substeps;
             }
+            way = dt;
         }
 
         // Points that are not of the group stay as they were.
@@ -454,8 +509,8 @@ private:
 
         void halve()
         {
-            half.resize(dt.size());
-            for (std::size_t i = 0; i < dt.size(); ++i) half[i] = 0.5 * dt[i];
+            half.resize(way.size());
+            for (std::size_t i = 0; i < way.size(); ++i) half[i] = 0.5 * way[i];
         }
 
         // s from the end of a drift to that of the frame, so many half sub-steps later.
@@ -487,6 +542,19 @@ private:
         }
     }
 
+    // What acts on a point in a sub-step, m/s²; on a sleeper, actions that move it and give it velocities, too.
+    Vec3d pull_on(const Block& block, std::size_t k, const Vec3d& from, bool asleep) const
+    {
+        Vec3d a = block.a[k];
+        if (block.linear.data) {
+            const Linear& linear = block.linear[k];
+            a += linear.ku + linear.w2q - linear.w2 * from;
+        }
+        const double dt = block.dt[k];
+        if (asleep && dt > 0) a += block.v[k] / dt + (block.P[k] - from) / (dt * dt);
+        return a;
+    }
+
     // One sub-step of a block.
     void take(Block& block, Collisions& collisions, int substep)
     {
@@ -502,7 +570,7 @@ private:
         if (scene_.kills) stop_dead(block);
         const double halves_after = 2.0 * (options_.substeps - substep - 1);
         if (scene_.actions.empty()) {
-            drift(block.dt, halves_after);
+            drift(block.way, halves_after);
         } else {
             // Half a drift, all actions at once, half a drift: of second order (numerics.md, Motion).
             block.halve();
@@ -583,9 +651,9 @@ private:
             const Vec3d a = block.one.acceleration(i);
             if (!a.allFinite())
                 throw Error(
-                    fmt::format("{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written; it had {}",
-                                name_of(block.places[i]), a.x(), a.y(), a.z(),
-                                text_of_point(points_, block.places[i])))
+                    fmt::format(
+                        "{}: its acceleration became {{{:g}, {:g}, {:g}}}; the frame was not written; it had {}",
+                        name_of(block.places[i]), a.x(), a.y(), a.z(), text_of_point(points_, block.places[i])))
                     .in_node(local.force->node)
                     .at(local.force->location);
             block.own_a[i] += a;
@@ -596,7 +664,7 @@ private:
     void stop_dead(Block& block) const
     {
         for (std::size_t i = 0; i < block.dt.size(); ++i)
-            if (dead_[block.places[i]]) block.dt[i] = 0;
+            if (dead_[block.places[i]]) block.dt[i] = block.way[i] = 0;
     }
 
     // All actions, in the order of the chain, on the points where they are in the middle of the sub-step. The forces
@@ -612,7 +680,7 @@ private:
             at_node(*local.action, [&] { local.pass->act(chunk, block.force, dead); });
         for (std::size_t i = 0; i < size; ++i) {
             block.v[i] += block.dt[i] * acceleration_by(block.force[i], block.places[i]);
-            if (dead[i]) block.dt[i] = block.half[i] = 0;
+            if (dead[i]) block.dt[i] = block.way[i] = block.half[i] = 0;
         }
     }
 

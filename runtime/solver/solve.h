@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,10 @@ struct SolveOptions {
 
     int iterations = 1;           // of the constraints, a sub-step
     ShapeLoads* loads = nullptr;  // kept from frame to frame where points are coupled; null: each begins anew
+
+    // s after which points at rest sleep, where they have the column `still`; and what is kept from frame to frame
+    double sleep = std::numeric_limits<double>::infinity();
+    SleepMemory* beds = nullptr;
 };
 
 struct SolveResult {
@@ -32,8 +37,9 @@ struct SolveResult {
     std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     double penetration_max = 0;       // m, the deepest at the end of the frame
     ContactEnergy contact_energy;
-    std::uint64_t died = 0;  // points that actions killed
-    Residual residual;       // of the constraints, at the end of the frame
+    std::uint64_t died = 0;    // points that actions killed
+    Residual residual;         // of the constraints, at the end of the frame
+    std::uint64_t asleep = 0;  // points, at the end of the frame
 };
 
 // How a point went through the frame.

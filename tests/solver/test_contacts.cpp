@@ -9,62 +9,16 @@
 #include <random>
 #include <set>
 
-#include "runtime/solver/shape_contacts.h"
-#include "tests/solver/scene.h"
+#include "tests/solver/granular.h"
 
 namespace rapid {
 namespace {
 
 using test::close_to;
+using test::Granular;
 using test::points;
-using test::Scene;
 
 constexpr double g = 9.81;
-
-class Spheres : public Constraint {
-public:
-    ContactOptions options;
-    std::shared_ptr<Contacts> contacts = std::make_shared<Contacts>();
-
-    std::shared_ptr<Coupling> begin(const PointSet& set, double) const override
-    {
-        contacts->follow(set, options, group);
-        return contacts;
-    }
-};
-
-// A scene whose points touch each other.
-class Granular : public Scene {
-public:
-    ShapeLoads loads;
-    std::shared_ptr<Spheres> spheres = std::make_shared<Spheres>();
-
-    explicit Granular(PointSet set, float bounce = 0, float friction = 0) : Scene(std::move(set))
-    {
-        options.loads = &loads;
-        spheres->node = "contact1";
-        spheres->options.bounce = bounce;
-        spheres->options.friction = friction;
-        dynamics.push_back(spheres);
-    }
-
-    Vec3d momentum() const
-    {
-        Vec3d sum = Vec3d::Zero();
-        const auto* mass = points.find<float>("mass");
-        for (std::size_t i = 0; i < points.size(); ++i) sum += (mass ? (*mass)[i] : 1.0) * v(i);
-        return sum;
-    }
-    double deepest() const  // overlap of two points, m
-    {
-        const auto& r = points.column<float>("pscale");
-        double worst = 0;
-        for (std::size_t i = 0; i < points.size(); ++i)
-            for (std::size_t j = 0; j < i; ++j)
-                worst = std::max(worst, double(r[i]) + double(r[j]) - (P(i) - P(j)).norm());
-        return worst;
-    }
-};
 
 std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
 
@@ -215,6 +169,60 @@ TEST_CASE("radii of 1 : 1,000 and masses of 1 : 10^6 in one heap stay finite, an
         CHECK(scene.v(i).norm() < 10);  // a fall from 1.6 m is of 5.6 m/s
         CHECK(scene.P(i).y() >= radius[i] * 0.999);
     }
+}
+
+TEST_CASE("what is heavy rests on what is light, and does not go through it", "[contacts][extreme]")
+{
+    const float ratio = GENERATE(1e3f, 1e6f);
+    const std::size_t n = GENERATE(1, 3);
+    CAPTURE(ratio, n);
+    const float r = 0.02f, large = 0.2f;
+    std::vector<Vec3f> at;
+    for (std::size_t k = 0; k < n; ++k) at.emplace_back(0.0f, r * static_cast<float>(2 * k + 1), 0.0f);
+    at.emplace_back(0.0f, 2 * r * static_cast<float>(n) + large, 0.0f);
+    std::vector<float> radius = alike(n, r), mass = alike(n, 1);
+    radius.push_back(large);
+    mass.push_back(ratio);
+    Granular scene(points(at).set<float>("pscale", radius).set<float>("mass", mass), 0, 0.3f);
+    scene.gravity().floor(0, 0.3f).substeps(12);
+    for (int frame = 0; frame < 96; ++frame) {
+        scene.run(1);
+        CHECK(scene.deepest() < 0.3 * r);  // in a sub-step it falls from one overlap into the next
+    }
+    CHECK(scene.deepest() < 0.06 * r);
+    CHECK(scene.v(n).norm() < 1e-3);
+    CHECK(scene.P(n).y() == Approx(at[n].y()).margin(0.06 * r * static_cast<double>(n)));
+}
+
+TEST_CASE("a ball of 10^6 times their mass on a bed of grains is in none of them, nor are they in the floor",
+          "[contacts][extreme]")
+{
+    std::mt19937 random(2);
+    std::uniform_real_distribution<float> off(-0.1f, 0.1f);
+    const float r = 0.04f;
+    std::vector<Vec3f> at;
+    for (int k = 0; k < 7 * 7 * 3; ++k)
+        at.emplace_back(r * (2.1f * static_cast<float>(k % 7 - 3) + off(random)),
+                        r * (2.1f * static_cast<float>(k / 49) + 1.05f),
+                        r * (2.1f * static_cast<float>(k / 7 % 7 - 3) + off(random)));
+    std::vector<float> radius = alike(at.size(), r), mass = alike(at.size(), 1);
+    at.emplace_back(0.0f, 0.47f, 0.0f);
+    radius.push_back(0.2f);
+    mass.push_back(1e6f);
+    Granular scene(points(at).set<float>("pscale", radius).set<float>("mass", mass), 0, 0.3f);
+    scene.gravity().floor(0, 0.3f).substeps(24);
+    for (const auto& [normal, offset] : {std::pair(Vec3d(1, 0, 0), -0.3), std::pair(Vec3d(-1, 0, 0), -0.3),
+                                         std::pair(Vec3d(0, 0, 1), -0.3), std::pair(Vec3d(0, 0, -1), -0.3)})
+        scene.collide(make_plane(normal, offset), 0.0f, 0.3f);
+    double fastest = 0;
+    for (int frame = 0; frame < 96; ++frame) {
+        scene.run(1);
+        CHECK(scene.deepest() < r);
+        for (std::size_t i = 0; i < scene.points.size(); ++i) fastest = std::max(fastest, scene.v(i).norm());
+    }
+    CHECK(fastest < 10);  // the ball comes down with 1 m/s, and what it squeezes out goes faster
+    CHECK(scene.deepest() < 0.15 * r);
+    for (std::size_t i = 0; i < scene.points.size(); ++i) CHECK(scene.P(i).y() >= double(radius[i]) * 0.999);
 }
 
 TEST_CASE("a heap comes to rest, and its energy does not grow", "[contacts]")

@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "runtime/shapes/neighbours.h"
 #include "tests/solver/granular.h"
 
 namespace rapid {
@@ -278,6 +279,80 @@ TEST_CASE("the search finds each pair that touches once, whatever the radii, gri
                 touching.insert({i, j});
     CHECK(found == touching);
     CHECK(grids.grids.size() <= static_cast<std::size_t>(max_grids));
+}
+
+TEST_CASE("the search finds the pairs that OpenVDB's point index grid finds", "[contacts]")
+{
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> in(0, 1);
+    const std::size_t n = 3000;
+    std::vector<Vec3f> at;
+    std::vector<Vec3d> exact;
+    for (std::size_t i = 0; i < n; ++i) at.emplace_back(in(random), in(random), in(random));
+    for (const Vec3f& P : at) exact.push_back(P.cast<double>());
+    const float radius = 0.035f;
+    Pairs pairs;
+    ContactSearch().find(exact, {&radius, 0}, RadiusGrids({&radius, 0}, n, 0, 1), pairs);
+
+    const Neighbours index(at, 2.0 * radius);
+    std::vector<std::uint32_t> near;
+    std::size_t found = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+        index.find(exact[i], near);
+        std::erase_if(near, [&](std::uint32_t j) { return j <= i; });
+        const auto of = pairs.of(i);
+        CHECK(std::equal(near.begin(), near.end(), of.begin(), of.end()));
+        found += near.size();
+    }
+    CHECK(found > 2 * n);
+}
+
+TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they, however many are above", "[contacts]")
+{
+    const float r = 0.01f;
+    // Grains a second through a square hole of that width in the floor of a box; those below are taken to the top
+    // again.
+    const auto flow = [&](double hole, std::size_t layers) {
+        constexpr int side = 14;
+        const double w = side * 2.1 * r;
+        std::mt19937 random(4);
+        std::uniform_real_distribution<float> off(-0.1f * r, 0.1f * r);
+        std::vector<Vec3f> at;
+        for (std::size_t k = 0; k < side * side * layers; ++k)
+            at.emplace_back(2.1f * r * (static_cast<float>(k % side) - 0.5f * side + 0.5f) + off(random),
+                            2.1f * r * (static_cast<float>(k / side / side) + 0.6f),
+                            2.1f * r * (static_cast<float>(k / side % side) - 0.5f * side + 0.5f) + off(random));
+        Granular scene(points(at).set<float>("pscale", alike(at.size(), r)), 0, 0.3f);
+        scene.gravity().substeps(12);
+        for (const auto& [normal, offset] : {std::pair(Vec3d(1, 0, 0), -w / 2), std::pair(Vec3d(-1, 0, 0), -w / 2),
+                                             std::pair(Vec3d(0, 0, 1), -w / 2), std::pair(Vec3d(0, 0, -1), -w / 2)})
+            scene.collide(make_plane(normal, offset), 0.0f, 0.3f);
+        const double across = w, beam = (across - hole) / 2;
+        for (const double sign : {-1.0, 1.0}) {
+            scene.collide(make_box_shape({beam, 0.1, across}, {sign * (hole + beam) / 2, -0.05, 0}), 0.0f, 0.3f);
+            scene.collide(make_box_shape({across, 0.1, beam}, {0, -0.05, sign * (hole + beam) / 2}), 0.0f, 0.3f);
+        }
+        const double top = 2.1 * r * (static_cast<double>(layers) + 4);
+        std::size_t passed = 0;
+        for (int frame = 0; frame < 44; ++frame) {
+            scene.run(1);
+            const auto P = scene.points.P().write();
+            const auto v = scene.points.v().write();
+            for (std::size_t i = 0; i < at.size(); ++i) {
+                if (P[i].y() > -0.1f) continue;
+                passed += frame >= 20;
+                P[i] = Vec3f(P[i].x() * 2, static_cast<float>(top), P[i].z() * 2);
+                v[i].setZero();
+            }
+        }
+        return static_cast<double>(passed);  // in a second
+    };
+    // Beverloo: flow ~ (hole - 1.4 d)^5/2, with d the diameter.
+    const double narrow = flow(0.10, 14), wide = flow(0.16, 14);
+    INFO(narrow << ", " << wide << " a second");
+    CHECK(std::log(wide / narrow) / std::log((0.16 - 2.8 * double(r)) / (0.10 - 2.8 * double(r))) ==
+          Approx(2.5).margin(0.3));
+    CHECK(flow(0.10, 20) == Approx(narrow).epsilon(0.1));
 }
 
 TEST_CASE("grids are those of Algorithm 1, and their quality that of equation 5", "[contacts]")

@@ -43,11 +43,17 @@ if(RAPID_SANITIZE)
 endif()
 
 # ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so; and
-# the header's path is taken relative to the build folder, so that two builds of the same sources share their objects.
+# paths are taken relative to the sources, or to the build folder where that lies elsewhere, so that two checkouts share
+# their objects.
 find_program(CCACHE ccache)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  cmake_path(IS_PREFIX PROJECT_SOURCE_DIR ${PROJECT_BINARY_DIR} NORMALIZE builds_inside)
+  set(ccache_base ${PROJECT_BINARY_DIR})
+  if(builds_inside)
+    set(ccache_base ${PROJECT_SOURCE_DIR})
+  endif()
   set(CMAKE_CXX_COMPILER_LAUNCHER
-    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR=${PROJECT_BINARY_DIR} ${CCACHE})
+    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR=${ccache_base} ${CCACHE})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(rapid_private INTERFACE -fpch-preprocess)
   endif()

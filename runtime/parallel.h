@@ -15,16 +15,15 @@ constexpr std::size_t chunk_size = 4096;
 
 // Calls f(begin, end) for each chunk of [0, n), in parallel, in no order. f may throw: the first exception is rethrown.
 template <class F>
-void for_each_chunk(std::size_t n, const F& f)
+void for_each_chunk(std::size_t n, const F& f, std::size_t size = chunk_size)
 {
-    const std::size_t chunks = (n + chunk_size - 1) / chunk_size;
+    const std::size_t chunks = (n + size - 1) / size;
     if (chunks == 0) return;
     if (chunks == 1) return f(std::size_t{0}, n);
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, chunks, 1),
         [&](const tbb::blocked_range<std::size_t>& range) {
-            for (std::size_t c = range.begin(); c != range.end(); ++c)
-                f(c * chunk_size, std::min(n, (c + 1) * chunk_size));
+            for (std::size_t c = range.begin(); c != range.end(); ++c) f(c * size, std::min(n, (c + 1) * size));
         },
         tbb::simple_partitioner());
 }

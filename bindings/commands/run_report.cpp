@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <chrono>
+
 #include "runtime/io/file.h"
 #include "runtime/report/memory.h"
 
@@ -15,10 +17,7 @@ RunReport::RunReport(Options options, std::function<std::vector<FrameWriter::Wri
     run_.threads = options_.threads;
 }
 
-double RunReport::now() const
-{
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-}
+double RunReport::now() const { return stopwatch_.seconds(); }
 
 void RunReport::begin(std::int64_t first, std::int64_t last)
 {

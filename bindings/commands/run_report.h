@@ -1,7 +1,6 @@
 // What `rapid run` tells while it runs and when it ends, however it ends.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -14,6 +13,7 @@
 #include "runtime/io/frame_writer.h"
 #include "runtime/report/progress.h"
 #include "runtime/report/statistics.h"
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 
@@ -49,7 +49,7 @@ private:
 
     const Options options_;
     const std::function<std::vector<FrameWriter::Written>()> written_;
-    const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch_;
 
     std::timed_mutex mutex_;
     RunStatistics run_;

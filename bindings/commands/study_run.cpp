@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -14,6 +13,7 @@
 #include "runtime/graph/override.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/id_order.h"
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {
@@ -166,13 +166,13 @@ double run_frames(const Plan& plan, const Study& study,
                   const std::function<void(const FrameResult& result, const PointSet& points)>& keep)
 {
     const std::string output = compared_output(plan);
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     Evaluator evaluator(plan);
     while (evaluator.next_frame() <= study.last) {
         const FrameResult result = evaluator.advance();
         if (keep && is_compared(study, result.frame)) keep(result, result.outputs.at(output));
     }
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return stopwatch.seconds();
 }
 
 // Tells what `work` raises. `started` is set by it when its first frame is due.

@@ -1,21 +1,14 @@
 #include "runtime/graph/evaluate.h"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <new>
 #include <optional>
 #include <utility>
 
+#include "runtime/stopwatch.h"
+
 namespace rapid {
-namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point begin)
-{
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-}  // namespace
 
 void FrameFigures::go_on(FrameFigures later)
 {
@@ -61,7 +54,7 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
 
 FrameResult Evaluator::advance()
 {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     FrameResult result;
     result.frame = next_;
 
@@ -80,7 +73,7 @@ FrameResult Evaluator::advance()
         result.time[name] = simulation.clock().at(static_cast<double>(next_)).time;
     }
     ++next_;
-    result.total_seconds = seconds_since(begin);
+    result.total_seconds = stopwatch.seconds();
     return result;
 }
 
@@ -154,11 +147,11 @@ Flow Evaluator::evaluate(std::size_t i, int left, std::vector<Flow>& results, st
                                 write,
                                 &plan_.simulations[planned.simulation].left_out};
     try {
-        const auto begin = std::chrono::steady_clock::now();
+        const Stopwatch stopwatch;
         Flow result = planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source
                           ? planned.op->start(inputs, evaluation)
                           : planned.op->evaluate(inputs, evaluation);
-        if (node.type->kind == NodeKind::Solve) frame.figures.solve_seconds += seconds_since(begin);
+        if (node.type->kind == NodeKind::Solve) frame.figures.solve_seconds += stopwatch.seconds();
         if (planned.once) kept_[i] = result;
         if (result_) result_(node, next_, result.points);
         return result;

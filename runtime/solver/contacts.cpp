@@ -5,12 +5,12 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
 #include "runtime/parallel.h"
 #include "runtime/solver/rows.h"
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {
@@ -149,7 +149,7 @@ bool Contacts::has_moved(const Substep& now) const
 
 void Contacts::search(const Substep& now)
 {
-    const auto begun = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     const std::size_t n = now.size();
     Vec3d mean = Vec3d::Zero();
     for (const Vec3d& v : now.v) mean += v / static_cast<double>(n);
@@ -169,7 +169,7 @@ void Contacts::search(const Substep& now)
     search_.find(searched_at_, {reach_.data(), 1}, grids_, near_);
     schedule();
     if (now.sleepers && now.sleepers->any()) wake_parted(now);
-    search_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    search_seconds_ += stopwatch.seconds();
 }
 
 // Points that have pressed each other, and are nowhere near any more: a node has moved one.

@@ -184,11 +184,7 @@ private:
         };
         // A few points, as shadows are, are still work for all threads.
         const std::size_t n = points_.size(), part = block_size * (n / (16 * block_size) + 1);
-        if (part < chunk_size)
-            tbb::parallel_for(std::size_t{0}, (n + part - 1) / part,
-                              [&](std::size_t p) { guarded(p * part, std::min(n, (p + 1) * part)); });
-        else
-            for_each_chunk(n, guarded);
+        for_each_chunk(n, guarded, std::min(part, chunk_size));
         if (error_) std::rethrow_exception(error_);
     }
 

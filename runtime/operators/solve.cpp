@@ -155,7 +155,7 @@ struct Solve {
     }
 
 private:
-    // After 1, 2, 4, 8, ... steps: what is stiff changes as points go on, and is looked for at no cost. With a
+    // After 1, 2, 4, 8, ... steps: what is stiff changes as points go on, and is looked for at little cost. With a
     // tolerance the sub-steps are chosen, and there is nothing to advise.
     void note_stiffness(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
                         const Evaluation& now) const

@@ -89,6 +89,7 @@ public:
     void fill()
     {
         fall();
+        forces();
         colliders();
         formats();
         small_scenes();
@@ -192,6 +193,14 @@ private:
                 "free_fall_rapid/threads:2/real_time", "free_fall_by_hand/threads:2/real_time", 1.3);
         compare("the same with 16 sub-steps / with one", "bench_solver",
                 "free_fall_rapid_16_substeps/threads:2/real_time", "free_fall_rapid/threads:2/real_time", 3);
+    }
+
+    void forces()
+    {
+        compare("gravity, drag and wind / gravity alone", "bench_forces", "air_alike/substeps:1",
+                "gravity_alone/substeps:1", 1.5);
+        compare("the same with 16 sub-steps / with one", "bench_forces", "air_alike/substeps:16",
+                "air_alike/substeps:1", 4);
     }
 
     void colliders()

@@ -81,7 +81,10 @@ public:
     void ask(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed, Forces& forces) const
     {
         forces.reset(size());
-        force.contribute({set, 0, at, speed, dt, time, 0}, forces);
+        if (const std::optional<Uniform> uniform = force.uniform())
+            forces.add(*uniform);
+        else
+            force.contribute({set, 0, at, speed, dt, time, 0}, forces);
     }
 
     // What a linear part leaves: a drag's own -k v and a spring's -w2 x are solved exactly, what they are drawn to is
@@ -192,7 +195,7 @@ private:
 Found ask(const Force& force, const Sample& sample)
 {
     Found found(sample.size());
-    if (force.uniform_acceleration()) return found;
+    if (const std::optional<Uniform> uniform = force.uniform(); uniform && uniform->linear.is_zero()) return found;
     std::vector<Vec3d> P = sample.P, v = sample.v;
     Forces forces;
     sample.ask(force, P, v, forces);

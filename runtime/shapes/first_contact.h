@@ -186,6 +186,7 @@ public:
     {
         const Path& path = paths_[i];
         const double T = path.duration;
+        if (!reach_speed(i, s, f, slope, level, close)) return;
         // The speed is convex along the way.
         const double fastest =
             std::sqrt(std::max((path.v + s * path.a).squaredNorm(), (path.v + T * path.a).squaredNorm()));
@@ -216,7 +217,36 @@ public:
     }
 
 private:
+    // A walk goes by the largest speed of the way that is left, and would take for ever where a path is at rest at
+    // first and fast in the end. Until it is not much slower than there, each step is as long as its speed and
+    // acceleration take it. False: it has come to its end, with a contact or without one.
+    bool reach_speed(std::size_t i, double& s, double& f, double& slope, double level, double close)
+    {
+        const Path& path = paths_[i];
+        const double least = 0.25 * sampler_.smallest_feature(), a = path.a.norm();
+        const double end = (path.v + path.duration * path.a).norm();
+        Vec3d v = path.v + s * path.a;
+        while (end > much_faster * v.norm()) {
+            const double next = s + time_to_travel(std::max(f / sampler_.slope_bound(), least), v.norm(), a);
+            if (!(next < path.duration) || !(next > s)) return next < path.duration;
+            Vec3d gradient;
+            const double there = sampler_.distance(place(path, next), gradient) - level;
+            if (there < 0) {
+                const auto height = [&](double t) { return sampler_.distance(place(path, t)) - level; };
+                const double speed = path.v.norm() + next * a;
+                contacts_[i] = contact_at(sampler_, path, last_outside(height, s, f, next, there, speed, close));
+                return false;
+            }
+            s = next;
+            f = there;
+            v = path.v + s * path.a;
+            slope = gradient.dot(v);
+        }
+        return true;
+    }
+
     static constexpr int most = 64;
+    static constexpr double much_faster = 64;
     // Of what the slope promises; the largest slope away from the surface, and the longest step in D, to count on it.
     static constexpr double cautious = 0.9, flattest = 0.9, farthest = 4;
 

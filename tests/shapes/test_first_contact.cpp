@@ -236,6 +236,22 @@ TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_con
     }
 }
 
+TEST_CASE("a path that is at rest at first meets what it falls to, or comes to its end, at any acceleration",
+          "[first_contact][extreme]")
+{
+    const ShapePtr ball = level_set_sphere(0.7, {0, 0, 0}, {0.05, 5});
+    const double a = std::pow(10.0, GENERATE(range(-1, 35)));
+    const double duration = 1e3;  // s: of up to 1e40 m
+    CAPTURE(a);
+    const Path there{{3, 0, 0}, {0, 0, 0}, {-a, 0, 0}, duration, 0},
+        away{{3, 0, 0}, {0, 0, 0}, {a, 0.1 * a, 0}, duration, 0};
+
+    const Contact contact = meet(ball, there);
+
+    CHECK(contact.time == Approx(std::sqrt(2 * 2.3 / a)).epsilon(1e-3));  // the field's error, a tenth of a voxel
+    CHECK(meet(ball, away).time == Contact::none);
+}
+
 TEST_CASE("a surface is not looked for beyond its bounds, and found from any distance", "[first_contact]")
 {
     const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});

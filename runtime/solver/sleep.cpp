@@ -23,6 +23,9 @@ constexpr double another_pull = 0.1;
 // A shape is touched that is as near as this, in radii: what rests on one is flush with it.
 constexpr double touch = 0.01;
 
+// What a shape that has come over a point, however slowly, adds to its grip.
+constexpr float sunk = 1000;
+
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
 }  // namespace
@@ -78,7 +81,9 @@ std::vector<float> Sleepers::grips(std::span<const std::uint32_t> points, std::s
             obstacle.shape->distance_at(at, times, phi, {});
             for (std::size_t k = 0; k < asked.size(); ++k) {
                 const std::uint32_t i = points[asked[k]];
-                if (phi[k] <= (1 + touch) * obstacle.radius[i]) result[asked[k]] += 1 + obstacle.friction[i];
+                const double radius = obstacle.radius[i];
+                if (phi[k] <= (1 + touch) * radius) result[asked[k]] += 1 + obstacle.friction[i];
+                if (phi[k] < (1 - touch) * radius) result[asked[k]] += sunk;
             }
         }
     });

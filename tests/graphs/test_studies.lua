@@ -54,6 +54,22 @@ describe("the study", function()
     assert.near(2, lines_of("orbit").orbit.order, 0.05)
   end)
 
+  it("net is stretched less by sub-steps than by as many iterations, and by more of them", function()
+    local lines = lines_of "net"
+    local substeps, iterations = lines["sub-steps"].errors, lines.iterations.errors
+    falls(substeps)
+    for i, strain in ipairs(substeps) do
+      assert.is_true(strain < iterations[i], ("%g and %g"):format(strain, iterations[i]))
+    end
+  end)
+
+  it("grids changes no bit by the number of grids", function()
+    for _, line in pairs(lines_of "grids") do
+      assert.equal(5, #line.errors)
+      for _, off in ipairs(line.errors) do assert.equal(0, off) end
+    end
+  end)
+
   it("spring is exact as a node, and of second order as an action", function()
     local lines = lines_of "spring"
     assert.is_true(lines.node.at_rounding)
@@ -87,7 +103,7 @@ describe("the study", function()
 
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
-    assert.equal("action.lua ball.lua drag.lua emitter.lua floor.lua kepler.lua orbit.lua spring.lua stiff.lua " ..
-      "subframes.lua turbulence.lua ", names)
+    assert.equal("action.lua ball.lua drag.lua emitter.lua floor.lua grids.lua kepler.lua net.lua orbit.lua " ..
+      "spring.lua stiff.lua subframes.lua turbulence.lua ", names)
   end)
 end)

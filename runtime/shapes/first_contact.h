@@ -218,17 +218,19 @@ public:
 
 private:
     // A walk goes by the largest speed of the way that is left, and would take for ever where a path is at rest at
-    // first and fast in the end. Until it is not much slower than there, each step is as long as its speed and
+    // first and a world away in the end. Until it is not much slower than there, each step is as long as its speed and
     // acceleration take it. False: it has come to its end, with a contact or without one.
     bool reach_speed(std::size_t i, double& s, double& f, double& slope, double level, double close)
     {
         const Path& path = paths_[i];
-        const double least = 0.25 * sampler_.smallest_feature(), a = path.a.norm();
-        const double end = (path.v + path.duration * path.a).norm();
+        const double feature = sampler_.smallest_feature(), a = path.a.norm(), T = path.duration;
+        if (!(feature > 0) || !(0.5 * a * T * T > a_world * feature)) return true;
+        const double end = (path.v + T * path.a).norm();
         Vec3d v = path.v + s * path.a;
-        while (end > much_faster * v.norm()) {
-            const double next = s + time_to_travel(std::max(f / sampler_.slope_bound(), least), v.norm(), a);
-            if (!(next < path.duration) || !(next > s)) return next < path.duration;
+        while (end > much_faster * v.norm() && s < T) {
+            const double reach = std::max(f / sampler_.slope_bound(), 0.25 * feature);
+            const double next = std::min(T, s + time_to_travel(reach, v.norm(), a));
+            if (!(next > s)) break;
             Vec3d gradient;
             const double there = sampler_.distance(place(path, next), gradient) - level;
             if (there < 0) {
@@ -242,11 +244,11 @@ private:
             v = path.v + s * path.a;
             slope = gradient.dot(v);
         }
-        return true;
+        return s < T;
     }
 
     static constexpr int most = 64;
-    static constexpr double much_faster = 64;
+    static constexpr double much_faster = 64, a_world = 1e6;  // features
     // Of what the slope promises; the largest slope away from the surface, and the longest step in D, to count on it.
     static constexpr double cautious = 0.9, flattest = 0.9, farthest = 4;
 

@@ -252,6 +252,21 @@ TEST_CASE("a path that is at rest at first meets what it falls to, or comes to i
     CHECK(meet(ball, away).time == Contact::none);
 }
 
+TEST_CASE("a path that is at rest just above a surface meets it, at any acceleration", "[first_contact][extreme]")
+{
+    const ShapePtr ball = level_set_sphere(0.7, {0, 0, 0}, {0.1, 5});
+    const double above = GENERATE(1e-4, 1e-3, 0.02), a = std::pow(10.0, GENERATE(range(-1, 35)));
+    const double duration = GENERATE(1.0 / 24, 10.0);
+    CAPTURE(above, a, duration);
+    const Vec3d P(0.7 + above, 0, 0);
+    double phi = 0;
+    ball->distance({&P, 1}, {&phi, 1}, {});
+    const Contact contact = meet(ball, {P, {0, 0, 0}, {-a, 0, 0}, duration, 0});
+    const double time = std::sqrt(2 * phi / a);
+    if (time < 0.9 * duration) CHECK(contact.time == Approx(time).epsilon(0.1));
+    if (time > 1.1 * duration) CHECK(contact.time == Contact::none);
+}
+
 TEST_CASE("a surface is not looked for beyond its bounds, and found from any distance", "[first_contact]")
 {
     const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});

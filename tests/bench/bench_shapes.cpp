@@ -50,7 +50,7 @@ const std::vector<Vec3d>& points_in_order()
     static const auto points = [] {
         auto made = points_near();
         const auto block = [](const Vec3d& P) {
-            const Vec3i at = (P / (8 * voxel)).array().floor().cast<int>();
+            const Eigen::Vector3i at = (P / (8 * voxel)).array().floor().cast<int>();
             return std::array{at.x(), at.y(), at.z()};
         };
         std::sort(made.begin(), made.end(), [&](const Vec3d& a, const Vec3d& b) { return block(a) < block(b); });

@@ -393,6 +393,8 @@ private:
                 collisions.begin(block.places);
                 collisions.advance(block.P, block.v, {{&scene_.uniform.a, 0}, block.dt, block.dt, {}});
                 deepest = std::max(deepest, collisions.round(block.P, block.rounded));
+                // A contact found in no time is none: the constraints have seen to it.
+                for (std::size_t i = 0; i < size; ++i) block.v[i] = now.v[first + i];
             } else {
                 cast(std::span<const Vec3d>(block.P), block.rounded);
             }

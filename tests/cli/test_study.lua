@@ -117,8 +117,8 @@ describe("rapid study", function()
     folder:write("fall.lua", header .. [[
 return rapid.study { name = "fall", frames = {1, 25}, sweep = { substeps = {1, 64} },
   scene = function(k)
-    return rapid.create { points = rapid.points.grid { spacing = 0.1 } } :gravity {} :drag { linear = 1 }
-      :solve { substeps = k.substeps }
+    return rapid.create { points = rapid.points.grid { spacing = 0.1 } } :gravity {} :attribute { heavy = 1 }
+      :drag { linear = rapid.attr "heavy" } :solve { substeps = k.substeps }
   end,
   reference = { substeps = 3 } }]])
     local found = result_of "fall.lua"

@@ -191,18 +191,17 @@ void deform_rapid(benchmark::State& state)
     const auto folder = std::filesystem::temp_directory_path() / fmt::format("rapid_bench_{}", getpid());
     std::filesystem::create_directories(folder);
     std::map<int, std::filesystem::path> files;
+    const MeshPtr rest = body();
     for (int frame = 1; frame <= 2; ++frame) {
         std::string text;
-        for (const Vec3f& P : body()->positions)
+        for (const Vec3f& P : rest->positions)
             text += fmt::format("v {} {} {}\n", P.x(), P.y() * (1 + 0.05 * frame), P.z());
-        for (const Mesh::Triangle& t : body()->triangles)
+        for (const Mesh::Triangle& t : rest->triangles)
             text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
         files[frame] = folder / fmt::format("{}.obj", frame);
         std::ofstream(files[frame]) << text;
     }
     const auto sequence = std::make_shared<MeshSequence>(files, "#.obj");
-    sequence->at(2);
-    std::filesystem::remove_all(folder);
 
     const auto turned = [](double angle) {
         return Pose{Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3d::UnitX()))};
@@ -216,7 +215,8 @@ void deform_rapid(benchmark::State& state)
         ++frame;
         benchmark::DoNotOptimize(deformation.over({24, 1}, frame, frame + 1, nullptr, {}, 0));
     }
-    state.counters["vertices"] = double(body()->positions.size());
+    std::filesystem::remove_all(folder);
+    state.counters["vertices"] = double(rest->positions.size());
     state.counters["voxels"] = double(deformation.at_end()->active_voxels());
 }
 

@@ -63,6 +63,25 @@ bool is_clear_of(const Box3d& box, const Vec3d& P, double radius)
     return ((P - box.max()).array() > radius).any() || ((box.min() - P).array() > radius).any();
 }
 
+// A place outside a shape, not much farther away than the nearest in any of 26 directions; P where there is none.
+Vec3d place_outside(const Obstacle& obstacle, const Vec3d& P, double radius)
+{
+    const double size = obstacle.bounds.sizes().maxCoeff() + 2 * radius;
+    if (!std::isfinite(size)) return P;
+    std::array<Vec3d, 26> places;
+    std::array<double, 26> phi;
+    for (double reach = std::max(obstacle.feature, 0x1p-10 * size); reach < 2 * size; reach *= 1.25) {
+        for (int k = 0, direction = 0; k < 27; ++k) {
+            const Vec3d d(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
+            if (!d.isZero()) places[direction++] = P + reach * d.normalized();
+        }
+        obstacle.shape->distance(places, phi, {});
+        const auto highest = std::max_element(phi.begin(), phi.end());
+        if (*highest >= radius) return places[highest - phi.begin()];
+    }
+    return P;
+}
+
 // Moves one coordinate, the one along which the normal is longest, by the least that lifts the point by `height`.
 Vec3f lifted(Vec3f P, const Vec3d& n, double height)
 {
@@ -1022,25 +1041,6 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
     return deepest(rounded);
 }
 
-// A place outside a shape, not much farther away than the nearest in any of 26 directions; P where there is none.
-Vec3d place_outside(const Obstacle& obstacle, const Vec3d& P, double radius)
-{
-    const double size = obstacle.bounds.sizes().maxCoeff() + 2 * radius;
-    if (!std::isfinite(size)) return P;
-    std::array<Vec3d, 26> places;
-    std::array<double, 26> phi;
-    for (double reach = std::max(obstacle.feature, 0x1p-10 * size); reach < 2 * size; reach *= 1.25) {
-        for (int k = 0, direction = 0; k < 27; ++k) {
-            const Vec3d d(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
-            if (!d.isZero()) places[direction++] = P + reach * d.normalized();
-        }
-        obstacle.shape->distance(places, phi, {});
-        const auto highest = std::max_element(phi.begin(), phi.end());
-        if (*highest >= radius) return places[highest - phi.begin()];
-    }
-    return P;
-}
-
 // Parts of a body that meet one another, or two bodies, leave no place to a point between them: at the end of the frame
 // it is brought out of both, with the velocity that it has. By the nearest way; and where that leads from one side of a
 // closed gap to the other, to the nearest place that is free.
@@ -1118,9 +1118,7 @@ void keep_outside(std::span<const DynamicPtr> dynamics, const PointSet& points, 
             for (std::size_t i = begin; i < end; ++i) {
                 if (!marks[i] || !obstacle.members[i]) continue;
                 const Vec3d x = P[i].cast<double>();
-                const double radius = obstacle.radius[i];
-                if (((x - obstacle.bounds.max()).array() > radius).any()) continue;
-                if (((obstacle.bounds.min() - x).array() > radius).any()) continue;
+                if (is_clear_of(obstacle.bounds, x, obstacle.radius[i])) continue;
                 asked.push_back(i);
                 at.push_back(x);
             }

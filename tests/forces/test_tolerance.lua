@@ -16,15 +16,19 @@ local function frame_two(options, first, last)
   return scene.run(orbits:format(P, v, options), { frames = {2, 2} })[2]
 end
 
+local function assert_within(tolerance, points, exact)
+  for i = 1, #points do
+    local off = (points[i].P - exact[i].P):length()
+    assert.truthy(off <= tolerance, ("point %d is off by %g m"):format(i, off))
+  end
+end
+
 describe("a tolerance", function()
   it("bounds the error of a frame for each point", function()
     local exact = frame_two "substeps = 4096"
     for _, tolerance in ipairs { 1e-2, 1e-3, 1e-4 } do
       local points = frame_two(("tolerance = %g, max_substeps = 1024"):format(tolerance))
-      for i = 1, #points do
-        local off = (points[i].P - exact[i].P):length()
-        assert.truthy(off <= tolerance, ("point %d is off by %g m"):format(i, off))
-      end
+      assert_within(tolerance, points, exact)
     end
   end)
 
@@ -40,10 +44,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :g
       for _, tolerance in ipairs { 1e-2, 1e-3 } do
         local options = ("tolerance = %g, max_substeps = 8192"):format(tolerance)
         local points = scene.run(text:format(method, options), { frames = {2, 2} })[2]
-        for i = 1, #points do
-          local off = (points[i].P - exact[i].P):length()
-          assert.truthy(off <= tolerance, ("point %d is off by %g m"):format(i, off))
-        end
+        assert_within(tolerance, points, exact)
       end
     end)
   end

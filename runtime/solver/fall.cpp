@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "runtime/solver/damped_motion.h"
@@ -17,7 +18,9 @@ float chosen(std::uint32_t bits, float a, float b)
 }
 
 // Points that are looked at, and then advanced, while they are in the first-level cache.
-constexpr std::size_t block = 256;
+constexpr std::size_t block = 512;
+
+constexpr auto nobody = [](std::uint32_t, bool) {};
 
 }  // namespace
 
@@ -40,6 +43,21 @@ void Fall::set_times(Times& times, int point, double t) const
         times.fallen[l] = by.x_of_G * g_[l];
         times.gained[l] = by.v_of_G * g_[l];
     }
+}
+
+Fall::Clock::Clock(const Fall& fall, const OwnTime& time, std::size_t begin)
+    : fall_(fall), time_(time), own_(time.own.data && time.own.stride != 0 ? time.own.data : nullptr), of_h_(own_)
+{
+    for (int p = 0; p < points_a_period; ++p) fall_.set_times(times_, p, own_ ? time.h : time(begin));
+}
+
+void Fall::Clock::set(std::size_t first, std::size_t n)
+{
+    bool whole = true;
+    for (std::size_t p = 0; p < n; ++p) whole &= own_[first + p] == static_cast<float>(time_.h);
+    if (whole && of_h_) return;
+    for (std::size_t p = 0; p < points_a_period; ++p) fall_.set_times(times_, p, time_(first + std::min(p, n - 1)));
+    of_h_ = whole;
 }
 
 void Fall::avoid(const Box3d& box, double radius)
@@ -104,34 +122,55 @@ void Fall::advance_period(float* P, float* v, const Times& times, std::uint32_t*
     for (int p = 0; p < points_a_period; ++p) near(p, !(clear[p] > 0));
 }
 
-// Whether all of the points are too far from all boxes to come near one in t seconds: by the boxes around their places
-// and velocities. Not-a-numbers are found later.
-bool Fall::are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t) const
+Fall::Extent Fall::extent_of(std::span<const Vec3f> values)
 {
-    using Lanes = Eigen::Array<float, period, 1>;
-    const auto box_around = [](std::span<const Vec3f> values) {
-        const float* x = coordinates(values);
-        const std::size_t size = 3 * values.size();
-        Lanes least, most;
-        for (std::size_t l = 0; l < period; ++l) least[l] = most[l] = x[l % size];
-        std::size_t at = 0;
-        for (; at + period <= size; at += period) {
-            const Eigen::Map<const Lanes> some(x + at);
-            least = least.min(some);
-            most = most.max(some);
-        }
-        for (; at < size; ++at) {
-            least[at % 3] = std::min(least[at % 3], x[at]);
-            most[at % 3] = std::max(most[at % 3], x[at]);
-        }
-        Box3d box;
-        for (int l = 0; l < period; l += 3) {
-            box.extend(least.segment<3>(l).cast<double>().matrix());
-            box.extend(most.segment<3>(l).cast<double>().matrix());
-        }
-        return box;
+    // Three vectors of eight are a period. They stay in registers.
+    typedef float Lanes __attribute__((vector_size(32)));
+    typedef std::int32_t Bits __attribute__((vector_size(32)));
+    constexpr std::int32_t infinity = infinity_bits;
+    const float* x = coordinates(values);
+    const std::size_t size = 3 * values.size();
+    float few[period];
+    if (size < period) {
+        for (std::size_t l = 0; l < period; ++l) few[l] = x[l % size];
+        x = few;
+    }
+    const auto load = [&](std::size_t l) {
+        Lanes some;
+        std::memcpy(&some, x + l, sizeof some);
+        return some;
     };
-    const Box3d places = box_around(P), speeds = box_around(v);
+    Lanes least[3] = {load(0), load(8), load(16)}, most[3] = {least[0], least[1], least[2]};
+    Bits largest[3] = {};
+    const auto take = [&](std::size_t l) {
+        for (int k = 0; k < 3; ++k) {
+            const Lanes some = load(l + 8 * k);
+            least[k] = some < least[k] ? some : least[k];
+            most[k] = some > most[k] ? some : most[k];
+            const Bits magnitude = std::bit_cast<Bits>(some) & 0x7fffffff;
+            largest[k] = magnitude > largest[k] ? magnitude : largest[k];
+        }
+    };
+    for (std::size_t l = 0; l + period < size; l += period) take(l);
+    take(std::max<std::size_t>(size, period) - period);
+
+    std::array<float, period> low, high;
+    std::memcpy(&low, least, sizeof low);
+    std::memcpy(&high, most, sizeof high);
+    for (int half = period / 2; half >= 3; half /= 2)
+        for (int l = 0; l < half; ++l) {
+            low[l] = std::min(low[l], low[l + half]);
+            high[l] = std::max(high[l], high[l + half]);
+        }
+    const Bits finite = (largest[0] < infinity) & (largest[1] < infinity) & (largest[2] < infinity);
+    bool all = true;
+    for (int l = 0; l < 8; ++l) all &= finite[l] != 0;
+    return {Box3d(Vec3d(low[0], low[1], low[2]), Vec3d(high[0], high[1], high[2])), all};
+}
+
+// Whether no point of these places and velocities comes near a box in t seconds.
+bool Fall::are_far(const Box3d& places, const Box3d& speeds, double t) const
+{
     const Vec3d g = Eigen::Map<const Vec3d>(g_.data()), pulled = t * g;
     // Drag makes less of the velocity and of what the acceleration adds, each by itself.
     const Vec3d slowest = k_ == 0 ? Vec3d(speeds.min().cwiseMin(speeds.min() + pulled).cwiseMin(0.0))
@@ -146,74 +185,81 @@ bool Fall::are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t)
 Fall::Way Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
                         std::vector<std::uint32_t>& near) const
 {
-    const double longest = std::max(time.h, double(static_cast<float>(time.h)));
-    if (limits_.empty() || are_far(P.subspan(begin, end - begin), v.subspan(begin, end - begin), longest))
-        return advance_any<false>(P, v, time, begin, end, [](std::uint32_t, bool) {});
-    std::size_t count = near.size();
-    near.resize(count + (end - begin) + points_a_period);
-    const Way way = advance_any<true>(P, v, time, begin, end, [&](std::uint32_t i, bool stays) {
-        near[count] = i;
-        count += stays && i < end;
-    });
-    near.resize(count);
-    return way;
+    if (limits_.empty()) return advance_any<false>(P, v, time, begin, end, near);
+    return advance_any<true>(P, v, time, begin, end, near);
 }
 
-template <bool Avoids, class Near>
+template <bool Avoids>
 Fall::Way Fall::advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
-                            std::size_t end, const Near& near) const
+                            std::size_t end, std::vector<std::uint32_t>& near) const
 {
     return k_ == 0 ? advance_all<false, Avoids>(P, v, time, begin, end, near)
                    : advance_all<true, Avoids>(P, v, time, begin, end, near);
 }
 
-template <bool Dragged, bool Avoids, class Near>
+template <bool Dragged, bool Avoids>
 Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
-                            std::size_t end, const Near& near) const
+                            std::size_t end, std::vector<std::uint32_t>& near) const
 {
-    // Most points move for the whole frame: their periods share one t.
-    const float* own = time.own.data && time.own.stride != 0 ? time.own.data : nullptr;
-    bool of_h = own != nullptr;
-    Times times;
-    const auto set_all = [&](double t) {
-        for (int p = 0; p < points_a_period; ++p) set_times(times, p, t);
-    };
-    set_all(own ? time.h : time(begin));
+    const double longest = std::max(time.h, double(static_cast<float>(time.h)));
+    Clock clock(*this, time, begin);
     std::uint32_t largest[period] = {};
-    std::size_t at = begin;
-    for (; at < end; at += points_a_period) {
-        if ((at - begin) % block == 0) {
-            const std::size_t size = std::min(block, end - at);
-            if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) break;
+    for (std::size_t at = begin; at < end; at += block) {
+        const std::size_t size = std::min(block, end - at);
+        if constexpr (!Avoids) {
+            if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) return way(at, largest);
+            advance_block<Dragged, false>(P, v, clock, at, at + size, largest, nobody);
+        } else {
+            const Extent places = extent_of(P.subspan(at, size)), speeds = extent_of(v.subspan(at, size));
+            if (!places.finite || !speeds.finite) return way(at, largest);
+            if (are_far(places.box, speeds.box, longest)) {
+                advance_block<Dragged, false>(P, v, clock, at, at + size, largest, nobody);
+                continue;
+            }
+            std::size_t count = near.size();
+            near.resize(count + size + points_a_period);
+            advance_block<Dragged, true>(P, v, clock, at, at + size, largest, [&](std::uint32_t i, bool stays) {
+                near[count] = i;
+                count += stays && i < end;
+            });
+            near.resize(count);
         }
+    }
+    return way(end, largest);
+}
+
+Fall::Way Fall::way(std::size_t end, const std::uint32_t* largest)
+{
+    return {end, *std::max_element(largest, largest + period) < infinity_bits};
+}
+
+template <bool Dragged, bool Avoids, class Near>
+void Fall::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
+                         std::uint32_t* largest, const Near& near) const
+{
+    std::uint32_t own_largest[period];
+    std::copy_n(largest, period, own_largest);
+    for (std::size_t at = begin; at < end; at += points_a_period) {
         // What the next block will look at is fetched while this one is computed.
         for (int line = 0; line < 2; ++line) {
             __builtin_prefetch(P.data()->data() + 3 * (at + block) + 16 * line);
             __builtin_prefetch(v.data()->data() + 3 * (at + block) + 16 * line);
         }
         const std::size_t n = std::min<std::size_t>(points_a_period, end - at);
-        if (own) {
-            bool whole = true;
-            for (std::size_t p = 0; p < n; ++p) whole &= own[at + p] == static_cast<float>(time.h);
-            if (!whole || !of_h) {
-                for (int p = 0; p < points_a_period; ++p) set_times(times, p, time(std::min(at + p, end - 1)));
-                of_h = whole;
-            }
+        const Times& times = clock.of(at, n);
+        float *P_some = P[at].data(), *v_some = v[at].data(), P_end[period] = {}, v_end[period] = {};
+        if (n < points_a_period) {
+            P_some = std::copy_n(P_some, 3 * n, P_end) - 3 * n;
+            v_some = std::copy_n(v_some, 3 * n, v_end) - 3 * n;
         }
-        const auto list = [&](int p, bool stays) { near(static_cast<std::uint32_t>(at + p), stays); };
-        if (n == points_a_period) {
-            advance_period<Dragged, Avoids>(P[at].data(), v[at].data(), times, largest, list);
-            continue;
+        advance_period<Dragged, Avoids>(P_some, v_some, times, own_largest,
+                                        [&](int p, bool stays) { near(static_cast<std::uint32_t>(at + p), stays); });
+        if (n < points_a_period) {
+            std::copy_n(P_end, 3 * n, P[at].data());
+            std::copy_n(v_end, 3 * n, v[at].data());
         }
-        float P_end[period] = {}, v_end[period] = {};
-        std::copy_n(P[at].data(), 3 * n, P_end);
-        std::copy_n(v[at].data(), 3 * n, v_end);
-        advance_period<Dragged, Avoids>(P_end, v_end, times, largest, list);
-        std::copy_n(P_end, 3 * n, P[at].data());
-        std::copy_n(v_end, 3 * n, v[at].data());
     }
-    const bool finite = *std::max_element(largest, largest + period) < infinity_bits;
-    return {std::min(at, end), finite};
+    std::copy_n(own_largest, period, largest);
 }
 
 }  // namespace rapid

@@ -60,17 +60,49 @@ private:
         Period t, x_of_v, v_of_v, fallen, gained;
     };
 
+    // The times of one period after another: most points move for the whole frame, and share them.
+    class Clock {
+    public:
+        Clock(const Fall& fall, const OwnTime& time, std::size_t begin);
+        // Of n points.
+        const Times& of(std::size_t first, std::size_t n)
+        {
+            if (own_) set(first, n);
+            return times_;
+        }
+
+    private:
+        void set(std::size_t first, std::size_t n);
+
+        const Fall& fall_;
+        const OwnTime& time_;
+        const float* own_;  // null where all move for the same time
+        bool of_h_;         // whether times_ are of the whole frame
+        Times times_;
+    };
+
+    // The box around some vectors, and whether all of them are finite; where they are not, the box means nothing.
+    struct Extent {
+        Box3d box;
+        bool finite;
+    };
+
     static Period by_axis(const Vec3d& x);
+    static Extent extent_of(std::span<const Vec3f> values);
+    static Way way(std::size_t end, const std::uint32_t* largest);
     void set_times(Times& times, int point, double t) const;
+    bool are_far(const Box3d& places, const Box3d& speeds, double t) const;
     template <bool Dragged, bool Avoids, class Near>
     void advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const;
-    template <bool Avoids, class Near>
-    Way advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                    const Near& near) const;
     template <bool Dragged, bool Avoids, class Near>
+    void advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
+                       std::uint32_t* largest, const Near& near) const;
+    template <bool Dragged, bool Avoids>
     Way advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                    const Near& near) const;
-    bool are_far(std::span<const Vec3f> P, std::span<const Vec3f> v, double t) const;
+                    std::vector<std::uint32_t>& near) const;
+    template <bool Avoids>
+    Way advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                    std::vector<std::uint32_t>& near) const;
 
     Period g_;
     double k_;

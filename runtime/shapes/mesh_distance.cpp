@@ -13,8 +13,8 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
-#include <set>
 
+#include "runtime/parallel.h"
 #include "runtime/shapes/level_set_grid.h"
 #include "runtime/shapes/ray_crossings.h"
 
@@ -29,11 +29,40 @@ using Leaf = FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with the tree*/ false>;
 using NearestAccessor = openvdb::tree::ValueAccessor<const openvdb::Int32Tree, /*registered with the tree*/ false>;
 
+// The plane of a triangle and those through its edges that are upright on it: a bound of the distance in a few
+// multiplications. Along an edge it is the distance, past a corner less.
+class Prism {
+public:
+    Prism(const openvdb::Vec3d& a, const openvdb::Vec3d& b, const openvdb::Vec3d& c)
+        : up_((b - a).cross(c - a).unitSafe()), height_(up_.dot(a))
+    {
+        const openvdb::Vec3d corners[3] = {a, b, c};
+        for (int k = 0; k < 3; ++k) {
+            outward_[k] = (corners[(k + 1) % 3] - corners[k]).cross(up_).unitSafe();
+            edge_[k] = outward_[k].dot(corners[k]);
+        }
+    }
+
+    // The triangle is no nearer to P than the root of this.
+    double square_at_least(const openvdb::Vec3d& P) const
+    {
+        const double h = up_.dot(P) - height_;
+        double beside = 0;
+        for (int k = 0; k < 3; ++k) beside = std::max(beside, outward_[k].dot(P) - edge_[k]);
+        return h * h + beside * beside;
+    }
+
+private:
+    openvdb::Vec3d up_, outward_[3];  // unit; zero where the triangle has no area
+    double height_, edge_[3];
+};
+
 // The mesh in voxels, as OpenVDB takes it and as ours.
 struct InVoxels {
     std::shared_ptr<Mesh> mesh = std::make_shared<Mesh>();
     std::vector<openvdb::Vec3s> points;
     std::vector<openvdb::Vec3I> faces;
+    std::vector<Prism> prisms;  // of the faces
 
     InVoxels(const Mesh& world, const openvdb::math::Transform& transform)
     {
@@ -45,7 +74,11 @@ struct InVoxels {
             points.emplace_back(transform.worldToIndex(openvdb::Vec3d(P.x(), P.y(), P.z())));
             mesh->positions.emplace_back(points.back().x(), points.back().y(), points.back().z());
         }
-        for (const Mesh::Triangle& t : world.triangles) faces.emplace_back(t[0], t[1], t[2]);
+        prisms.reserve(world.triangles.size());
+        for (const Mesh::Triangle& t : world.triangles) {
+            faces.emplace_back(t[0], t[1], t[2]);
+            prisms.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+        }
     }
 
     openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter() const
@@ -93,47 +126,6 @@ struct Update {
     openvdb::Int32 nearest;
 };
 
-// Asks `improve(leaf, accessor, nearest, updates)` of all leaves at once, takes what they found, and asks again where
-// neighbours have changed, until nothing is found: what a voxel becomes depends on the round before alone, never on the
-// order of leaves. Distances only shrink.
-template <class Improve>
-void improve_until_done(Band& band, const Improve& improve)
-{
-    FloatGrid::Accessor distance = band.distance->getAccessor();
-    Int32Grid::Accessor nearest = band.nearest->getAccessor();
-    std::vector<std::vector<Update>> updates;
-    std::vector<Leaf*> leaves = band.leaves;
-    while (!leaves.empty()) {
-        updates.resize(leaves.size());
-        tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
-            updates[i].clear();
-            improve(*leaves[i], Accessor(band.distance->constTree()), NearestAccessor(band.nearest->constTree()),
-                    updates[i]);
-        });
-
-        std::set<Coord> changed;  // origins of leaves
-        for (const auto& of_leaf : updates) {
-            openvdb::CoordBBox around;
-            for (const Update& update : of_leaf) {
-                if (std::abs(update.distance) >= std::abs(distance.getValue(update.voxel))) continue;
-                distance.setValue(update.voxel, update.distance);
-                nearest.setValue(update.voxel, update.nearest);
-                around.expand(update.voxel);
-            }
-            if (around.empty()) continue;
-            around.expand(1);
-            const Coord low = around.min() & ~(Leaf::DIM - 1);
-            for (int x = low.x(); x <= around.max().x(); x += Leaf::DIM)
-                for (int y = low.y(); y <= around.max().y(); y += Leaf::DIM)
-                    for (int z = low.z(); z <= around.max().z(); z += Leaf::DIM) changed.insert(Coord(x, y, z));
-        }
-        leaves.clear();
-        for (const Coord& origin : changed)
-            if (Leaf* leaf = band.distance->tree().probeLeaf(origin)) leaves.push_back(leaf);
-    }
-    band.find_leaves();
-}
-
 // The 26 neighbours of a voxel, or the six across its faces alone, and how far they are, in voxels.
 template <class F>
 void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
@@ -147,6 +139,50 @@ void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
             }
 }
 
+// Asks `improve(voxel, phi, accessor, nearest, updates)` of all active voxels at once, takes what they found, and asks
+// again around those that have changed, until nothing is found: what a voxel becomes depends on the round before alone,
+// never on an order. Distances only shrink.
+template <class Improve>
+void improve_until_done(Band& band, const Improve& improve)
+{
+    constexpr std::size_t part = 512;
+    FloatGrid::Accessor distance = band.distance->getAccessor();
+    Int32Grid::Accessor nearest = band.nearest->getAccessor();
+    std::vector<Coord> asked;
+    for (const Leaf* leaf : band.leaves)
+        for (auto it = leaf->cbeginValueOn(); it; ++it) asked.push_back(it.getCoord());
+    std::vector<std::vector<Update>> updates;
+    while (!asked.empty()) {
+        updates.resize((asked.size() + part - 1) / part);
+        for_each_chunk(
+            asked.size(),
+            [&](std::size_t begin, std::size_t end) {
+                std::vector<Update>& found = updates[begin / part];
+                found.clear();
+                const Accessor now(band.distance->constTree());
+                const NearestAccessor nearest_now(band.nearest->constTree());
+                for (std::size_t i = begin; i < end; ++i)
+                    improve(asked[i], now.getValue(asked[i]), now, nearest_now, found);
+            },
+            part);
+
+        asked.clear();
+        for (const auto& of_part : updates)
+            for (const Update& update : of_part) {
+                if (std::abs(update.distance) >= std::abs(distance.getValue(update.voxel))) continue;
+                distance.setValue(update.voxel, update.distance);
+                nearest.setValue(update.voxel, update.nearest);
+                asked.push_back(update.voxel);
+                for_each_neighbour(update.voxel, /*across_faces=*/false,
+                                   [&](const Coord& other, double) { asked.push_back(other); });
+            }
+        std::erase_if(asked, [&](const Coord& voxel) { return !distance.isValueOn(voxel); });
+        std::sort(asked.begin(), asked.end());
+        asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
+    }
+    band.find_leaves();
+}
+
 // A voxel takes the triangle of a neighbour that is nearer to the mesh where that is nearer to it too, and a voxel that
 // the band lacks comes into it.
 void shorten_distances(Band& band, const InVoxels& mesh)
@@ -157,31 +193,30 @@ void shorten_distances(Band& band, const InVoxels& mesh)
     // right.
     const double exact = 1.5 * band.voxel;
     const double half_width = band.distance->background();
-    improve_until_done(band, [&](const Leaf& leaf, const Accessor& accessor, const NearestAccessor& nearest,
-                                 auto& updates) {
-        for (auto it = leaf.cbeginValueOn(); it; ++it) {
-            const Coord voxel = it.getCoord();
-            const openvdb::Int32 own = nearest.getValue(voxel);
-            double best = *it;
-            openvdb::Int32 triangle = own, tried = own;
-            for_each_neighbour(voxel, *it < exact, [&](const Coord& other, double far) {
-                const double phi = accessor.getValue(other);
-                if (phi >= half_width) {
-                    if (*it + far * band.voxel < half_width)
-                        updates.push_back({other, static_cast<float>(mesh.distance_to(own, other) * band.voxel), own});
-                    return;
-                }
-                if (phi >= best || *it < exact) return;
-                const openvdb::Int32 candidate = nearest.getValue(other);
-                if (candidate == tried || candidate == triangle) return;
-                tried = candidate;
-                const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
-                if (distance >= best - worth) return;
-                best = distance;
-                triangle = candidate;
-            });
-            if (triangle != own) updates.push_back({voxel, static_cast<float>(best), triangle});
-        }
+    improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
+                                 const NearestAccessor& nearest, std::vector<Update>& updates) {
+        const openvdb::Int32 own = nearest.getValue(voxel);
+        double best = phi;
+        openvdb::Int32 triangle = own, tried = own;
+        for_each_neighbour(voxel, phi < exact, [&](const Coord& other, double far) {
+            const double there = accessor.getValue(other);
+            if (there >= half_width) {
+                if (phi + far * band.voxel < half_width)
+                    updates.push_back({other, static_cast<float>(mesh.distance_to(own, other) * band.voxel), own});
+                return;
+            }
+            if (there >= best || phi < exact) return;
+            const openvdb::Int32 candidate = nearest.getValue(other);
+            if (candidate == tried || candidate == triangle) return;
+            tried = candidate;
+            const double enough = (best - worth) / band.voxel;
+            if (mesh.prisms[candidate].square_at_least(voxel.asVec3d()) >= enough * enough) return;
+            const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
+            if (distance >= best - worth) return;
+            best = distance;
+            triangle = candidate;
+        });
+        if (triangle != own) updates.push_back({voxel, static_cast<float>(best), triangle});
     });
 }
 
@@ -236,25 +271,22 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
             if (std::signbit(*it) && !is_surface(nearest.getValue(it.getCoord()), it.getCoord()))
                 it.setValue(-half_width);
     });
-    improve_until_done(band,
-                       [&](const Leaf& leaf, const Accessor& accessor, const NearestAccessor& nearest, auto& updates) {
-                           for (auto it = leaf.cbeginValueOn(); it; ++it) {
-                               if (*it > -half_width) continue;
-                               const Coord voxel = it.getCoord();
-                               double best = half_width;
-                               openvdb::Int32 triangle = -1;
-                               for_each_neighbour(voxel, /*across_faces=*/false, [&](const Coord& other, double) {
-                                   const float phi = accessor.getValue(other);
-                                   if (!(phi < half_width && phi > -half_width)) return;
-                                   const openvdb::Int32 candidate = nearest.getValue(other);
-                                   const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
-                                   if (distance >= best || !is_surface(candidate, voxel)) return;
-                                   best = distance;
-                                   triangle = candidate;
-                               });
-                               if (triangle >= 0) updates.push_back({voxel, static_cast<float>(-best), triangle});
-                           }
-                       });
+    improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
+                                 const NearestAccessor& nearest, std::vector<Update>& updates) {
+        if (phi > -half_width) return;
+        double best = half_width;
+        openvdb::Int32 triangle = -1;
+        for_each_neighbour(voxel, /*across_faces=*/false, [&](const Coord& other, double) {
+            const float there = accessor.getValue(other);
+            if (!(there < half_width && there > -half_width)) return;
+            const openvdb::Int32 candidate = nearest.getValue(other);
+            const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
+            if (distance >= best || !is_surface(candidate, voxel)) return;
+            best = distance;
+            triangle = candidate;
+        });
+        if (triangle >= 0) updates.push_back({voxel, static_cast<float>(-best), triangle});
+    });
     for (Leaf* leaf : band.leaves)
         for (auto it = leaf->beginValueOn(); it; ++it)
             if (*it <= -half_width) it.setValueOff();

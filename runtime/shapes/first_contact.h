@@ -142,14 +142,21 @@ double curvature(const Sampler& sampler, const Vec3d& P, const Vec3d& n, const V
     return size > 0 ? tangent.dot(ahead / size - n) / (speed * way) : 0;
 }
 
+// ahead: s, a time soon after; where the field has kinks.
 template <class Sampler>
-Contact contact_at(const Sampler& sampler, const Path& path, double s)
+Contact contact_at(const Sampler& sampler, const Path& path, double s, double ahead = 0)
 {
     Contact contact;
     contact.time = s;
     Vec3d gradient;
     const Vec3d P = place(path, s), v = path.v + s * path.a;
     sampler.distance(P, gradient);
+    if (ahead > s && gradient.dot(v) >= 0) {
+        // On a kink of the field, and still on its side that the path leaves by: the surface that it meets is ahead.
+        Vec3d there;
+        sampler.distance(place(path, ahead), there);
+        if (there.dot(v) < 0) gradient = there;
+    }
     contact.n = unit_normal(gradient, v);
     contact.curvature = curvature(sampler, P, contact.n, v);
     return contact;
@@ -309,7 +316,7 @@ private:
         const double speed = path.v.norm() + next * path.a.norm();  // the largest on the way
         const auto height = [&](double s) { return sampler_.distance(place(path, s)) - level_[k]; };
         const double s = last_outside(height, s_[k], f_[k], next, f, speed, close_[k]);
-        contacts_[path_[k]] = contact_at(sampler_, path, s);
+        contacts_[path_[k]] = contact_at(sampler_, path, s, s + 0x1p-8 * least_[k]);
     }
 
     void move(int from, int to)
@@ -398,17 +405,19 @@ void first_contacts(const Sampler& sampler, std::span<const Path> paths, std::sp
                 contacts[i] = detail::contact_at(sampler, path, 0);
                 continue;
             }
-            // Pressed inwards, though it may still move outwards by less than will lift it by more than rounding: the
-            // test is where it is after the time of such a hop.
-            const double acceleration = path.a.norm();
-            if (acceleration > 0) {
-                double hop = 2 * std::sqrt(2 * flush / acceleration);
-                const double speed = path.v.norm();
+            // It leaves, or is pressed inwards though it may still move outwards by less than will lift it by more than
+            // rounding: the test is where it is after the time of such a hop. From there it is a path as any other,
+            // which may come back within a voxel.
+            const double acceleration = path.a.norm(), speed = path.v.norm();
+            double hop = Contact::none;
+            if (acceleration > 0) hop = 2 * std::sqrt(2 * flush / acceleration);
+            if (feature > 0 && slope > 0) hop = std::min(hop, 2 * flush / slope);
+            if (hop < Contact::none) {
                 if (feature > 0 && hop * speed > feature / 4) hop = feature / (4 * speed);
                 hop = std::min(hop, path.duration);
                 const double after = sampler.distance(place(path, hop)) - level;
                 if (after < 0) {
-                    contacts[i] = detail::contact_at(sampler, path, 0);
+                    contacts[i] = detail::contact_at(sampler, path, 0, hop);
                     continue;
                 }
                 s = hop, ahead = after;

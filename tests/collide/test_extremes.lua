@@ -21,7 +21,7 @@ return rapid.create { fps = 24, seed = 1 }
     assert.same({}, result.warnings)
     for i = 1, 40 do
       assert.truthy(result[3][i].P:length() <= 1.001, tostring(result[3][i].P))
-      assert.near(1e5, result[3][i].v:length(), 100)
+      assert.near(1e5, result[3][i].v:length(), 10)
     end
   end)
 end)

@@ -215,6 +215,31 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
     CHECK(met > 40);
 }
 
+TEST_CASE("a path that has left a surface meets one only where it comes up to it, if within the same voxel",
+          "[first_contact]")
+{
+    // Around the inside of the tube the surface turns towards what leaves it, and from cell to cell in kinks.
+    const ShapePtr shape = level_set_torus(0.8, 0.25, {0, 0, 0}, {0.05, 5});
+    Random random(5);
+    int again = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const Vec3d to = 0.8 * Vec3d(random.in(-1, 1), 0, random.in(-1, 1)).normalized();
+        const Path in{{0, 0, 0}, to - Vec3d(0, random.in(-0.1, 0.1), 0), Vec3d::Zero(), 1, 0};
+        const Contact first = meet(shape, in);
+        REQUIRE(first.time < 1);
+        const Vec3d across = first.n.cross(Vec3d::UnitY()).normalized();
+        const Path out{on_path(in, first.time), across + std::pow(10, random.in(-4, -1)) * first.n, Vec3d::Zero(), 2,
+                       0};
+        const Contact second = meet(shape, out);
+        CAPTURE(i, second.time, out.v.dot(first.n));
+        REQUIRE(second.time < out.duration);  // it is in the hole
+        // Slower than this it comes back before it has left by more than rounding.
+        REQUIRE(second.n.dot(out.v) < 2e-3);
+        again += second.time < 0.05;
+    }
+    CHECK(again > 1000);
+}
+
 TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_contact][extreme]")
 {
     const double voxel = 0.1;

@@ -54,12 +54,17 @@ public:
     void find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs);
 
 private:
-    // Cells of one grid, and the spheres in them in order of the cells.
+    struct Sphere {
+        float x, y, z, r;
+        std::uint32_t place, cell;
+    };
+    // Cells of one grid, with a border of empty ones, and the spheres in them in order of the cells.
     struct Cells {
         double width;
         std::int64_t least[3], count[3];   // cell coordinates
+        std::size_t size;                  // spheres
         std::vector<std::uint32_t> place;  // in the set
-        std::vector<float> x, y, z, r;     // from the middle of the scene, m
+        std::vector<float> x, y, z, r;     // from the middle of the scene, m; with room for a few lanes more
         std::vector<std::uint64_t> key;    // of the cells that are not empty
         std::vector<std::uint32_t> begin;  // of these; or of all where `dense`
         bool dense;
@@ -70,26 +75,43 @@ private:
             return (at(k, 2) * static_cast<std::uint64_t>(count[1]) + at(j, 1)) * static_cast<std::uint64_t>(count[0]) +
                    at(i, 0);
         }
+        void put(std::size_t m, const Sphere& sphere)
+        {
+            x[m] = sphere.x, y[m] = sphere.y, z[m] = sphere.z, r[m] = sphere.r;
+            place[m] = sphere.place;
+        }
         struct Run {
             std::uint32_t begin, end;
         };
-        // The spheres in the cells from i0 to i1 of a row.
-        Run run(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const;
+        // The spheres in the cells of these keys, the last one included: part of a row.
+        Run run(std::uint64_t first, std::uint64_t last) const;
+        // In those from i0 to i1 of a row.
+        Run row(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const;
     };
-    using Found = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+    using Pair = std::pair<std::uint32_t, std::uint32_t>;
+    using Found = std::vector<Pair>;
 
     void fill(Cells& cells, std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, std::size_t g);
+    template <class F>
+    void sort_dense(Cells& cells, std::size_t all, const F& sphere);
+    template <class F>
+    void sort_sparse(Cells& cells, const F& sphere);
     std::vector<Found>& room_for(std::size_t spheres);
     void within(const Cells& cells, std::span<const Vec3d> P, Strided<float> reach);
     void between(const Cells& fine, const Cells& coarse, std::span<const Vec3d> P, Strided<float> reach);
+    void list(Pairs& pairs, std::size_t points);
 
     Vec3d middle_;
     double blur_;  // m, by which positions in single precision may be off
     std::vector<Cells> cells_;
     std::vector<std::vector<Found>> found_;  // by grids and chunks of spheres; kept for their memory
     std::size_t used_ = 0;                   // of them
-    std::vector<std::uint64_t> keys_;
     std::vector<std::uint32_t> members_, order_;
+    std::vector<std::uint64_t> keys_;
+    // Sorted roughly: by buckets that fit a cache.
+    std::vector<Sphere> spheres_;
+    std::vector<Pair> pairs_;
+    std::vector<std::uint32_t> starts_, ends_;  // by bucket and by where they come from
 };
 
 }  // namespace rapid

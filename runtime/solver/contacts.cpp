@@ -15,11 +15,6 @@
 namespace rapid {
 namespace {
 
-// How far points may move before pairs are looked for again, as a part of their radius: at least, at most, and between
-// these as far as they go in so many sub-steps. More pairs to look at, or more searches: a column that falls is
-// searched three or four times a frame of 16 sub-steps, a pile that rests once.
-constexpr double least_slack = 0.1, most_slack = 0.4, slack_substeps = 4;
-
 // Of an overlap, what is taken away in a sub-step, and what is left as it is, as a part of the sum of the radii:
 // contact that is just lost is gained anew in the next sub-step, and that is jitter.
 constexpr double recovery = 0.8, left_over = 1e-4;
@@ -84,7 +79,8 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
         largest_ = std::max(largest_, radius_[i]);
         if (radius_[i] > 0) least_ = std::min(least_, radius_[i]);
     }
-    if (radius_ != before)
+    const bool same_radii = radius_ == before;
+    if (!same_radii)
         grids_ = RadiusGrids({radius_.data(), 1}, n, options.max_difference.value_or(largest_ / 4), options.max_grids);
     search_seconds_ = 0;
     fresh_ = true;
@@ -102,28 +98,36 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
         const std::uint32_t i = now[k];
         if (i != PlacesById::none && (radius_[i] != before[k] || friction_[i] != rough_before[k])) roused_.push_back(i);
     }
+    stale_ |= !same || !same_radii;
     if (same) return;
     ids_.assign(id.data, id.data + n);
-    std::vector<std::pair<Pair, Impulse>> kept;
+    struct Kept {
+        Pair pair;
+        float pressed;
+        Impulse impulse;
+    };
+    std::vector<Kept> kept;
     for (std::size_t s = 0; s < pairs_.size(); ++s) {
+        if (!(pressed_[s] > 0)) continue;
         Impulse impulse = impulses_[s];
-        if (!(impulse.pressed > 0)) continue;
         const std::uint32_t i = now[pairs_[s][0]], j = now[pairs_[s][1]];
         if (i == PlacesById::none && j != PlacesById::none) roused_.push_back(j);
         if (j == PlacesById::none && i != PlacesById::none) roused_.push_back(i);
         if (i == PlacesById::none || j == PlacesById::none) continue;
         if (i > j) impulse.rubbed = -impulse.rubbed, impulse.borne = -impulse.borne;
-        kept.push_back({{std::min(i, j), std::max(i, j)}, impulse});
+        kept.push_back({{std::min(i, j), std::max(i, j)}, pressed_[s], impulse});
     }
-    std::sort(kept.begin(), kept.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::sort(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) { return a.pair < b.pair; });
     near_.begin.assign(n + 1, 0);
     near_.other.clear();
     pairs_.clear();
+    pressed_.clear();
     impulses_.clear();
-    for (const auto& [pair, impulse] : kept) {
+    for (const auto& [pair, pressed, impulse] : kept) {
         ++near_.begin[pair[0] + 1];
         near_.other.push_back(pair[1]);
         pairs_.push_back(pair);
+        pressed_.push_back(pressed);
         impulses_.push_back(impulse);
     }
     std::partial_sum(near_.begin.begin(), near_.begin.end(), near_.begin.begin());
@@ -134,39 +138,15 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     touching_in_.clear();
 }
 
-// Since pairs were looked for. What all points move by together brings nobody closer.
-bool Contacts::has_moved(const Substep& now) const
-{
-    Vec3d mean = Vec3d::Zero();
-    for (std::size_t i = 0; i < now.size(); ++i) mean += now.at[i].P - searched_at_[i];
-    mean /= static_cast<double>(now.size());
-    for (std::size_t i = 0; i < now.size(); ++i) {
-        const double most = double(reach_[i]) - double(radius_[i]);
-        if ((now.at[i].P - searched_at_[i] - mean).squaredNorm() > most * most && radius_[i] > 0) return true;
-    }
-    return false;
-}
-
 void Contacts::search(const Substep& now)
 {
     const Stopwatch stopwatch;
-    const std::size_t n = now.size();
-    Vec3d mean = Vec3d::Zero();
-    for (const Vec3d& v : now.v) mean += v / static_cast<double>(n);
-    searched_at_.resize(n);
-    reach_.resize(n);
-    for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            searched_at_[i] = now.at[i].P;
-            const double way = slack_substeps * now.dt * (now.v[i] - mean).norm();
-            reach_[i] = radius_[i] + std::clamp(static_cast<float>(way), static_cast<float>(least_slack) * radius_[i],
-                                                static_cast<float>(most_slack) * radius_[i]);
-        }
-    });
+    searched_.set(now, radius_, largest_, least_);
     std::swap(near_, near_before_);
     std::swap(slot_, slot_before_);
+    std::swap(pressed_, pressed_before_);
     std::swap(impulses_, impulses_before_);
-    search_.find(searched_at_, {reach_.data(), 1}, grids_, near_);
+    search_.find(searched_.places(), {searched_.reach().data(), 1}, grids_, near_);
     schedule();
     if (now.sleepers && now.sleepers->any()) wake_parted(now);
     search_seconds_ += stopwatch.seconds();
@@ -178,7 +158,7 @@ void Contacts::wake_parted(const Substep& now) const
     for (std::uint32_t i = 0; i + 1 < near_before_.begin.size(); ++i)
         for (std::uint32_t k = near_before_.begin[i]; k < near_before_.begin[i + 1]; ++k) {
             const std::uint32_t j = near_before_.other[k];
-            if (!(impulses_before_[slot_before_[k]].pressed > 0)) continue;
+            if (!(pressed_before_[slot_before_[k]] > 0)) continue;
             const auto here = near_.of(i);
             if (!std::binary_search(here.begin(), here.end(), j)) now.sleepers->wake(i), now.sleepers->wake(j);
         }
@@ -190,44 +170,23 @@ void Contacts::wake_parted(const Substep& now) const
 void Contacts::schedule()
 {
     const std::size_t n = radius_.size(), m = near_.size();
-    // Wider than any pair is apart, and of some hundred pairs where all radii are alike.
-    const double edge = std::max(2.001 * (1 + most_slack) * largest_, 8.0 * least_);
-    block_.resize(n);
-    for (std::size_t i = 0; i < n; ++i)
-        for (int k = 0; k < 3; ++k)
-            block_[i][k] = static_cast<std::int32_t>(
-                std::clamp(std::floor(searched_at_[i][k] / edge), double(INT32_MIN / 2), double(INT32_MAX / 2)));
-
-    // In each block the first pairs of all points, then the second, and so on: pairs that follow each other then seldom
-    // share a point, and the processor need not wait for one to begin the next.
-    turn_.clear();
-    going_.resize(n);
-    std::iota(going_.begin(), going_.end(), 0u);
-    for (std::uint32_t rank = 0; !going_.empty(); ++rank) {
-        std::size_t left = 0;
-        for (const std::uint32_t i : going_) {
-            const std::uint32_t k = near_.begin[i] + rank;
-            if (k >= near_.begin[i + 1]) continue;
-            turn_.push_back({i, k});
-            going_[left++] = i;
-        }
-        going_.resize(left);
-    }
-
     constexpr std::size_t blocks = 8 * 16 * 16 * 16;
     owner_.resize(m);
+    for_each_chunk(n, [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i)
+            for (std::uint32_t k = near_.begin[i]; k < near_.begin[i + 1]; ++k) {
+                const auto &a = searched_.block(i), &b = searched_.block(near_.other[k]);
+                std::uint32_t colour = 0, place = 0;
+                for (int axis = 2; axis >= 0; --axis) {
+                    const auto least = static_cast<std::uint32_t>(std::min(a[axis], b[axis]));
+                    colour = colour << 1 | (least & 1);
+                    place = place << 4 | (least >> 1 & 15);
+                }
+                owner_[k] = static_cast<std::uint16_t>(colour << 12 | place);
+            }
+    });
     std::vector<std::uint32_t> next(blocks + 1);
-    for (const auto& [i, k] : turn_) {
-        const auto &a = block_[i], &b = block_[near_.other[k]];
-        std::uint32_t colour = 0, place = 0;
-        for (int axis = 2; axis >= 0; --axis) {
-            const auto least = static_cast<std::uint32_t>(std::min(a[axis], b[axis]));
-            colour = colour << 1 | (least & 1);
-            place = place << 4 | (least >> 1 & 15);
-        }
-        owner_[k] = static_cast<std::uint16_t>(colour << 12 | place);
-        ++next[owner_[k] + 1];
-    }
+    for (const std::uint16_t owner : owner_) ++next[owner + 1];
     std::partial_sum(next.begin(), next.end(), next.begin());
     batches_.clear();
     colours_.clear();
@@ -237,22 +196,55 @@ void Contacts::schedule()
     }
     colours_.push_back(static_cast<std::uint32_t>(batches_.size()));
     batches_.push_back(static_cast<std::uint32_t>(m));
+    turn_.resize(m);
+    for (std::uint32_t i = 0; i < n; ++i)
+        for (std::uint32_t k = near_.begin[i]; k < near_.begin[i + 1]; ++k) turn_[next[owner_[k]]++] = {i, k};
 
     pairs_.resize(m);
     slot_.resize(m);
-    impulses_.assign(m, {});
+    pressed_.resize(m);
+    impulses_.resize(m);
     rows_.resize(m);
     touching_in_.assign(batches_.size() - 1, 0);
-    for (const auto& [i, k] : turn_) {
-        const std::uint32_t j = near_.other[k];
-        slot_[k] = next[owner_[k]]++;
-        pairs_[slot_[k]] = {i, j};
-        if (near_before_.begin.empty()) continue;
-        const auto old = near_before_.of(i);
-        const auto found = std::lower_bound(old.begin(), old.end(), j);
-        if (found == old.end() || *found != j) continue;
-        impulses_[slot_[k]] =
-            impulses_before_[slot_before_[near_before_.begin[i] + static_cast<std::size_t>(found - old.begin())]];
+    each_batch(false, [&](std::size_t b) { take_turns(b); });
+}
+
+// In each block the first pairs of all points, then the second, and so on: pairs that follow each other then seldom
+// share a point, and the processor need not wait for one to begin the next. Each has the impulse that it had.
+void Contacts::take_turns(std::size_t block)
+{
+    thread_local std::vector<std::array<std::uint32_t, 2>> going;  // of each point, what is left of its pairs
+    thread_local std::vector<std::uint32_t> before;                // of each pair, its slot before
+    constexpr std::uint32_t none = 0xffffffff;
+    const std::uint32_t first = batches_[block], last = batches_[block + 1];
+    going.clear();
+    before.assign(last - first, none);
+    for (std::uint32_t t = first; t < last;) {
+        const std::uint32_t i = turn_[t][0];
+        going.push_back({t, t});
+        std::uint32_t old = near_before_.begin.empty() ? 0 : near_before_.begin[i];
+        const std::uint32_t end = near_before_.begin.empty() ? 0 : near_before_.begin[i + 1];
+        for (; t < last && turn_[t][0] == i; ++t) {
+            const std::uint32_t j = near_.other[turn_[t][1]];
+            while (old < end && near_before_.other[old] < j) ++old;
+            if (old < end && near_before_.other[old] == j) before[t - first] = slot_before_[old];
+        }
+        going.back()[1] = t;
+    }
+    std::uint32_t slot = first;
+    while (!going.empty()) {
+        std::size_t left = 0;
+        for (auto [t, end] : going) {
+            const auto [i, k] = turn_[t];
+            slot_[k] = slot;
+            pairs_[slot] = {i, near_.other[k]};
+            const std::uint32_t old = before[t - first];
+            pressed_[slot] = old == none ? 0 : pressed_before_[old];
+            impulses_[slot] = old == none ? Impulse{} : impulses_before_[old];
+            ++slot;
+            if (++t < end) going[left++] = {t, end};
+        }
+        going.resize(left);
     }
 }
 
@@ -294,52 +286,66 @@ void Contacts::sweep(const F& f)
     });
 }
 
-// The pairs that touch where their own ways end, or have pressed each other until now, become rows.
+// The pairs that touch where their own ways end, or have pressed each other until now, become rows. Which these are is
+// found first, without a branch: that would be mispredicted for every other pair.
 void Contacts::touch(const Substep& now)
 {
+    const double at_rest = resting * now.pull * now.dt;
     each_batch(false, [&](std::size_t b) {
-        std::uint32_t count = 0;
-        for (std::uint32_t k = batches_[b]; k < batches_[b + 1]; ++k) {
+        thread_local std::vector<std::uint32_t> close;
+        const std::uint32_t first = batches_[b], last = batches_[b + 1];
+        close.resize(last - first + 1);
+        std::size_t found = 0;
+        for (std::uint32_t k = first; k < last; ++k) {
             const auto [i, j] = pairs_[k];
-            const Place &a = now.at[i], &c = now.at[j];
-            if (!(a.w + c.w > 0) && !now.sleepers) continue;
-            const Vec3d d = a.P - c.P;
-            const double reach = double(radius_[i]) + double(radius_[j]), d2 = d.squaredNorm();
-            const Impulse& before = impulses_[k];
-            if (d2 > near * near * reach * reach && before.pressed <= 0) continue;
-            if (!now.lives(i) || !now.lives(j)) continue;
-            if (!(a.w + c.w > 0)) {
-                // What no constraint moves, and goes its way, wakes a sleeper in it.
-                if (now.v[i] != now.v[j]) now.sleepers->wake(i), now.sleepers->wake(j);
-                continue;
-            }
-            const Vec3d apart = now.begin[i] - now.begin[j];
-            Row& row = rows_[batches_[b] + count++];
-            row.i = i;
-            row.j = j;
-            row.pair = k;
-            row.reach = static_cast<float>(reach);
-            row.allowed = std::min(0.0f, static_cast<float>(apart.norm() - reach));
-            row.n = direction(i, j, d);
-            row.pressed = row.held = 0.5f * before.pressed;
-            row.rubbed = before.rubbed - (row.n.dot(before.rubbed.cast<double>()) * row.n).cast<float>();
-            row.friction = std::sqrt(friction_[i] * friction_[j]);
-            row.bounce = std::max(bounce_[i], bounce_[j]);
-            row.approach = bounces_ ? static_cast<float>(direction(i, j, apart).dot(now.v[i] - now.v[j])) : 0;
+            const double most = near * (double(radius_[i]) + double(radius_[j]));
+            close[found] = k;
+            found += ((now.at[i].P - now.at[j].P).squaredNorm() <= most * most) | (pressed_[k] > 0);
         }
-        touching_in_[b] = count;
+        Row* row = rows_.data() + first;
+        for (const std::uint32_t k : std::span(close).first(found)) row += enter(*row, k, at_rest, now);
+        touching_in_[b] = static_cast<std::uint32_t>(row - rows_.data()) - first;
     });
+}
+
+// Whether the pair k has a row, and what it is.
+bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& now) const
+{
+    const auto [i, j] = pairs_[k];
+    const Place &a = now.at[i], &b = now.at[j];
+    if (!(a.w + b.w > 0) && !now.sleepers) return false;
+    if (!now.lives(i) || !now.lives(j)) return false;
+    if (!(a.w + b.w > 0)) {
+        // What no constraint moves, and goes its way, wakes a sleeper in it.
+        if (now.v[i] != now.v[j]) now.sleepers->wake(i), now.sleepers->wake(j);
+        return false;
+    }
+    const Vec3d apart = now.begin[i] - now.begin[j];
+    const double reach = double(radius_[i]) + double(radius_[j]);
+    row.i = i;
+    row.j = j;
+    row.pair = k;
+    row.reach = static_cast<float>(reach);
+    row.allowed = std::min(0.0f, static_cast<float>(apart.norm() - reach));
+    row.n = direction(i, j, a.P - b.P).cast<float>();
+    row.pressed = row.held = 0.5f * pressed_[k];
+    const Vec3f& rubbed = impulses_[k].rubbed;
+    row.rubbed = rubbed - row.n.dot(rubbed) * row.n;
+    row.friction = std::sqrt(friction_[i] * friction_[j]);
+    row.leaves = 0;
+    if (!bounces_) return true;
+    const double approach = direction(i, j, apart).dot(now.v[i] - now.v[j]);
+    if (approach < -at_rest) row.leaves = -std::max(bounce_[i], bounce_[j]) * static_cast<float>(approach);
+    return true;
 }
 
 void Contacts::rouse(Substep& now)
 {
-    if (per_dt_ > 0 && per_dt_ * now.dt != 1)
-        for (Impulse& impulse : impulses_) {  // forces stay
-            const auto scale = static_cast<float>(now.dt * per_dt_);
-            impulse.pressed *= scale;
-            impulse.rubbed *= scale;
-            impulse.borne *= scale;
-        }
+    if (per_dt_ > 0 && per_dt_ * now.dt != 1) {  // forces stay
+        const auto scale = static_cast<float>(now.dt * per_dt_);
+        for (float& pressed : pressed_) pressed *= scale;
+        for (Impulse& impulse : impulses_) impulse.rubbed *= scale, impulse.borne *= scale;
+    }
     per_dt_ = 1 / now.dt;
     if (fresh_) {
         double most = 0, least = std::numeric_limits<double>::infinity();
@@ -347,8 +353,8 @@ void Contacts::rouse(Substep& now)
             if (at.w > 0) most = std::max(most, at.w), least = std::min(least, at.w);
         uneven_ = most > 2 * least;
     }
-    if (fresh_ || has_moved(now)) search(now);
-    fresh_ = false;
+    if (stale_ || searched_.outrun(now)) search(now);
+    fresh_ = stale_ = false;
     touch(now);
     if (now.sleepers && now.sleepers->any() && shock(now)) touch(now);
 }
@@ -364,8 +370,8 @@ bool Contacts::shock(Substep& now)
             const Row& row = rows_[r];
             const bool first = now.asleep(row.i);
             if (first == now.asleep(row.j)) continue;
-            const double closing = -row.n.dot(now.v[row.i] - now.v[row.j]);
-            if (closing < at_rest || row.n.dot(now.at[row.i].P - now.at[row.j].P) > row.reach) continue;
+            const double closing = -row.n.cast<double>().dot(now.v[row.i] - now.v[row.j]);
+            if (closing < at_rest || row.n.cast<double>().dot(now.at[row.i].P - now.at[row.j].P) > row.reach) continue;
             if (shock_.empty()) shock_.assign(now.size(), 0);
             const std::uint32_t hit = first ? row.i : row.j, by = first ? row.j : row.i;
             shock_[hit] = std::max(shock_[hit], closing / now.at[by].w);
@@ -403,7 +409,7 @@ void Contacts::disturb(const Row& row, const Substep& now) const
     if (first == now.asleep(row.j)) return;
     const std::uint32_t sleeper = first ? row.i : row.j;
     const Impulse& impulse = impulses_[row.pair];
-    const Vec3f change = impulse.pressed * row.n.cast<float>() + impulse.rubbed - impulse.borne;
+    const Vec3f change = pressed_[row.pair] * row.n + impulse.rubbed - impulse.borne;
     if (change.norm() > disturbed * now.dt * now.sleepers->burden(sleeper)) now.sleepers->wake(sleeper);
 }
 
@@ -413,7 +419,7 @@ void Contacts::prepare(Substep& now)
     sweep([&](Row& row) {
         if (!(row.pressed > 0)) return;
         Place &a = now.at[row.i], &b = now.at[row.j];
-        const Vec3d half = double(row.pressed) * row.n + 0.5 * row.rubbed.cast<double>();
+        const Vec3d half = (row.pressed * row.n + 0.5f * row.rubbed).cast<double>();
         a.P += a.w * dt * half;
         b.P -= b.w * dt * half;
         now.v[row.i] += a.w * half;
@@ -426,7 +432,7 @@ void Contacts::project(Substep& now)
     const double dt = now.dt, per_dt = per_dt_;
     sweep([&](Row& row) {
         Place &a = now.at[row.i], &b = now.at[row.j];
-        const Vec3d& n = row.n;
+        const Vec3d n = row.n.cast<double>();
         const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
         const double pressed = std::max(0.0, row.pressed - C * per_dt / (a.w + b.w));
         const double change = dt * (pressed - row.pressed);
@@ -470,52 +476,52 @@ void Contacts::take_back(const Row& row, Substep& now) const
 
 void Contacts::settle_once(Substep& now, bool last)
 {
-    const double dt = now.dt, at_rest = resting * now.pull * dt;
+    const double dt = now.dt;
     const bool watched = last && now.sleepers && now.sleepers->any();
     const auto solve = [&](Row& row) {
-        Impulse& kept = impulses_[row.pair];
-        kept.pressed = 0;
+        float& pressed = pressed_[row.pair];
+        Vec3f& rubs = impulses_[row.pair].rubbed;
         Place &a = now.at[row.i], &b = now.at[row.j];
-        const Vec3d& n = row.n;
+        const Vec3d n = row.n.cast<double>();
         const double before = double(row.pressed) + double(row.held);
         const double overlap = row.reach - n.dot(a.P - b.P);
         if (!(before > 0) && !(overlap > 0)) {
-            kept.rubbed.setZero();
+            pressed = 0;
+            rubs.setZero();
             return;
         }
-        const double W = a.w + b.w;
+        const double per_W = 1 / (a.w + b.w);
         Vec3d &va = now.v[row.i], &vb = now.v[row.j];
 
-        const double wanted = row.approach < -at_rest ? -double(row.bounce) * row.approach : 0;
-        const double p = std::max(0.0, before + (wanted - n.dot(va - vb)) / W);
-        va += a.w * (p - before) * n;
-        vb -= b.w * (p - before) * n;
-        kept.pressed = row.pressed = static_cast<float>(p);
+        const Vec3d relative = va - vb;
+        const double closing = n.dot(relative);
+        const double p = std::max(0.0, before + (row.leaves - closing) * per_W);
+        Vec3d push = (p - before) * n, shift = Vec3d::Zero();
+        pressed = row.pressed = static_cast<float>(p);
         row.held = 0;
         if (row.friction > 0) {
-            const Vec3d relative = va - vb, had = row.rubbed.cast<double>();
-            Vec3d rubbed = had - (relative - n.dot(relative) * n) / W;
-            const double most = row.friction * p, size = rubbed.norm();
-            if (size > most) rubbed *= most / size;
-            const Vec3d change = rubbed - had;
-            va += a.w * change;
-            vb -= b.w * change;
-            a.P += 0.5 * dt * a.w * change;
-            b.P -= 0.5 * dt * b.w * change;
-            kept.rubbed = row.rubbed = rubbed.cast<float>();
+            const Vec3d had = row.rubbed.cast<double>();
+            const Vec3d held = had - (relative - closing * n) * per_W;
+            const double most = row.friction * p, size2 = held.squaredNorm();
+            const Vec3d rubbed = (size2 > most * most ? most / std::sqrt(size2) : 1.0) * held, change = rubbed - had;
+            push += change;
+            shift = 0.5 * dt * change;
+            rubs = row.rubbed = rubbed.cast<float>();
         }
-        if (!last) return;
-        if (kept.pressed > 0) {
-            const std::uint8_t bi = now.borne[row.i], bj = now.borne[row.j];
-            std::uint8_t &fi = now.found_borne[row.i], &fj = now.found_borne[row.j];
-            fi = std::max<std::uint8_t>(fi, std::max<std::uint8_t>(bj, 1) - 1);
-            fj = std::max<std::uint8_t>(fj, std::max<std::uint8_t>(bi, 1) - 1);
+        va += a.w * push;
+        vb -= b.w * push;
+        if (last) {
+            const bool from_sleeper = watched && (now.asleep(row.i) || now.asleep(row.j));
+            const double part = from_sleeper ? recovery_asleep : recovery;
+            shift += part * std::max(0.0, overlap - left_over * row.reach) * per_W * n;
         }
-        const bool from_sleeper = watched && (now.asleep(row.i) || now.asleep(row.j));
-        const double part = from_sleeper ? recovery_asleep : recovery;
-        const double out = part * std::max(0.0, overlap - left_over * row.reach) / W;
-        a.P += a.w * out * n;
-        b.P -= b.w * out * n;
+        a.P += a.w * shift;
+        b.P -= b.w * shift;
+        if (!last || !(p > 0)) return;
+        const std::uint8_t bi = now.borne[row.i], bj = now.borne[row.j];
+        std::uint8_t &fi = now.found_borne[row.i], &fj = now.found_borne[row.j];
+        fi = std::max<std::uint8_t>(fi, std::max<std::uint8_t>(bj, 1) - 1);
+        fj = std::max<std::uint8_t>(fj, std::max<std::uint8_t>(bi, 1) - 1);
     };
     if (watched)
         sweep([&](Row& row) { solve(row), disturb(row, now); });
@@ -552,9 +558,9 @@ Residual Contacts::close(Substep& now)
             if (now.asleep(row.i) && now.asleep(row.j)) continue;
             Impulse& impulse = impulses_[row.pair];
             const double overlap = row.reach - (now.at[row.i].P - now.at[row.j].P).norm();
-            count(row.i, row.j, overlap, impulse.pressed > 0);
+            count(row.i, row.j, overlap, pressed_[row.pair] > 0);
             if (!now.sleepers) continue;
-            const Vec3f borne = impulse.pressed * row.n.cast<float>() + impulse.rubbed;
+            const Vec3f borne = pressed_[row.pair] * row.n + impulse.rubbed;
             for (const std::uint32_t of : {row.i, row.j}) now.sleepers->load(of, borne.norm() * per_dt_);
             if (overlap > too_deep_to_sleep * std::min(radius_[row.i], radius_[row.j]))
                 deep.insert(deep.end(), {row.i, row.j});
@@ -565,8 +571,7 @@ Residual Contacts::close(Substep& now)
     for (std::size_t k = 0; now.sleepers && k < pairs_.size(); ++k) {
         const auto [i, j] = pairs_[k];
         if (!now.asleep(i) || !now.asleep(j)) continue;
-        count(i, j, double(radius_[i]) + double(radius_[j]) - (now.at[i].P - now.at[j].P).norm(),
-              impulses_[k].pressed > 0);
+        count(i, j, double(radius_[i]) + double(radius_[j]) - (now.at[i].P - now.at[j].P).norm(), pressed_[k] > 0);
     }
     Residual::Search search{{}, grids_.error, grids_.excess, search_seconds_};
     for (const RadiusGrids::Grid& grid : grids_.grids) search.grids.push_back(grid.points);

@@ -25,6 +25,7 @@
 
 #include "runtime/solver/constraint.h"
 #include "runtime/solver/contact_search.h"
+#include "runtime/solver/searched_places.h"
 
 namespace rapid {
 
@@ -56,23 +57,22 @@ public:
 private:
     using Pair = std::array<std::uint32_t, 2>;
 
-    // What a pair does to each other, as it is kept from sub-step to sub-step.
+    // What a pair does to each other besides pressing, as it is kept from sub-step to sub-step.
     struct Impulse {
-        float pressed = 0;             // N s along the normal
-        Vec3f rubbed = Vec3f::Zero();  // N s across it
+        Vec3f rubbed = Vec3f::Zero();  // N s across the normal
         Vec3f borne = Vec3f::Zero();   // N s, both together, at the end of the last frame in which both were awake
     };
 
-    // A pair that touches in this sub-step.
+    // A pair that touches in this sub-step. A cache line holds it.
     struct Row {
         std::uint32_t i, j, pair;
-        float reach;             // m: r_i + r_j
-        float allowed;           // m: the overlap at the beginning of the sub-step, at most 0
-        float pressed, held;     // N s along n: by places, by velocities
-        float friction, bounce;  // μ, ε
-        float approach;          // m/s, before the sub-step's contacts; below 0 where the points close in
-        Vec3d n;                 // from j to i, unit
-        Vec3f rubbed;            // N s, across n
+        float reach;          // m: r_i + r_j
+        float allowed;        // m: the overlap at the beginning of the sub-step, at most 0
+        float pressed, held;  // N s along n: by places, by velocities
+        float friction;       // μ
+        float leaves;         // m/s, along n: what a bounce gives it
+        Vec3f n;              // from j to i, unit
+        Vec3f rubbed;         // N s, across n
     };
 
     template <class F>
@@ -80,28 +80,29 @@ private:
     template <class F>
     void sweep(const F& f);
     void touch(const Substep& now);
+    bool enter(Row& row, std::uint32_t pair, double at_rest, const Substep& now) const;
     bool shock(Substep& now);
     void disturb(const Row& row, const Substep& now) const;
     void keep_awake(std::span<const std::uint32_t> deep, const Substep& now) const;
     void search(const Substep& now);
     void schedule();
+    void take_turns(std::size_t block);
     void wake_parted(const Substep& now) const;
     void settle_once(Substep& now, bool last);
     void take_back(const Row& row, Substep& now) const;
-    bool has_moved(const Substep& now) const;
 
     std::vector<float> radius_, friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
     float largest_ = 0, least_ = 0;
-    bool bounces_ = false, fresh_ = true, backwards_ = false, uneven_ = false;
+    bool bounces_ = false, fresh_ = true, stale_ = true, backwards_ = false, uneven_ = false;
     RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};
     ContactSearch search_;
     std::vector<std::int64_t> ids_;
-    std::vector<Vec3d> searched_at_;
-    std::vector<float> reach_;  // m: how far each was looked from, its radius and what it may move
+    SearchedPlaces searched_;
 
     Pairs near_, near_before_;                       // of this search, and of that before
     std::vector<std::uint32_t> slot_, slot_before_;  // of each of them, its place in the order of the sweeps:
     std::vector<Pair> pairs_;                        // colour by colour, block by block
+    std::vector<float> pressed_, pressed_before_;    // N s along the normal: what each pair presses itself apart by
     std::vector<Impulse> impulses_, impulses_before_;
     std::vector<std::uint32_t> batches_;      // the beginning of each block's pairs, and the end
     std::vector<std::uint32_t> colours_;      // the beginning of each colour's blocks, and the end
@@ -109,10 +110,8 @@ private:
     std::vector<std::uint32_t> touching_in_;  // of each block, how many
 
     // Of a search.
-    std::vector<std::array<std::int32_t, 3>> block_;  // of each point
-    std::vector<Pair> turn_;                          // point and pair, in the order in which a block has them
-    std::vector<std::uint16_t> owner_;                // of each pair, its block
-    std::vector<std::uint32_t> going_;
+    std::vector<std::uint16_t> owner_;  // of each pair, its block
+    std::vector<Pair> turn_;            // point and pair, block by block
 
     std::vector<std::uint32_t>
         roused_;                 // points that are not what they were, or have lost a neighbour that they pressed

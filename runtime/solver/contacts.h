@@ -57,12 +57,6 @@ public:
 private:
     using Pair = std::array<std::uint32_t, 2>;
 
-    // What a pair does to each other besides pressing, as it is kept from sub-step to sub-step.
-    struct Impulse {
-        Vec3f rubbed = Vec3f::Zero();  // N s across the normal
-        Vec3f borne = Vec3f::Zero();   // N s, both together, at the end of the last frame in which both were awake
-    };
-
     // A pair that touches in this sub-step. A cache line holds it.
     struct Row {
         std::uint32_t i, j, pair;
@@ -102,8 +96,10 @@ private:
     Pairs near_, near_before_;                       // of this search, and of that before
     std::vector<std::uint32_t> slot_, slot_before_;  // of each of them, its place in the order of the sweeps:
     std::vector<Pair> pairs_;                        // colour by colour, block by block
-    std::vector<float> pressed_, pressed_before_;    // N s along the normal: what each pair presses itself apart by
-    std::vector<Impulse> impulses_, impulses_before_;
+    // What each pair does to each other, as it is kept from sub-step to sub-step, N s: along the normal, and across it;
+    // and both together at the end of the last frame in which both were awake, where any may sleep.
+    std::vector<float> pressed_, pressed_before_;
+    std::vector<Vec3f> rubbed_, rubbed_before_, borne_, borne_before_;
     std::vector<std::uint32_t> batches_;      // the beginning of each block's pairs, and the end
     std::vector<std::uint32_t> colours_;      // the beginning of each colour's blocks, and the end
     std::vector<Row> rows_;                   // of each block, at the place of its pairs

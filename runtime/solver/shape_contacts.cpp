@@ -78,27 +78,42 @@ void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::sp
 {
     thread_local std::vector<std::uint32_t> asked;
     thread_local std::vector<Vec3d> P, gradient;
-    thread_local std::vector<double> phi, time;
+    thread_local std::vector<double> phi, time, own, since_asked;
     const double since = (now.index + 1) * now.dt;  // s, since the frame began
 
+    own.resize(end - begin);
+    since_asked.resize(end - begin);
+    for (std::size_t i = begin; i < end; ++i) {
+        own[i - begin] = (free[i] - now.begin[i]).norm();
+        since_asked[i - begin] = (free[i] - asked_at_[i]).norm();
+    }
     rows.clear();
     std::size_t old = 0;
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
         const Obstacle& obstacle = obstacles_[o];
         if (obstacle.response == Response::Die) continue;
         float* clearance = clearance_.data() + o * size_;
-        asked.clear();
-        P.clear();
-        const auto reach = [&](std::size_t i) { return push * obstacle.radius[i] + (free[i] - now.begin[i]).norm(); };
+        const auto reach = [&](std::size_t i) { return push * obstacle.radius[i] + own[i - begin]; };
+        // Most are known to be far from it, or close to it for long: without a branch.
+        asked.resize(end - begin + 1);
+        std::size_t near = 0;
         for (std::size_t i = begin; i < end; ++i) {
-            if (!(now.at[i].w > 0) || !obstacle.members[i] || !now.lives(i)) continue;
-            const double far = obstacle.radius[i] + reach(i);
-            if (((free[i] - obstacle.bounds.max()).array() > far).any()) continue;
-            if (((obstacle.bounds.min() - free[i]).array() > far).any()) continue;
-            if (!obstacle.moves && clearance[i] >= (free[i] - asked_at_[i]).norm() + reach(i)) continue;
-            asked.push_back(static_cast<std::uint32_t>(i));
-            P.push_back(free[i]);
+            asked[near] = static_cast<std::uint32_t>(i);
+            near += obstacle.moves | (clearance[i] < since_asked[i - begin] + reach(i));
         }
+        asked.resize(near);
+        P.clear();
+        std::erase_if(asked, [&](std::uint32_t i) {
+            if (!(now.at[i].w > 0) || !obstacle.members[i] || !now.lives(i)) return true;
+            const double off = (free[i] - obstacle.bounds.max()).cwiseMax(obstacle.bounds.min() - free[i]).maxCoeff() -
+                               obstacle.radius[i];
+            if (off > reach(i)) {
+                clearance[i] = static_cast<float>(off - since_asked[i - begin]);
+                return true;
+            }
+            P.push_back(free[i]);
+            return false;
+        });
         const std::size_t rows_before = rows.size();
         phi.resize(P.size());
         gradient.resize(P.size());
@@ -108,7 +123,7 @@ void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::sp
             const std::uint32_t i = asked[k];
             const double slope = gradient[k].norm(), gap = phi[k] - obstacle.radius[i];
             // Measured from where the point is now: what it was off asked_at_ is taken off.
-            clearance[i] = static_cast<float>(gap - (free[i] - asked_at_[i]).norm());
+            clearance[i] = static_cast<float>(gap - since_asked[i - begin]);
             if (gap > reach(i) || !(slope > 0)) continue;
             Row row{};
             row.i = i;

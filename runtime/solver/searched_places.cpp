@@ -11,7 +11,7 @@ namespace {
 
 // How far points may move before pairs are looked for again, as a part of their radius: at least, at most, and between
 // these as far as they go in so many sub-steps. More pairs to look at, or more searches.
-constexpr double least_slack = 0.3, most_slack = 1, slack_substeps = 6;
+constexpr double least_slack = 0.2, most_slack = 1, slack_substeps = 6;
 
 // Blocks whose points are handed to a thread together.
 constexpr std::size_t blocks_a_task = 64;
@@ -52,15 +52,22 @@ void SearchedPlaces::set(const Substep& now, std::span<const float> radius, floa
         frames_[a].excess = std::max(frames_[a].excess, apart);
         frames_[b].excess = std::max(frames_[b].excess, apart);
     }
+    // m, by which a point leaves its frame in a sub-step, or its neighbours' frames leave it.
+    const auto leaves = [&](std::size_t i) {
+        const Frame& frame = frames_[home_[i]];
+        return (now.dt * now.v[i] - frame.way).norm() + frame.excess;
+    };
+    // Where the search before has not lasted, because of one point maybe, more slack only finds more pairs.
+    const double substeps = lasted_ > 1 ? slack_substeps : 0;
+    lasted_ = 0;
     reach_.assign(n, 0);
     slack_.resize(n);
     for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (!(radius[i] > 0)) continue;
-            const Frame& frame = frames_[home_[i]];
-            const double way = slack_substeps * ((now.dt * now.v[i] - frame.way).norm() + frame.excess);
-            slack_[i] = std::clamp(static_cast<float>(way), static_cast<float>(least_slack) * radius[i],
-                                   static_cast<float>(most_slack) * radius[i]);
+            slack_[i] =
+                std::clamp(static_cast<float>(substeps * leaves(i)), static_cast<float>(least_slack) * radius[i],
+                           static_cast<float>(most_slack) * radius[i]);
             reach_[i] = radius[i] + slack_[i];
             slack_[i] = reach_[i] - radius[i];
         }
@@ -109,6 +116,7 @@ void SearchedPlaces::cut_blocks(std::span<const float> radius)
 
 bool SearchedPlaces::outrun(const Substep& now)
 {
+    ++lasted_;
     for_each_chunk(
         frames_.size(),
         [&](std::size_t first, std::size_t last) {

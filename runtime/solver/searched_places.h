@@ -36,6 +36,7 @@ public:
 private:
     void cut_blocks(std::span<const float> radius);
 
+    int lasted_ = 0;             // sub-steps, at the end of which it was outrun
     double edge_ = 0, far_ = 0;  // m: of a block; what blocks that are no neighbours may come closer by
     std::vector<Vec3d> at_;
     std::vector<float> reach_, slack_;  // m

@@ -44,12 +44,16 @@ constexpr double too_deep_to_sleep = 0.05;
 constexpr std::size_t worth_a_task = 2048;
 
 // Points in one place are parted somewhere, each pair elsewhere.
-Vec3d direction(std::uint32_t i, std::uint32_t j, const Vec3d& d)
+Vec3d somewhere(std::uint32_t i, std::uint32_t j)
 {
-    const double length = d.norm();
-    if (length > 0) return d / length;
     const std::uint32_t mixed = (i * 0x9e3779b9u) ^ (j * 0x85ebca6bu);
     return Vec3d(1.0 + (mixed & 255), 1.0 + (mixed >> 8 & 255), 1.0 + (mixed >> 16 & 255)).normalized();
+}
+
+inline Vec3d direction(std::uint32_t i, std::uint32_t j, const Vec3d& d)
+{
+    const double length = d.norm();
+    return length > 0 ? Vec3d(1 / length * d) : somewhere(i, j);
 }
 
 }  // namespace
@@ -62,9 +66,9 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     const Strided<std::uint8_t> members = members_of(points, group);
 
     roused_.clear();
-    const std::vector<float> before = std::move(radius_), rough_before = std::move(friction_);
+    const std::vector<float> before = std::move(radius_), rough_before = std::move(root_friction_);
     radius_.resize(n);
-    friction_.resize(n);
+    root_friction_.resize(n);
     bounce_.resize(n);
     largest_ = 0, least_ = std::numeric_limits<float>::infinity();
     bounces_ = false;
@@ -73,7 +77,7 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
             throw Error(fmt::format("point {}: its radius is {:g}; it must be finite and at least 0", points.id()[i],
                                     radius[i]));
         radius_[i] = members[i] ? radius[i] : 0;
-        friction_[i] = friction[i];
+        root_friction_[i] = std::sqrt(friction[i]);
         bounce_[i] = bounce[i];
         bounces_ |= bounce[i] > 0;
         largest_ = std::max(largest_, radius_[i]);
@@ -96,7 +100,8 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     }
     for (std::size_t k = 0; k < now.size(); ++k) {
         const std::uint32_t i = now[k];
-        if (i != PlacesById::none && (radius_[i] != before[k] || friction_[i] != rough_before[k])) roused_.push_back(i);
+        if (i != PlacesById::none && (radius_[i] != before[k] || root_friction_[i] != rough_before[k]))
+            roused_.push_back(i);
     }
     stale_ |= !same || !same_radii;
     if (same) return;
@@ -337,7 +342,8 @@ bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& n
     row.pressed = row.held = 0.5f * pressed_[k];
     const Vec3f& rubbed = rubbed_[k];
     row.rubbed = rubbed - row.n.dot(rubbed) * row.n;
-    row.friction = std::sqrt(friction_[i] * friction_[j]);
+    row.friction = root_friction_[i] * root_friction_[j];
+    row.per_w = static_cast<float>(1 / (a.w + b.w));
     row.leaves = 0;
     if (!bounces_) return true;
     const double approach = direction(i, j, apart).dot(now.v[i] - now.v[j]);
@@ -441,7 +447,7 @@ void Contacts::project(Substep& now)
         Place &a = now.at[row.i], &b = now.at[row.j];
         const Vec3d n = row.n.cast<double>();
         const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
-        const double pressed = std::max(0.0, row.pressed - C * per_dt / (a.w + b.w));
+        const double pressed = std::max(0.0, row.pressed - C * per_dt * row.per_w);
         const double change = dt * (pressed - row.pressed);
         row.pressed = static_cast<float>(pressed);
         a.P += a.w * change * n;
@@ -499,18 +505,17 @@ void Contacts::settle_once(Substep& now, bool last)
             rubs.setZero();
             return;
         }
-        const double per_W = 1 / (a.w + b.w);
         Vec3d &va = now.v[row.i], &vb = now.v[row.j];
 
         const Vec3d relative = va - vb;
         const double closing = n.dot(relative);
-        const double p = std::max(0.0, before + (row.leaves - closing) * per_W);
+        const double p = std::max(0.0, before + (row.leaves - closing) * row.per_w);
         Vec3d push = (p - before) * n, shift = Vec3d::Zero();
         pressed = row.pressed = static_cast<float>(p);
         row.held = 0;
         if (row.friction > 0) {
             const Vec3d had = row.rubbed.cast<double>();
-            const Vec3d held = had - (relative - closing * n) * per_W;
+            const Vec3d held = had - (relative - closing * n) * row.per_w;
             const double most = row.friction * p;  // of nothing, a part that is no number: min leaves it out
             const Vec3d rubbed = std::min(1.0, most / held.norm()) * held, change = rubbed - had;
             push += change;
@@ -522,7 +527,7 @@ void Contacts::settle_once(Substep& now, bool last)
         if (last) {
             const bool from_sleeper = watched && (now.asleep(row.i) || now.asleep(row.j));
             const double part = from_sleeper ? recovery_asleep : recovery;
-            shift += part * std::max(0.0, overlap - left_over * row.reach) * per_W * n;
+            shift += part * std::max(0.0, overlap - left_over * row.reach) * row.per_w * n;
         }
         a.P += a.w * shift;
         b.P -= b.w * shift;

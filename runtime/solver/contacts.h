@@ -65,6 +65,7 @@ private:
         float pressed, held;  // N s along n: by places, by velocities
         float friction;       // μ
         float leaves;         // m/s, along n: what a bounce gives it
+        float per_w;          // kg: 1 / (w_i + w_j)
         Vec3f n;              // from j to i, unit
         Vec3f rubbed;         // N s, across n
     };
@@ -85,7 +86,7 @@ private:
     void settle_once(Substep& now, bool last);
     void take_back(const Row& row, Substep& now) const;
 
-    std::vector<float> radius_, friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
+    std::vector<float> radius_, root_friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
     float largest_ = 0, least_ = 0;
     bool bounces_ = false, fresh_ = true, stale_ = true, backwards_ = false, uneven_ = false;
     RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};

@@ -29,8 +29,12 @@ std::int64_t cell_of(double x, double width)
 // A sum of radii in single precision, with room for the rounding of what it is compared with.
 constexpr float rounding = 1 + 0x1p-20f;
 
-// Spheres, or points with their pairs, that are sorted together: in the second-level cache.
-constexpr std::size_t bucket_size = 8192;
+// Spheres whose neighbours are looked for together: a fraction of a millisecond's work, so that a few thousand are enough for
+// several threads.
+constexpr std::size_t spheres_a_task = 2048;
+
+// How many spheres, or points with their pairs, are sorted together: in the second-level cache, and on all threads.
+std::size_t bucket_size(std::size_t n) { return std::clamp<std::size_t>(n / 8, spheres_a_task, 8192); }
 
 // Spheres that are tested at a time.
 constexpr std::uint32_t lanes = 8;
@@ -178,19 +182,19 @@ void ContactSearch::fill(Cells& cells, std::span<const Vec3d> P, Strided<float> 
 template <class F>
 void ContactSearch::sort_dense(Cells& cells, std::size_t all, const F& sphere)
 {
-    const std::size_t n = cells.size, buckets = n / bucket_size + 1, cells_each = all / buckets + 1;
-    const std::size_t chunks = (n + bucket_size - 1) / bucket_size;
+    const std::size_t n = cells.size, each_size = bucket_size(n), buckets = n / each_size + 1;
+    const std::size_t chunks = (n + each_size - 1) / each_size, cells_each = all / buckets + 1;
     starts_.assign(buckets * chunks + 1, 0);
-    const auto each = [&](const auto& f) { for_each_chunk(n, f, bucket_size); };
+    const auto each = [&](const auto& f) { for_each_chunk(n, f, each_size); };
     each([&](std::size_t first, std::size_t last) {
-        for (std::size_t m = first; m < last; ++m) ++starts_[keys_[m] / cells_each * chunks + first / bucket_size];
+        for (std::size_t m = first; m < last; ++m) ++starts_[keys_[m] / cells_each * chunks + first / each_size];
     });
     to_places(starts_);
     ends_ = starts_;
     spheres_.resize(n);
     each([&](std::size_t first, std::size_t last) {
         for (std::size_t m = first; m < last; ++m) {
-            Sphere& to = spheres_[ends_[keys_[m] / cells_each * chunks + first / bucket_size]++];
+            Sphere& to = spheres_[ends_[keys_[m] / cells_each * chunks + first / each_size]++];
             to = sphere(m);
             to.cell = static_cast<std::uint32_t>(keys_[m]);
         }
@@ -294,8 +298,8 @@ void ContactSearch::within(const Cells& cells, std::span<const Vec3d> P, Strided
     std::vector<Found>& found = room_for(n);
     const float blur = static_cast<float>(2 * blur_);
     const auto nx = static_cast<std::uint64_t>(cells.count[0]), layer = nx * static_cast<std::uint64_t>(cells.count[1]);
-    for_each_chunk(n, [&](std::size_t first, std::size_t last) {
-        Found& pairs = found[first / chunk_size];
+    const auto look = [&](std::size_t first, std::size_t last) {
+        Found& pairs = found[first / spheres_a_task];
         pairs.clear();
         auto c = static_cast<std::size_t>(
             std::upper_bound(cells.begin.begin(), cells.begin.end(), static_cast<std::uint32_t>(first)) -
@@ -324,7 +328,8 @@ void ContactSearch::within(const Cells& cells, std::span<const Vec3d> P, Strided
                 for_near(cells, m, runs, blur, emit);
             }
         }
-    });
+    };
+    for_each_chunk(n, look, spheres_a_task);
 }
 
 // All of the neighbourhood of each sphere of the finer grid in the coarser.
@@ -333,8 +338,8 @@ void ContactSearch::between(const Cells& fine, const Cells& coarse, std::span<co
     const std::size_t n = fine.size;
     std::vector<Found>& found = room_for(n);
     const float blur = static_cast<float>(2 * blur_);
-    for_each_chunk(n, [&](std::size_t first, std::size_t last) {
-        Found& pairs = found[first / chunk_size];
+    const auto look = [&](std::size_t first, std::size_t last) {
+        Found& pairs = found[first / spheres_a_task];
         pairs.clear();
         for (std::size_t m = first; m < last; ++m) {
             const std::uint32_t a = fine.place[m];
@@ -354,14 +359,15 @@ void ContactSearch::between(const Cells& fine, const Cells& coarse, std::span<co
                     }
                 }
         }
-    });
+    };
+    for_each_chunk(n, look, spheres_a_task);
 }
 
 std::vector<ContactSearch::Found>& ContactSearch::room_for(std::size_t spheres)
 {
     if (used_ == found_.size()) found_.emplace_back();
     std::vector<Found>& found = found_[used_++];
-    found.resize((spheres + chunk_size - 1) / chunk_size);
+    found.resize((spheres + spheres_a_task - 1) / spheres_a_task);
     return found;
 }
 
@@ -399,20 +405,20 @@ void ContactSearch::list(Pairs& pairs, std::size_t points)
     std::vector<const Found*> sources;
     for (const auto& part : std::span(found_).first(used_))
         for (const Found& found : part) sources.push_back(&found);
-    const std::size_t buckets = points / bucket_size + 1, chunks = sources.size();
+    const std::size_t each_size = bucket_size(points), buckets = points / each_size + 1, chunks = sources.size();
     starts_.assign(buckets * chunks + 1, 0);
     const auto each = [&](const auto& f) {
         for_each_chunk(
             chunks, [&](std::size_t c, std::size_t) { f(c); }, 1);
     };
     each([&](std::size_t c) {
-        for (const Pair& pair : *sources[c]) ++starts_[pair.first / bucket_size * chunks + c];
+        for (const Pair& pair : *sources[c]) ++starts_[pair.first / each_size * chunks + c];
     });
     to_places(starts_);
     ends_ = starts_;
     pairs_.resize(starts_.back());
     each([&](std::size_t c) {
-        for (const Pair& pair : *sources[c]) pairs_[ends_[pair.first / bucket_size * chunks + c]++] = pair;
+        for (const Pair& pair : *sources[c]) pairs_[ends_[pair.first / each_size * chunks + c]++] = pair;
     });
     pairs.begin.resize(points + 1);
     pairs.begin[0] = 0;
@@ -420,7 +426,7 @@ void ContactSearch::list(Pairs& pairs, std::size_t points)
     for_each_chunk(
         points + 1,
         [&](std::size_t first, std::size_t last) {
-            const std::size_t bucket = first / bucket_size;
+            const std::size_t bucket = first / each_size;
             last = std::min(last, points);
             if (first == last) return;
             const std::uint32_t start = starts_[bucket * chunks];
@@ -434,7 +440,7 @@ void ContactSearch::list(Pairs& pairs, std::size_t points)
             for (std::size_t i = first; i < last; begin = end[i++])
                 sort_few(pairs.other.data() + begin, pairs.other.data() + end[i]);
         },
-        bucket_size);
+        each_size);
 }
 
 }  // namespace rapid

@@ -40,8 +40,8 @@ constexpr double disturbed = 0.1;
 // they have to give way.
 constexpr double too_deep_to_sleep = 0.05;
 
-// Rows a task: tens of microseconds.
-constexpr std::size_t worth_a_task = 2048;
+// Rows, and points with their pairs, a task: tens of microseconds.
+constexpr std::size_t worth_a_task = 2048, points_a_task = 2048;
 
 // Points in one place are parted somewhere, each pair elsewhere.
 Vec3d somewhere(std::uint32_t i, std::uint32_t j)
@@ -181,7 +181,7 @@ void Contacts::schedule()
     const std::size_t n = radius_.size(), m = near_.size();
     constexpr std::size_t blocks = 8 * 16 * 16 * 16;
     owner_.resize(m);
-    for_each_chunk(n, [&](std::size_t first, std::size_t last) {
+    const auto find_owners = [&](std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i)
             for (std::uint32_t k = near_.begin[i]; k < near_.begin[i + 1]; ++k) {
                 const auto &a = searched_.block(i), &b = searched_.block(near_.other[k]);
@@ -193,7 +193,8 @@ void Contacts::schedule()
                 }
                 owner_[k] = static_cast<std::uint16_t>(colour << 12 | place);
             }
-    });
+    };
+    for_each_chunk(n, find_owners, points_a_task);
     std::vector<std::uint32_t> next(blocks + 1);
     for (const std::uint16_t owner : owner_) ++next[owner + 1];
     std::partial_sum(next.begin(), next.end(), next.begin());

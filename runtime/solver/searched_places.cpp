@@ -14,7 +14,7 @@ namespace {
 constexpr double least_slack = 0.4, most_slack = 1, slack_substeps = 4;
 
 // Blocks whose points are handed to a thread together.
-constexpr std::size_t blocks_a_task = 64;
+constexpr std::size_t blocks_a_task = 16;
 
 }  // namespace
 

@@ -17,12 +17,15 @@ constexpr double push = 0.5;
 // A point lies on a shape that is as near to it as this, in radii.
 constexpr double flush = 0.01;
 
+// Points that are seen to together.
+constexpr std::size_t points_a_task = 2048;
+
 }  // namespace
 
 ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size)
     : obstacles_(obstacles),
       size_(size),
-      rows_((size + chunk_size - 1) / chunk_size),
+      rows_((size + points_a_task - 1) / points_a_task),
       before_(rows_.size()),
       clearance_(obstacles.size() * size, -1.0f)
 {
@@ -39,7 +42,7 @@ void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& 
         row.obstacle = load.obstacle;
         row.pressed = row.held = 0.5 * dt * load.normal;
         row.rubbed = dt * load.tangent.cast<double>();
-        rows_[i / chunk_size].push_back(row);
+        rows_[i / points_a_task].push_back(row);
     }
     for (Batch& rows : rows_)
         std::sort(rows.begin(), rows.end(),
@@ -60,9 +63,9 @@ void ShapeContacts::prepare(Substep& now, std::span<const Vec3d> free)
 {
     if (asked_at_.empty()) asked_at_.assign(free.begin(), free.end());
     std::swap(rows_, before_);
-    for_each_chunk(size_, [&](std::size_t begin, std::size_t end) {
-        Batch& rows = rows_[begin / chunk_size];
-        find(rows, before_[begin / chunk_size], now, free, begin, end);
+    const auto see_to = [&](std::size_t begin, std::size_t end) {
+        Batch& rows = rows_[begin / points_a_task];
+        find(rows, before_[begin / points_a_task], now, free, begin, end);
         for (Row& row : rows) {
             const double w = now.at[row.i].w;
             if (!(row.pressed > 0) || !(w > 0)) continue;
@@ -70,7 +73,8 @@ void ShapeContacts::prepare(Substep& now, std::span<const Vec3d> free)
             now.at[row.i].P += w * now.dt * half;
             now.v[row.i] += w * half;
         }
-    });
+    };
+    for_each_chunk(size_, see_to, points_a_task);
 }
 
 void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::span<const Vec3d> free, std::size_t begin,

@@ -22,7 +22,9 @@
 namespace rapid {
 namespace {
 
-constexpr double most_voxels = 0x1p31;  // of a level set
+// Of a level set; and of one whose band is wider than the shape itself, which takes 4 s to fill and 1.5 GiB to hold:
+// what keeps so large points out needs no such small voxels.
+constexpr double most_voxels = 0x1p31, most_around = 0x1p27;
 
 struct Solve {
     int substeps = 1, iterations = 1, max_substeps = 64;
@@ -249,10 +251,12 @@ private:
         const Eigen::Array3d size = shape->bounds().sizes().array() / shape->voxel();
         const double band = needed / shape->voxel();
         const double voxels = (size + 2 * band).prod() - (size - 2 * band).max(0).prod();
-        if (voxels > most_voxels)
-            throw Error(fmt::format("points with a radius of {:g} m need a band of {:.0f} voxels of {:g} m around its "
-                                    "level set, some {:.1e} in all; at most {:.1e} fit: give it a larger voxel",
-                                    needed - 2 * shape->voxel(), band, shape->voxel(), voxels, most_voxels))
+        const double most = band > size.maxCoeff() ? most_around : most_voxels;
+        if (voxels > most)
+            throw Error(
+                fmt::format("points with a radius of {:.4g} m need a band of {:.0f} voxels of {:g} m around its "
+                            "level set, some {:.1e} in all; at most {:.1e} fit: give it a larger voxel",
+                            needed - 2 * shape->voxel(), band, shape->voxel(), voxels, most))
                 .in_node(collider.node)
                 .at(collider.location);
         return shape->with_band(needed);

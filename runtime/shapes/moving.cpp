@@ -27,10 +27,13 @@ public:
         // The relative velocity is linear in time, so its size is largest at an end; the way between is off its chord
         // by a T²/8 at most.
         const double speed = std::max(begin.relative_velocity.norm(), end.relative_velocity.norm());
-        const double arm = std::max(begin.arm.norm(), end.arm.norm()) + a * T * T / 8;
-        acceleration_ = (a + 2 * turning * speed + turning * turning * arm + 2 * growth * (speed + turning * arm) +
-                         2 * growth * growth * arm) /
-                        k;
+        const double sag = a * T * T / 8, arm = std::max(begin.arm.norm(), end.arm.norm()) + sag;
+        // From the axis: of what lies along it nothing turns.
+        const auto lever = [&](const Vec3d& x) { return x.cross(piece.spin).norm(); };
+        const double turned = turning > 0 ? std::max(lever(begin.arm), lever(end.arm)) + turning * sag : 0;
+        acceleration_ =
+            (a + 2 * turning * speed + turning * turned + 2 * growth * (speed + turned) + 2 * growth * growth * arm) /
+            k;
         level_speed_ = std::abs(piece.growth) / (k * k);
         level_acceleration_ = 2 * growth * growth / k;
     }
@@ -87,7 +90,7 @@ struct Walker {
     int steps = 0;
 };
 
-class MovingShape final : public Shape {
+class MovingShape final : public RigidBody {
 public:
     MovingShape(ShapePtr rest, MotionTrack track)
         : rest_(std::move(rest)),
@@ -127,6 +130,17 @@ public:
 
     bool moves() const override { return true; }
     Vec3d velocity_at(const Vec3d& P, double time) const override { return track_.velocity_at(time).at(P); }
+    // Of x = T + k R X with X' constant: centripetal, Coriolis', and their kin by growth.
+    Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const override
+    {
+        const Piece& piece = track_.piece_at(time);
+        if (piece.only_translates()) return piece.a;
+        const Pose pose = piece.at(time);
+        const Vec3d arm = P - pose.translation, slip = v - piece.velocity_at(time).at(P);
+        const double growth = piece.growth / pose.scale;
+        const Vec3d turned = piece.spin.cross(arm);
+        return piece.a + piece.spin.cross(turned) + 2 * growth * turned + 2 * (piece.spin.cross(slip) + growth * slip);
+    }
 
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {
@@ -320,14 +334,15 @@ private:
     // A step of all walkers in turn, with one question to the rest shape.
     void walk(std::vector<Walker>& walkers, std::span<const Path> paths, std::span<Contact> contacts) const
     {
-        std::vector<double> next, phi;
+        std::vector<double> next, phi, hops;
         std::vector<Vec3d> X, gradient;
         while (true) {
             std::erase_if(walkers, [&](Walker& w) { return is_over(w, paths[w.path], contacts[w.path]); });
             if (walkers.empty()) return;
-            next.clear(), X.clear();
+            next.clear(), X.clear(), hops.clear();
             for (const Walker& w : walkers) {
-                next.push_back(std::min(w.end, w.s + step(w)));
+                hops.push_back(hop_of(w, paths[w.path]));
+                next.push_back(std::min(w.end, w.s + std::max(step(w), hops.back())));
                 X.push_back(w.seen.at(next.back()).X);
             }
             ask(X, phi, gradient);
@@ -340,7 +355,8 @@ private:
                     w.end = w.s;
                     continue;
                 }
-                if (!(next[i] > w.s)) {  // below the rounding of the time: as good as there
+                // Below the surface after a hop, or below the rounding of the time: as good as there.
+                if ((f < 0 && hops[i] > 0) || !(next[i] > w.s)) {
                     meet(w, w.s, contacts[w.path]);
                     w.end = w.s;
                     continue;
@@ -370,6 +386,16 @@ private:
             if (w.steps >= most) return meet(w, w.s, contact), true;
         }
         return !(w.s < w.end);
+    }
+
+    // Along a face of a convex shape, flush with it, the bound on the acceleration would make steps of nothing but
+    // rounding: s of a hop that may dip into the surface by no more than what counts as flush; 0 elsewhere.
+    double hop_of(const Walker& w, const Path& path) const
+    {
+        const double acceleration = w.seen.acceleration(w.level);
+        if (!convex_ || !(acceleration > 0)) return 0;
+        const double scale = w.seen.at(w.s).scale, near = flush(path, scale * rounding_) / scale;
+        return w.f <= near && w.slope * w.slope <= 2 * acceleration * near ? 2 * std::sqrt(2 * near / acceleration) : 0;
     }
 
     // s that the walker can go without reaching the surface; of a field that is no convex function, or a quarter of the

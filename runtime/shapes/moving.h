@@ -7,6 +7,14 @@
 
 namespace rapid {
 
+// A body whose every part moves with it.
+class RigidBody : public Shape {
+public:
+    // The acceleration, m/s², of what moves at the velocity v (m/s) at a place, straight and evenly as the body sees
+    // it: what is accelerated otherwise is pressed to its surface, or drawn off it. time: s since its interval began.
+    virtual Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const = 0;
+};
+
 // Between two frames, whole or not; times (Path::begin, distance_at) are in seconds since `from`. distance() is that at
 // the end. On one thread, as the motion is asked here, ahead; the result is asked from any.
 //

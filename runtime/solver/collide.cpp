@@ -101,6 +101,7 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points)
       bounds(shape->bounds()),
       feature(shape->smallest_feature()),
       moves(shape->moves()),
+      body(dynamic_cast<const RigidBody*>(shape)),
       plane(shape->half_space()),
       method(collider.method),
       response(collider.response),
@@ -236,6 +237,12 @@ void Collisions::hold_stuck(std::span<const double> dt)
                 no_surface};
         }
     }
+}
+
+// Of what goes on along a surface as it is; zero where that is not known.
+Vec3d Collisions::acceleration_of(const Obstacle& obstacle, const Vec3d& P, const Vec3d& v, double time) const
+{
+    return obstacle.body ? obstacle.body->acceleration_at(P, v, time) : Vec3d(Vec3d::Zero());
 }
 
 // The unit normal of a shape's field; zero where it has none.
@@ -383,6 +390,7 @@ bool Collisions::slides_on_plane(std::size_t i, const Vec3d& a, double dt)
     const int o = obstacle_[i];
     const Obstacle& obstacle = obstacles_[o];
     if (obstacle.response == Response::Stick || obstacle.response == Response::Die) return false;
+    if (!acceleration_of(obstacle, P_[i], v_[i], since_begin(i, dt)).isZero(0)) return false;
     const double g = -a.dot(contact.n), vn = (v_[i] - contact.vc).dot(contact.n);
     const double flush = flush_within(P_[i], obstacle.radius[places_[i]], obstacle.feature * 0x1p-21);
     if (!(g > 0) || vn * vn > 2 * g * flush) return false;
@@ -462,11 +470,11 @@ bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
         t.way = Traveller::Free;
         t.stops = false;
         if (t.supports == 0) return true;
-        if (chatters(t)) {
-            v = t.on[0].vc;
-            P_[t.i] += t.left * v;
-            return false;
-        }
+        const auto ride = [&](const Support& on) {
+            P_[t.i] += t.left * (on.vc + 0.5 * t.left * on.ac);
+            v = on.vc + t.left * on.ac;
+        };
+        if (chatters(t)) return ride(t.on[0]), false;
 
         Slide slide;
         bool flat = t.on[0].flat;
@@ -483,24 +491,22 @@ bool Collisions::plan(Traveller& t, Path& path, const Vec3d& a, double dt)
             }
         }
         if (slide.kind == Slide::Leaves) continue;
-        if (slide.kind == Slide::Sticks) {
-            v = t.on[0].vc;
-            P_[t.i] += t.left * v;
-            return false;
-        }
+        if (slide.kind == Slide::Sticks) return ride(t.on[0]), false;
         path.a = slide.a;
         path.duration = slide.duration;
         t.stops = slide.stops;
         if (flat) {
             t.way = Traveller::Straight;
+            path.a += t.on[0].ac;
         } else if (t.supports == 1) {
-            t.way = Traveller::Curved;
+            t.way = Traveller::Curved;  // in the surface's frame, to the end of the piece
             if (path.duration > t.piece) path.duration = t.piece, t.stops = false;
             if (++t.events >= most_contacts) return ++limited, false;
         } else {
             // Along the edge of curved surfaces in short straight pieces; each ends in the air, or within rounding of
             // the surfaces, where the next contact finds it.
             t.way = Traveller::Straight;
+            path.a += t.on[0].ac;
             double most = dt / 16;
             if (const double feature = std::max(t.on[0].feature, t.on[1].feature); feature > 0)
                 most = std::min(most, detail::time_to_travel(feature, path.v.norm(), path.a.norm()));
@@ -576,7 +582,7 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
         const double cosine = n.dot(n1), turn = length > 0 ? (n1 - n).dot(d) / length : 0;
         const double curvature = length > 0 ? turn / length : 0;
         const double least = least_piece(obstacle, path, dt[t.i]);
-        const bool leaves = -a[t.i].dot(n) - curvature * path.v.squaredNorm() < 0;
+        const bool leaves = -(a[t.i] - t.on[0].ac).dot(n) - curvature * path.v.squaredNorm() < 0;
         const bool kink = turn < -least_kink && -curvature * 2 * obstacle.feature > 1;
         if (s > least && (cosine < least_cosine || leaves || kink || !(slope > 0))) {
             t.piece = std::max(s / 4, least);
@@ -602,7 +608,7 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
             contact.n = n1;
             contact.vc = t.on[0].vc;
             path.v += contact.vc;
-            meet(t, path.P, path.v, path.a, contact, o, dt[t.i]);
+            meet(t, path.P, path.v, path.a + t.on[0].ac, contact, o, dt[t.i]);
             t.way = Traveller::Waits;
             continue;
         }
@@ -635,7 +641,7 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
         const Support& on = t.on[0];
         const double slope = gradients_[j].norm(), s = path.duration;
         end.P = asked_P_[j];
-        end.a = path.a;
+        end.a = path.a + on.ac;
         end.n = slope > 0 ? Vec3d(gradients_[j] / slope) : on.n;
         const auto turned = [&](const Vec3d& x) { return carried(x, on.n, end.n); };
         if (t.stops) {
@@ -651,19 +657,20 @@ void Collisions::bend_on(int o, Strided<Vec3d> a, std::span<const double> dt)
                 t.way = Traveller::Waits;
                 continue;
             }
-            const Vec3d a1 = next.kind == Slide::Moves ? next.a : Vec3d(a[t.i] - a[t.i].dot(end.n) * end.n);
+            const Vec3d pull = a[t.i] - on.ac;
+            const Vec3d a1 = next.kind == Slide::Moves ? next.a : Vec3d(pull - pull.dot(end.n) * end.n);
             end.v = turned(path.v + 0.5 * s * path.a) + 0.5 * s * a1;
             end.v -= end.n.dot(end.v) * end.n;
             // The energy is known better than the velocity, whose direction that leaves: the weight's work along the
             // way, less that of friction, which is what else is in the accelerations. A point that turns back is left
             // out: its speed is the small difference of larger ones.
-            const double friction0 = (a[t.i] - path.a).dot(path.v), friction1 = (a[t.i] - a1).dot(end.v);
-            const double speed2 = path.v.squaredNorm() + 2 * a[t.i].dot(end.P - path.P) - s * (friction0 + friction1);
+            const double friction0 = (pull - path.a).dot(path.v), friction1 = (pull - a1).dot(end.v);
+            const double speed2 = path.v.squaredNorm() + 2 * pull.dot(end.P - path.P) - s * (friction0 + friction1);
             const double scale2 = speed2 / end.v.squaredNorm();
             if (scale2 > 0.8 && scale2 < 1.25) end.v *= std::sqrt(scale2);
         }
-        end.v += on.vc;
-        end.P += s * on.vc;
+        end.v += on.vc + s * on.ac;
+        end.P += s * (on.vc + 0.5 * s * on.ac);
         t.piece = std::min(2 * s, dt[t.i]);
         // What else may be in the way is looked for along the chord.
         if (s > 0) path.v = (end.P - path.P) / s;
@@ -749,14 +756,16 @@ void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d&
     const Vec3d& n = contact.n;
     const Vec3d relative = v - contact.vc;
     const double vn = relative.dot(n);
-    const double g = -a.dot(n) - contact.curvature * (relative - vn * n).squaredNorm();
+    const Vec3d along = v - vn * n;
+    const Vec3d ac = acceleration_of(obstacle, P, along, since_begin(t.i, t.left));
+    const double g = -(a - ac).dot(n) - contact.curvature * (along - contact.vc).squaredNorm();
     const double u = vn < 0 ? -bounce * vn : vn;
     const double flush = flush_within(P, obstacle.radius[places_[t.i]], obstacle.feature * 0x1p-21);
     const double rising2 = g > 0 ? 2 * g * flush : 0;  // of a speed that lifts by less than rounding
     const bool hits = vn < 0 && vn * vn > rising2;
     const double when = consequences_.time - after_[t.i] - t.left;
 
-    const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature};
+    const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature, ac};
     if (g < 0 && vn >= -tangential * relative.norm()) {
         // Flush with the surface, and drawn off it: the next moments belong to the path. (An approach by rounding alone
         // would be met here again and again, at the same moment.)
@@ -968,9 +977,16 @@ void Collisions::proceed(Traveller& t, const Path& path, const Bend& end)
         on.curvature = end.curvature;
     } else {
         P_[t.i] = place(path, path.duration);
-        v_[t.i] = t.stops ? on.vc : Vec3d(path.v + path.duration * path.a);
+        v_[t.i] = path.v + path.duration * path.a;
     }
     t.left -= path.duration;
+    if (t.supports > 0 && !on.ac.isZero(0)) {
+        const Obstacle& obstacle = obstacles_[on.collider];
+        const double now = since_begin(t.i, t.left);
+        on.vc = obstacle.shape->velocity_at(P_[t.i], now);
+        on.ac = acceleration_of(obstacle, P_[t.i], t.stops ? on.vc : v_[t.i], now);
+    }
+    if (t.stops) v_[t.i] = on.vc;
     if (t.supports == 2 && !(on.flat && t.on[1].flat)) t.supports = 0;
 }
 

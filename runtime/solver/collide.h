@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "runtime/points/column.h"
+#include "runtime/shapes/moving.h"
 #include "runtime/shapes/shape.h"
 #include "runtime/solver/contact_energy.h"
 #include "runtime/solver/damped_motion.h"
@@ -34,6 +35,7 @@ struct Obstacle {
     Box3d bounds;
     double feature;  // m, the shape's smallest
     bool moves;
+    const RigidBody* body;  // null where it does not move as one
     std::optional<HalfSpace> plane;
     Method method;
     Response response;
@@ -164,6 +166,7 @@ private:
     void settle(Traveller& t, const Support& support, const Vec3d& v);
     void touch(std::size_t i);
     void hold_stuck(std::span<const double> dt);
+    Vec3d acceleration_of(const Obstacle& obstacle, const Vec3d& P, const Vec3d& v, double time) const;
     Vec3d normal_at(const Obstacle& obstacle, const Vec3d& P, double time) const;
     bool takes(Traveller& t, const Contact& contact, int obstacle);
     void count(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double speed, const Vec3d& change,

@@ -21,13 +21,14 @@ constexpr double rounding = 0x1p-48;
 
 }  // namespace
 
-// With N = g - κ |vt|² the surface's force a mass, g = -a·n, and at = a + g n:
+// With a the acceleration in the surface's frame, N = g - κ |vt|² the surface's force a mass, g = -a·n, at = a + g n:
 //
 //   at rest    the point stays while |at| <= μ N, else a' = at (1 - μ N / |at|)
 //   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece
-Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& a, double left, double least)
+Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double left, double least)
 {
     const Vec3d& n = support.n;
+    const Vec3d a = pull - support.ac;
     const Vec3d relative = v - support.vc;
     const Vec3d vt = relative - relative.dot(n) * n;
     const double g = -a.dot(n), speed2 = vt.squaredNorm();
@@ -84,10 +85,10 @@ Vec3d edge_of(const Support& A, const Support& B)
 //   NA = (gA - c gB) / (1 - c²),   NB = (gB - c gA) / (1 - c²)
 //
 // and friction takes up to μA NA + μB NB along e.
-Slide slide_along(const Support& A, const Support& B, const Vec3d& v, const Vec3d& a, double left, int& lifted)
+Slide slide_along(const Support& A, const Support& B, const Vec3d& v, const Vec3d& pull, double left, int& lifted)
 {
-    const Vec3d e = edge_of(A, B);
-    const double c = A.n.dot(B.n), gA = -a.dot(A.n), gB = -a.dot(B.n);
+    const Vec3d e = edge_of(A, B), a = pull - A.ac;
+    const double c = A.n.dot(B.n), gA = -a.dot(A.n), gB = -(pull - B.ac).dot(B.n);
     const double sine2 = (1 - c) * (1 + c);
     const double NA = (gA - c * gB) / sine2, NB = (gB - c * gA) / sine2;
     lifted = -1;

@@ -14,9 +14,13 @@ struct Support {
     double friction;   // μ
     bool flat;         // a plane
     double feature;    // m, the shape's smallest
+
+    // m/s², of what goes straight on along the surface as the body sees it (RigidBody)
+    Vec3d ac = Vec3d::Zero();
 };
 
-// What comes next: the parabola of constant acceleration `a` for `duration`, if the surface stays flat.
+// What comes next: the parabola of constant acceleration `a`, in the surface's frame, for `duration`, if the surface
+// stays flat.
 struct Slide {
     enum Kind {
         Leaves,  // nothing presses the point to the surface: it moves freely

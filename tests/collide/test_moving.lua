@@ -48,6 +48,38 @@ describe("a wall that moves", function()
     assert.near(0.5 - 0.5 * math.cos(9), result[73][1].P.y, 0.02)
   end)
 
+  -- Flush with a box that turns a point is a bead on a rod: pressed by Coriolis' force, it goes outwards as cosh ωt.
+  it("presses what lies flush with a face that turns, however it would bounce", function()
+    local rate = math.rad(90)
+    local expected = math.cosh(rate / 2)
+    local function off(bounce, substeps)
+      local p = run(([[:collide { shape = rapid.shape.box { size = {8, 0.1, 1} }, bounce = %g, record = 0,
+        transform = function(frame) return rapid.rotate({0, 0, 1}, 90 * frame.time) end }]]):format(bounce),
+        ("P = {{1, 0.05, 0}}, v = {{%.9g, %.9g, 0}}"):format(-0.05 * rate, rate), 13, substeps)[13][1]
+      local cos, sin = math.cos(rate / 2), math.sin(rate / 2)
+      assert.near(0.05, cos * p.P.y - sin * p.P.x, 1e-5)
+      assert.truthy(p.hittotal < 100, p.hittotal) -- its hops grow no lower than rounding
+      return math.abs(cos * p.P.x + sin * p.P.y - expected)
+    end
+    assert.truthy(off(0, 1) < 5e-3)
+    assert.truthy(off(0, 4) < off(0, 1) / 3) -- of first order in how its frame turns
+    assert.truthy(off(1, 1) < 1e-4)
+  end)
+
+  it("keeps outside what is born in a body that turns about a place beside it, in few contacts", function()
+    local points = run([[:collide { bounce = 1, record = 0, cut = {},
+      shape = rapid.shape.sphere { radius = 0.147, center = {-0.063, 0.063, -0.063} },
+      transform = function(frame) return rapid.rotate({0, 0, 1}, 152 * frame.time) end }]],
+      "P = {{0, 0, 0}, {0.03, -0.02, 0.01}, {-0.04, 0.05, 0.02}}", 6, 16)[6]
+    local angle = math.rad(152 * 5 / 24)
+    local cos, sin = math.cos(angle), math.sin(angle)
+    local center = vec3(-0.063 * (cos + sin), 0.063 * (cos - sin), -0.063)
+    for i = 1, 3 do
+      assert.truthy((points[i].P - center):length() > 0.147 - 1e-7)
+      assert.truthy(points[i].hittotal < 100, points[i].hittotal)
+    end
+  end)
+
   it("drives points along by friction up to its speed, as a conveyor does", function()
     local result = run([[:gravity {} :collide { shape = rapid.shape.plane {}, friction = 0.4,
       transform = function(frame) return rapid.translate(2 * frame.time, 0, 0) end }]], "P = {{0, 0, 0}}", 49)

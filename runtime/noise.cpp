@@ -121,56 +121,78 @@ struct Octave {
     Axis<One> time;
 };
 
-// Values and gradients of `fields` independent noises on one lattice, at x, w; added to what is there.
-template <class Lane, int fields, bool moves>
-inline void add_octave(const typename Lane::Real (&x)[3], const Octave& octave, typename Lane::Real (&value)[fields],
-                       typename Lane::Real (&gradient)[fields][3])
+// Value and gradient of a noise at x, w; added to what is there.
+inline void add_octave(const double (&x)[3], const Octave& octave, double& value, double (&gradient)[3])
+{
+    const Axis<One>& time = octave.time;
+    const Axis<One> axes[3] = {Axis<One>(x[0]), Axis<One>(x[1]), Axis<One>(x[2])};
+    for (std::uint32_t dw = 0; dw < (time.f == 0 ? 1u : 2u); ++dw) {
+        const double weight_w = octave.amount * (dw ? time.s : 1 - time.s);
+        const std::uint32_t hash_w = mixed(mixed(octave.seed) + time.corner + dw);
+        for (std::uint32_t corner = 0; corner < 8; ++corner) {
+            const std::uint32_t d[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
+            std::uint32_t hash = hash_w;
+            for (int axis = 2; axis >= 0; --axis) hash = mixed(axes[axis].corner + hash + d[axis]);
+            double weights[3], g[4];
+            for (int axis = 0; axis < 3; ++axis) weights[axis] = d[axis] ? axes[axis].s : 1.0 - axes[axis].s;
+            gradient_of<4>(One::wide(hash), g);
+            double along = g[3] * (time.f - dw);
+            for (int axis = 0; axis < 3; ++axis) along += g[axis] * (axes[axis].f - d[axis]);
+            const double weight = weight_w * weights[0] * weights[1] * weights[2];
+            value += weight * along;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double slope = d[axis] ? axes[axis].slope : -axes[axis].slope;
+                const double others = weights[(axis + 1) % 3] * weights[(axis + 2) % 3];
+                gradient[axis] += weight_w * slope * others * along + weight * g[axis];
+            }
+        }
+    }
+}
+
+// The curl at x, w of an octave of three noises on one lattice, summed over the corners of the cell: of each the curl
+// of its gradients, and how its weight changes across its values.
+template <class Lane, bool moves>
+inline void curl_of_octave(const typename Lane::Real (&x)[3], const Octave& octave, typename Lane::Real (&curl)[3])
 {
     const Axis<One>& time = octave.time;
     using Real = typename Lane::Real;
     using Bits = typename Lane::Bits;
     const Axis<Lane> axes[3] = {Axis<Lane>(x[0]), Axis<Lane>(x[1]), Axis<Lane>(x[2])};
+    Real to[2][3];  // from the corner below, and from that above
+    for (int axis = 0; axis < 3; ++axis) to[0][axis] = axes[axis].f, to[1][axis] = axes[axis].f - 1.0;
 
     for (std::uint32_t dw = 0; dw < (moves ? 2u : 1u); ++dw) {
-        const double weight_w = octave.amount * (dw ? time.s : 1 - time.s);
+        const double weight_w = dw ? time.s : 1 - time.s;
         const std::uint32_t hash_w = mixed(mixed(octave.seed) + time.corner + dw);
 #pragma GCC unroll 2
         for (std::uint32_t dz = 0; dz < 2; ++dz) {
             const Bits hash_z = mixed(axes[2].corner + (hash_w + dz));
             Real weight_z = dz ? axes[2].s : 1.0 - axes[2].s;
             Real slope_z = dz ? axes[2].slope : -axes[2].slope;
-            if constexpr (!moves) {  // then the weight in time is a power of 2: the same bits wherever it comes in
-                weight_z *= weight_w;
-                slope_z *= weight_w;
-            }
-            const auto in_time = [&](const Real& weight) {
-                if constexpr (moves)
-                    return Real(weight * weight_w);
-                else
-                    return weight;
-            };
+            if constexpr (moves) weight_z *= weight_w, slope_z *= weight_w;
 #pragma GCC unroll 2
             for (std::uint32_t dy = 0; dy < 2; ++dy) {
                 const Bits hash_y = mixed(axes[1].corner + (hash_z + dy));
                 const Real weight_y = dy ? axes[1].s : 1.0 - axes[1].s;
                 const Real slope_y = dy ? axes[1].slope : -axes[1].slope;
+                const Real weight_yz = weight_y * weight_z;
+                const Real slope_yz = slope_y * weight_z, slope_zy = weight_y * slope_z;
 #pragma GCC unroll 2
                 for (std::uint32_t dx = 0; dx < 2; ++dx) {
                     typename Lane::Words bits = Lane::wide(mixed(axes[0].corner + (hash_y + dx)));
                     const Real weight_x = dx ? axes[0].s : 1.0 - axes[0].s;
                     const Real slope_x = dx ? axes[0].slope : -axes[0].slope;
-                    const Real to[3] = {axes[0].f - dx, axes[1].f - dy, axes[2].f - dz};
-                    const Real weight_xy = weight_x * weight_y, weight = in_time(weight_xy * weight_z);
-                    const Real slopes[3] = {in_time(slope_x * weight_y * weight_z),
-                                            in_time(weight_x * slope_y * weight_z), in_time(weight_xy * slope_z)};
-                    for (int k = 0; k < fields; ++k, bits >>= 6) {
-                        Real g[4];
-                        gradient_of<moves ? 4 : 3>(bits, g);
-                        Real along = g[0] * to[0] + g[1] * to[1] + g[2] * to[2];
-                        if constexpr (moves) along += g[3] * (time.f - dw);
-                        value[k] += weight * along;
-                        for (int axis = 0; axis < 3; ++axis)
-                            gradient[k][axis] += slopes[axis] * along + weight * g[axis];
+                    const Real weight = weight_x * weight_yz;
+                    const Real slopes[3] = {slope_x * weight_yz, weight_x * slope_yz, weight_x * slope_zy};
+                    Real g[3][4], along[3];
+                    for (int k = 0; k < 3; ++k, bits >>= 6) {
+                        gradient_of<moves ? 4 : 3>(bits, g[k]);
+                        along[k] = g[k][0] * to[dx][0] + g[k][1] * to[dy][1] + g[k][2] * to[dz][2];
+                        if constexpr (moves) along[k] += g[k][3] * (time.f - dw);
+                    }
+                    for (int k = 0; k < 3; ++k) {
+                        const int l = (k + 1) % 3, m = (k + 2) % 3;
+                        curl[k] += weight * (g[m][l] - g[l][m]) + (slopes[l] * along[m] - slopes[m] * along[l]);
                     }
                 }
             }
@@ -202,24 +224,11 @@ private:
     std::array<Octave, NoiseOptions::most_octaves> all_;
 };
 
-// The sum of the octaves. Gradients are of each octave's own lattice where `of_lattice`: all as strong as its values.
-template <class Lane, int fields>
-inline void add_octaves(const typename Lane::Real (&P)[3], const Octaves& octaves, bool of_lattice,
-                        typename Lane::Real (&value)[fields], typename Lane::Real (&gradient)[fields][3])
+// Where a place is in an octave's lattice.
+template <class Lane>
+inline void place_in(const Octave& octave, const typename Lane::Real (&P)[3], typename Lane::Real (&x)[3])
 {
-    for (const Octave& octave : octaves) {
-        const typename Lane::Real x[3] = {P[0] * octave.fineness + octave.shift,
-                                          P[1] * octave.fineness + 2 * octave.shift,
-                                          P[2] * octave.fineness + 3 * octave.shift};
-        typename Lane::Real slope[fields][3] = {};
-        if (octave.time.f == 0)
-            add_octave<Lane, fields, false>(x, octave, value, slope);
-        else
-            add_octave<Lane, fields, true>(x, octave, value, slope);
-        for (int k = 0; k < fields; ++k)
-            for (int axis = 0; axis < 3; ++axis)
-                gradient[k][axis] += slope[k][axis] * (of_lattice ? 1 : octave.fineness);
-    }
+    for (int axis = 0; axis < 3; ++axis) x[axis] = P[axis] * octave.fineness + (axis + 1) * octave.shift;
 }
 
 // 1 + r + r² + ... of n octaves.
@@ -241,22 +250,33 @@ template <class Lane>
 inline void curl_of(const typename Lane::Real (&P)[3], const Octaves& octaves, double scale,
                     typename Lane::Real (&curl)[3])
 {
-    typename Lane::Real potential[3] = {}, d[3][3] = {};
-    add_octaves<Lane, 3>(P, octaves, true, potential, d);
-    curl[0] = (d[2][1] - d[1][2]) * scale;
-    curl[1] = (d[0][2] - d[2][0]) * scale;
-    curl[2] = (d[1][0] - d[0][1]) * scale;
+    for (int k = 0; k < 3; ++k) curl[k] = typename Lane::Real{};
+    for (const Octave& octave : octaves) {
+        typename Lane::Real x[3], one[3] = {};
+        place_in<Lane>(octave, P, x);
+        if (octave.time.f == 0)
+            curl_of_octave<Lane, false>(x, octave, one);
+        else
+            curl_of_octave<Lane, true>(x, octave, one);
+        for (int k = 0; k < 3; ++k) curl[k] += octave.amount * scale * one[k];
+    }
 }
 
 }  // namespace
 
 double noise(const Vec3d& P, const NoiseOptions& options, Vec3d* gradient)
 {
-    double value[1] = {}, d[1][3] = {};
-    add_octaves<One, 1>({P.x(), P.y(), P.z()}, Octaves(options), false, value, d);
+    double value = 0;
+    Vec3d slope = Vec3d::Zero();
+    for (const Octave& octave : Octaves(options)) {
+        double x[3], d[3] = {};
+        place_in<One>(octave, {P.x(), P.y(), P.z()}, x);
+        add_octave(x, octave, value, d);
+        slope += octave.fineness * Vec3d(d[0], d[1], d[2]);
+    }
     const double scale = 1 / (largest_value * geometric(roughness, options.octaves));
-    if (gradient) *gradient = Vec3d(d[0][0], d[0][1], d[0][2]) * scale;
-    return value[0] * scale;
+    if (gradient) *gradient = slope * scale;
+    return value * scale;
 }
 
 Vec3d curl_noise(const Vec3d& P, const NoiseOptions& options)

@@ -32,22 +32,32 @@ Propagator by_series(double k, double w2, double t)
     return {t * h, t * t * integral, slope, t * h};
 }
 
-// The same without a spring, for any k: by (e^-x - 1 + x)/x², x = k t; the others follow from it without cancellation.
+// Without a spring, by x = k t: e^-x, (1 - e^-x)/x and (e^-x - 1 + x)/x². Up to 1 by the series of the last, from which
+// the others follow without cancellation.
+struct Decay {
+    double slope, h, integral;
+};
+
+inline Decay small_decay(double x)
+{
+    double integral = one_over[terms];
+#pragma GCC unroll 32
+    for (int n = terms - 1; n >= 2; --n) integral = (1 - x * integral) * one_over[n];
+    const double h = 1 - x * integral;
+    return {1 - x * h, h, integral};
+}
+
+Decay large_decay(double x)
+{
+    const double slope = std::exp(-x), h = (1 - slope) / x;
+    return {slope, h, (1 - h) / x};
+}
+
 Propagator respond_to_drag(double k, double t)
 {
     const double x = k * t;
-    double slope, h, integral;  // e^-x, (1 - e^-x)/x and the above
-    if (x <= 1) {
-        integral = one_over[terms];
-        for (int n = terms - 1; n >= 2; --n) integral = (1 - x * integral) * one_over[n];
-        h = 1 - x * integral;
-        slope = 1 - x * h;
-    } else {
-        slope = std::exp(-x);
-        h = (1 - slope) / x;
-        integral = (1 - h) / x;
-    }
-    return {t * h, t * t * integral, slope, t * h};
+    const Decay decay = x <= 1 ? small_decay(x) : large_decay(x);
+    return {t * decay.h, t * t * decay.integral, decay.slope, t * decay.h};
 }
 
 // (e^x - 1)/x
@@ -81,6 +91,27 @@ Propagator respond(double k, double w2, double t)
     return {h, (1 - decay * (c + half * t * s)) / w2, decay * (c - half * t * s), h};
 }
 
+void DragPropagators::respond(std::span<const double> k, std::span<const double> t)
+{
+    const std::size_t size = k.size();
+    for (auto* column : {&x_of_v, &x_of_G, &v_of_v}) column->resize(size);
+    double *xv = x_of_v.data(), *xG = x_of_G.data(), *vv = v_of_v.data();
+    const auto set = [=](std::size_t i, const Decay& decay) {
+        xv[i] = t[i] * decay.h;
+        xG[i] = t[i] * t[i] * decay.integral;
+        vv[i] = decay.slope;
+    };
+    std::size_t small = 0;
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < size; ++i) {
+        const double x = k[i] * t[i];
+        small += x <= 1;
+        set(i, small_decay(x));
+    }
+    for (std::size_t i = 0; small < size && i < size; ++i)
+        if (!(k[i] * t[i] <= 1)) set(i, large_decay(k[i] * t[i]));
+}
+
 double mean_speed(double speed, double a, double c, double t)
 {
     if (!(t > 0)) return speed;
@@ -102,18 +133,21 @@ double mean_speed(double speed, double a, double c, double t)
     return std::max(log_ratio, 0.0) / (c * t);
 }
 
+double drag_rate_along(const Vec3d& direction, const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
+{
+    if (!(linear.c > 0)) return linear.k;
+    const double size = direction.norm();
+    const double along = size > 0 ? G.dot(direction) / size : 0;
+    return linear.k + linear.c * mean_speed(v.norm(), along, linear.c, t);
+}
+
 double drag_rate(const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
 {
     if (!(linear.c > 0)) return linear.k;
-    const auto rate_along = [&](const Vec3d& direction) {
-        const double size = direction.norm();
-        const double along = size > 0 ? G.dot(direction) / size : 0;
-        return linear.k + linear.c * mean_speed(v.norm(), along, linear.c, t);
-    };
     // The direction of the way is not known before the rate is: a second time with that of the first.
-    const double first = rate_along(v.squaredNorm() > 0 ? v : G);
+    const double first = drag_rate_along(v.squaredNorm() > 0 ? v : G, v, G, linear, t);
     const Propagator r = respond(first, linear.w2, t);
-    return rate_along(v + (v * r.v_of_v + G * r.v_of_G));
+    return drag_rate_along(v + (v * r.v_of_v + G * r.v_of_G), v, G, linear, t);
 }
 
 Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t, Responder& respond)

@@ -6,6 +6,9 @@
 // and exact to rounding for k t and w t from 0 to 1e9.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
@@ -17,6 +20,13 @@ struct Propagator {
 
 // k: 1/s, at least 0; w2: 1/s², at least 0; t: s, at least 0.
 Propagator respond(double k, double w2, double t);
+
+// The same without springs, of many, several at a time; shapes [n].
+struct DragPropagators {
+    std::vector<double> x_of_v, x_of_G, v_of_v;  // v_of_G is x_of_v
+
+    void respond(std::span<const double> k, std::span<const double> t);
+};
 
 // The same; where it is asked for what it was asked last, as for points that are alike, it knows it.
 class Responder {
@@ -42,6 +52,9 @@ inline Vec3d acceleration_at_rest(const Vec3d& P, const Vec3d& a, const Linear& 
 // (m/s²) and dragged by c speed² (c: 1/m, above 0): by its closed form. A drag of rate c times this over the step never
 // turns a velocity round, and leaves the terminal speed √(a/c) as it is.
 double mean_speed(double speed, double a, double c, double t);
+
+// The rate of all drag over a time t, as it is along a way in this direction.
+double drag_rate_along(const Vec3d& direction, const Vec3d& v, const Vec3d& G, const Linear& linear, double t);
 
 // The rate of all drag over a time t, of a point at the velocity v that G would accelerate at rest; quadratic drag
 // counts by the mean speed.

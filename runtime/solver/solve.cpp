@@ -432,6 +432,8 @@ private:
         std::vector<Vec3d> own_a;
         std::vector<Linear> own_linear;
         std::vector<Damped> damped;  // the ways of points with linear parts among shapes
+        std::vector<double> rates;   // 1/s, of all drag
+        DragPropagators dragged;
         Forces one;
 
         void begin(const Step& step, std::size_t first, std::size_t size)
@@ -496,12 +498,48 @@ private:
 
         void drift_damped(std::span<const double> t)
         {
+            if (is_springless() && (linear.stride || linear[0].c > 0)) return drift_dragged(t);
             Responder responder;
             for (std::size_t i = 0; i < P.size(); ++i) {
                 const Vec3d G = acceleration_at_rest(P[i], a[i], linear[i]);
                 const Propagator& r = responder(drag_rate(v[i], G, linear[i], t[i]), linear[i].w2, t[i]);
                 P[i] += v[i] * r.x_of_v + G * r.x_of_G;
                 v[i] = v[i] * r.v_of_v + G * r.v_of_G;
+            }
+        }
+
+        bool is_springless() const
+        {
+            for (std::size_t i = 0; i < (linear.stride ? P.size() : 1); ++i)
+                if (linear[i].w2 > 0) return false;
+            return true;
+        }
+
+        // The same, with the exponentials of all points at once. Quadratic drag goes as drag_rate() has it.
+        void drift_dragged(std::span<const double> t)
+        {
+            const std::size_t size = P.size();
+            const auto G = [&](std::size_t i) { return acceleration_at_rest(P[i], a[i], linear[i]); };
+            rates.resize(size);
+            bool quadratic = false;
+            for (std::size_t i = 0; i < size; ++i) {
+                rates[i] = linear[i].k;
+                quadratic |= linear[i].c > 0;
+            }
+            if (quadratic) {
+                for (std::size_t i = 0; i < size; ++i)
+                    rates[i] = drag_rate_along(v[i].squaredNorm() > 0 ? v[i] : G(i), v[i], G(i), linear[i], t[i]);
+                dragged.respond(rates, t);
+                for (std::size_t i = 0; i < size; ++i) {
+                    const Vec3d after_first = v[i] + (v[i] * dragged.v_of_v[i] + G(i) * dragged.x_of_v[i]);
+                    rates[i] = drag_rate_along(after_first, v[i], G(i), linear[i], t[i]);
+                }
+            }
+            dragged.respond(rates, t);
+            for (std::size_t i = 0; i < size; ++i) {
+                const Vec3d g = G(i);
+                P[i] += v[i] * dragged.x_of_v[i] + g * dragged.x_of_G[i];
+                v[i] = v[i] * dragged.v_of_v[i] + g * dragged.x_of_v[i];
             }
         }
 

@@ -46,6 +46,23 @@ TEST_CASE("drag without a spring is exact to rounding for k t from 1e-9 to 1e9",
     }
 }
 
+TEST_CASE("many drags at once have the bits of each alone", "[damped]")
+{
+    std::vector<double> k, t;
+    for (double x = 1e-9; x < 2e9; x *= 3.1) {
+        k.push_back(x);
+        t.push_back(k.size() % 3 == 0 ? 0 : k.size() % 3 == 1 ? 1.0 : 1.0 / 24);
+    }
+    DragPropagators many;
+    many.respond(k, t);
+    for (std::size_t i = 0; i < k.size(); ++i) {
+        const Propagator alone = respond(k[i], 0, t[i]);
+        CHECK(many.x_of_v[i] == alone.x_of_v);
+        CHECK(many.x_of_G[i] == alone.x_of_G);
+        CHECK(many.v_of_v[i] == alone.v_of_v);
+    }
+}
+
 TEST_CASE("one response leads on from the other: two halves of a time are the whole", "[damped]")
 {
     const double k = GENERATE(0.0, 0.3, 20.0, 1e4), w2 = GENERATE(1e-6, 1.0, 90.0, 100.0, 110.0, 1e6);

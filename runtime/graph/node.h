@@ -17,6 +17,7 @@
 //   void edit(PointSet&, const Evaluation&)                  a point node: changes points at once
 //   void contribute(const Chunk&, Forces&) const             a force: Solve calls it (solver/dynamics.h)
 //   std::optional<Uniform> uniform() const                   a force that is uniform; also besides contribute()
+//   bool add_potential(const Chunk&, std::span<double>) const    besides these: the energy of which it is the slope
 //   DynamicPtr dynamic(const Evaluation&) const              a collider, a constraint, a force with a state of its own
 //   Flow evaluate(std::span<Flow>, const Evaluation&)        anything else (Create, Merge, Solve)
 //
@@ -102,6 +103,10 @@ struct FrameFigures {
     std::optional<Residual::Search> contact_search;
     std::vector<BandFigures> bands;  // by collide node, of those with a level set
     std::vector<double> errors;      // estimated, of the positions of a sample of the points, m
+    // By how much the integrator has changed the energy of each of that sample since its birth, J/kg; and whether an
+    // energy of motion is not defined, because of drags, scripts or couplings.
+    std::vector<double> energy_drift;
+    bool has_no_energy = false;
     std::vector<Stiffness> stiff;
     double script_seconds = 0, solve_seconds = 0;
 
@@ -236,6 +241,13 @@ public:
             return fields_.uniform();
         else
             return std::nullopt;
+    }
+    bool add_potential(const Chunk& chunk, std::span<double> energy) const override
+    {
+        if constexpr (requires { fields_.add_potential(chunk, energy); })
+            return fields_.add_potential(chunk, energy);
+        else
+            return Force::add_potential(chunk, energy);
     }
 
 private:

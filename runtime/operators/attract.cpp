@@ -48,6 +48,20 @@ struct Attract {
             if (d2 > 0) forces.add(i, size[i] / power(d2 + core * core) * towards[i]);
         }
     }
+
+    // Of a shape's surface it has one only where the field is an exact distance, which is not known.
+    bool add_potential(const Chunk& chunk, std::span<double> energy) const
+    {
+        if (shape) return false;
+        const Strided<Vec3f> to = chunk.read(center);
+        const Strided<float> size = chunk.read(strength);
+        for (std::size_t i = 0; i < chunk.size(); ++i) {
+            const double d2 = (to[i].cast<double>() - chunk.P[i]).squaredNorm() + core * core;
+            energy[i] +=
+                size[i] * (falloff == 1 ? 0.5 * std::log(d2) : std::pow(d2, 0.5 * (1 - falloff)) / (1 - falloff));
+        }
+        return true;
+    }
 };
 RAPID_NODE(Attract);
 

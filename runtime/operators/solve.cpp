@@ -12,6 +12,7 @@
 #include "runtime/shapes/deforming.h"
 #include "runtime/shapes/level_set.h"
 #include "runtime/shapes/moving.h"
+#include "runtime/solver/energy_drift.h"
 #include "runtime/solver/error_control.h"
 #include "runtime/solver/interaction.h"
 #include "runtime/solver/shadow.h"
@@ -59,6 +60,7 @@ struct Solve {
         flow.dynamics.clear();
         flow.simulation->state = flow.points;
         shadows_ = Shadows();
+        drift_ = EnergyDrift();
         return flow;
     }
 
@@ -95,23 +97,34 @@ struct Solve {
         }
         const double allowed = tolerance ? *tolerance / clock.subframes : 0;  // m, in this step
         interact(points, flow.dynamics, options);
-        if (!coupled) shadows_.begin(points, is_closed_form(points, flow.dynamics, options));
+        if (!coupled) {
+            shadows_.begin(points, is_closed_form(points, flow.dynamics, options));
+            drift_.begin(points, shadows_, flow.dynamics, options);
+        }
         const Tolerated done = tolerance ? solve_within(points, flow.dynamics, options, allowed, max_substeps)
                                          : Tolerated{solve(points, flow.dynamics, options), substeps, 0};
         std::vector<double> errors;
-        if (!coupled)  // a part of the points alone would tell nothing: the residual is what says how wrong they are
+        std::optional<std::vector<double>> drift;
+        if (!coupled) {  // a part of the points alone would tell nothing: the residual is what says how wrong they are
             errors = shadows_.advance(points, [&](PointSet& shadows) {
                 SolveOptions finer = options;
                 finer.substeps *= 2;
+                finer.met = nullptr;
                 if (tolerance)
                     solve_within(shadows, flow.dynamics, finer, allowed / 4, 2 * max_substeps);
                 else
                     solve(shadows, flow.dynamics, finer);
             });
+            drift = drift_.end(points, shadows_, flow.dynamics);
+        }
         interact(points, flow.dynamics, options);
         const SolveResult& result = done.result;
         now.figures.substeps = std::max(now.figures.substeps, done.substeps);
         now.figures.errors.insert(now.figures.errors.end(), errors.begin(), errors.end());
+        if (drift)
+            now.figures.energy_drift.insert(now.figures.energy_drift.end(), drift->begin(), drift->end());
+        else
+            now.figures.has_no_energy = true;
         now.figures.collisions += result.collisions;
         now.figures.died += result.died;
         now.figures.contact_limit += result.contact_limit;
@@ -329,6 +342,7 @@ private:
     }
 
     Shadows shadows_;
+    EnergyDrift drift_;
     // Of the frame before.
     ShapeLoads loads_;  // of coupled points
     SleepMemory beds_;  // of those that sleep

@@ -54,14 +54,33 @@ struct Spring {
             for (std::size_t i = 0; i < chunk.size(); ++i) place[i] = own[i].cast<double>();
         }
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
-        const float unit = 1;
-        const auto* masses = chunk.points.find<float>("mass");
-        const Strided<float> mass = masses ? masses->read() : Strided<float>{&unit, 0};
+        const Strided<float> mass = masses_of(chunk);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             const double m = mass[chunk.first + i];
             forces.add_spring(i, k[i] / m, place[i]);
             forces.add_drag(i, d[i] / m, Vec3d::Zero());
         }
+    }
+
+    bool add_potential(const Chunk& chunk, std::span<double> energy) const
+    {
+        if (target.shape) return false;
+        const Strided<Vec3f> place = chunk.read(target.place);
+        const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
+        const Strided<float> mass = masses_of(chunk);
+        for (std::size_t i = 0; i < chunk.size(); ++i) {
+            if (d[i] > 0) return false;
+            energy[i] += 0.5 * k[i] / mass[chunk.first + i] * (chunk.P[i] - place[i].cast<double>()).squaredNorm();
+        }
+        return true;
+    }
+
+private:
+    static Strided<float> masses_of(const Chunk& chunk)
+    {
+        static constexpr float unit = 1;
+        const auto* masses = chunk.points.find<float>("mass");
+        return masses ? masses->read() : Strided<float>{&unit, 0};
     }
 };
 RAPID_NODE(Spring);

@@ -31,6 +31,18 @@ std::optional<FrameStatistics::Error> error_of(std::vector<double> errors)
     return FrameStatistics::Error{quantile(0.5), quantile(0.95), quantile(1)};
 }
 
+std::optional<FrameStatistics::EnergyDrift> drift_of(const FrameFigures& figures)
+{
+    const std::vector<double>& drifts = figures.energy_drift;
+    if (figures.has_no_energy || drifts.empty()) return std::nullopt;
+    FrameStatistics::EnergyDrift of_all{0, 0};
+    for (const double drift : drifts) {
+        of_all.mean += drift / static_cast<double>(drifts.size());
+        of_all.max = std::max(of_all.max, std::abs(drift));
+    }
+    return of_all;
+}
+
 FrameStatistics statistics_of(const FrameResult& result)
 {
     FrameStatistics frame;
@@ -43,6 +55,7 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.trapped = result.figures.trapped;
     frame.beyond_tolerance = result.figures.beyond_tolerance;
     frame.error = error_of(result.figures.errors);
+    frame.energy_drift = drift_of(result.figures);
     frame.substeps = result.figures.substeps;
     frame.penetration_max = result.figures.penetration_max;
     frame.constraint_rows = result.figures.constraint_rows;
@@ -88,6 +101,9 @@ ordered_json to_json(const FrameStatistics& frame)
     if (frame.error)
         json["error"] = {
             {"position_p50", frame.error->p50}, {"position_p95", frame.error->p95}, {"position_max", frame.error->max}};
+    json["energy_drift"] = nullptr;
+    if (frame.energy_drift)
+        json["energy_drift"] = {{"mean", frame.energy_drift->mean}, {"max", frame.energy_drift->max}};
     json["penetration_max"] = frame.penetration_max;
     json["constraint_residual_max"] = frame.constraint_residual_max;
     if (frame.constraint_rows > 0) json["constraint_rows"] = frame.constraint_rows;
@@ -160,6 +176,16 @@ std::string doubtful_frames(const RunStatistics& run, std::uint64_t FrameStatist
     const std::string where = frames == 1 ? fmt::format("in frame {}", first)
                                           : fmt::format("in {} frames from {} to {}", frames, first, last);
     return fmt::format("warning  {} {}, {}\n", what, points == 1 ? "once" : with_separators(points) + " times", where);
+}
+
+// What the integrator has done to the energy of motion; nothing where it is not defined at the end.
+std::string drift_of(const RunStatistics& run)
+{
+    if (run.frames.empty() || !run.frames.back().energy_drift) return "";
+    const FrameStatistics::EnergyDrift& drift = *run.frames.back().energy_drift;
+    if (drift.max == 0) return "energy   of motion, without contacts: kept since birth\n";
+    return fmt::format("energy   of motion, without contacts: {:+.1e} J/kg since birth on average, {:.1e} at most\n",
+                       drift.mean, drift.max);
 }
 
 // What is left of the constraints, where there are any, and in how many grids contacts were looked for.
@@ -236,6 +262,7 @@ std::string summary(const RunStatistics& run)
                                             within(error.p50, " m"), within(error.p95, ""), error.max, worst->frame)
                               : "none above rounding\n";
     }
+    text += drift_of(run);
     text += contacts_of(run);
     text += constraint_text(run);
     text += bands_of(run);

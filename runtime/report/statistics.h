@@ -34,6 +34,12 @@ struct FrameStatistics {
         double p50, p95, max;
     };
     std::optional<Error> error;
+    // By how much the integrator has changed the energies of motion of that sample since birth, J/kg: on average, and
+    // at most, whichever way. Nothing where such an energy is not defined (energy_drift.h).
+    struct EnergyDrift {
+        double mean, max;
+    };
+    std::optional<EnergyDrift> energy_drift;
     std::uint64_t beyond_tolerance = 0;
     double penetration_max = 0;  // m
     ContactEnergy contact_energy;

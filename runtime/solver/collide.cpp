@@ -191,6 +191,7 @@ void Collisions::touch(std::size_t i)
 {
     if (met_[i]) return;
     met_[i] = 1;
+    if (consequences_.met) consequences_.met[places_[i]] = 1;
     touched_.push_back(static_cast<std::uint32_t>(i));
     surfaces_[i] = {no_surface, no_surface};
 }

@@ -65,6 +65,7 @@ void keep_outside(std::span<const DynamicPtr> dynamics, const PointSet& points, 
 struct Consequences {
     Hits* hits = nullptr;          // null where no collider records
     std::span<std::uint8_t> dead;  // set to 1 by a collider that kills; empty where none does
+    std::uint8_t* met = nullptr;   // set to 1 by every contact; null where nobody asks
     Strided<float> mass;           // kg
     double time = 0;               // s since the start, at the end of the frame
     double h = 0;                  // s, the frame's length

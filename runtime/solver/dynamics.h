@@ -148,6 +148,18 @@ public:
 
     // The whole of it, where it is uniform: then contribute() is not called.
     virtual std::optional<Uniform> uniform() const { return std::nullopt; }
+
+    // Adds the energy that the chunk's points have by where they are, J/kg, up to a constant of each point's own. False
+    // where the force is not the slope of one, as drag is not. Shape [size].
+    virtual bool add_potential(const Chunk& chunk, std::span<double> energy) const
+    {
+        const std::optional<Uniform> force = uniform();
+        if (!force || force->linear.k > 0 || force->linear.c > 0) return false;
+        const Linear& linear = force->linear;
+        for (std::size_t i = 0; i < chunk.size(); ++i)
+            energy[i] += 0.5 * linear.w2 * chunk.P[i].squaredNorm() - (force->a + linear.w2q).dot(chunk.P[i]);
+        return true;
+    }
 };
 
 // What an action does in one step.

@@ -28,6 +28,7 @@ std::vector<std::uint32_t> places_after(const PointSet& before, const PointSet& 
 SolveOptions with_substeps(SolveOptions options, int substeps)
 {
     options.substeps = substeps;
+    options.met = nullptr;  // the ways tell
     return options;
 }
 
@@ -145,6 +146,7 @@ Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, c
         for_each_chunk(size, [&](std::size_t from, std::size_t to) {
             for (std::size_t i = from; i < to; ++i) {
                 finished[i] = run.way[i] == Way::Exact;
+                if (options.met && run.way[i] == Way::Broken) options.met[places[i]] = 1;
                 if (finished[i]) continue;
                 const Series::Difference difference = series.add(i, run, after[i] == gone);
                 off[i] = difference.run;

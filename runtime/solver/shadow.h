@@ -36,6 +36,13 @@ public:
         return compare(solved);
     }
 
+    // Of the points that have a shadow, in order of id: after begin() in the set that it was given, after advance() in
+    // the one that it was given.
+    std::span<const std::int64_t> ids() const { return ids_; }
+    std::span<const std::uint32_t> places() const { return places_; }
+    // Whether nothing has to be done in this frame.
+    bool idle() const { return idle_; }
+
 private:
     std::vector<double> compare(const PointSet& solved);
 

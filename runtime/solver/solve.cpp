@@ -249,7 +249,10 @@ private:
         if (collisions.energy != ContactEnergy()) energies_.emplace_back(begin, collisions.energy);
     }
 
-    Consequences consequences() { return {hits_ ? &*hits_ : nullptr, dead_, scene_.mass, options_.time, options_.h}; }
+    Consequences consequences()
+    {
+        return {hits_ ? &*hits_ : nullptr, dead_, options_.met, scene_.mass, options_.time, options_.h};
+    }
 
     // All points take a sub-step, each by itself; then what couples them is projected.
     void advance_coupled()

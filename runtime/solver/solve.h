@@ -17,10 +17,12 @@ struct ShapeLoads;
 
 struct SolveOptions {
     int substeps = 1;
-    double time = 0;           // s since the start, at the end of the frame
-    double h = 0;              // s, the frame's length
-    std::int64_t frame = 0;    // its number, for messages
-    std::string group;         // only these points are advanced; all when empty
+    double time = 0;         // s since the start, at the end of the frame
+    double h = 0;            // s, the frame's length
+    std::int64_t frame = 0;  // its number, for messages
+    std::string group;       // only these points are advanced; all when empty
+    std::uint8_t* met =
+        nullptr;  // set to 1 for points that meet a shape, by their place before the step; null: nobody asks
     bool begins_frame = true;  // no step of this frame was before: contacts are counted from 0
 
     int iterations = 1;           // of the constraints, a sub-step

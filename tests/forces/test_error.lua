@@ -64,3 +64,71 @@ describe("the p95 error of a run since birth is within a factor of four of the t
     end)
   end
 end)
+
+describe("the drift of the energy of motion", function()
+  local function told(text)
+    local folder = command.folder()
+    folder:write("scene.lua", "local rapid = require 'rapid'\n" .. text)
+    local ran = command.rapid(("run scene.lua -f 1-%d --stats stats.json"):format(last), { cwd = folder.path })
+    assert.equal(0, ran.status, ran.stderr)
+    local undefined = {}
+    local drift = json.decode(folder:read "stats.json", 1, undefined).frames[last].energy_drift
+    assert.truthy(drift, "it is there in every frame")
+    return drift ~= undefined and drift or nil, ran.stdout
+  end
+
+  it("is that of each point's velocity and place, since its birth", function()
+    local text = [[
+local P, v = {}, {}
+for i = 1, 50 do P[i] = {1 + i / 50, 0, 0} v[i] = {0, 0, 1.2 / math.sqrt(1 + i / 50)} end
+return rapid.create { points = rapid.points.from { P = P, v = v } } :attract { strength = 4 } :gravity {}
+  :attract { strength = -1, falloff = 1, core = 0.5, center = {0, 3, 0} }
+  :spring { stiffness = 2, target = {1, 1, 1} } :solve {}]]
+    local result = scene.run(text, { frames = {1, last} })
+    local function energy(p)
+      return p.v:dot(p.v) / 2 - 4 / p.P:length() + 9.81 * p.P.y + (p.P - vec3(1, 1, 1)):dot(p.P - vec3(1, 1, 1))
+        - 0.5 * math.log((p.P - vec3(0, 3, 0)):dot(p.P - vec3(0, 3, 0)) + 0.25)
+    end
+    local mean, most = 0, 0
+    for i = 1, 50 do
+      local drift = energy(result[last][i]) - energy(result[1][i])
+      mean, most = mean + drift / 50, math.max(most, math.abs(drift))
+    end
+    assert.truthy(most > 1e-3)
+    local drift, summary = told(text)
+    assert.near(mean, drift.mean, 1e-5)
+    assert.near(most, drift.max, 1e-5)
+    assert.match("energy   of motion, without contacts: [+-]%d", summary)
+  end)
+
+  it("is none where a closed form moves points, and rounding where they bounce besides, or swing", function()
+    local points = "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.25, "
+      .. "center = {0, 2, 0} } } "
+    assert.same({ mean = 0, max = 0 }, told(points .. ":gravity {} :solve {}"))
+    for _, chain in ipairs {
+      ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve {}", -- which takes half of 20 J/kg
+      ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve { tolerance = 1e-3 }",
+      ":spring { stiffness = 1000 } :solve {}",
+    } do
+      assert.truthy(told(points .. chain).max < 2e-3, chain) -- of up to 3 kJ/kg, to single precision
+    end
+  end)
+
+  it("is of those that are born in the run, too, and of each no longer than it lives", function()
+    local drift = told([[
+return rapid.create { seed = 3 } :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 3000, life = 0.2 }
+  :attract { strength = 6, core = 0.5 } :solve { substeps = 4 }]])
+    assert.truthy(drift.max > 1e-6 and drift.max < 1e-2, drift.max)
+  end)
+
+  it("is not defined where something else spends energy, or gives it", function()
+    for _, node in ipairs { ":drag { linear = 1 }", ":spring { damping = 1 }", ":turbulence {}", ":wind {}",
+      ':action("a", function(p, step) p.v = p.v * 0.9 end)', ":interact { radius = 2, drag = 1 }",
+      ':points("b", function(p) p.force = vec3(1, 0, 0) end)' } do
+      local drift, summary = told("return rapid.create { points = rapid.points.from { P = {{1, 0, 0}, {1, 1, 0}} } } "
+        .. node .. " :solve {}")
+      assert.is_nil(drift, node)
+      assert.falsy(summary:find "of motion", node)
+    end
+  end)
+end)

@@ -92,7 +92,7 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
     CHECK(json["frames"][0] == ordered_json::parse(R"({
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
-        "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12,
+        "energy_drift": null, "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12,
         "contact_energy": { "added": 0.5, "lost": 3.0 },
         "bands": [ { "node": "collide1", "width": 0.125, "voxels": 5000, "seconds": 0.5 } ],
         "contact_limit": 3, "trapped": 2, "beyond_tolerance": 0 })"));
@@ -110,6 +110,22 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
     CHECK(error["position_max"] == 100 * 1e-4);
     CHECK_THAT(summary(run),
                Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
+}
+
+TEST_CASE("a drift of energy is told by its mean and its largest, whichever way, where there is an energy", "[report]")
+{
+    FrameResult result = frame_result();
+    result.figures.energy_drift = {0.5, -2, 0};
+    RunStatistics run = run_of({});
+    run.frames.push_back(statistics_of(result));
+    CHECK(ordered_json::parse(to_json(run))["frames"][0]["energy_drift"] == ordered_json{{"mean", -0.5}, {"max", 2.0}});
+    CHECK_THAT(summary(run),
+               Catch::Contains("without contacts: -5.0e-01 J/kg since birth on average, 2.0e+00 at most"));
+
+    result.figures.has_no_energy = true;
+    run.frames.push_back(statistics_of(result));
+    CHECK(ordered_json::parse(to_json(run))["frames"][1]["energy_drift"].is_null());
+    CHECK_THAT(summary(run), !Catch::Contains("of motion"));
 }
 
 TEST_CASE("a run that ended before its first frame has an empty list of frames", "[report]")

@@ -40,6 +40,11 @@ constexpr double disturbed = 0.1;
 // they have to give way.
 constexpr double too_deep_to_sleep = 0.05;
 
+// By how much more than it needs a row is corrected by places (successive over-relaxation; Macklin et al. 2014): what
+// it gives its neighbours to do is then done already. A column of 10,000 that has collapsed has a third of the overlaps
+// that it has without, with any of 1.3 to 1.8. Velocities are not corrected by more: they are what bounces.
+constexpr double relaxation = 1.4;
+
 // Rows, and points with their pairs, a task: tens of microseconds.
 constexpr std::size_t worth_a_task = 2048, points_a_task = 2048;
 
@@ -123,24 +128,17 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
         kept.push_back({{std::min(i, j), std::max(i, j)}, pressed_[s], way * rubbed_[s], way * borne});
     }
     std::sort(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) { return a.pair < b.pair; });
-    near_.begin.assign(n + 1, 0);
-    near_.other.clear();
     pairs_.clear();
     pressed_.clear();
     rubbed_.clear();
     const bool some_borne = !borne_.empty();
     borne_.clear();
     for (const auto& [pair, pressed, rubbed, borne] : kept) {
-        ++near_.begin[pair[0] + 1];
-        near_.other.push_back(pair[1]);
         pairs_.push_back(pair);
         pressed_.push_back(pressed);
         rubbed_.push_back(rubbed);
         if (some_borne) borne_.push_back(borne);
     }
-    std::partial_sum(near_.begin.begin(), near_.begin.end(), near_.begin.begin());
-    slot_.resize(pairs_.size());
-    std::iota(slot_.begin(), slot_.end(), 0u);
     batches_.assign(1, 0);
     colours_.clear();
     touching_in_.clear();
@@ -150,27 +148,40 @@ void Contacts::search(const Substep& now)
 {
     const Stopwatch stopwatch;
     searched_.set(now, radius_, largest_, least_);
-    std::swap(near_, near_before_);
-    std::swap(slot_, slot_before_);
+    std::swap(pairs_, pairs_before_);
     std::swap(pressed_, pressed_before_);
     std::swap(rubbed_, rubbed_before_);
     std::swap(borne_, borne_before_);
     search_.find(searched_.places(), {searched_.reach().data(), 1}, grids_, near_);
     schedule();
-    if (now.sleepers && now.sleepers->any()) wake_parted(now);
+    take_over(now);
     search_seconds_ += stopwatch.seconds();
 }
 
-// Points that have pressed each other, and are nowhere near any more: a node has moved one.
-void Contacts::wake_parted(const Substep& now) const
+// What pairs have done to each other before the search. Where they are nowhere near any more, a node has moved one.
+void Contacts::take_over(const Substep& now)
 {
-    for (std::uint32_t i = 0; i + 1 < near_before_.begin.size(); ++i)
-        for (std::uint32_t k = near_before_.begin[i]; k < near_before_.begin[i + 1]; ++k) {
-            const std::uint32_t j = near_before_.other[k];
-            if (!(pressed_before_[slot_before_[k]] > 0)) continue;
+    const std::size_t m = pairs_.size();
+    pressed_.assign(m, 0);
+    rubbed_.assign(m, Vec3f::Zero());
+    borne_.assign(borne_before_.empty() ? 0 : m, Vec3f::Zero());
+    for_each_chunk(pairs_before_.size(), [&](std::size_t first, std::size_t last) {
+        for (std::size_t s = first; s < last; ++s) {
+            const bool pressed = pressed_before_[s] > 0;
+            if (!pressed && (borne_.empty() || borne_before_[s].isZero(0))) continue;
+            const auto [i, j] = pairs_before_[s];
             const auto here = near_.of(i);
-            if (!std::binary_search(here.begin(), here.end(), j)) now.sleepers->wake(i), now.sleepers->wake(j);
+            const auto found = std::lower_bound(here.begin(), here.end(), j);
+            if (found == here.end() || *found != j) {
+                if (pressed && now.sleepers) now.sleepers->wake(i), now.sleepers->wake(j);
+                continue;
+            }
+            const std::uint32_t to = slot_[near_.begin[i] + static_cast<std::size_t>(found - here.begin())];
+            pressed_[to] = pressed_before_[s];
+            rubbed_[to] = rubbed_before_[s];
+            if (!borne_.empty()) borne_[to] = borne_before_[s];
         }
+    });
 }
 
 // Pairs go to the block of space that their points are in, or the least of the blocks along each axis: it then
@@ -212,35 +223,21 @@ void Contacts::schedule()
 
     pairs_.resize(m);
     slot_.resize(m);
-    pressed_.resize(m);
-    rubbed_.resize(m);
-    borne_.resize(borne_before_.empty() ? 0 : m);
     rows_.resize(m);
     touching_in_.assign(batches_.size() - 1, 0);
     each_batch(false, [&](std::size_t b) { take_turns(b); });
 }
 
 // In each block the first pairs of all points, then the second, and so on: pairs that follow each other then seldom
-// share a point, and the processor need not wait for one to begin the next. Each has the impulse that it had.
+// share a point, and the processor need not wait for one to begin the next.
 void Contacts::take_turns(std::size_t block)
 {
     thread_local std::vector<std::array<std::uint32_t, 2>> going;  // of each point, what is left of its pairs
-    thread_local std::vector<std::uint32_t> before;                // of each pair, its slot before
-    constexpr std::uint32_t none = 0xffffffff;
     const std::uint32_t first = batches_[block], last = batches_[block + 1];
     going.clear();
-    before.assign(last - first, none);
-    for (std::uint32_t t = first; t < last;) {
-        const std::uint32_t i = turn_[t][0];
-        going.push_back({t, t});
-        std::uint32_t old = near_before_.begin.empty() ? 0 : near_before_.begin[i];
-        const std::uint32_t end = near_before_.begin.empty() ? 0 : near_before_.begin[i + 1];
-        for (; t < last && turn_[t][0] == i; ++t) {
-            const std::uint32_t j = near_.other[turn_[t][1]];
-            while (old < end && near_before_.other[old] < j) ++old;
-            if (old < end && near_before_.other[old] == j) before[t - first] = slot_before_[old];
-        }
-        going.back()[1] = t;
+    for (std::uint32_t t = first; t < last; ++t) {
+        if (t == first || turn_[t][0] != turn_[t - 1][0]) going.push_back({t, t});
+        going.back()[1] = t + 1;
     }
     std::uint32_t slot = first;
     while (!going.empty()) {
@@ -248,13 +245,9 @@ void Contacts::take_turns(std::size_t block)
         for (auto [t, end] : going) {
             const auto [i, k] = turn_[t];
             slot_[k] = slot;
-            pairs_[slot] = {i, near_.other[k]};
-            const std::uint32_t old = before[t - first];
-            pressed_[slot] = old == none ? 0 : pressed_before_[old];
-            rubbed_[slot] = pressed_[slot] > 0 ? rubbed_before_[old] : Vec3f(Vec3f::Zero());
-            if (!borne_.empty()) borne_[slot] = old == none ? Vec3f(Vec3f::Zero()) : borne_before_[old];
-            ++slot;
-            if (++t < end) going[left++] = {t, end};
+            pairs_[slot++] = {i, near_.other[k]};
+            going[left] = {t + 1, end};
+            left += t + 1 < end;
         }
         going.resize(left);
     }
@@ -448,7 +441,7 @@ void Contacts::project(Substep& now)
         Place &a = now.at[row.i], &b = now.at[row.j];
         const Vec3d n = row.n.cast<double>();
         const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
-        const double pressed = std::max(0.0, row.pressed - C * per_dt * row.per_w);
+        const double pressed = std::max(0.0, row.pressed - relaxation * C * per_dt * row.per_w);
         const double change = dt * (pressed - row.pressed);
         row.pressed = static_cast<float>(pressed);
         a.P += a.w * change * n;

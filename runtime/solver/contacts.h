@@ -82,7 +82,7 @@ private:
     void search(const Substep& now);
     void schedule();
     void take_turns(std::size_t block);
-    void wake_parted(const Substep& now) const;
+    void take_over(const Substep& now);
     void settle_once(Substep& now, bool last);
     void take_back(const Row& row, Substep& now) const;
 
@@ -94,9 +94,9 @@ private:
     std::vector<std::int64_t> ids_;
     SearchedPlaces searched_;
 
-    Pairs near_, near_before_;                       // of this search, and of that before
-    std::vector<std::uint32_t> slot_, slot_before_;  // of each of them, its place in the order of the sweeps:
-    std::vector<Pair> pairs_;                        // colour by colour, block by block
+    Pairs near_;                              // of the last search
+    std::vector<std::uint32_t> slot_;         // of each of them, its place in the order of the sweeps:
+    std::vector<Pair> pairs_, pairs_before_;  // colour by colour, block by block; and as they were in the search before
     // What each pair does to each other, as it is kept from sub-step to sub-step, N s: along the normal, and across it;
     // and both together at the end of the last frame in which both were awake, where any may sleep.
     std::vector<float> pressed_, pressed_before_;

@@ -11,7 +11,7 @@ namespace {
 
 // How far points may move before pairs are looked for again, as a part of their radius: at least, at most, and between
 // these as far as they go in so many sub-steps. More pairs to look at, or more searches.
-constexpr double least_slack = 0.4, most_slack = 1, slack_substeps = 4;
+constexpr double least_slack = 0.5, most_slack = 1.2, slack_substeps = 3;
 
 // Blocks whose points are handed to a thread together.
 constexpr std::size_t blocks_a_task = 16;

@@ -114,6 +114,17 @@ describe("a level set's ball", function()
   end)
 end)
 
+describe("a level set's ball that moves", function()
+  -- It is as if the point had flown in from there.
+  it("lets out ahead of it what is deep inside, beyond its band", function()
+    local result = run(":collide { shape = rapid.levelset.sphere { radius = 1, voxel = 0.05 }, "
+      .. "transform = function(frame) return rapid.translate(12 * frame.time, 0, 0) end }",
+      "P = {{0.01, 0.02, 0.03}}", 2)
+    local P = result[2][1].P
+    assert.truthy(P.x > 1.49 and P.x < 2.1, tostring(P)) -- ahead, and a bounce farther
+  end)
+end)
+
 describe("a mesh that is turned inside out", function()
   it("is reported, and keeps points out as it would the right way round", function()
     -- A tetrahedron with faces that look inwards.

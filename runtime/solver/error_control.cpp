@@ -35,7 +35,13 @@ SolveOptions with_substeps(SolveOptions options, int substeps)
 // Of each point that is solved again: what its runs so far come to.
 class Series {
 public:
-    Series(std::size_t size, double h) : h_(h), length_(size, 0), died_(size, 0) {}
+    void reset(std::size_t size, double h)
+    {
+        h_ = h;
+        runs_ = 0;
+        length_.assign(size, 0);
+        died_.assign(size, 0);
+    }
 
     void begin_run()
     {
@@ -57,7 +63,7 @@ public:
         Vec3d &P = run.P[i], &v = run.v[i];
         const bool lives = !dies && !died_[i], is_series = !dies && run.way[i] != Way::Broken;
         Difference off{infinity, infinity};
-        if (lives)
+        if (lives && runs_ > 1)
             // Runs that find a contact at the same end of a sub-step agree on what is wrong with it.
             off.run = off.best = std::max(apart(P - P_[0][i], v - v_[0][i]), run.put_off[i]);
         else if (dies && died_[i])
@@ -86,14 +92,15 @@ public:
     void keep(std::span<const std::uint32_t> again)
     {
         const auto keep = [&](auto& list) {
-            if (list.empty()) return;
             for (std::size_t k = 0; k < again.size(); ++k) list[k] = list[again[k]];
             list.resize(again.size());
         };
         keep(length_);
         keep(died_);
-        for (auto& column : P_) keep(column);
-        for (auto& column : v_) keep(column);
+        for (std::size_t column = 0; column < std::min(runs_, most_columns); ++column) {
+            keep(P_[column]);
+            keep(v_[column]);
+        }
     }
 
 private:
@@ -106,11 +113,22 @@ private:
 
     double apart(const Vec3d& dP, const Vec3d& dv) const { return std::max(dP.norm(), h_ * dv.norm()); }
 
-    const double h_;  // s, of the frame
+    double h_ = 0;  // s, of the frame
     std::size_t runs_ = 0;
     std::vector<std::uint8_t> length_;  // how many columns the next run can go on from
     std::vector<std::uint8_t> died_;    // in the last run
     std::array<std::vector<Vec3d>, most_columns> P_, v_;
+};
+
+// Of a large set its memory is worth keeping from frame to frame: to have it anew takes as long as to solve.
+struct Workspace {
+    Series series;
+    Arrivals run;
+
+    // Of each point that is solved again.
+    std::vector<double> off;
+    std::vector<Vec3f> best;
+    std::vector<std::uint8_t> finished, improved;
 };
 
 }  // namespace
@@ -124,8 +142,9 @@ Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, c
     std::vector<std::uint32_t> places(points.size());  // theirs in `points`
     std::iota(places.begin(), places.end(), 0u);
     std::vector<std::uint8_t> alive(points.size(), 1);
-    Series series(points.size(), options.h);
-    Arrivals run;
+    thread_local Workspace kept;
+    auto& [series, run, off, best, finished, improved] = kept;  // this thread's, for all that work on it
+    series.reset(points.size(), options.h);
 
     bool first = true, last = false;
     for (int substeps = options.substeps; !places.empty() && !last; substeps *= 2, first = false) {
@@ -140,9 +159,10 @@ Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, c
 
         const std::vector<std::uint32_t> after = places_after(begin, end);
         series.begin_run();
-        std::vector<double> off(size);
-        std::vector<Vec3f> best(size);
-        std::vector<std::uint8_t> finished(size), improved(size);
+        off.assign(size, 0);
+        best.resize(size);
+        finished.resize(size);
+        improved.assign(size, 0);
         for_each_chunk(size, [&](std::size_t from, std::size_t to) {
             for (std::size_t i = from; i < to; ++i) {
                 finished[i] = run.way[i] == Way::Exact;

@@ -672,9 +672,12 @@ private:
 
     void tell_arrivals(const Block& block, const Collisions& collisions)
     {
+        // On a parabola that has met nothing sub-steps would find the same: of drag the path between is no parabola.
+        const bool parabolas = scene_.falls() && scene_.uniform.linear.is_zero();
         for (std::size_t i = 0; i < block.places.size(); ++i) {
             const std::uint32_t place = block.places[i];
             arrivals_->way[place] = !scene_.obstacles.empty() && collisions.has_met(i) ? Way::Broken
+                                    : parabolas                                        ? Way::Exact
                                     : scene_.actions.empty()                           ? Way::Smooth
                                                                                        : Way::Acted;
             arrivals_->put_off[place] = scene_.obstacles.empty() ? 0 : collisions.put_off(i);

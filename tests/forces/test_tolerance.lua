@@ -64,6 +64,23 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :g
     assert.truthy((all[4].P - tends_to(4)):length() > 1e-2)
   end)
 
+  it("takes one step of what falls past a shape without meeting it, and tries two of what meets it", function()
+    local function substeps(place)
+      local folder = command.folder()
+      folder:write("scene.lua", ([[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{%g, -0.1, 0.9}}, v = {{0, -2, 0}} } } :gravity {}
+  :collide { shape = rapid.shape.sphere { radius = 1, center = {0, -1, 0} }, friction = 0.3 }
+  :solve { tolerance = 1e-12, max_substeps = 8 }]]):format(place))
+      assert.equal(0, command.rapid("run scene.lua -f 1-9 --stats stats.json", { cwd = folder.path }).status)
+      local most = 0
+      for _, frame in ipairs(json.decode(folder:read "stats.json").frames) do most = math.max(most, frame.substeps) end
+      return most
+    end
+    assert.equal(1, substeps(0.9)) -- through a corner of the box around the sphere
+    assert.equal(2, substeps(0.3))
+  end)
+
   it("works with actions, deaths and births, the same bits on 1, 2 and 7 threads", function()
     local text = [[
 return rapid.create { fps = 24, seed = 2 }

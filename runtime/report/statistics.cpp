@@ -178,13 +178,13 @@ std::string doubtful_frames(const RunStatistics& run, std::uint64_t FrameStatist
     return fmt::format("warning  {} {}, {}\n", what, points == 1 ? "once" : with_separators(points) + " times", where);
 }
 
-// What the integrator has done to the energy of motion; nothing where it is not defined at the end.
+// What the integrator has done to the energy of motion; nothing where it has kept it, or where there is none.
 std::string drift_of(const RunStatistics& run)
 {
     if (run.frames.empty() || !run.frames.back().energy_drift) return "";
     const FrameStatistics::EnergyDrift& drift = *run.frames.back().energy_drift;
-    if (drift.max == 0) return "energy   of motion, without contacts: kept since birth\n";
-    return fmt::format("energy   of motion, without contacts: {:+.1e} J/kg since birth on average, {:.1e} at most\n",
+    if (drift.max == 0) return "";
+    return fmt::format("energy   of motion, collisions aside: {:+.1e} J/kg since birth on average, {:.1e} at most\n",
                        drift.mean, drift.max);
 }
 

@@ -98,7 +98,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :attract { s
     local drift, summary = told(text)
     assert.near(mean, drift.mean, 1e-5)
     assert.near(most, drift.max, 1e-5)
-    assert.match("energy   of motion, without contacts: [+-]%d", summary)
+    assert.match("energy   of motion, collisions aside: [+-]%d", summary)
   end)
 
   it("is none where a closed form moves points, and rounding where they bounce besides, or swing", function()

@@ -120,7 +120,7 @@ TEST_CASE("a drift of energy is told by its mean and its largest, whichever way,
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["energy_drift"] == ordered_json{{"mean", -0.5}, {"max", 2.0}});
     CHECK_THAT(summary(run),
-               Catch::Contains("without contacts: -5.0e-01 J/kg since birth on average, 2.0e+00 at most"));
+               Catch::Contains("collisions aside: -5.0e-01 J/kg since birth on average, 2.0e+00 at most"));
 
     result.figures.has_no_energy = true;
     run.frames.push_back(statistics_of(result));

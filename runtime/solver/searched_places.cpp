@@ -11,7 +11,7 @@ namespace {
 
 // How far points may move before pairs are looked for again, as a part of their radius: at least, at most, and between
 // these as far as they go in so many sub-steps. More pairs to look at, or more searches.
-constexpr double least_slack = 0.5, most_slack = 1.2, slack_substeps = 3;
+constexpr double least_slack = 0.25, most_slack = 1, slack_substeps = 3;
 
 // Blocks whose points are handed to a thread together.
 constexpr std::size_t blocks_a_task = 16;
@@ -57,8 +57,10 @@ void SearchedPlaces::set(const Substep& now, std::span<const float> radius, floa
         const Frame& frame = frames_[home_[i]];
         return (now.dt * now.v[i] - frame.way).norm() + frame.excess;
     };
-    // Where the search before has not lasted, because of one point maybe, more slack only finds more pairs.
-    const double substeps = lasted_ > 1 ? slack_substeps : 0;
+    // Where searches do not last, because of one point maybe, more slack only finds more pairs: it is tried again at
+    // every eighth.
+    in_vain_ = lasted_ > 1 ? 0 : in_vain_ + 1;
+    const double substeps = in_vain_ % 8 == 0 ? slack_substeps : 0;
     lasted_ = 0;
     reach_.assign(n, 0);
     slack_.resize(n);

@@ -37,6 +37,7 @@ private:
     void cut_blocks(std::span<const float> radius);
 
     int lasted_ = 0;             // sub-steps, at the end of which it was outrun
+    int in_vain_ = 0;            // searches one after the other that have not lasted
     double edge_ = 0, far_ = 0;  // m: of a block; what blocks that are no neighbours may come closer by
     std::vector<Vec3d> at_;
     std::vector<float> reach_, slack_;  // m

@@ -313,10 +313,10 @@ TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they
     const float r = 0.01f;
     // Grains a second through a square hole of that width in the floor of a box; those below are taken to the top
     // again.
-    const auto flow = [&](double hole, std::size_t layers) {
+    const auto flow_of = [&](double hole, std::size_t layers, unsigned seed) {
         constexpr int side = 14;
         const double w = side * 2.1 * r;
-        std::mt19937 random(4);
+        std::mt19937 random(seed);
         std::uniform_real_distribution<float> off(-0.1f * r, 0.1f * r);
         std::vector<Vec3f> at;
         for (std::size_t k = 0; k < side * side * layers; ++k)
@@ -348,11 +348,18 @@ TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they
         }
         return static_cast<double>(passed);  // in a second
     };
-    // Beverloo: flow ~ (hole - 1.4 d)^5/2, with d the diameter.
-    const double narrow = flow(0.10, 14), wide = flow(0.16, 14);
-    INFO(narrow << ", " << wide << " a second");
-    CHECK(std::log(wide / narrow) / std::log((0.16 - 2.8 * double(r)) / (0.10 - 2.8 * double(r))) ==
-          Approx(2.5).margin(0.3));
+    // One differs from another by a tenth: grains go in bursts.
+    const auto flow = [&](double hole, std::size_t layers) {
+        return 0.5 * (flow_of(hole, layers, 4) + flow_of(hole, layers, 5));
+    };
+    // Beverloo: flow ~ (hole - k d)^5/2, with d the diameter; k is 1.4 to 3 by what is measured, and not known here. So
+    // its 2/5 power is linear in the width.
+    const double narrow = flow(0.10, 14), wide = flow(0.16, 14), wider = flow(0.20, 14);
+    INFO(narrow << ", " << wide << ", " << wider << " a second");
+    const auto root = [](double a_second) { return std::pow(a_second, 0.4); };
+    const double slope = (root(wide) - root(narrow)) / 0.06, shut = 0.10 - root(narrow) / slope;
+    CHECK((root(wider) - root(wide)) / 0.04 == Approx(slope).epsilon(0.15));
+    CHECK((shut > 1.4 * 2 * double(r) && shut < 3 * 2 * double(r)));
     CHECK(flow(0.10, 20) == Approx(narrow).epsilon(0.1));
 }
 

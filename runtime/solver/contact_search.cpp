@@ -29,8 +29,8 @@ std::int64_t cell_of(double x, double width)
 // A sum of radii in single precision, with room for the rounding of what it is compared with.
 constexpr float rounding = 1 + 0x1p-20f;
 
-// Spheres whose neighbours are looked for together: a fraction of a millisecond's work, so that a few thousand are enough for
-// several threads.
+// Spheres whose neighbours are looked for together: a fraction of a millisecond's work, so that a few thousand are
+// enough for several threads.
 constexpr std::size_t spheres_a_task = 2048;
 
 // How many spheres, or points with their pairs, are sorted together: in the second-level cache, and on all threads.

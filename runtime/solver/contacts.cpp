@@ -40,11 +40,6 @@ constexpr double disturbed = 0.1;
 // they have to give way.
 constexpr double too_deep_to_sleep = 0.05;
 
-// By how much more than it needs a row is corrected by places (successive over-relaxation; Macklin et al. 2014): what
-// it gives its neighbours to do is then done already. A column of 10,000 that has collapsed has a third of the overlaps
-// that it has without, with any of 1.3 to 1.8. Velocities are not corrected by more: they are what bounces.
-constexpr double relaxation = 1.4;
-
 // Rows, and points with their pairs, a task: tens of microseconds.
 constexpr std::size_t worth_a_task = 2048, points_a_task = 2048;
 
@@ -441,7 +436,7 @@ void Contacts::project(Substep& now)
         Place &a = now.at[row.i], &b = now.at[row.j];
         const Vec3d n = row.n.cast<double>();
         const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
-        const double pressed = std::max(0.0, row.pressed - relaxation * C * per_dt * row.per_w);
+        const double pressed = std::max(0.0, row.pressed - C * per_dt * row.per_w);
         const double change = dt * (pressed - row.pressed);
         row.pressed = static_cast<float>(pressed);
         a.P += a.w * change * n;

@@ -74,7 +74,7 @@ TEST_CASE("a pile that rests sleeps: the same bits from frame to frame, and no m
     Box box(400);
     box.run(24);
     double before = box.energy();
-    for (int second = 0; second < 5; ++second) {
+    for (int second = 0; second < 9; ++second) {
         box.run(24);
         const double now = box.energy();
         CHECK(now <= before * (1 + 1e-5));

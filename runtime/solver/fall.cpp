@@ -68,8 +68,8 @@ void Fall::avoid(const Box3d& box, double radius)
 }
 
 // One period. near(p) is told, for each of its points, whether it stays; `largest`, by coordinate, keeps the size of
-// what is written.
-template <bool Dragged, bool Avoids, class Near>
+// what is written, unless that is known to be finite.
+template <bool Dragged, bool Avoids, bool Checks, class Near>
 void Fall::advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const
 {
     float P1[period], v1[period];
@@ -91,7 +91,7 @@ void Fall::advance_period(float* P, float* v, const Times& times, std::uint32_t*
         }
         P1[l] = static_cast<float>(x1);
         v1[l] = static_cast<float>(u1);
-        largest[l] = std::max({largest[l], magnitude_bits(P1[l]), magnitude_bits(v1[l])});
+        if constexpr (Checks) largest[l] = std::max({largest[l], magnitude_bits(P1[l]), magnitude_bits(v1[l])});
         if constexpr (Avoids) {
             // The factor keeps a point that is flush with a box and rounded away from it.
             const double margin = bend + 0x1p-21 * std::abs(x);
@@ -168,7 +168,7 @@ Fall::Extent Fall::extent_of(std::span<const Vec3f> values)
     return {Box3d(Vec3d(low[0], low[1], low[2]), Vec3d(high[0], high[1], high[2])), all};
 }
 
-// Whether no point of these places and velocities comes near a box in t seconds.
+// Whether no point of these places and velocities comes near a box in t seconds, and all stay finite.
 bool Fall::are_far(const Box3d& places, const Box3d& speeds, double t) const
 {
     const Vec3d g = Eigen::Map<const Vec3d>(g_.data()), pulled = t * g;
@@ -179,7 +179,12 @@ bool Fall::are_far(const Box3d& places, const Box3d& speeds, double t) const
                                   : Vec3d(speeds.max().cwiseMax(0.0) + pulled.cwiseMax(0.0));
     const Vec3d rounding = 0x1p-20 * places.min().cwiseAbs().cwiseMax(places.max().cwiseAbs());
     const Box3d reach(places.min() + t * slowest - rounding, places.max() + t * fastest + rounding);
-    return std::none_of(boxes_.begin(), boxes_.end(), [&](const Box3d& box) { return box.intersects(reach); });
+    static constexpr double most = std::numeric_limits<float>::max() / 2;
+    const auto is_finite = [](const Vec3d& least, const Vec3d& greatest) {
+        return (least.array() > -most).all() && (greatest.array() < most).all();
+    };
+    return is_finite(reach.min(), reach.max()) && is_finite(slowest, fastest) &&
+           std::none_of(boxes_.begin(), boxes_.end(), [&](const Box3d& box) { return box.intersects(reach); });
 }
 
 Fall::Way Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
@@ -208,17 +213,17 @@ Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTim
         const std::size_t size = std::min(block, end - at);
         if constexpr (!Avoids) {
             if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) return way(at, largest);
-            advance_block<Dragged, false>(P, v, clock, at, at + size, largest, nobody);
+            advance_block<Dragged, false, true>(P, v, clock, at, at + size, largest, nobody);
         } else {
             const Extent places = extent_of(P.subspan(at, size)), speeds = extent_of(v.subspan(at, size));
             if (!places.finite || !speeds.finite) return way(at, largest);
             if (are_far(places.box, speeds.box, longest)) {
-                advance_block<Dragged, false>(P, v, clock, at, at + size, largest, nobody);
+                advance_block<Dragged, false, false>(P, v, clock, at, at + size, largest, nobody);
                 continue;
             }
             std::size_t count = near.size();
             near.resize(count + size + points_a_period);
-            advance_block<Dragged, true>(P, v, clock, at, at + size, largest, [&](std::uint32_t i, bool stays) {
+            advance_block<Dragged, true, true>(P, v, clock, at, at + size, largest, [&](std::uint32_t i, bool stays) {
                 near[count] = i;
                 count += stays && i < end;
             });
@@ -233,7 +238,7 @@ Fall::Way Fall::way(std::size_t end, const std::uint32_t* largest)
     return {end, *std::max_element(largest, largest + period) < infinity_bits};
 }
 
-template <bool Dragged, bool Avoids, class Near>
+template <bool Dragged, bool Avoids, bool Checks, class Near>
 void Fall::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
                          std::uint32_t* largest, const Near& near) const
 {
@@ -252,8 +257,9 @@ void Fall::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, s
             P_some = std::copy_n(P_some, 3 * n, P_end) - 3 * n;
             v_some = std::copy_n(v_some, 3 * n, v_end) - 3 * n;
         }
-        advance_period<Dragged, Avoids>(P_some, v_some, times, own_largest,
-                                        [&](int p, bool stays) { near(static_cast<std::uint32_t>(at + p), stays); });
+        advance_period<Dragged, Avoids, Checks>(P_some, v_some, times, own_largest, [&](int p, bool stays) {
+            near(static_cast<std::uint32_t>(at + p), stays);
+        });
         if (n < points_a_period) {
             std::copy_n(P_end, 3 * n, P[at].data());
             std::copy_n(v_end, 3 * n, v[at].data());

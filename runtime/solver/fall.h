@@ -92,9 +92,9 @@ private:
     static Way way(std::size_t end, const std::uint32_t* largest);
     void set_times(Times& times, int point, double t) const;
     bool are_far(const Box3d& places, const Box3d& speeds, double t) const;
-    template <bool Dragged, bool Avoids, class Near>
+    template <bool Dragged, bool Avoids, bool Checks, class Near>
     void advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const;
-    template <bool Dragged, bool Avoids, class Near>
+    template <bool Dragged, bool Avoids, bool Checks, class Near>
     void advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
                        std::uint32_t* largest, const Near& near) const;
     template <bool Dragged, bool Avoids>

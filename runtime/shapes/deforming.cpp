@@ -183,14 +183,17 @@ private:
             const Vec3d relative = path.v - here.vc;
             const double slope = here.gradient.dot(relative);
             if (slope < 0 && !is_along(slope, relative)) return meet(path, 0, here.near);
+            // It leaves, or is pressed to the surface.
             const double acceleration = path.a.norm() + curved_;
-            if (acceleration > 0) {
-                double hop = 2 * std::sqrt(2 * near / acceleration);
+            double hop = Contact::none;
+            if (acceleration > 0) hop = 2 * std::sqrt(2 * near / acceleration);
+            if (slope > 0) hop = std::min(hop, 2 * near / slope);
+            if (hop < Contact::none) {
                 const double speed = relative.norm();
                 if (hop * speed > feature / 4) hop = feature / (4 * speed);
                 hop = std::min(hop, path.duration);
                 const Sample there = ask(place(path, hop), path.begin + hop, r + 2 * feature, here.near);
-                if (there.phi < level) return meet(path, 0, here.near);
+                if (there.phi < level) return meet(path, 0, here.near, hop);
                 s = hop, f = there.phi - level, here = there;
             }
         }
@@ -205,7 +208,8 @@ private:
                 };
                 const double close = std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + r), rounding_ / 16);
                 const double speed = (path.v + s * path.a).norm() + path.duration * path.a.norm() + fastest_;
-                return meet(path, last_outside(height, s, f, next, there.phi - level, speed, close), there.near);
+                const double met = last_outside(height, s, f, next, there.phi - level, speed, close);
+                return meet(path, met, there.near, met + 0x1p-8 * (next - s));
             }
             s = next, f = there.phi - level, here = there;
         }
@@ -226,15 +230,20 @@ private:
         return std::max(free, std::min(beside, voxel / fastest));
     }
 
-    // The contact of a path that is on the surface at time s.
-    Contact meet(const Path& path, double s, std::int32_t hint) const
+    // The contact of a path that is on the surface at time s. soon: s, a time after it, as in first_contact.h.
+    Contact meet(const Path& path, double s, std::int32_t hint, double soon = 0) const
     {
         Contact contact;
         contact.time = s;
         const Vec3d P = place(path, s), v = path.v + s * path.a;
         const Sample here = ask(P, path.begin + s, path.radius + band(), hint);
         contact.vc = here.vc;
-        const Vec3d n = contact.n = detail::unit_normal(here.gradient, v - here.vc);
+        Vec3d gradient = here.gradient;
+        if (soon > s && gradient.dot(v - here.vc) >= 0) {
+            const Sample beyond = ask(place(path, soon), path.begin + soon, path.radius + band(), hint);
+            if (beyond.gradient.dot(path.v + soon * path.a - beyond.vc) < 0) gradient = beyond.gradient;
+        }
+        const Vec3d n = contact.n = detail::unit_normal(gradient, v - here.vc);
         const Vec3d tangent = v - here.vc - n.dot(v - here.vc) * n;
         const double speed = tangent.norm(), way = end_->voxel() / 2;
         if (!(speed > 0)) return contact;

@@ -142,7 +142,7 @@ double curvature(const Sampler& sampler, const Vec3d& P, const Vec3d& n, const V
     return size > 0 ? tangent.dot(ahead / size - n) / (speed * way) : 0;
 }
 
-// ahead: s, a time soon after; where the field has kinks.
+// ahead: s, a time soon after, of a field with kinks; 0 of one without.
 template <class Sampler>
 Contact contact_at(const Sampler& sampler, const Path& path, double s, double ahead = 0)
 {

@@ -252,16 +252,19 @@ private:
         if (f > near) return true;
 
         if (w.slope < 0 && !is_along(w.slope, there.velocity)) return meet(w, w.s, contact), false;
-        // Pressed to the surface, as in first_contact.h.
-        const double acceleration = w.seen.acceleration(w.level);
-        if (acceleration > 0) {
-            double hop = 2 * std::sqrt(2 * near / there.scale / acceleration);
-            const double speed = there.velocity.norm(), feature = rest_->smallest_feature();
+        // It leaves, or is pressed to the surface: as in first_contact.h.
+        const double acceleration = w.seen.acceleration(w.level), lift = 2 * near / there.scale;
+        const double feature = rest_->smallest_feature();
+        double hop = Contact::none;
+        if (acceleration > 0) hop = 2 * std::sqrt(lift / acceleration);
+        if (feature > 0 && w.slope > 0) hop = std::min(hop, lift / w.slope);
+        if (hop < Contact::none) {
+            const double speed = there.velocity.norm();
             if (feature > 0 && hop * speed > feature / 4) hop = feature / (4 * speed);
             const double after = std::min(w.end, w.s + hop);
             Vec3d g;
             const double ahead = height(w, after, g);
-            if (ahead < 0) return meet(w, w.s, contact), false;
+            if (ahead < 0) return meet(w, w.s, contact, after), false;
             const Seen::Place then = w.seen.at(after);
             w.s = after, w.f = ahead, w.slope = g.dot(then.velocity) + w.level * then.level_rate;
         }
@@ -282,12 +285,17 @@ private:
         contact.curvature /= there.scale;
     }
 
-    // The contact of a path that is on the surface at time s.
-    void meet(const Walker& w, double s, Contact& contact) const
+    // The contact of a path that is on the surface at time s. soon: s, a time after it, as in first_contact.h.
+    void meet(const Walker& w, double s, Contact& contact, double soon = 0) const
     {
         const Seen::Place there = w.seen.at(s);
         Vec3d gradient;
         height(w, s, gradient);
+        if (soon > s && gradient.dot(there.velocity) >= 0) {
+            Vec3d beyond;
+            height(w, soon, beyond);
+            if (beyond.dot(w.seen.at(soon).velocity) < 0) gradient = beyond;
+        }
         contact.time = s;
         const Vec3d n = detail::unit_normal(gradient, there.velocity);
         contact.n = there.rotation * n;
@@ -351,7 +359,8 @@ private:
                 const Seen::Place there = w.seen.at(next[i]);
                 const double f = phi[i] - w.level / there.scale;
                 if (f < 0 && !convex_) {
-                    meet(w, refine(w, next[i], f, close(paths[w.path], there.scale)), contacts[w.path]);
+                    const double s = refine(w, next[i], f, close(paths[w.path], there.scale));
+                    meet(w, s, contacts[w.path], s + 0x1p-8 * (next[i] - w.s));
                     w.end = w.s;
                     continue;
                 }

@@ -149,6 +149,37 @@ TEST_CASE("a point deep in a deforming body is shown the nearest way out", "[def
     CHECK_THAT(contact.n, close_to(Vec3d(0, 0, 1), 1e-6));
 }
 
+TEST_CASE("a path that leaves a deforming body meets it only where it comes up to it, if within the same voxel",
+          "[deforming]")
+{
+    const Body torus(*make_torus(0.8, 0.25, 96, {0, 0, 0}), 4,
+                     [](const Vec3d& X, int frame) -> Vec3d { return (1 + 1e-3 * frame) * X; });
+    const ShapePtr shape = torus.over(2, 3, voxel).shape;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> in(-1, 1);
+    int again = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const Vec3d to = 100 * Vec3d(in(random), 0, in(random)).normalized();
+        const Path inwards{{0, 0, 0}, to - Vec3d(0, 10 * in(random), 0), Vec3d::Zero(), h / 2, 0};
+        const Contact first = contact_of(shape, inwards);
+        REQUIRE(first.time < inwards.duration);
+        const double away = 100 * std::pow(10, 1.5 * in(random)-2.5);
+        const Vec3d across = first.n.cross(Vec3d::UnitY()).normalized();
+        const Path out{inwards.P + first.time * inwards.v,
+                       first.vc + 100 * across + away * first.n,
+                       Vec3d::Zero(),
+                       h / 2,
+                       0,
+                       first.time};
+        const Contact second = contact_of(shape, out);
+        CAPTURE(i, second.time, away);
+        REQUIRE(second.time < out.duration);
+        REQUIRE(second.n.dot(out.v - second.vc) < 0.1);
+        again += second.time < 5e-4;
+    }
+    CHECK(again > 100);
+}
+
 TEST_CASE("a paddle of files that turns 40 degrees a frame lets no point in its way through", "[deforming]")
 {
     const double step = 40 * std::numbers::pi / 180;

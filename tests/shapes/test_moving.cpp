@@ -178,6 +178,33 @@ TEST_CASE("nothing passes a moving wall, at any speed or turn", "[moving][extrem
     }
 }
 
+TEST_CASE("a path that leaves a turning body meets it only where it comes up to it, if within the same voxel",
+          "[moving]")
+{
+    const MotionPtr turning =
+        keyed_motion({{0, {}}, {1, {{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Vec3d::UnitY()))}}});
+    const ShapePtr body = moving_in_a_second(level_set_torus(0.8, 0.25, {0, 0, 0}, {0.05, 5}), turning);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> in(-1, 1);
+    int again = 0;
+    for (int i = 0; i < 5000; ++i) {
+        const Vec3d to = 4 * Vec3d(in(random), 0, in(random)).normalized();
+        const Path inwards{{0, 0, 0}, to - Vec3d(0, 0.3 * in(random), 0), Vec3d::Zero(), 1, 0};
+        const Contact first = contact_of(body, inwards);
+        REQUIRE(first.time < 0.2);
+        const double away = std::pow(10, 1.5 * in(random)-2.5);
+        const Vec3d across = first.n.cross(Vec3d::UnitY()).normalized();
+        const Path out{
+            at(inwards, first.time), first.vc + 4 * across + away * first.n, Vec3d::Zero(), 0.5, 0, first.time};
+        const Contact second = contact_of(body, out);
+        CAPTURE(i, second.time, away);
+        REQUIRE(second.time < out.duration);
+        REQUIRE(second.n.dot(out.v - second.vc) < 4e-3);
+        again += second.time < 0.0125;
+    }
+    CHECK(again > 250);
+}
+
 TEST_CASE("paths that begin later meet the shape where it is then", "[moving]")
 {
     const ShapePtr ball = moving_in_a_second(make_sphere_shape(1, {0, 0, 0}), along({100, 0, 0}));

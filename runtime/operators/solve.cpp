@@ -23,8 +23,8 @@
 namespace rapid {
 namespace {
 
-// Of a level set; and of one whose band is wider than the shape itself, which takes 4 s to fill and 1.5 GiB to hold:
-// what keeps so large points out needs no such small voxels.
+// Of a level set; and of one whose band is wider than the shape itself, which takes some 4 s to fill and 1.5 GiB to
+// hold: what keeps so large points out needs no such small voxels.
 constexpr double most_voxels = 0x1p31, most_around = 0x1p27;
 
 struct Solve {

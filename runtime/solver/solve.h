@@ -21,8 +21,8 @@ struct SolveOptions {
     double h = 0;            // s, the frame's length
     std::int64_t frame = 0;  // its number, for messages
     std::string group;       // only these points are advanced; all when empty
-    std::uint8_t* met =
-        nullptr;  // set to 1 for points that meet a shape, by their place before the step; null: nobody asks
+    // Set to 1 for points that meet a shape, by their place before the step; null: nobody asks.
+    std::uint8_t* met = nullptr;
     bool begins_frame = true;  // no step of this frame was before: contacts are counted from 0
 
     int iterations = 1;           // of the constraints, a sub-step

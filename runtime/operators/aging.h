@@ -8,7 +8,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -18,31 +17,26 @@ namespace rapid {
 class Aging {
 public:
     // h: the frame's length, s.
-    explicit Aging(double h) : h_(h)
-    {
-        for (int exponent = 0; exponent < 256; ++exponent) {
-            const double step = std::ldexp(1.0, std::max(exponent, 1) - 127 - 23);
-            const int m = std::ilogb(h / (2 * step));
-            steps_a_frame_[static_cast<std::size_t>(exponent)] = std::ldexp(1.0, std::clamp(m, 0, most_));
-        }
-    }
+    explicit Aging(double h) : h_(h), per_h_(1 / h), finest_(std::ilogb(h) - 1 + 127 + 23) {}
 
-    // An age one frame later, s.
+    // An age one frame later, s. Written so that a loop over it becomes vectors.
     float after_frame(float age) const
     {
         const double sum = age + h_;
         // Of the coarser: what is known, or what is kept.
         const float larger = std::max(std::abs(age), std::abs(static_cast<float>(sum)));
-        const auto exponent = std::bit_cast<std::uint32_t>(larger) >> 23;
-        const double steps = steps_a_frame_[exponent];
-        return static_cast<float>(std::nearbyint(sum / h_ * steps) / steps * h_);
+        const auto exponent = static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(larger) >> 23);
+        const std::int32_t m = std::min(std::max(finest_ - std::max(exponent, 1), 0), most);
+        return static_cast<float>(std::nearbyint(sum * per_h_ * power_of_2(m)) * power_of_2(-m) * h_);
     }
 
 private:
-    static constexpr int most_ = 60;  // of steps that double can count; a younger age is rounded as any sum is
+    static constexpr std::int32_t most = 60;  // of steps that double can count; a younger age is rounded as any sum is
 
-    double h_;
-    std::array<double, 256> steps_a_frame_;  // h/δ by the float's exponent
+    static double power_of_2(std::int32_t m) { return std::bit_cast<double>(std::int64_t{m + 1023} << 52); }
+
+    double h_, per_h_;
+    std::int32_t finest_;  // m and the float's exponent together, where δ is two to four of its steps
 };
 
 }  // namespace rapid

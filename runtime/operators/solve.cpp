@@ -181,6 +181,15 @@ private:
         now.figures.stiff.insert(now.figures.stiff.end(), found.begin(), found.end());
     }
 
+    // The values of a chunk one after the other, in the buffer where all share one.
+    template <class T>
+    static const T* contiguous(const Strided<T>& values, std::size_t begin, std::size_t end, T* buffer)
+    {
+        if (values.stride != 0) return values.data + begin;
+        std::fill_n(buffer, end - begin, *values.data);
+        return buffer;
+    }
+
     void age(PointSet& points, const Evaluation& now) const
     {
         auto* ages = points.find<float>("age");
@@ -202,10 +211,21 @@ private:
 
         std::vector<std::uint8_t> keep(points.size());
         const std::span<float> age = ages->write();
-        for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                if (members[i]) age[i] = dt[i] == h ? aging.after_frame(age[i]) : age[i] + dt[i];
-                keep[i] = age[i] < life[i];
+        for_each_chunk(points.size(), [&, h](std::size_t begin, std::size_t end) {
+            // Contiguous, so that the loops are over vectors.
+            float dts[chunk_size], lives_until[chunk_size], whole[chunk_size];
+            std::uint8_t alike[chunk_size];
+            const float* __restrict t = contiguous(dt, begin, end, dts);
+            const float* __restrict last = contiguous(life, begin, end, lives_until);
+            const std::uint8_t* __restrict ages_here = contiguous(members, begin, end, alike);
+            float* __restrict a = age.data() + begin;
+            std::uint8_t* __restrict stays = keep.data() + begin;
+            const std::size_t size = end - begin;
+            for (std::size_t i = 0; i < size; ++i) whole[i] = aging.after_frame(a[i]);
+            for (std::size_t i = 0; i < size; ++i) {
+                const float part = a[i] + t[i], later = t[i] == h ? whole[i] : part;
+                a[i] = ages_here[i] ? later : a[i];
+                stays[i] = a[i] < last[i];
             }
         });
         const std::size_t before = points.size();

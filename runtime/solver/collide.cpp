@@ -136,6 +136,9 @@ void Collisions::begin(std::span<const std::uint32_t> places)
     contact_.resize(size);
     surfaces_.resize(size);
     before_.resize(size);
+    plane_.assign(size, -1);
+    steps_back_ = std::any_of(obstacles_.begin(), obstacles_.end(),
+                              [](const Obstacle& o) { return o.method != Method::Continuous; });
     widest_.clear();
     for (const Obstacle& obstacle : obstacles_) {
         float widest = 0;
@@ -164,13 +167,11 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
         }
         a_ = {mean_a_.data(), 1};
     }
-    const bool steps_back = std::any_of(obstacles_.begin(), obstacles_.end(),
-                                        [](const Obstacle& o) { return o.method != Method::Continuous; });
-    if (steps_back) start_.assign(P.begin(), P.end());
+    if (steps_back_) start_.assign(P.begin(), P.end());
     hold_stuck(dt);
     fly(a_, dt);
     while (!going_.empty()) round_of_travellers(a_, dt);
-    for (std::size_t o = 0; steps_back && o < obstacles_.size(); ++o)
+    for (std::size_t o = 0; steps_back_ && o < obstacles_.size(); ++o)
         if (obstacles_[o].method != Method::Continuous) correct(static_cast<int>(o), dt);
     if (damped_.empty()) audit_energy();
 }
@@ -225,6 +226,7 @@ void Collisions::hold_stuck(std::span<const double> dt)
             if (std::abs(phi_[j] - radius) > flush_within(P_[i], radius, obstacle.feature * 0x1p-21)) continue;
             held_.push_back(static_cast<std::uint32_t>(i));
             stuck_[i] = 1;
+            plane_[i] = -1;
             touch(i);
             // Along the body's field of velocities: of the fourth order (Runge and Kutta).
             const auto flow = [&](const Vec3d& x, double s) { return obstacle.shape->velocity_at(x, now + s); };
@@ -296,7 +298,9 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
         asked_paths_.clear();
         for (const std::uint32_t i : near_[o]) {
             if (!obstacle.members[places_[i]] || stuck_[i]) continue;
-            if (plane && near_count_[i] == 1 && passes_plane(i, static_cast<int>(o), a[i], dt[i])) continue;
+            const bool passes = plane && near_count_[i] == 1 && passes_plane(i, static_cast<int>(o), a[i], dt[i]);
+            plane_[i] = passes && !steps_back_ ? static_cast<int>(o) : -1;
+            if (passes) continue;
             asked_.push_back(i);
             asked_paths_.push_back(free_path(i, dt[i]));
             Path& path = asked_paths_.back();
@@ -1012,14 +1016,24 @@ void Collisions::ask_surfaces(const Place& place, const Use& use)
             obstacle.shape->distance(asked_P_, phi_, {});
             for (std::size_t j = 0; j < moved.size(); ++j) {
                 const std::uint32_t i = moved[j];
-                const double radius = obstacle.radius[places_[i]];
-                // Of the way, not of its end, which may be 0.
-                const Vec3d largest = asked_P_[j].cwiseAbs().cwiseMax(before_[i].cast<double>().cwiseAbs());
-                const double flush = flush_within(largest, radius, obstacle.feature * 0x1p-21);
-                use(i, surfaces_[i][side], phi_[j] - radius, flush);
+                const double f = phi_[j] - obstacle.radius[places_[i]];
+                use(i, surfaces_[i][side], f, flush_of_way(i, asked_P_[j], obstacle));
             }
         }
     }
+}
+
+// How near to a surface its end is flush with it: by the way's coordinates, as those of the end may be 0.
+double Collisions::flush_of_way(std::size_t i, const Vec3d& P, const Obstacle& obstacle) const
+{
+    const Vec3d largest = P.cwiseAbs().cwiseMax(before_[i].cast<double>().cwiseAbs());
+    return flush_within(largest, obstacle.radius[places_[i]], obstacle.feature * 0x1p-21);
+}
+
+double Collisions::over_plane(std::size_t i, const Vec3d& P) const
+{
+    const Obstacle& obstacle = obstacles_[plane_[i]];
+    return obstacle.plane->n.dot(P) - obstacle.plane->offset - obstacle.radius[places_[i]];
 }
 
 // To nearest, which can leave a point on the inner side of its surface by half an ulp an axis. Then the coordinate that
@@ -1029,10 +1043,15 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
 {
     for (auto& side : moved_on_)
         for (std::vector<std::uint32_t>& moved : side) moved.clear();
+    moved_on_plane_.clear();
     for (const std::uint32_t i : touched_) {
         before_[i] = rounded[i];
         const std::array<Surface, 2>& on = surfaces_[i];
         if (on[0].obstacle < 0 || (P[i] == before_[i].cast<double>() && !obstacles_[on[0].obstacle].moves)) continue;
+        if (plane_[i] >= 0) {
+            if (plane_[i] == on[0].obstacle) moved_on_plane_.push_back(i);
+            continue;
+        }
         for (int side = 0; side < 2 && on[side].obstacle >= 0; ++side) moved_on_[side][on[side].obstacle].push_back(i);
     }
 
@@ -1046,6 +1065,11 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
                      const double drawn = obstacle.moves ? h * (speed(0) + speed(h)) : 0;
                      if (std::abs(f) <= flush + drawn) P[i] -= f * surface.n;
                  });
+    for (const std::uint32_t i : moved_on_plane_) {
+        const Obstacle& obstacle = obstacles_[plane_[i]];
+        const double f = over_plane(i, P[i]);
+        if (std::abs(f) <= flush_of_way(i, P[i], obstacle)) P[i] -= f * obstacle.plane->n;
+    }
     const bool moves = std::any_of(obstacles_.begin(), obstacles_.end(), [](const Obstacle& o) { return o.moves; });
     std::sort(lost_.begin(), lost_.end());
     lost_.erase(std::unique(lost_.begin(), lost_.end()), lost_.end());
@@ -1055,6 +1079,12 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
                  [&](std::size_t i, const Surface& surface, double f, double flush) {
                      if (f < 0 && f >= -flush) rounded[i] = lifted(rounded[i], surface.n, -f);
                  });
+    for (const std::uint32_t i : moved_on_plane_) {
+        const Obstacle& obstacle = obstacles_[plane_[i]];
+        const Vec3d at = rounded[i].cast<double>();
+        const double f = over_plane(i, at);
+        if (f < 0 && f >= -flush_of_way(i, at, obstacle)) rounded[i] = lifted(rounded[i], obstacle.plane->n, -f);
+    }
     return deepest(rounded);
 }
 
@@ -1102,11 +1132,13 @@ void Collisions::take_out(std::span<Vec3d> P, std::vector<std::uint32_t> inside)
 double Collisions::deepest(std::span<const Vec3f> P)
 {
     double depth = 0;
+    for (const std::uint32_t i : touched_)
+        if (plane_[i] >= 0) depth = std::max(depth, -over_plane(i, P[i].cast<double>()));
     for (const Obstacle& obstacle : obstacles_) {
         asked_.clear();
         asked_P_.clear();
         for (const std::uint32_t i : touched_) {
-            if (!obstacle.members[places_[i]]) continue;
+            if (plane_[i] >= 0 || !obstacle.members[places_[i]]) continue;
             const double radius = obstacle.radius[places_[i]];
             const Vec3d at = P[i].cast<double>();
             if (is_clear_of(obstacle.bounds, at, radius)) continue;

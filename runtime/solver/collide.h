@@ -179,6 +179,8 @@ private:
     template <class Place, class Use>
     void ask_surfaces(const Place& place, const Use& use);
     void take_out(std::span<Vec3d> P, std::vector<std::uint32_t> inside);
+    double over_plane(std::size_t i, const Vec3d& P) const;
+    double flush_of_way(std::size_t i, const Vec3d& P, const Obstacle& obstacle) const;
     double deepest(std::span<const Vec3f> P);
 
     std::span<const Obstacle> obstacles_;
@@ -186,6 +188,7 @@ private:
     std::span<const std::uint32_t> places_;  // of the block's points, in the set
     std::size_t size_ = 0;
     std::vector<double> widest_;  // of each obstacle, the largest radius in the block, m
+    bool steps_back_ = false;     // whether an obstacle looks at the ends of sub-steps
 
     std::span<Vec3d> P_, v_;
     Strided<Vec3d> a_{nullptr, 0};  // of the sub-step, without the forces of surfaces
@@ -211,6 +214,7 @@ private:
     std::vector<Bend> bends_;
     std::vector<std::array<Surface, 2>> surfaces_;  // that it is on now
     std::vector<Vec3f> before_;                     // at the beginning of the frame
+    std::vector<int> plane_;  // the plane that is all it can have touched at the end of the sub-step, or -1
 
     // Places in the block.
     std::vector<std::vector<std::uint32_t>> near_;  // by obstacle, those whose free path may come near it
@@ -218,6 +222,7 @@ private:
     // Of these, those that are elsewhere on a surface than at the beginning of the frame, by the surface's side and
     // obstacle.
     std::array<std::vector<std::vector<std::uint32_t>>, 2> moved_on_;
+    std::vector<std::uint32_t> moved_on_plane_;    // and those of them that can have touched one plane only
     std::vector<std::uint32_t> lost_;              // those that found no way out in their step
     std::vector<std::uint32_t> held_;              // those that are stuck
     std::vector<std::uint32_t> meeting_;           // those whose free path meets a shape

@@ -263,6 +263,17 @@ Path Collisions::free_path(std::size_t i, double dt) const
     return {P_[i], free ? v_[i] : path_v_[i], free ? a_[i] : path_a_[i], dt, 0, since_begin(i, dt)};
 }
 
+// Its free path goes to the shape that is asked next.
+void Collisions::ask_about(std::uint32_t i, int o, double dt)
+{
+    plane_[i] = -1;
+    asked_.push_back(i);
+    asked_paths_.push_back(free_path(i, dt));
+    Path& path = asked_paths_.back();
+    path.radius = obstacles_[o].radius[places_[i]];
+    if (obstacle_[i] >= 0) path.duration = contact_[i].time;  // only an earlier contact is of interest
+}
+
 // The time of a point that has so much left of its sub-step, for shapes that move in the frame.
 double Collisions::since_begin(std::size_t i, double left) const { return consequences_.h - after_[i] - left; }
 
@@ -298,15 +309,16 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
         asked_paths_.clear();
         for (const std::uint32_t i : near_[o]) {
             if (!obstacle.members[places_[i]] || stuck_[i]) continue;
-            const bool passes = plane && near_count_[i] == 1 && passes_plane(i, static_cast<int>(o), a[i], dt[i]);
-            plane_[i] = passes && !steps_back_ ? static_cast<int>(o) : -1;
-            if (passes) continue;
-            asked_.push_back(i);
-            asked_paths_.push_back(free_path(i, dt[i]));
-            Path& path = asked_paths_.back();
-            path.radius = obstacle.radius[places_[i]];
-            if (obstacle_[i] >= 0) path.duration = contact_[i].time;  // only an earlier contact is of interest
+            if (!plane || near_count_[i] > 1) {
+                ask_about(i, static_cast<int>(o), dt[i]);
+                continue;
+            }
+            const std::uint32_t at = places_[i];
+            pass_.add(i, P_[i], v_[i], a[i], dt[i], obstacle.radius[at],
+                      obstacle.response == Response::Slide ? 0.0f : obstacle.bounce[at], obstacle.friction[at]);
+            if (pass_.is_full()) pass_plane(static_cast<int>(o), a, dt);
         }
+        if (pass_.size > 0) pass_plane(static_cast<int>(o), a, dt);
         ask_first_contacts(static_cast<int>(o));
     }
 
@@ -330,59 +342,41 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
     }
 }
 
-// Takes a point through the whole sub-step that may come near a plane only: where it misses it, bounces off it once, or
-// lies on it and nothing but friction changes its way; most points that touch anything do one of these. What a
-// Traveller would do, at a tenth of its cost; false where there is more to it.
-bool Collisions::passes_plane(std::size_t i, int o, const Vec3d& a, double dt)
+// Takes the points of pass_ through the whole sub-step; those for which there is more to it are left to be asked.
+void Collisions::pass_plane(int o, Strided<Vec3d> a, std::span<const double> dt)
 {
     const Obstacle& obstacle = obstacles_[o];
-    const Vec3d n = obstacle.plane->n, P = P_[i], v = v_[i];
-    const double radius = obstacle.radius[places_[i]];
-    const double f = n.dot(P) - obstacle.plane->offset - radius, vn = n.dot(v), g = -n.dot(a);
-    const double flush = flush_within(P, radius, 0);
-    if (!(g > 0) || f < -flush) return false;
-    if (f > flush && f + dt * (vn - 0.5 * dt * g) > 0) return true;
-    if (obstacle.response != Response::Bounce && obstacle.response != Response::Slide) return false;
-
-    const double friction = obstacle.friction[places_[i]];
-    const auto meets_another = [&](const Vec3d& from, const Vec3d& to, const Vec3d& acceleration, double duration) {
-        for (std::size_t other = 0; other < obstacles_.size(); ++other)
-            if (static_cast<int>(other) != o && may_reach_shape(i, from, to, acceleration, duration, other))
-                return true;
-        return false;
-    };
-
-    if (f <= flush && vn * vn <= 2 * g * flush) {
-        if (!(a + g * n).isZero(0)) return false;
-        // A last approach by less than rounding costs its friction too, as every contact does.
-        const Vec3d vt = v - vn * n;
-        const double slid = vt.norm(), speed = std::max(0.0, slid - friction * std::max(0.0, -vn));
-        const double slowing = friction * g;
-        const bool stops = speed <= slowing * dt;
-        const double way = stops ? 0.5 * speed * speed / slowing : dt * (speed - 0.5 * slowing * dt);
-        const Vec3d end = speed > 0 ? Vec3d(P + way / slid * vt) : P;
-        if (meets_another(P, end, Vec3d::Zero(), dt)) return false;
-        flight_.end_with(i, end, stops ? Vec3d(Vec3d::Zero()) : Vec3d((speed - slowing * dt) / slid * vt));
+    const bool responds = obstacle.response == Response::Bounce || obstacle.response == Response::Slide;
+    const Vec3d n = obstacle.plane->n;
+    pass_.solve(*obstacle.plane);
+    for (std::size_t j = 0; j < pass_.size; ++j) {
+        const std::uint32_t i = pass_.place[j];
+        const auto kind = pass_.kind[j];
+        const bool bounces = kind == PlanePass::Bounces;
+        const Vec3d end = pass_.end(j);
+        const auto meets_another = [&] {
+            for (std::size_t other = 0; other < obstacles_.size(); ++other)
+                if (static_cast<int>(other) != o &&
+                    (bounces ? may_reach_shape(i, pass_.bounce_at(j), end, a[i], pass_.left[j], other)
+                             : may_reach_shape(i, P_[i], end, Vec3d::Zero(), dt[i], other)))
+                    return true;
+            return false;
+        };
+        if (kind == PlanePass::More || (kind != PlanePass::Misses && (!responds || meets_another()))) {
+            ask_about(i, o, dt[i]);
+            continue;
+        }
+        plane_[i] = steps_back_ ? -1 : o;
+        if (kind == PlanePass::Misses) continue;
+        flight_.end_with(i, end, pass_.velocity(j));
         touch(i);
-        surfaces_[i] = {Surface{o, n}, no_surface};
-        return true;
+        if (bounces)
+            count(i, pass_.bounce_at(j), n, Vec3d::Zero(), pass_.approach[j], pass_.change(j),
+                  consequences_.time - after_[i] - pass_.left[j], o);
+        else
+            surfaces_[i] = {Surface{o, n}, no_surface};
     }
-
-    const bool touches = f <= flush && vn < 0;
-    const double s = touches ? 0 : first_fall_through(std::max(f, 0.0), vn, -g), left = dt - s;
-    if (!(left > 0)) return !touches;
-    const double bounce = obstacle.response == Response::Slide ? 0.0 : double(obstacle.bounce[places_[i]]);
-    const Vec3d at = P + s * (v + 0.5 * s * a), arriving = v + s * a;
-    const double approach = -n.dot(arriving), u = bounce * approach;
-    const double rising2 = 2 * g * flush_within(at, radius, 0);
-    if (!(approach * approach > rising2 && u * u > rising2 && 2 * u > g * left)) return false;  // it comes back
-    const Vec3d leaving = contact_response(arriving, Vec3d::Zero(), n, bounce, friction);
-    const Vec3d end = at + left * (leaving + 0.5 * left * a);
-    if (meets_another(at, end, a, left)) return false;
-    flight_.end_with(i, end, leaving + left * a);
-    touch(i);
-    count(i, at, n, Vec3d::Zero(), approach, leaving - arriving, consequences_.time - after_[i] - left, o);
-    return true;
+    pass_.size = 0;
 }
 
 // Takes a point through the whole sub-step that lies on a plane, and meets nothing else on its way along it: most of

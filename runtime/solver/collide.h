@@ -22,6 +22,7 @@
 #include "runtime/solver/dynamics.h"
 #include "runtime/solver/flight.h"
 #include "runtime/solver/hits.h"
+#include "runtime/solver/plane_pass.h"
 #include "runtime/solver/slide.h"
 
 namespace rapid {
@@ -147,7 +148,8 @@ private:
     Vec3d velocity_after(std::size_t i, double s, double dt) const;
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
     bool slides_on_plane(std::size_t i, const Vec3d& a, double dt);
-    bool passes_plane(std::size_t i, int obstacle, const Vec3d& a, double dt);
+    void pass_plane(int obstacle, Strided<Vec3d> a, std::span<const double> dt);
+    void ask_about(std::uint32_t i, int obstacle, double dt);
     bool goes_on(Traveller& t, const Vec3d& a, double dt);
     bool plan(Traveller& t, Path& path, const Vec3d& a, double dt);
     bool chatters(Traveller& t);
@@ -227,6 +229,8 @@ private:
     std::vector<std::uint32_t> held_;              // those that are stuck
     std::vector<std::uint32_t> meeting_;           // those whose free path meets a shape
     std::vector<std::uint32_t> going_, going_on_;  // those whose sub-step is not over
+
+    PlanePass pass_;
 
     // What a shape is asked.
     std::vector<std::size_t> asked_;

@@ -316,9 +316,9 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
             const std::uint32_t at = places_[i];
             pass_.add(i, P_[i], v_[i], a[i], dt[i], obstacle.radius[at],
                       obstacle.response == Response::Slide ? 0.0f : obstacle.bounce[at], obstacle.friction[at]);
-            if (pass_.is_full()) pass_plane(static_cast<int>(o), a, dt);
+            if (pass_.is_full()) pass_plane(static_cast<int>(o), dt);
         }
-        if (pass_.size > 0) pass_plane(static_cast<int>(o), a, dt);
+        if (pass_.size > 0) pass_plane(static_cast<int>(o), dt);
         ask_first_contacts(static_cast<int>(o));
     }
 
@@ -343,35 +343,28 @@ void Collisions::fly(Strided<Vec3d> a, std::span<const double> dt)
 }
 
 // Takes the points of pass_ through the whole sub-step; those for which there is more to it are left to be asked.
-void Collisions::pass_plane(int o, Strided<Vec3d> a, std::span<const double> dt)
+void Collisions::pass_plane(int o, std::span<const double> dt)
 {
     const Obstacle& obstacle = obstacles_[o];
     const bool responds = obstacle.response == Response::Bounce || obstacle.response == Response::Slide;
     const Vec3d n = obstacle.plane->n;
     pass_.solve(*obstacle.plane);
+    for (std::size_t other = 0; other < obstacles_.size(); ++other)
+        if (static_cast<int>(other) != o && obstacles_[other].method == Method::Continuous)
+            pass_.leave_out_near(obstacles_[other].bounds, widest_[other]);
     for (std::size_t j = 0; j < pass_.size; ++j) {
         const std::uint32_t i = pass_.place[j];
         const auto kind = pass_.kind[j];
-        const bool bounces = kind == PlanePass::Bounces;
-        const Vec3d end = pass_.end(j);
-        const auto meets_another = [&] {
-            for (std::size_t other = 0; other < obstacles_.size(); ++other)
-                if (static_cast<int>(other) != o &&
-                    (bounces ? may_reach_shape(i, pass_.bounce_at(j), end, a[i], pass_.left[j], other)
-                             : may_reach_shape(i, P_[i], end, Vec3d::Zero(), dt[i], other)))
-                    return true;
-            return false;
-        };
-        if (kind == PlanePass::More || (kind != PlanePass::Misses && (!responds || meets_another()))) {
+        if (kind == PlanePass::More || (kind != PlanePass::Misses && !responds)) {
             ask_about(i, o, dt[i]);
             continue;
         }
         plane_[i] = steps_back_ ? -1 : o;
         if (kind == PlanePass::Misses) continue;
-        flight_.end_with(i, end, pass_.velocity(j));
+        flight_.end_with(i, pass_.end(j), pass_.velocity(j));
         touch(i);
-        if (bounces)
-            count(i, pass_.bounce_at(j), n, Vec3d::Zero(), pass_.approach[j], pass_.change(j),
+        if (kind == PlanePass::Bounces)
+            count(i, pass_.from(j), n, Vec3d::Zero(), pass_.approach[j], pass_.change(j),
                   consequences_.time - after_[i] - pass_.left[j], o);
         else
             surfaces_[i] = {Surface{o, n}, no_surface};

@@ -148,7 +148,7 @@ private:
     Vec3d velocity_after(std::size_t i, double s, double dt) const;
     void round_of_travellers(Strided<Vec3d> a, std::span<const double> dt);
     bool slides_on_plane(std::size_t i, const Vec3d& a, double dt);
-    void pass_plane(int obstacle, Strided<Vec3d> a, std::span<const double> dt);
+    void pass_plane(int obstacle, std::span<const double> dt);
     void ask_about(std::uint32_t i, int obstacle, double dt);
     bool goes_on(Traveller& t, const Vec3d& a, double dt);
     bool plan(Traveller& t, Path& path, const Vec3d& a, double dt);

@@ -92,13 +92,35 @@ void PlanePass::solve(const HalfSpace& plane)
         v_end_[0][j] = lies ? (stops ? 0 : of_slide * tx) : lx + rest * ax;
         v_end_[1][j] = lies ? (stops ? 0 : of_slide * ty) : ly + rest * ay;
         v_end_[2][j] = lies ? (stops ? 0 : of_slide * tz) : lz + rest * az;
-        bounce_at_[0][j] = bx;
-        bounce_at_[1][j] = by;
-        bounce_at_[2][j] = bz;
+        from_[0][j] = lies ? x : bx;
+        from_[1][j] = lies ? y : by;
+        from_[2][j] = lies ? z : bz;
+        const double sagging = lies ? 0 : 0.125 * rest * rest;
+        sagging_[0][j] = sagging * std::abs(ax);
+        sagging_[1][j] = sagging * std::abs(ay);
+        sagging_[2][j] = sagging * std::abs(az);
         change_[0][j] = lx - ux;
         change_[1][j] = ly - uy;
         change_[2][j] = lz - uz;
     }
+}
+
+// may_reach(), of all ways.
+void PlanePass::leave_out_near(const Box3d& box, double radius)
+{
+    const Vec3d least = box.min(), most = box.max();
+    std::int64_t far[many] = {};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double lowest = least[axis] - radius, highest = most[axis] + radius;
+        const double *from = from_[axis], *end = end_[axis], *sagging = sagging_[axis];
+        for (std::size_t j = 0; j < size; ++j) {
+            const double margin = sagging[j] + 0x1p-21 * (std::abs(from[j]) + radius);
+            const bool below = std::max(from[j], end[j]) < lowest - margin;
+            const bool above = std::min(from[j], end[j]) > highest + margin;
+            far[j] |= below | above;
+        }
+    }
+    for (std::size_t j = 0; j < size; ++j) kind[j] = (kind[j] == Misses) | (far[j] != 0) ? kind[j] : More;
 }
 
 }  // namespace rapid

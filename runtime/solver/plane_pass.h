@@ -24,6 +24,9 @@ struct PlanePass {
     // Takes all through their steps.
     void solve(const HalfSpace& plane);
 
+    // Those that bounce or lie, and may come near this box with what is known of their radius, have more to it.
+    void leave_out_near(const Box3d& box, double radius);
+
     std::size_t size = 0;
     std::uint32_t place[many];
     std::int64_t kind[many];
@@ -31,14 +34,15 @@ struct PlanePass {
 
     Vec3d end(std::size_t j) const { return at(end_, j); }         // m
     Vec3d velocity(std::size_t j) const { return at(v_end_, j); }  // m/s, at the end
-    Vec3d bounce_at(std::size_t j) const { return at(bounce_at_, j); }
-    Vec3d change(std::size_t j) const { return at(change_, j); }  // of the velocity by the bounce, m/s
+    Vec3d from(std::size_t j) const { return at(from_, j); }       // where it bounces, or lies at first
+    Vec3d change(std::size_t j) const { return at(change_, j); }   // of the velocity by the bounce, m/s
 
 private:
     using Coordinates = double[3][many];
     static Vec3d at(const Coordinates& x, std::size_t j) { return {x[0][j], x[1][j], x[2][j]}; }
 
-    Coordinates P_, v_, a_, end_, v_end_, bounce_at_, change_;
+    Coordinates P_, v_, a_, end_, v_end_, from_, change_;
+    Coordinates sagging_;  // how far the way is off the straight line to its end at most, m
     double dt_[many], radius_[many], bounce_[many], friction_[many];
 };
 

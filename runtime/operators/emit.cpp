@@ -465,11 +465,24 @@ void Emit::append(PointSet& points, std::size_t n, const Evaluation& now) const
     points.append(n, common, joins_group(now) ? std::vector{joins} : std::vector<std::string>());
 }
 
+// The values of all points, one each; in parallel, as they are many more than are born.
+std::span<float> expanded(Column<float>& column)
+{
+    if (!column.is_uniform()) return column.write();
+    const float shared = column[0];
+    const std::span<float> values = column.overwrite();
+    for_each_chunk(values.size(), [&](std::size_t begin, std::size_t end) {
+        std::fill(values.begin() + static_cast<std::ptrdiff_t>(begin),
+                  values.begin() + static_cast<std::ptrdiff_t>(end), shared);
+    });
+    return values;
+}
+
 Newborn Emit::newborn_of(PointSet& points, std::size_t n, const Evaluation& now) const
 {
     const auto floats = [&](const char* name, bool own) {
         Column<float>* column = own ? points.find<float>(name) : nullptr;
-        return column ? column->write().last(n) : std::span<float>();
+        return column ? expanded(*column).last(n) : std::span<float>();
     };
     const bool own_age = !same_age(now);
     Newborn newborn;

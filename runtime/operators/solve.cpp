@@ -209,7 +209,7 @@ private:
             members = column ? column->read() : Strided<std::uint8_t>{&nobody, 0};
         }
 
-        std::vector<std::uint8_t> keep(points.size());
+        const auto keep = std::make_unique_for_overwrite<std::uint8_t[]>(points.size());
         const std::span<float> age = ages->write();
         for_each_chunk(points.size(), [&, h](std::size_t begin, std::size_t end) {
             // Contiguous, so that the loops are over vectors.
@@ -219,7 +219,7 @@ private:
             const float* __restrict last = contiguous(life, begin, end, lives_until);
             const std::uint8_t* __restrict ages_here = contiguous(members, begin, end, alike);
             float* __restrict a = age.data() + begin;
-            std::uint8_t* __restrict stays = keep.data() + begin;
+            std::uint8_t* __restrict stays = keep.get() + begin;
             const std::size_t size = end - begin;
             for (std::size_t i = 0; i < size; ++i) whole[i] = aging.after_frame(a[i]);
             for (std::size_t i = 0; i < size; ++i) {
@@ -229,7 +229,7 @@ private:
             }
         });
         const std::size_t before = points.size();
-        if (lives) points.keep(keep);
+        if (lives) points.keep({keep.get(), points.size()});
         now.figures.died += before - points.size();
     }
 

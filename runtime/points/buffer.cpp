@@ -3,9 +3,11 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <new>
 #include <utility>
 
@@ -25,6 +27,60 @@ std::size_t stagger()
 }
 
 std::size_t whole_pages(std::size_t bytes) { return (bytes + page - 1) / page * page; }
+
+// Pages that were given back, for who next needs about as many: columns that come and go in every frame would else have
+// the system clear theirs anew each time, page by page.
+class SparePages {
+public:
+    struct Block {
+        void* begin = nullptr;
+        std::size_t bytes = 0;
+    };
+
+    // At least so many bytes, and at most twice as many; null where there are none.
+    Block take(std::size_t bytes)
+    {
+        const std::lock_guard lock(mutex_);
+        Block* smallest = nullptr;
+        for (Block& block : blocks_)
+            if (block.bytes >= bytes && block.bytes / 2 <= bytes && (!smallest || block.bytes < smallest->bytes))
+                smallest = &block;
+        return smallest ? std::exchange(*smallest, {}) : Block();
+    }
+
+    void give(Block block)
+    {
+        if (block.bytes <= most / blocks_.size()) {
+            const std::lock_guard lock(mutex_);
+            std::swap(block, blocks_[oldest_]);
+            oldest_ = (oldest_ + 1) % blocks_.size();
+        }
+        if (block.begin) munmap(block.begin, block.bytes);
+    }
+
+private:
+    static constexpr std::size_t most = std::size_t{1} << 26;  // bytes, of all
+
+    std::mutex mutex_;
+    std::array<Block, 4> blocks_;
+    std::size_t oldest_ = 0;
+};
+
+SparePages& spare_pages()
+{
+    static auto* pages = new SparePages;  // for buffers that outlive what is static
+    return *pages;
+}
+
+SparePages::Block new_pages(std::size_t bytes)
+{
+    SparePages::Block block = spare_pages().take(bytes);
+    if (block.begin) return block;
+    block = {mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes};
+    if (block.begin == MAP_FAILED) throw std::bad_alloc();
+    madvise(block.begin, bytes, MADV_HUGEPAGE);
+    return block;
+}
 
 }  // namespace
 
@@ -69,13 +125,9 @@ void Buffer::reserve(std::size_t bytes)
     Buffer grown;
     if (wanted >= mapped_from) {
         const std::size_t offset = stagger();
-        grown.block_bytes_ = whole_pages(wanted + offset);
-        grown.block_ = mmap(nullptr, grown.block_bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-        if (grown.block_ == MAP_FAILED) {
-            grown.block_ = nullptr;
-            throw std::bad_alloc();
-        }
-        madvise(grown.block_, grown.block_bytes_, MADV_HUGEPAGE);
+        const SparePages::Block pages = new_pages(whole_pages(wanted + offset));
+        grown.block_ = pages.begin;
+        grown.block_bytes_ = pages.bytes;
         grown.mapped_ = true;
         grown.data_ = static_cast<char*>(grown.block_) + offset;
         grown.capacity_ = grown.block_bytes_ - offset;
@@ -93,7 +145,7 @@ void Buffer::reserve(std::size_t bytes)
 void Buffer::release()
 {
     if (mapped_)
-        munmap(block_, block_bytes_);
+        spare_pages().give({block_, block_bytes_});
     else
         std::free(block_);
 }

@@ -47,6 +47,26 @@ TEST_CASE("room that is there already is kept where it is", "[buffer]")
     CHECK(buffer.data() == before);
 }
 
+TEST_CASE("pages that are given back serve the next of about their size, and no other", "[buffer]")
+{
+    const std::size_t bytes = std::size_t{5} << 20;
+    std::uintptr_t before = 0;
+    {
+        Buffer buffer(bytes);
+        before = address(buffer) / 4096;
+    }
+    const Buffer larger(3 * bytes), smaller(bytes / 3);
+    CHECK(address(larger) / 4096 != before);
+    CHECK(address(smaller) / 4096 != before);
+    const Buffer same(bytes - 100), other(bytes);
+    CHECK(address(same) / 4096 == before);
+    CHECK(same.capacity() >= bytes - 100);
+    CHECK(address(other) / 4096 != before);
+    std::memset(same.data(), 1, same.capacity());
+    std::memset(other.data(), 2, other.capacity());
+    CHECK(static_cast<char*>(same.data())[same.capacity() - 1] == 1);
+}
+
 TEST_CASE("growing bit by bit moves the values a few times, not every time", "[buffer]")
 {
     Buffer buffer;

@@ -100,6 +100,7 @@ struct FrameFigures {
     ContactEnergy contact_energy;
     std::uint64_t constraint_rows = 0;    // that were active at the end of the frame
     std::uint64_t loose_constraints = 0;  // of them, those that were off by more than a tenth of their size
+    std::uint64_t asleep = 0;             // points that slept at the end of the frame
     std::optional<Residual::Search> contact_search;
     std::vector<BandFigures> bands;  // by collide node, of those with a level set
     std::vector<double> errors;      // estimated, of the positions of a sample of the points, m

@@ -131,6 +131,7 @@ struct Solve {
         now.figures.trapped += result.trapped;
         now.figures.constraint_rows += result.residual.rows;
         now.figures.loose_constraints += result.residual.loose;
+        now.figures.asleep += result.asleep;
         if (result.residual.search) now.figures.contact_search = result.residual.search;
         now.figures.constraint_residual_max = std::max(now.figures.constraint_residual_max, result.residual.worst);
         now.figures.contact_energy += result.contact_energy;

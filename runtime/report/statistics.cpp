@@ -60,6 +60,7 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.penetration_max = result.figures.penetration_max;
     frame.constraint_rows = result.figures.constraint_rows;
     frame.loose_constraints = result.figures.loose_constraints;
+    frame.asleep = result.figures.asleep;
     frame.contact_search = result.figures.contact_search;
     frame.constraint_residual_max = result.figures.constraint_residual_max;
     frame.contact_energy = result.figures.contact_energy;
@@ -108,6 +109,7 @@ ordered_json to_json(const FrameStatistics& frame)
     json["constraint_residual_max"] = frame.constraint_residual_max;
     if (frame.constraint_rows > 0) json["constraint_rows"] = frame.constraint_rows;
     if (frame.constraint_rows > 0) json["loose_constraints"] = frame.loose_constraints;
+    json["asleep"] = frame.asleep;
     if (frame.contact_search)
         json["contact_grids"] = {{"points", frame.contact_search->grids},
                                  {"error", frame.contact_search->error},
@@ -209,6 +211,14 @@ std::string constraint_text(const RunStatistics& run)
     return text;
 }
 
+std::string sleepers_of(const RunStatistics& run)
+{
+    if (run.frames.empty() || run.frames.back().asleep == 0) return "";
+    const FrameStatistics& last = run.frames.back();
+    return fmt::format("asleep   {} of {} points in the last frame\n", with_separators(last.asleep),
+                       with_separators(last.points));
+}
+
 }  // namespace
 
 std::string to_json(const RunStatistics& run)
@@ -265,6 +275,7 @@ std::string summary(const RunStatistics& run)
     text += drift_of(run);
     text += contacts_of(run);
     text += constraint_text(run);
+    text += sleepers_of(run);
     text += bands_of(run);
     text += advice(run.stiff);
     text += doubtful_frames(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");

@@ -47,6 +47,7 @@ struct FrameStatistics {
     double constraint_residual_max = 0;   // m; 0 where nothing is constrained
     std::uint64_t constraint_rows = 0;    // that were active at the frame's end
     std::uint64_t loose_constraints = 0;  // of them, those that were off by more than a tenth of their size
+    std::uint64_t asleep = 0;             // points, at the frame's end
     std::optional<Residual::Search> contact_search;
     StageSeconds seconds;
 };

@@ -344,6 +344,21 @@ describe("--stats", function()
     end
   end)
 
+  it("counts the points that sleep, and so does the summary", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 0.1, 0}, {1, 0.1, 0}, {2, 99, 0}} } }
+  :gravity {} :contact { radius = 0.1 } :collide { shape = rapid.shape.plane {}, bounce = 0 }
+  :solve { substeps = 4, sleep = 0.25 }
+]]
+    local result = folder:run("-f 1-12 --stats stats.json")
+    assert.equal(0, result.status)
+    local frames = json.decode(folder:read "stats.json").frames
+    assert.equal(0, frames[6].asleep) -- 5/24 s after the first
+    assert.equal(2, frames[12].asleep)
+    assert.truthy(result.stdout:find("\nasleep   2 of 3 points in the last frame\n", 1, true), result.stdout)
+  end)
+
   it("counts births, deaths and collisions", function()
     local folder = new_folder [[
 local rapid = require "rapid"

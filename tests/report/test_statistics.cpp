@@ -20,6 +20,7 @@ FrameResult frame_result()
     result.figures.contact_limit = 3;
     result.figures.trapped = 2;
     result.figures.substeps = 2;
+    result.figures.asleep = 3;
     result.figures.penetration_max = 0.25;
     result.figures.contact_energy = {0.5, 3};
     result.figures.bands = {{"collide1", 0.125, 5000, 0.5}};
@@ -92,7 +93,8 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
     CHECK(json["frames"][0] == ordered_json::parse(R"({
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
-        "energy_drift": null, "penetration_max": 0.25, "constraint_residual_max": 0.0, "collisions": 12,
+        "energy_drift": null, "penetration_max": 0.25, "constraint_residual_max": 0.0, "asleep": 3,
+        "collisions": 12,
         "contact_energy": { "added": 0.5, "lost": 3.0 },
         "bands": [ { "node": "collide1", "width": 0.125, "voxels": 5000, "seconds": 0.5 } ],
         "contact_limit": 3, "trapped": 2, "beyond_tolerance": 0 })"));

@@ -25,6 +25,7 @@ struct ContactNode {
     PerPoint<float> bounce, friction;
     std::optional<double> max_difference;
     int max_grids = 8;
+    double mass_scaling = 0;
     std::string group;
 
     static NodeType declare()
@@ -42,15 +43,16 @@ struct ContactNode {
                    "Coulomb's coefficient; of two points that differ the geometric mean")
             .param(&ContactNode::max_difference, "max_difference", Value(), at_least(0), "m",
                    "of the radii in one grid; where not given, a quarter of the largest")
-            .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "",
-                   "the most grids for different radii");
+            .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "", "the most grids for different radii")
+            .param(&ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, 8), "",
+                   "a point counts as e^mass_scaling times lighter than what it stands on");
     }
 
     DynamicPtr dynamic(const Evaluation& now) const
     {
         auto constraint = dynamic_of<ContactConstraint>(now, group);
         constraint->contacts = contacts_;
-        constraint->options = {radius, bounce, friction, max_difference, max_grids};
+        constraint->options = {radius, bounce, friction, max_difference, max_grids, mass_scaling};
         return constraint;
     }
 

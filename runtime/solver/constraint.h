@@ -53,8 +53,9 @@ struct Substep {
     std::span<const Yield> yields;       // empty where no force has a linear part
     double dt = 0;                       // s, of a point that lives through the whole frame
     double time = 0;                     // s since the start, at its end
-    double pull = 0;  // m/s², the largest acceleration by forces: what a point at rest is pressed by
-    int index = 0;    // from 0
+    double pull = 0;           // m/s², the largest acceleration by forces: what a point at rest is pressed by
+    Vec3d up = Vec3d::Zero();  // unit, against the sum of what is the same for all points, as gravity; 0 where it is 0
+    int index = 0;             // from 0
     int iterations = 1;
     Sleepers* sleepers = nullptr;  // null where nobody may sleep
 

@@ -86,6 +86,7 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     const bool same_radii = radius_ == before;
     if (!same_radii)
         grids_ = RadiusGrids({radius_.data(), 1}, n, options.max_difference.value_or(largest_ / 4), options.max_grids);
+    mass_scaling_ = options.mass_scaling;
     search_seconds_ = 0;
     fresh_ = true;
 
@@ -286,11 +287,26 @@ void Contacts::sweep(const F& f)
     });
 }
 
+// Calls f(weights), where weights(row, a, b) are the inverse masses of a row's points, as the row takes them. Of
+// another type where they are not scaled: that costs nothing.
+template <class F>
+void Contacts::weighed(const F& f)
+{
+    if (lightness_.empty())
+        f([](const Row&, const Place& a, const Place& b) { return std::array{a.w, b.w}; });
+    else
+        f([this](const Row& row, const Place& a, const Place& b) {
+            const auto [i, j] = lightness_[static_cast<std::size_t>(&row - rows_.data())];
+            return std::array{i * a.w, j * b.w};
+        });
+}
+
 // The pairs that touch where their own ways end, or have pressed each other until now, become rows. Which these are is
 // found first, without a branch: that would be mispredicted for every other pair.
 void Contacts::touch(const Substep& now)
 {
     const double at_rest = resting * now.pull * now.dt;
+    lightness_.resize(mass_scaling_ > 0 && !now.up.isZero(0) ? rows_.size() : 0);
     each_batch(false, [&](std::size_t b) {
         thread_local std::vector<std::uint32_t> close;
         const std::uint32_t first = batches_[b], last = batches_[b + 1];
@@ -309,7 +325,7 @@ void Contacts::touch(const Substep& now)
 }
 
 // Whether the pair k has a row, and what it is.
-bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& now) const
+bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& now)
 {
     const auto [i, j] = pairs_[k];
     const Place &a = now.at[i], &b = now.at[j];
@@ -333,11 +349,30 @@ bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& n
     row.rubbed = rubbed - row.n.dot(rubbed) * row.n;
     row.friction = root_friction_[i] * root_friction_[j];
     row.per_w = static_cast<float>(1 / (a.w + b.w));
+    if (!lightness_.empty()) scale_masses(row, now);
     row.leaves = 0;
     if (!bounces_) return true;
     const double approach = direction(i, j, apart).dot(now.v[i] - now.v[j]);
     if (approach < -at_rest) row.leaves = -std::max(bounce_[i], bounce_[j]) * static_cast<float>(approach);
     return true;
+}
+
+// With c = n·up, the upper point is taken as e^(k c) times lighter than the lower: in touch, as if mass fell by
+// e^(-k h / (r_i + r_j)) with the height h (Macklin et al. 2014). The load then does not add up. A row bears
+//
+//   p = m g dt / (2 c sinh(k c / 2)),   as   w e^(k c / 2) c p = g dt + w e^(-k c / 2) c p
+//
+// under a stack of any height, w = 1/m. What is above that, as a fall leaves it, is not carried over: released, it
+// would throw the light ones, as a whip does its end.
+void Contacts::scale_masses(Row& row, const Substep& now)
+{
+    const Place &a = now.at[row.i], &b = now.at[row.j];
+    const double k = mass_scaling_, c = row.n.cast<double>().dot(now.up), lighter = std::exp(0.5 * k * c);
+    lightness_[static_cast<std::size_t>(&row - rows_.data())] = {static_cast<float>(lighter),
+                                                                 static_cast<float>(1 / lighter)};
+    row.per_w = static_cast<float>(1 / (lighter * a.w + b.w / lighter));
+    const double borne = now.pull * now.dt / ((c > 0 ? a.w : b.w) * c * (lighter - 1 / lighter));
+    row.pressed = row.held = std::min(row.pressed, static_cast<float>(0.5 * borne));
 }
 
 void Contacts::rouse(Substep& now)
@@ -418,29 +453,35 @@ void Contacts::disturb(const Row& row, const Substep& now) const
 void Contacts::prepare(Substep& now)
 {
     const double dt = now.dt;
-    sweep([&](Row& row) {
-        if (!(row.pressed > 0)) return;
-        Place &a = now.at[row.i], &b = now.at[row.j];
-        const Vec3d half = (row.pressed * row.n + 0.5f * row.rubbed).cast<double>();
-        a.P += a.w * dt * half;
-        b.P -= b.w * dt * half;
-        now.v[row.i] += a.w * half;
-        now.v[row.j] -= b.w * half;
+    weighed([&](const auto& weights) {
+        sweep([&](Row& row) {
+            if (!(row.pressed > 0)) return;
+            Place &a = now.at[row.i], &b = now.at[row.j];
+            const auto [wa, wb] = weights(row, a, b);
+            const Vec3d half = (row.pressed * row.n + 0.5f * row.rubbed).cast<double>();
+            a.P += wa * dt * half;
+            b.P -= wb * dt * half;
+            now.v[row.i] += wa * half;
+            now.v[row.j] -= wb * half;
+        });
     });
 }
 
 void Contacts::project(Substep& now)
 {
     const double dt = now.dt, per_dt = per_dt_;
-    sweep([&](Row& row) {
-        Place &a = now.at[row.i], &b = now.at[row.j];
-        const Vec3d n = row.n.cast<double>();
-        const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
-        const double pressed = std::max(0.0, row.pressed - C * per_dt * row.per_w);
-        const double change = dt * (pressed - row.pressed);
-        row.pressed = static_cast<float>(pressed);
-        a.P += a.w * change * n;
-        b.P -= b.w * change * n;
+    weighed([&](const auto& weights) {
+        sweep([&](Row& row) {
+            Place &a = now.at[row.i], &b = now.at[row.j];
+            const auto [wa, wb] = weights(row, a, b);
+            const Vec3d n = row.n.cast<double>();
+            const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
+            const double pressed = std::max(0.0, row.pressed - C * per_dt * row.per_w);
+            const double change = dt * (pressed - row.pressed);
+            row.pressed = static_cast<float>(pressed);
+            a.P += wa * change * n;
+            b.P -= wb * change * n;
+        });
     });
 }
 
@@ -450,7 +491,7 @@ void Contacts::settle(Substep& now)
 {
     for (int k = 1; k <= now.iterations; ++k) {
         backwards_ = !backwards_;
-        settle_once(now, k == now.iterations);
+        weighed([&](const auto& weights) { settle_once(now, k == now.iterations, weights); });
     }
 }
 
@@ -476,7 +517,8 @@ void Contacts::take_back(const Row& row, Substep& now) const
     now.v[heavy] += std::max(0.0, -n.dot(now.v[heavy] - now.v[light])) * n;
 }
 
-void Contacts::settle_once(Substep& now, bool last)
+template <class Weights>
+void Contacts::settle_once(Substep& now, bool last, const Weights& weights)
 {
     const double dt = now.dt;
     const bool watched = last && now.sleepers && now.sleepers->any();
@@ -511,15 +553,16 @@ void Contacts::settle_once(Substep& now, bool last)
             shift = 0.5 * dt * change;
             rubs = row.rubbed = rubbed.cast<float>();
         }
-        va += a.w * push;
-        vb -= b.w * push;
+        const auto [wa, wb] = weights(row, a, b);
+        va += wa * push;
+        vb -= wb * push;
         if (last) {
             const bool from_sleeper = watched && (now.asleep(row.i) || now.asleep(row.j));
             const double part = from_sleeper ? recovery_asleep : recovery;
             shift += part * std::max(0.0, overlap - left_over * row.reach) * row.per_w * n;
         }
-        a.P += a.w * shift;
-        b.P -= b.w * shift;
+        a.P += wa * shift;
+        b.P -= wb * shift;
         if (!last || !(p > 0)) return;
         const std::uint8_t bi = now.borne[row.i], bj = now.borne[row.j];
         std::uint8_t &fi = now.found_borne[row.i], &fj = now.found_borne[row.j];

@@ -9,6 +9,9 @@
 // An overlap that was there at the sub-step's beginning is not to be made deeper; what there is of it is taken away
 // without giving speed. So points that are born in one another part, and do not fly.
 //
+// With mass_scaling, points count as lighter the higher they are: fewer sweeps then hold a stack, but what is hit from
+// above or below does not keep its momentum.
+//
 // A sleeper (sleep.h) that is hit wakes before the sub-step is solved, and so do those that the shock reaches: each
 // passes half of it on to those that it touches. One that is borne or pressed otherwise than when it fell asleep wakes
 // after.
@@ -35,6 +38,7 @@ struct ContactOptions {
     PerPoint<float> friction{0.0f};         // μ >= 0; of two points the geometric mean
     std::optional<double> max_difference;   // m; a quarter of the largest radius
     int max_grids = 8;
+    double mass_scaling = 0;  // at least 0: a point counts as e^mass_scaling times lighter than what it stands on
 };
 
 class Contacts : public Coupling {
@@ -74,8 +78,11 @@ private:
     void each_batch(bool in_colours, const F& f);
     template <class F>
     void sweep(const F& f);
+    template <class F>
+    void weighed(const F& f);
     void touch(const Substep& now);
-    bool enter(Row& row, std::uint32_t pair, double at_rest, const Substep& now) const;
+    bool enter(Row& row, std::uint32_t pair, double at_rest, const Substep& now);
+    void scale_masses(Row& row, const Substep& now);
     bool shock(Substep& now);
     void disturb(const Row& row, const Substep& now) const;
     void keep_awake(std::span<const std::uint32_t> deep, const Substep& now) const;
@@ -83,11 +90,13 @@ private:
     void schedule();
     void take_turns(std::size_t block);
     void take_over(const Substep& now);
-    void settle_once(Substep& now, bool last);
+    template <class Weights>
+    void settle_once(Substep& now, bool last, const Weights& weights);
     void take_back(const Row& row, Substep& now) const;
 
     std::vector<float> radius_, root_friction_, bounce_;  // shape [size]; the radius is 0 of points that take no part
     float largest_ = 0, least_ = 0;
+    double mass_scaling_ = 0;
     bool bounces_ = false, fresh_ = true, stale_ = true, backwards_ = false, uneven_ = false;
     RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};
     ContactSearch search_;
@@ -105,6 +114,8 @@ private:
     std::vector<std::uint32_t> colours_;      // the beginning of each colour's blocks, and the end
     std::vector<Row> rows_;                   // of each block, at the place of its pairs
     std::vector<std::uint32_t> touching_in_;  // of each block, how many
+    // Of each row, what its points' inverse masses are multiplied by; empty where masses are not scaled.
+    std::vector<std::array<float, 2>> lightness_;
 
     // Of a search.
     std::vector<std::uint16_t> owner_;  // of each pair, its block

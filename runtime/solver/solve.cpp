@@ -61,6 +61,14 @@ struct Scene {
     Strided<float> mass{&unit_mass, 0};
 
     bool is_uniform() const { return forces.empty() && !force; }
+    // What all forces that are the same for many points give them, m/s²: gravity.
+    Vec3d gravity() const
+    {
+        Vec3d sum = uniform.a;
+        for (const LocalForce& local : forces)
+            if (local.uniform) sum += local.uniform->a;
+        return sum;
+    }
     // Whether what moves points that are far from shapes has a closed form for the whole frame.
     bool falls() const { return is_uniform() && actions.empty() && is_closed_form(uniform.linear); }
 };
@@ -279,6 +287,8 @@ private:
         now.dead = dead_;
         now.dt = options_.h / options_.substeps;
         now.iterations = options_.iterations;
+        const Vec3d gravity = scene_.gravity();
+        if (!gravity.isZero(0)) now.up = -gravity.normalized();
         std::vector<Yield> yields;
         if (!scene_.forces.empty() || !scene_.uniform.linear.is_zero()) {
             yields.assign(n, {now.dt, 0.5 * now.dt * now.dt});

@@ -23,6 +23,12 @@ constexpr double g = 9.81;
 
 std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
 
+bool same_bits(const PointSet& a, const PointSet& b)
+{
+    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
+           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
+}
+
 TEST_CASE("a head-on impact keeps the momentum, and bounces back by its restitution", "[contacts]")
 {
     const float bounce = GENERATE(0.0f, 0.5f, 1.0f);
@@ -81,6 +87,72 @@ TEST_CASE("a stack of points rests on the ground: no overlap, no creep, no jitte
     CHECK(scene.P(0).y() >= r);
 }
 
+// n spheres of 1 kg and 0.02 m on the ground, one upon the other.
+Granular stack(std::size_t n, double mass_scaling)
+{
+    const float r = 0.02f;
+    std::vector<Vec3f> at;
+    for (std::size_t k = 0; k < n; ++k) at.emplace_back(0.0f, r * static_cast<float>(2 * k + 1), 0.0f);
+    Granular scene(points(at).set<float>("pscale", alike(n, r)), 0, 0.5f);
+    scene.spheres->options.mass_scaling = mass_scaling;
+    scene.gravity().floor(0, 0.5f).substeps(11);
+    return scene;
+}
+
+TEST_CASE("mass scaling takes six sevenths of what a tall stack is pressed together, and throws nothing", "[contacts]")
+{
+    const std::size_t n = GENERATE(50, 100);
+    const auto worst_of = [&](double mass_scaling) {
+        Granular scene = stack(n, mass_scaling);
+        double worst = 0;
+        for (int frame = 0; frame < 24; ++frame) {
+            scene.run(1);
+            worst = std::max(worst, scene.last.residual.worst);
+            if (mass_scaling == 0) continue;
+            for (std::size_t i = 0; i < n; ++i) CHECK(scene.v(i).y() < 1e-3 * g);
+        }
+        return worst;
+    };
+    CHECK(worst_of(1) < worst_of(0) / 6);
+}
+
+TEST_CASE("with mass scaling a stack bears m g / (2 sinh(k/2)) at most, as the closed form has it", "[contacts]")
+{
+    const std::size_t n = 12;
+    const double k = GENERATE(0.5, 1.0, 2.0);
+    CAPTURE(k);
+    Granular scene = stack(n, k);
+    scene.sleep().run(96);
+    REQUIRE(scene.last.asleep == n);
+    CHECK(scene.deepest() < 0.01 * 0.02);
+    // N, of the j-th from above and what it stands on: g e^(-k/2) (1 + e^-k + ... + e^(-k (j-1))).
+    const auto between = [&](std::size_t j) {
+        double sum = 0;
+        for (std::size_t i = 0; i < j; ++i) sum += g * std::exp(-k * (0.5 + static_cast<double>(i)));
+        return sum;
+    };
+    for (const SleepMemory::Bed& bed : scene.beds.beds) {
+        const std::size_t j = n - static_cast<std::size_t>(bed.id);
+        const double load = between(j - 1) + (bed.id > 0 ? between(j) : 0);  // from above and below, but for the ground
+        CHECK(bed.load == Approx(load).epsilon(0.01));
+        CHECK(bed.load < 2 * g / (2 * std::sinh(k / 2)));
+    }
+}
+
+TEST_CASE("without gravity there is no height, and mass scaling changes no bit", "[contacts]")
+{
+    const auto collided = [](double mass_scaling) {
+        Granular scene(points({{0, 0, 0}, {0.02f, 0.3f, 0}, {0.3f, 0.31f, 0}})
+                           .v({{0, 2, 0}, {0, -1, 0}, {-3, 0, 0}})
+                           .set<float>("pscale", alike(3, 0.1f)),
+                       0.5f, 0.3f);
+        scene.spheres->options.mass_scaling = mass_scaling;
+        scene.substeps(6).run(12);
+        return scene.points;
+    };
+    CHECK(same_bits(collided(0), collided(2)));
+}
+
 TEST_CASE("points that are born in each other part, and fly nowhere", "[contacts]")
 {
     Granular scene(points({{0, 0, 0}, {0.01f, 0, 0}, {0.05f, 0.02f, 0}}).set<float>("pscale", alike(3, 0.1f)));
@@ -131,20 +203,16 @@ Granular heap(std::size_t n, float smallest, float largest, unsigned seed = 1)
     return scene;
 }
 
-bool same_bits(const PointSet& a, const PointSet& b)
-{
-    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
-           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
-}
-
 TEST_CASE("a heap comes to the same bits on any number of threads, and with any grids", "[contacts][threads]")
 {
-    const auto run = [](int threads, int max_grids) {
+    const double mass_scaling = GENERATE(0.0, 1.0);
+    const auto run = [&](int threads, int max_grids) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                         static_cast<std::size_t>(threads));
         Granular scene = heap(6000, 0.01f, 0.04f);
         scene.spheres->options.max_grids = max_grids;
         scene.spheres->options.max_difference = 0.004;
+        scene.spheres->options.mass_scaling = mass_scaling;
         scene.run(5);
         return scene.points;
     };

@@ -371,7 +371,7 @@ void Contacts::scale_masses(Row& row, const Substep& now)
     lightness_[static_cast<std::size_t>(&row - rows_.data())] = {static_cast<float>(lighter),
                                                                  static_cast<float>(1 / lighter)};
     row.per_w = static_cast<float>(1 / (lighter * a.w + b.w / lighter));
-    const double borne = now.pull * now.dt / ((c > 0 ? a.w : b.w) * c * (lighter - 1 / lighter));
+    const double borne = now.pull * now.dt / ((c > 0 ? a.w : b.w) * std::abs(c * (lighter - 1 / lighter)));
     row.pressed = row.held = std::min(row.pressed, static_cast<float>(0.5 * borne));
 }
 

@@ -139,6 +139,17 @@ TEST_CASE("with mass scaling a stack bears m g / (2 sinh(k/2)) at most, as the c
     }
 }
 
+TEST_CASE("points that are level, but for less than rounding, are alike to mass scaling", "[contacts][extreme]")
+{
+    const float higher = GENERATE(0.0f, 1e-20f, -1e-20f);
+    Granular scene(points({{0, 0, 0}, {0.3f, higher, 0}})
+                       .v({{2, 0, 0}, {-1, 0, 0}})
+                       .set<float>("pscale", alike(2, 0.125f)));  // lies at 0 to the bit
+    scene.spheres->options.mass_scaling = 2;
+    scene.gravity().collide(make_plane({0, 1, 0}, -0.125), 0).substeps(4).run(12);
+    for (const std::size_t i : {0, 1}) CHECK_THAT(scene.v(i), close_to(Vec3d(0.5, 0, 0), 1e-6));
+}
+
 TEST_CASE("without gravity there is no height, and mass scaling changes no bit", "[contacts]")
 {
     const auto collided = [](double mass_scaling) {

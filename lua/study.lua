@@ -12,7 +12,7 @@ end
 
 local fields = { name = true, scene = true, frames = true, sweep = true, lines = true, reference = true, error = true,
   error_frames = true, repeat_runs = true }
-local norms = { rms = true, max = true, p95 = true }
+local norms = { rms = true, max = true, p95 = true, residual = true }
 
 -- A value in a message: as it is written, where it is short; any other by its type, never by its address.
 local function shown(value)
@@ -65,18 +65,21 @@ local function make(native, vector)
         end
       end
     end
-    local reference = definition.reference
-    expect(type(reference) == "function" or type(reference) == "table" and next(reference) ~= nil, "reference",
-      "a function of the frame that returns { P = {...} }, or knobs: { substeps = 512 }")
+    local norm, reference = definition.error, definition.reference
+    expect(norm == nil or type(norm) == "function" or norms[norm], "error",
+      '"rms", "max", "p95", "residual" or a function(points, reference)')
+    if norm == "residual" then
+      expect(reference == nil, "reference", "left out: a residual is compared with nothing")
+    else
+      expect(type(reference) == "function" or type(reference) == "table" and next(reference) ~= nil, "reference",
+        "a function of the frame that returns { P = {...} }, or knobs: { substeps = 512 }")
+    end
     if type(reference) == "table" then
       for knob, value in pairs(reference) do
         if not is_knob(value) then wrong("reference: %s = %s; it must be a number, a text or a boolean", knob,
           shown(value)) end
       end
     end
-    local norm = definition.error
-    expect(norm == nil or type(norm) == "function" or norms[norm], "error",
-      '"rms", "max", "p95" or a function(points, reference)')
     local over = definition.error_frames
     expect(over == nil or over == "all" or over == "last", "error_frames", '"all" or "last"')
     local runs = definition.repeat_runs

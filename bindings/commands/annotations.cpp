@@ -72,8 +72,8 @@ function Quat:slerp(r, t) end
 ---@field frames integer[]  the first and the last
 ---@field sweep table<string, (number|string|boolean)[]>  the values of each knob
 ---@field lines? string|string[]  the knobs that tell the lines of the plot apart
----@field reference table|fun(frame: rapid.Frame, knobs: table): table  knobs, or a closed form: { P = {...} }
----@field error? "rms"|"max"|"p95"|fun(points: table, reference: table): number  of columns, place by place
+---@field reference? table|fun(frame: rapid.Frame, knobs: table): table  knobs, or a closed form: { P = {...} }
+---@field error? "rms"|"max"|"p95"|"residual"|fun(points: table, reference: table): number  of columns, place by place
 ---@field error_frames? "all"|"last"
 ---@field repeat_runs? integer  timed runs of each row, 5 if not given
 

@@ -145,8 +145,8 @@ public:
                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
                "of a graph: the first frame and the last: 1-48 [default: 48 from the first]")
             ->type_name("FRAMES");
-        app.add_option("--error", error_, "of a graph: rms, max or p95 [default rms]")
-            ->check(CLI::IsMember({"rms", "max", "p95"}))
+        app.add_option("--error", error_, "of a graph: rms, max or p95; or residual, of its constraints [default rms]")
+            ->check(CLI::IsMember({"rms", "max", "p95", "residual"}))
             ->type_name("NORM");
         app.add_option("--error-frames", error_frames_, "of a graph: all but the first, or the last [default all]")
             ->check(CLI::IsMember({"all", "last"}))
@@ -201,9 +201,12 @@ private:
             for (const std::string& value : values)
                 study.sweep[knob].push_back(read_value_of("--sweep " + knob, value));
         }
-        if (reference_.empty())
+        study.error = error_.value_or("rms");
+        if (!study.compares() && !reference_.empty())
+            throw Error("--reference: a residual is compared with nothing; leave it out");
+        if (study.compares() && reference_.empty())
             throw Error("--reference is missing; give the value that is taken for right, such as --reference 64");
-        study.reference.emplace();
+        if (study.compares()) study.reference.emplace();
         for (const std::string& text : reference_) {
             if (study.sweep.size() == 1 && text.find('=') == std::string::npos) {
                 (*study.reference)[study.sweep.begin()->first] = read_value_of("--reference", text);
@@ -214,7 +217,6 @@ private:
             (*study.reference)[knob] = read_value_of("--reference " + knob, values.front());
         }
         study.lines = lines_;
-        study.error = error_.value_or("rms");
         study.last_frame_only = error_frames_ == "last";
         if (frames_) {
             if (frames_->step != 1) throw Error("-f: a study compares every frame; leave out the step");

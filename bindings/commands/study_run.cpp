@@ -113,6 +113,14 @@ class Measure {
 public:
     Measure(const Study& study, const Session& session) : study_(study), session_(session) {}
 
+    // The largest residual of the frame's constraints.
+    void add(const FrameFigures& figures, const PointSet& points)
+    {
+        residual_ = std::max(residual_, figures.constraint_residual_max);
+        constrained_ |= figures.constraint_rows > 0;
+        row_.compared += points.size();
+    }
+
     void add(const PointSet& points, const PointSet& reference, std::int64_t frames, double time)
     {
         const IdMatch match = match_by_id(points, reference);
@@ -132,7 +140,9 @@ public:
     // Error: there is no number.
     StudyRow row() const
     {
-        if (row_.compared == 0)
+        if (!study_.compares() && !constrained_)
+            throw Error("no constraint acts in the frames that are looked at, so that none has a residual");
+        if (study_.compares() && row_.compared == 0)
             throw Error(
                 fmt::format("no point is both in the run and in its reference ({} are in one of them)", row_.missing));
         StudyRow row = row_;
@@ -144,6 +154,7 @@ public:
 private:
     double norm() const
     {
+        if (!study_.compares()) return residual_;
         if (study_.error == "own") return own_;
         if (study_.error == "p95") return p95_of(distances_);
         double squares = 0, largest = 0;
@@ -158,6 +169,8 @@ private:
     const Session& session_;
     StudyRow row_;
     double own_ = -std::numeric_limits<double>::infinity();
+    double residual_ = 0;
+    bool constrained_ = false;  // there was something that could have one
     std::vector<double> distances_;
 };
 
@@ -276,6 +289,7 @@ void run_row(const StudySource& source, const Study& study, const Knobs& knobs, 
                 std::uint64_t place = 0;
                 const std::string output = compared_output(plan);
                 run_frames(plan, study, [&](const FrameResult& result, const PointSet& points) {
+                    if (!study.compares()) return measure.add(result.figures, points);
                     const double time = result.time.at(output), fps = result.fps.at(output);
                     const Frame frame{static_cast<double>(result.frame), time, 1 / fps};
                     const PointSet reference = study.reference ? store.read(result.frame, place)

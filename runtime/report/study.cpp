@@ -68,7 +68,15 @@ std::optional<double> slope(const std::vector<std::pair<double, double>>& points
 // What the error column is, for people: "rms error (m)".
 std::string error_title(const Study& study)
 {
+    if (!study.compares()) return "residual of constraints (m)";
     return study.error == "own" ? "error (the study's own measure)" : study.error + " error of P (m)";
+}
+
+// With a comma before it; nothing where nothing is compared.
+std::string reference_text(const Study& study)
+{
+    if (!study.compares()) return "";
+    return ", against " + (study.reference ? described(*study.reference) : "the closed form");
 }
 
 std::string frames_text(const Study& study)
@@ -262,9 +270,8 @@ std::string to_text(const StudyResult& result)
     std::vector<std::size_t> widths(table[0].size());
     for (const auto& cells : table)
         for (std::size_t c = 0; c < cells.size(); ++c) widths[c] = std::max(widths[c], cells[c].size());
-    std::string text =
-        fmt::format("{}: {}, {}, against {}; median of {} runs\n\n", study.name, error_title(study), frames_text(study),
-                    study.reference ? described(*study.reference) : "the closed form", study.repeat_runs);
+    std::string text = fmt::format("{}: {}, {}{}; median of {} runs\n\n", study.name, error_title(study),
+                                   frames_text(study), reference_text(study), study.repeat_runs);
     for (std::size_t i = 0; i < table.size(); ++i) {
         std::string line;
         for (std::size_t c = 0; c < table[i].size(); ++c) {
@@ -289,7 +296,9 @@ ordered_json to_json(const StudyResult& result)
     json["frames"] = {study.first, study.last};
     json["error"] = study.error;
     json["error_frames"] = study.last_frame_only ? "last" : "all";
-    json["reference"] = study.reference ? json_of(*study.reference) : ordered_json("closed form");
+    json["reference"] = study.reference    ? json_of(*study.reference)
+                        : study.compares() ? ordered_json("closed form")
+                                           : ordered_json();
     json["repeat_runs"] = study.repeat_runs;
 
     json["rows"] = ordered_json::array();

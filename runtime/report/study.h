@@ -23,11 +23,14 @@ struct Study {
     std::map<std::string, std::vector<Value>> sweep;
     std::vector<std::string> lines;     // the knobs that tell the lines of the plot apart
     std::int64_t first = 1, last = 48;  // frames
-    std::string error = "rms";          // "rms", "max", "p95"; "own": a function of the study file
-    bool last_frame_only = false;       // else all frames after the first
-    std::optional<Knobs> reference;     // knobs of the reference run; none: a closed form of the study file
+    // "rms", "max", "p95"; "residual": of the constraints, the largest; "own": a function of the study file
+    std::string error = "rms";
+    bool last_frame_only = false;    // else all frames after the first
+    std::optional<Knobs> reference;  // knobs of the reference run; none: a closed form of the study file, if any
     int repeat_runs = 5;
 
+    // Whether points are compared with a reference: a residual needs none.
+    bool compares() const { return error != "residual"; }
     // Fills in `lines` where the sweep leaves no choice. Error: two knobs are left for the step; unknown names; two
     // rows that would be one.
     void complete();

@@ -208,8 +208,9 @@ std::string to_svg(const StudyResult& result)
     svg += text_at(left, 30, study.name, "start", "title");
     const std::string frames = study.last_frame_only ? fmt::format("in frame {}", study.last)
                                                      : fmt::format("over frames {} to {}", study.first + 1, study.last);
-    const std::string measure =
-        study.error == "own" ? "error, the study's own measure" : study.error + " error of the positions";
+    const std::string measure = !study.compares()      ? "residual of the constraints"
+                                : study.error == "own" ? "error, the study's own measure"
+                                                       : study.error + " error of the positions";
     svg += text_at(left, 54, fmt::format("{} {}, against run time; lower and further left is better", measure, frames),
                    "start", "small");
     svg += grid(axes, study.error != "own");

@@ -215,6 +215,32 @@ return rapid.create { points = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 0, 
     assert.equal(0, found.rows[3].error) -- straight lines are exact
   end)
 
+  it("takes the residual of constraints for the error: the largest of its frames, as --stats has them", function()
+    folder:write("heap.lua", header .. [[
+return rapid.create { points = rapid.points.grid { size = {0.6, 0.9, 0.3}, spacing = 0.3 } }
+  :gravity {} :contact { radius = 0.16 } :collide { shape = rapid.shape.plane { offset = -1 }, bounce = 0 }
+  :solve { substeps = rapid.param("n", 1) }]])
+    local found, result = result_of "heap.lua --sweep solve.substeps=2,4 --error residual --repeat 1 -f 1-24"
+    assert.equal(0, result.status)
+    assert.equal("residual", found.error)
+    for _, row in ipairs(found.rows) do
+      local run = ("run heap.lua --set n=%d -f 1-24 --stats s.json"):format(row.knobs["solve.substeps"])
+      assert.equal(0, command.rapid(run, { cwd = folder.path }).status)
+      local worst = 0
+      for i, frame in ipairs(json.decode(folder:read "s.json").frames) do
+        if i > 1 then worst = math.max(worst, frame.constraint_residual_max) end
+      end
+      assert.is_true(worst > 1e-4)
+      assert.near(worst, row.error, 1e-12)
+    end
+  end)
+
+  it("says that there is no residual where there is no constraint", function()
+    local result = rapid "orbit.lua --sweep solve.substeps=1,2 --error residual -f 1-3 -o out"
+    assert.equal(1, result.status)
+    assert.truthy(result.stdout:find("no constraint acts in the frames that are looked at", 1, true), result.stdout)
+  end)
+
   local function message(arguments, status)
     local result = rapid(arguments)
     assert.equal(status or 2, result.status, result.stdout)
@@ -227,6 +253,8 @@ return rapid.create { points = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 0, 
     assert.truthy(message("orbit.lua --sweep solve.substep=1 --reference 2")
       :find('orbit.lua:3: node "solve1": unknown parameter "substep"; did you mean "substeps"?', 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2"):find("--reference is missing", 1, true))
+    assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --error residual --reference 2")
+      :find("--reference: a residual is compared with nothing; leave it out", 1, true))
     assert.truthy(message("orbit.lua --sweep solve --reference 2"):find("it must be NODE.PARAM=VALUE", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,1 --reference 2"):find("has the value 1 twice", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --sweep attract.core=0,1 --reference solve.substeps=2")
@@ -261,7 +289,10 @@ return rapid.study { %s }]]):format(fields))
     for fields, expected in pairs {
       [rest] = "name = nil; it must be a text",
       [rest .. 'name = "x", eror = "rms"'] = 'unknown field "eror"; did you mean "error"?',
-      [rest .. 'name = "x", error = "mean"'] = 'error = "mean"; it must be "rms", "max", "p95" or a function',
+      [rest .. 'name = "x", error = "mean"'] =
+        'error = "mean"; it must be "rms", "max", "p95", "residual" or a function',
+      [rest .. 'name = "x", error = "residual"'] =
+        "reference = a function; it must be left out: a residual is compared with nothing",
       [rest .. 'name = "x", frames = {2, 1}'] = "frames = {2, 1}; the last must come after the first",
       [rest .. 'name = "x", sweep = { n = {{}} }'] = "sweep: n holds a table; it must be finite numbers,",
       [rest .. 'name = "x", repeat_runs = 0'] = "repeat_runs = 0; it must be a whole number, at least 1",

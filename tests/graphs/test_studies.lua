@@ -63,6 +63,16 @@ describe("the study", function()
     end
   end)
 
+  it("collapse overlaps less by sub-steps than by as many iterations, and by more of them", function()
+    local lines = lines_of "collapse"
+    local substeps, iterations = lines["sub-steps"].errors, lines.iterations.errors
+    falls(substeps)
+    assert.equal(substeps[1], iterations[1]) -- eight sub-steps of one iteration, both
+    for i = 2, #substeps do
+      assert.is_true(substeps[i] < iterations[i] / 2, ("%g and %g"):format(substeps[i], iterations[i]))
+    end
+  end)
+
   it("grids changes no bit by the number of grids", function()
     for _, line in pairs(lines_of "grids") do
       assert.equal(5, #line.errors)
@@ -103,7 +113,7 @@ describe("the study", function()
 
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
-    assert.equal("action.lua ball.lua drag.lua emitter.lua floor.lua grids.lua kepler.lua net.lua orbit.lua " ..
-      "spring.lua stiff.lua subframes.lua turbulence.lua ", names)
+    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua kepler.lua net.lua " ..
+      "orbit.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
   end)
 end)

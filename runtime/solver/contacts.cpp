@@ -27,6 +27,12 @@ constexpr double recovery_asleep = 0.1;
 // is taken back: iterations would have to be as many as the ratio of their masses.
 constexpr double too_deep = 0.05;
 
+// An overlap of which a sub-step leaves more than this part, where it takes away four fifths, is stuck.
+constexpr double stuck = 0.9;
+
+// Masses that differ by more than this factor are left to more than iterations.
+constexpr double uneven = 2;
+
 // Pairs that are as near as this, in parts of the sum of their radii, may come to touch in the projection.
 constexpr double near = 1.02;
 
@@ -388,7 +394,7 @@ void Contacts::rouse(Substep& now)
         double most = 0, least = std::numeric_limits<double>::infinity();
         for (const Place& at : now.at)
             if (at.w > 0) most = std::max(most, at.w), least = std::min(least, at.w);
-        uneven_ = most > 2 * least;
+        uneven_ = most > uneven * least;
     }
     if (stale_ || searched_.outrun(now)) search(now);
     fresh_ = stale_ = false;
@@ -502,16 +508,20 @@ void Contacts::take_back(Substep& now)
 
 // A heavy point on a light one that a shape bears, itself or through others, would go through it: in a sweep the shape
 // gives back no more than the lighter weighs. Where that has left it too deep it is taken back, with the lighter as a
-// wall.
+// wall. So it is where it wedges a light one that something bears: what parts them moves the light one, and that is put
+// back.
 void Contacts::take_back(const Row& row, Substep& now) const
 {
     const bool first = now.at[row.i].w < now.at[row.j].w;  // is the heavier
     const std::uint32_t heavy = first ? row.i : row.j, light = first ? row.j : row.i;
-    if (!(now.at[heavy].w > 0) || now.borne[light] <= now.borne[heavy]) return;
+    if (!(now.at[heavy].w > 0) || now.borne[light] == 0) return;
     const Vec3d d = now.at[heavy].P - now.at[light].P;
-    const double distance = d.norm();
-    const double depth = row.reach - distance - too_deep * std::min(radius_[row.i], radius_[row.j]);
+    const double distance = d.norm(), overlap = row.reach - distance;
+    const double allowed = too_deep * std::min(radius_[row.i], radius_[row.j]), depth = overlap - allowed;
     if (!(depth > 0) || !(distance > 0)) return;
+    const bool wedged =
+        -row.allowed > allowed && overlap > stuck * -row.allowed && now.at[light].w > uneven * now.at[heavy].w;
+    if (now.borne[light] <= now.borne[heavy] && !wedged) return;
     const Vec3d n = d / distance;
     now.at[heavy].P += depth * n;
     now.v[heavy] += std::max(0.0, -n.dot(now.v[heavy] - now.v[light])) * n;

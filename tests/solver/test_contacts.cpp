@@ -274,6 +274,27 @@ TEST_CASE("what is heavy rests on what is light, and does not go through it", "[
     CHECK(scene.P(n).y() == Approx(at[n].y()).margin(0.06 * r * static_cast<double>(n)));
 }
 
+TEST_CASE("what is heavy does not go through what is light by wedging it into a corner", "[contacts][extreme]")
+{
+    const double r = 0.005, R = 0.02, x = r + 2 * std::sqrt(R * r);  // on the floor, (x - r)² + (R - r)² = (R + r)²
+    const float ratio = GENERATE(64.0f, 1e4f, 1e6f);
+    CAPTURE(ratio);
+    Granular scene(points({Vec3d(r, r, 0).cast<float>(), Vec3d(x, R, 0).cast<float>()})
+                       .set<float>("mass", {1, ratio})
+                       .set<float>("pscale", {static_cast<float>(r), static_cast<float>(R)}),
+                   0, 0.3f);
+    scene.gravity({-0.5 * g, -g, 0}).floor(0, 0.3f).collide(make_plane({1, 0, 0}, 0), 0.0f, 0.3f);
+    scene.substeps(11);
+    for (int second = 0; second < 4; ++second) {
+        scene.run(24);
+        // A twentieth of the smaller radius is let be.
+        CHECK(scene.deepest() < 0.06 * r);
+        CHECK_THAT(scene.P(0), close_to(Vec3d(r, r, 0), 0.05 * r));
+        CHECK(scene.P(1).x() == Approx(x).epsilon(0.03));
+        for (const std::size_t i : {0, 1}) CHECK(scene.v(i).norm() < std::sqrt(2) * g / 24 / 11);  // a sub-step's worth
+    }
+}
+
 TEST_CASE("a ball of 10^6 times their mass on a bed of grains is in none of them, nor are they in the floor",
           "[contacts][extreme]")
 {

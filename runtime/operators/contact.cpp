@@ -44,8 +44,10 @@ struct ContactNode {
             .param(&ContactNode::max_difference, "max_difference", Value(), at_least(0), "m",
                    "of the radii in one grid; where not given, a quarter of the largest")
             .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "", "the most grids for different radii")
-            .param(&ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, 8), "",
-                   "a point counts as e^mass_scaling times lighter than what it stands on");
+            .param(
+                &ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, 8), "",
+                "a point counts as e^mass_scaling times lighter than what it stands on, against gravity: tall stacks "
+                "hold with few sub-steps, and flow less");
     }
 
     DynamicPtr dynamic(const Evaluation& now) const

@@ -11,6 +11,9 @@
 // A way that a shape has broken has no such series, and what would lie in a shape is not used either. Then the result
 // is the last run itself; how far that is from the run before is at least its error where halving the step halves it,
 // and three times it where that quarters it. A way in closed form is solved once.
+//
+// Layout: a few thousand points take two runs while all that is known of them is in cache; those that need more are
+// gathered from everywhere for the next two.
 #pragma once
 
 #include <span>

@@ -64,6 +64,29 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :g
     assert.truthy((all[4].P - tends_to(4)):length() > 1e-2)
   end)
 
+  it("does so for ten thousand of which few need many, with bounces and deaths, on any number of threads", function()
+    local text = [[
+local P, v, radius = {}, {}, {}
+for i = 1, 10000, %d do
+  local r = i %% 97 == 0 and 0.1 or 1 + i / 10000
+  P[#P + 1], v[#v + 1] = {r, 0.002 * (i %% 50), 0}, {0, -0.5, math.sqrt(5 / r)}
+end
+return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :attract { strength = 5 }
+  :collide { shape = rapid.shape.plane { offset = -0.03 }, bounce = 0.5 }
+  :collide { shape = rapid.shape.plane { normal = {-1, 0, 0}, offset = -1.95 }, response = "die" }
+  :solve { tolerance = 1e-6, max_substeps = 1024 }]]
+    local function run(step, threads) return scene.run(text:format(step), { frames = {3, 3}, threads = threads })[3] end
+    local all = run(1, 1)
+    assert.truthy(#all > 8000 and #all < 9950, #all)
+    for _, threads in ipairs { 2, 7 } do assert.same_points(all, run(1, threads)) end
+    local some = run(13)
+    for i = 1, #some do
+      local same = all:by_id(13 * some[i].id)
+      assert.equal(same.P, some[i].P)
+      assert.equal(same.v, some[i].v)
+    end
+  end)
+
   it("takes one step of what falls past a shape without meeting it, and tries two of what meets it", function()
     local function substeps(place)
       local folder = command.folder()

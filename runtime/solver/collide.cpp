@@ -1141,29 +1141,24 @@ double Collisions::deepest(std::span<const Vec3f> P)
     return depth;
 }
 
-void keep_outside(std::span<const DynamicPtr> dynamics, const PointSet& points, std::span<const Vec3f> P,
+void keep_outside(std::span<const Obstacle> obstacles, std::span<const std::uint32_t> places, std::span<const Vec3d> P,
                   std::span<std::uint8_t> marks)
 {
-    for (const DynamicPtr& dynamic : dynamics) {
-        const auto* collider = dynamic_cast<const Collider*>(dynamic.get());
-        if (!collider) continue;
-        const Obstacle obstacle(*collider, points);
-        for_each_chunk(P.size(), [&](std::size_t begin, std::size_t end) {
-            std::vector<std::size_t> asked;
-            std::vector<Vec3d> at;
-            for (std::size_t i = begin; i < end; ++i) {
-                if (!marks[i] || !obstacle.members[i]) continue;
-                const Vec3d x = P[i].cast<double>();
-                if (is_clear_of(obstacle.bounds, x, obstacle.radius[i])) continue;
-                asked.push_back(i);
-                at.push_back(x);
-            }
-            if (asked.empty()) return;
-            std::vector<double> phi(asked.size());
-            obstacle.shape->distance(at, phi, {});
-            for (std::size_t j = 0; j < asked.size(); ++j)
-                if (!(phi[j] > obstacle.radius[asked[j]])) marks[asked[j]] = 0;
-        });
+    for (const Obstacle& obstacle : obstacles) {
+        std::vector<std::size_t> asked;
+        std::vector<Vec3d> at;
+        for (std::size_t i = 0; i < places.size(); ++i) {
+            if (!marks[i] || !obstacle.members[places[i]]) continue;
+            const Vec3d x = P[i].cast<float>().cast<double>();
+            if (is_clear_of(obstacle.bounds, x, obstacle.radius[places[i]])) continue;
+            asked.push_back(i);
+            at.push_back(x);
+        }
+        if (asked.empty()) continue;
+        std::vector<double> phi(asked.size());
+        obstacle.shape->distance(at, phi, {});
+        for (std::size_t j = 0; j < asked.size(); ++j)
+            if (!(phi[j] > obstacle.radius[places[asked[j]]])) marks[asked[j]] = 0;
     }
 }
 

@@ -57,9 +57,9 @@ struct Drift {
     std::span<const Damped> damped;  // where it is not empty, in place of a
 };
 
-// Of the marks of some points of a set, leaves those of points that are outside of all colliders at P, at the end of
-// the frame; shapes [n].
-void keep_outside(std::span<const DynamicPtr> dynamics, const PointSet& points, std::span<const Vec3f> P,
+// Of the marks of points at these places of the set, leaves those of points that are outside of all obstacles at P, at
+// the end of the frame; shapes [n].
+void keep_outside(std::span<const Obstacle> obstacles, std::span<const std::uint32_t> places, std::span<const Vec3d> P,
                   std::span<std::uint8_t> marks);
 
 // What a contact does besides, to points of the whole set.

@@ -1,14 +1,12 @@
 #include "runtime/solver/error_control.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <exception>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <numeric>
 
 #include "runtime/parallel.h"
@@ -17,18 +15,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::uint32_t gone = UINT32_MAX;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-// For each point of `before` its place in `after`, which has the same order; `gone` where it has died.
-std::vector<std::uint32_t> places_after(const PointSet& before, const PointSet& after)
-{
-    const Strided<std::int64_t> id = before.id().read(), left = after.id().read();
-    std::vector<std::uint32_t> places(before.size(), gone);
-    for (std::size_t i = 0, j = 0; i < before.size() && j < after.size(); ++i)
-        if (id[i] == left[j]) places[i] = static_cast<std::uint32_t>(j++);
-    return places;
-}
 
 // Of each of some points: what its runs so far come to.
 class Series {
@@ -42,33 +29,38 @@ public:
         died_.assign(size, 0);
     }
 
-    // Those of `from` from `begin` on.
-    void assign(const Series& from, std::size_t begin, std::size_t size)
+    // Of these of `from`.
+    void select(const Series& from, std::span<const std::uint32_t> places)
+    {
+        reset(0, from.h_);
+        for (std::size_t column = 0; column < most_columns; ++column) {
+            P_[column].clear();
+            v_[column].clear();
+        }
+        append(from, places);
+    }
+
+    // And of these, which have as many runs.
+    void append(const Series& from, std::span<const std::uint32_t> places)
     {
         h_ = from.h_;
         runs_ = from.runs_;
-        each(*this, from,
-             [&](auto& list, const auto& other) { list.assign(other.begin() + begin, other.begin() + begin + size); });
+        const auto add = [&](auto& list, const auto& other) {
+            for (const std::uint32_t place : places) list.push_back(other[place]);
+        };
+        add(length_, from.length_);
+        add(died_, from.died_);
+        for (std::size_t column = 0; column < std::min(runs_, most_columns); ++column) {
+            add(P_[column], from.P_[column]);
+            add(v_[column], from.v_[column]);
+        }
     }
 
-    // Points that have as many runs.
-    void append(const Series& from)
-    {
-        h_ = from.h_;
-        runs_ = from.runs_;
-        each(*this, from, [](auto& list, const auto& other) { list.insert(list.end(), other.begin(), other.end()); });
-    }
-
-    // Takes the ends of a run, which then has those of the run before.
-    void begin_run(Arrivals& run)
+    void begin_run()
     {
         const std::size_t column = std::min(runs_++, most_columns - 1);
         P_[column].resize(length_.size());
         v_[column].resize(length_.size());
-        P_[0].swap(run.P);
-        v_[0].swap(run.v);
-        run.P.resize(length_.size());
-        run.v.resize(length_.size());
     }
 
     // How far apart are, m, the last two runs, and the last two columns of the series: at the frame's end, or at that
@@ -77,56 +69,37 @@ public:
         double run, best;
     };
 
-    // What the run adds for point i, which dies in it or not: puts the best that is known now into `run`, where that is
-    // more than the run itself.
-    Difference add(std::size_t i, Arrivals& run, bool dies)
+    // What the run adds for point i: puts the best that is known now in place of its end.
+    Difference add(std::size_t i, const RunEnd& end)
     {
-        const bool lives = !dies && !died_[i], is_series = !dies && run.way[i] != Way::Broken;
+        Vec3d &P = end.P[i], &v = end.v[i];
+        const bool dies = !end.dead.empty() && end.dead[i];
+        const bool lives = !dies && !died_[i], is_series = !dies && end.way[i] != Way::Broken;
+        Difference off{infinity, infinity};
+        if (lives && runs_ > 1)
+            // Runs that find a contact at the same end of a sub-step agree on what is wrong with it.
+            off.run = off.best = std::max(apart(P - P_[0][i], v - v_[0][i]), end.put_off[i]);
+        else if (dies && died_[i])
+            off = {0, 0};
         const std::size_t known = lives && is_series ? std::min<std::size_t>(length_[i], most_columns - 1) : 0;
-        const bool is_second = lives && runs_ > 1, stays_dead = dies && died_[i];
-        died_[i] = dies;
-        length_[i] = static_cast<std::uint8_t>(is_series ? known + 1 : 0);
-        if (!is_second) return stays_dead ? Difference{0, 0} : Difference{infinity, infinity};
-
-        Vec3d P = P_[0][i], v = v_[0][i];
-        Vec3d dP = P - run.P[i], dv = v - run.v[i];
-        // Runs that find a contact at the same end of a sub-step agree on what is wrong with it.
-        Difference off;
-        off.run = off.best = std::max(apart(dP, dv), run.put_off[i]);
-        if (known == 0) return off;
-        const double order = run.way[i] == Way::Acted ? 2 : 4;
-        double power = order;
-        for (std::size_t c = 1;; ++c, power *= order) {
-            P += dP / (power - 1);
-            v += dv / (power - 1);
-            if (c == known) break;
-            dP = P - P_[c][i];
-            dv = v - v_[c][i];
+        double power = 1;
+        for (std::size_t c = 0; c < known; ++c) {
+            power *= end.way[i] == Way::Acted ? 2 : 4;
+            const Vec3d dP = P - P_[c][i], dv = v - v_[c][i];
             P_[c][i] = P;
             v_[c][i] = v;
+            P += dP / (power - 1);
+            v += dv / (power - 1);
+            off.best = apart(dP, dv) / std::min(power - 1, most_trust);
         }
-        off.best = apart(dP, dv) / std::min(power - 1, most_trust);
-        run.P[i] = P;
-        run.v[i] = v;
+        P_[known][i] = P;
+        v_[known][i] = v;
+        length_[i] = static_cast<std::uint8_t>(is_series ? known + 1 : 0);
+        died_[i] = dies;
         return off;
     }
 
     bool has_improved(std::size_t i) const { return length_[i] > 1; }
-
-    // After a run: leaves only these points, whose best is the last column.
-    void keep(std::span<const std::uint32_t> places, const Arrivals& run)
-    {
-        for (const std::uint32_t i : places) {
-            if (!has_improved(i)) continue;
-            P_[length_[i] - 1][i] = run.P[i];
-            v_[length_[i] - 1][i] = run.v[i];
-        }
-        if (places.size() == length_.size()) return;
-        each(*this, *this, [&](auto& list, const auto&) {
-            for (std::size_t k = 0; k < places.size(); ++k) list[k] = list[places[k]];
-            list.resize(places.size());
-        });
-    }
 
 private:
     // What the difference of two columns is divided by, at most, to say how wrong the second is. The series itself has
@@ -135,18 +108,6 @@ private:
     // fast that it costs nothing.
     static constexpr double most_trust = 3;
     static constexpr std::size_t most_columns = 6;  // what higher powers of the step add is rounding
-
-    // All lists that have an entry a point.
-    template <class F>
-    static void each(Series& series, const Series& other, const F& f)
-    {
-        f(series.length_, other.length_);
-        f(series.died_, other.died_);
-        for (std::size_t column = 0; column < std::min(other.runs_, most_columns); ++column) {
-            f(series.P_[column], other.P_[column]);
-            f(series.v_[column], other.v_[column]);
-        }
-    }
 
     double apart(const Vec3d& dP, const Vec3d& dv) const
     {
@@ -160,35 +121,207 @@ private:
     std::array<std::vector<Vec3d>, most_columns> P_, v_;
 };
 
-// Of a point after a run.
-enum class Verdict : std::uint8_t { Again, WithinIfImproved, Within };
+// What is asked for, and what a run of so many sub-steps is by that.
+struct Asked {
+    double tolerance;    // m
+    int first_substeps;  // of the first run of a point
+    int max_substeps;
+    double h;           // s, the frame's length
+    std::uint8_t* met;  // by place; may be null
+    bool repeats;       // a block may go through the frame as often as it needs to
 
-// Points that are solved together: all of their runs are in cache.
-struct Part {
-    PointSet begin;                     // as they were before the step
-    std::vector<std::uint32_t> places;  // of these in the set
+    // One run tells nothing: there is a second even where that would be beyond the limit, but for its error alone.
+    bool is_first(int substeps) const { return substeps == first_substeps; }
+    bool counts(int substeps) const { return is_first(substeps) || substeps <= max_substeps; }
+    bool takes_all(int substeps) const { return counts(substeps) && substeps > max_substeps / 2; }
+    bool is_last(int substeps) const { return !is_first(substeps) && substeps > max_substeps / 2; }
+};
+
+// Points that need more runs, all as many so far.
+struct Rest {
+    std::vector<std::uint32_t> places;
     Series series;
-    Arrivals run;
 
-    // Of each, after the run.
-    std::vector<std::uint32_t> after;  // its place in the set that the run has left; empty: the same
-    std::vector<Verdict> verdict;
-    std::vector<std::uint8_t> improved;  // whether the series' best is the result
-    std::vector<Vec3f> best;             // of these where it is
+    // Those from `begin` on, as a set of their own.
+    Rest part(std::size_t begin, std::size_t size) const
+    {
+        Rest some;
+        some.places.resize(size);
+        std::iota(some.places.begin(), some.places.end(), static_cast<std::uint32_t>(begin));
+        some.series.select(series, some.places);
+        std::iota(some.places.begin(), some.places.end(), 0u);
+        return some;
+    }
 
-    std::uint32_t place_after(std::size_t i) const { return after.empty() ? static_cast<std::uint32_t>(i) : after[i]; }
+    void append(const Rest& other)
+    {
+        std::vector<std::uint32_t> all(other.places.size());
+        std::iota(all.begin(), all.end(), 0u);
+        series.append(other.series, all);
+        places.insert(places.end(), other.places.begin(), other.places.end());
+    }
 };
 
-// What has become of a part.
-struct Outcome {
-    SolveResult result;                     // of the first run
-    int substeps = 0;                       // the most
-    std::uint64_t beyond = 0;               // points that are not within the tolerance
-    std::vector<std::uint32_t> dead, left;  // places in the set
-    Series series;                          // of those that are left
-    std::exception_ptr error;
+// One pass over a set, or over the rest of one.
+class Pass final : public Runs {
+public:
+    // substeps: of the next run. P and v: of all points, to write results to. rest: those that are solved, as a set of
+    // their own, and their runs so far; null: all, from the first run on.
+    Pass(const Asked& asked, int substeps, std::span<Vec3f> P, std::span<Vec3f> v, const Rest* rest)
+        : asked_(asked), substeps_(substeps), P_(P), v_(v), rest_(rest)
+    {
+    }
+
+    bool takes_exact() const override { return asked_.is_first(substeps_); }
+    std::unique_ptr<BlockRuns> begin() override;
+
+    // Afterwards: those that need more, by the sub-steps of their next run; those that have died.
+    std::map<int, Rest> left()
+    {
+        std::sort(left_.begin(), left_.end(),
+                  [](const auto& a, const auto& b) { return a.second.places.front() < b.second.places.front(); });
+        std::map<int, Rest> all;
+        for (const auto& [substeps, some] : left_) all[substeps].append(some);
+        return all;
+    }
+    std::span<const std::uint32_t> dead() const { return dead_; }
+
+    int most_substeps() const { return most_substeps_; }
+    std::uint64_t beyond() const { return beyond_; }
+
+private:
+    class Block;
+
+    std::uint32_t place_of(std::uint32_t solved) const { return rest_ ? rest_->places[solved] : solved; }
+
+    const Asked& asked_;
+    const int substeps_;
+    const std::span<Vec3f> P_, v_;
+    const Rest* const rest_;
+
+    std::mutex mutex_;
+    std::vector<std::pair<int, Rest>> left_;
+    std::vector<std::uint32_t> dead_;
+    int most_substeps_ = 0;
+    std::uint64_t beyond_ = 0;
 };
 
+class Pass::Block final : public BlockRuns {
+public:
+    explicit Block(Pass& pass) : pass_(pass), asked_(pass.asked_) {}
+
+    void begin(std::span<const std::uint32_t> places) override
+    {
+        const std::size_t size = places.size();
+        substeps_ = pass_.substeps_;
+        places_.resize(size);
+        for (std::size_t i = 0; i < size; ++i) places_[i] = pass_.place_of(places[i]);
+        if (pass_.rest_)
+            series_.select(pass_.rest_->series, places);
+        else
+            series_.reset(size, asked_.h);
+        open_.resize(size);
+        std::iota(open_.begin(), open_.end(), 0u);
+        fate_.assign(size, Fate::Open);
+        P_.resize(size);
+        v_.resize(size);
+    }
+
+    int take(const RunEnd& end) override
+    {
+        judge(end);
+        settle(end);
+        const int substeps = substeps_;
+        substeps_ *= 2;
+        if (!open_.empty() && !asked_.is_last(substeps)) {
+            // That some go once more in vain costs less than to gather the others.
+            const bool are_most = 4 * open_.size() >= 3 * places_.size();
+            if (asked_.repeats && (are_most || asked_.takes_all(substeps))) return substeps_;
+        }
+        write(substeps);
+        return 0;
+    }
+
+private:
+    enum class Verdict : std::uint8_t { Again, WithinIfImproved, Within };
+    enum class Fate : std::uint8_t { Open, Known, Dead };
+
+    // How wrong the points that are open are.
+    void judge(const RunEnd& end)
+    {
+        const bool first = asked_.is_first(substeps_), counts = asked_.counts(substeps_);
+        series_.begin_run();
+        verdict_.assign(places_.size(), Verdict::Within);
+        improved_.assign(places_.size(), 0);
+        for (const std::uint32_t i : open_) {
+            if (end.way[i] == Way::Exact) continue;
+            if (asked_.met && end.way[i] == Way::Broken) asked_.met[places_[i]] = 1;
+            const Series::Difference off = series_.add(i, end);
+            const bool within = !first && (counts ? off.best : off.run) <= asked_.tolerance;
+            verdict_[i] = !within                       ? Verdict::Again
+                          : off.run <= asked_.tolerance ? Verdict::Within
+                                                        : Verdict::WithinIfImproved;
+            improved_[i] = counts && (within || asked_.takes_all(substeps_)) && series_.has_improved(i);
+        }
+        if (!first) keep_outside(end.obstacles, end.places, end.P, improved_);
+    }
+
+    // What of that is their result. Leaves open those that need another run.
+    void settle(const RunEnd& end)
+    {
+        const bool counts = asked_.counts(substeps_), takes_all = asked_.takes_all(substeps_);
+        std::size_t open = 0;
+        for (const std::uint32_t i : open_) {
+            const bool within =
+                verdict_[i] == Verdict::Within || (improved_[i] && verdict_[i] == Verdict::WithinIfImproved);
+            if (counts && (within || takes_all)) {
+                P_[i] = improved_[i] ? end.P[i].cast<float>() : end.rounded[i];
+                v_[i] = end.v[i].cast<float>();
+                fate_[i] = !end.dead.empty() && end.dead[i] ? Fate::Dead : Fate::Known;
+            }
+            if (!within) open_[open++] = i;
+        }
+        open_.resize(open);
+    }
+
+    // The block is over, with a run of so many sub-steps.
+    void write(int substeps)
+    {
+        for (std::size_t i = 0; i < places_.size(); ++i) {
+            if (fate_[i] != Fate::Known) continue;
+            pass_.P_[places_[i]] = P_[i];
+            pass_.v_[places_[i]] = v_[i];
+        }
+        const std::scoped_lock lock(pass_.mutex_);
+        for (std::size_t i = 0; i < places_.size(); ++i)
+            if (fate_[i] == Fate::Dead) pass_.dead_.push_back(places_[i]);
+        pass_.most_substeps_ = std::max(pass_.most_substeps_, asked_.counts(substeps) ? substeps : substeps / 2);
+        if (asked_.is_last(substeps)) {
+            pass_.beyond_ += open_.size();
+        } else if (!open_.empty()) {
+            Rest rest;
+            rest.series.select(series_, open_);
+            for (const std::uint32_t i : open_) rest.places.push_back(places_[i]);
+            pass_.left_.emplace_back(2 * substeps, std::move(rest));
+        }
+    }
+
+    Pass& pass_;
+    const Asked& asked_;
+
+    int substeps_ = 1;                   // of the run
+    std::vector<std::uint32_t> places_;  // in the set
+    Series series_;
+    std::vector<std::uint32_t> open_;  // places in the block of those that have no result yet that is good enough
+    std::vector<Verdict> verdict_;
+    std::vector<std::uint8_t> improved_;  // whether the series' best is the result
+    std::vector<Fate> fate_;
+    std::vector<Vec3f> P_, v_;  // where it is known
+};
+
+std::unique_ptr<BlockRuns> Pass::begin() { return std::make_unique<Block>(*this); }
+
+// What solve_within() does, in one call of it.
 class SolveWithin {
 public:
     SolveWithin(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, double tolerance,
@@ -196,32 +329,20 @@ public:
         : points_(points),
           dynamics_(dynamics),
           options_(options),
-          tolerance_(tolerance),
-          max_substeps_(max_substeps),
-          collides_(std::any_of(dynamics.begin(), dynamics.end(), is_collider)),
-          writes_any_(std::any_of(dynamics.begin(), dynamics.end(), writes_any)),
-          P_(points.P().write()),
-          v_(points.v().write())
+          asked_{tolerance, options.substeps, max_substeps,
+                 options.h, options.met,      std::none_of(dynamics.begin(), dynamics.end(), writes_more)}
     {
+        done_.substeps = options.substeps;
     }
 
     Tolerated run()
     {
-        done_.substeps = options_.substeps;
-        advance_all(points_.size(), options_.substeps, [&](Part& part, std::size_t begin, std::size_t size) {
-            part.places.resize(size);
-            std::iota(part.places.begin(), part.places.end(), static_cast<std::uint32_t>(begin));
-            part.series.reset(size, options_.h);
-        });
-        for (int substeps = options_.substeps; !left_.empty();) {
-            substeps *= 1 << runs_a_pass;
-            const std::vector<std::uint32_t> left = std::exchange(left_, {});
-            const Series series = std::exchange(series_, {});
-            advance_all(left.size(), substeps, [&](Part& part, std::size_t begin, std::size_t size) {
-                part.places.assign(left.begin() + begin, left.begin() + begin + size);
-                part.series.assign(series, begin, size);
-            });
+        advance_all();
+        while (!left_.empty()) {
+            const auto next = left_.extract(left_.begin());
+            advance(next.mapped(), next.key());
         }
+        done_.result.died = dead_.size();
         if (!dead_.empty()) {
             std::vector<std::uint8_t> alive(points_.size(), 1);
             for (const std::uint32_t place : dead_) alive[place] = 0;
@@ -232,200 +353,106 @@ public:
     }
 
 private:
-    // Those that need more are few, or they need so many that to begin anew with them costs nothing: they are gathered
-    // from all parts.
-    static constexpr int runs_a_pass = 2;
-
-    static bool is_collider(const DynamicPtr& dynamic)
-    {
-        return dynamic_cast<const Collider*>(dynamic.get()) != nullptr;
-    }
-
-    // Whether it may change more of points than their P and v.
-    static bool writes_any(const DynamicPtr& dynamic)
+    // Whether it writes more of points than their P and v.
+    static bool writes_more(const DynamicPtr& dynamic)
     {
         const auto* collider = dynamic_cast<const Collider*>(dynamic.get());
         return dynamic_cast<const Action*>(dynamic.get()) || (collider && collider->record);
     }
 
-    struct Turn {
-        bool first;      // it is the first run
-        bool counts;     // points may have its result
-        bool takes_all;  // all points that are left have it
-    };
-
-    // Takes n points through the runs of a pass, part by part: those that `begin` gives.
-    template <class F>
-    void advance_all(std::size_t n, int substeps, const F& begin_part)
+    void advance_all()
     {
-        // Where more is written than P and v, by actions that begin on one thread, it is written part by part.
-        const std::size_t size = writes_any_ ? 16 * chunk_size : chunk_size;
-        std::vector<Outcome> outcomes((n + size - 1) / size);
-        tbb::enumerable_thread_specific<Part> parts;
-        const auto advance = [&](std::size_t begin, std::size_t end) {
-            Outcome& outcome = outcomes[begin / size];
-            try {
-                Part& part = parts.local();
-                begin_part(part, begin, end - begin);
-                part.begin = points_.select(part.places);
-                advance_part(part, substeps, outcome);
-            } catch (...) {
-                outcome.error = std::current_exception();
-            }
-        };
-        if (writes_any_)
-            for (std::size_t begin = 0; begin < n; begin += size) advance(begin, std::min(n, begin + size));
-        else
-            for_each_chunk(
-                n,
-                [&](std::size_t begin, std::size_t end) {
-                    // What a thread waits for within a part is not another one, whose memory would be the same.
-                    tbb::this_task_arena::isolate([&] { advance(begin, end); });
-                },
-                size);
-        for (const Outcome& outcome : outcomes) take(outcome);
+        if (!asked_.repeats) {
+            Rest all;
+            all.places.resize(points_.size());
+            std::iota(all.places.begin(), all.places.end(), 0u);
+            all.series.reset(points_.size(), options_.h);
+            return advance(all, options_.substeps);
+        }
+        Pass pass(asked_, options_.substeps, points_.P().write(), points_.v().write(), nullptr);
+        solve_once(points_, options_.substeps, pass);
+        left_ = pass.left();
+        dead_.assign(pass.dead().begin(), pass.dead().end());
     }
 
-    void take(const Outcome& outcome)
+    void advance(const Rest& rest, int substeps)
     {
-        if (outcome.error) std::rethrow_exception(outcome.error);
+        if (!asked_.repeats) return advance_copies(rest, substeps);
+        PointSet some = points_.select(rest.places);
+        Pass pass(asked_, substeps, points_.P().write(), points_.v().write(), &rest);
+        solve_once(some, substeps, pass);
+        leave(pass.left());
+        dead_.insert(dead_.end(), pass.dead().begin(), pass.dead().end());
+    }
+
+    // Where a run writes other columns, too: on a copy, part by part, of which those that are done are kept.
+    void advance_copies(const Rest& rest, int substeps)
+    {
+        constexpr std::size_t part_size = 16 * chunk_size;
+        for (std::size_t begin = 0; begin < rest.places.size(); begin += part_size) {
+            const std::size_t size = std::min(part_size, rest.places.size() - begin);
+            const std::span places = std::span(rest.places).subspan(begin, size);
+            const Rest part = rest.part(begin, size);
+            const PointSet start = points_.select(places);
+            PointSet end = start;
+            std::vector<std::uint8_t> met(options_.met ? size : 0);
+            Asked asked = asked_;
+            asked.met = options_.met ? met.data() : nullptr;
+            Pass pass(asked, substeps, end.P().write(), end.v().write(), &part);
+            solve_once(end, substeps, pass);
+            std::map<int, Rest> left = pass.left();
+            std::vector<std::uint8_t> is_done(size, 1);
+            if (asked.takes_all(substeps)) {  // these are done, too, and how wrong they are is looked at
+                for (const auto& [next, some] : left) {
+                    PointSet again = start.select(some.places);
+                    Pass error(asked, next, end.P().write(), end.v().write(), &some);
+                    solve_once(again, next, error);
+                }
+                left.clear();
+            }
+            for (auto& [next, some] : left)
+                for (std::uint32_t& place : some.places) is_done[place] = 0, place = places[place];
+            leave(left);
+            for (const std::uint32_t place : pass.dead()) is_done[place] = 0, dead_.push_back(places[place]);
+            std::vector<std::uint32_t> from, to;
+            for (std::uint32_t i = 0; i < size; ++i) {
+                if (is_done[i]) from.push_back(i), to.push_back(places[i]);
+                if (options_.met && met[i]) options_.met[places[i]] = 1;
+            }
+            points_.put(to, end.select(from));
+        }
+    }
+
+    void solve_once(PointSet& set, int substeps, Pass& pass)
+    {
+        SolveOptions options = options_;
+        options.substeps = substeps;
+        options.met = nullptr;  // the ways tell
+        const SolveResult result = solve(set, dynamics_, options, pass);
         SolveResult& all = done_.result;
-        const SolveResult& result = outcome.result;
+        all.penetration_max = std::max(all.penetration_max, result.penetration_max);
+        done_.substeps = std::max(done_.substeps, pass.most_substeps());
+        done_.beyond += pass.beyond();
+        if (!asked_.is_first(substeps)) return;
         all.collisions += result.collisions;
         all.contact_limit += result.contact_limit;
         all.trapped += result.trapped;
         all.contact_energy += result.contact_energy;
-        all.penetration_max = std::max(all.penetration_max, result.penetration_max);
-        all.died += outcome.dead.size();
-        done_.substeps = std::max(done_.substeps, outcome.substeps);
-        done_.beyond += outcome.beyond;
-        dead_.insert(dead_.end(), outcome.dead.begin(), outcome.dead.end());
-        left_.insert(left_.end(), outcome.left.begin(), outcome.left.end());
-        if (!outcome.left.empty()) series_.append(outcome.series);
     }
 
-    void advance_part(Part& part, int substeps, Outcome& outcome)
+    void leave(const std::map<int, Rest>& left)
     {
-        bool last = false;
-        for (int run = 0; run < runs_a_pass && !part.places.empty() && !last; ++run, substeps *= 2)
-            last = advance_once(part, substeps, outcome);
-        if (last) return;
-        outcome.left = part.places;
-        outcome.series = part.series;
-    }
-
-    // A run. Leaves in `part` those that need another; true: there is none.
-    bool advance_once(Part& part, int substeps, Outcome& outcome)
-    {
-        const std::size_t size = part.places.size();
-        const bool first = substeps == options_.substeps;
-        // One run tells nothing: there is a second even where that would be beyond the limit, but for its error alone.
-        const bool counts = first || substeps <= max_substeps_, takes_all = counts && substeps > max_substeps_ / 2;
-        const bool last = !first && substeps > max_substeps_ / 2;
-        const Turn turn{first, counts, takes_all};
-
-        PointSet end = part.begin;
-        SolveOptions now = options_;
-        now.substeps = substeps;
-        now.met = nullptr;  // the ways tell
-        const SolveResult result = solve(end, dynamics_, now, &part.run);
-        if (first) outcome.result = result;
-        outcome.result.penetration_max = std::max(outcome.result.penetration_max, result.penetration_max);
-
-        part.after.clear();
-        if (end.size() < size) part.after = places_after(part.begin, end);
-        if (counts) outcome.substeps = substeps;
-        judge(part, turn);
-        if (first && !takes_all && std::all_of(part.verdict.begin(), part.verdict.end(), [](Verdict verdict) {
-                return verdict == Verdict::Again;
-            }))
-            return false;
-        if (collides_ && !first) {
-            part.best.resize(size);
-            cast(std::span<const Vec3d>(part.run.P), part.best);
-            keep_outside(dynamics_, part.begin, part.best, part.improved);
-        }
-
-        const std::vector<std::uint32_t> again = take_final(part, end, turn, outcome);
-        if (last) outcome.beyond = again.size();
-        if (last) return true;
-        part.series.keep(again, part.run);
-        if (again.size() == size) return false;
-        part.begin = part.begin.select(again);
-        for (std::size_t k = 0; k < again.size(); ++k) part.places[k] = part.places[again[k]];
-        part.places.resize(again.size());
-        return false;
-    }
-
-    // What is to become of each point after its run.
-    void judge(Part& part, const Turn& turn) const
-    {
-        const std::size_t size = part.places.size();
-        part.series.begin_run(part.run);
-        part.verdict.resize(size);
-        part.improved.resize(size);
-        for_each_chunk(size, [&](std::size_t from, std::size_t to) {
-            const std::span<Verdict> verdict = part.verdict;
-            const std::span<std::uint8_t> improved = part.improved;
-            const std::span<const Way> way = part.run.way;
-            for (std::size_t i = from; i < to; ++i) {
-                improved[i] = 0;
-                verdict[i] = Verdict::Within;
-                if (way[i] == Way::Exact) continue;
-                if (options_.met && way[i] == Way::Broken) options_.met[part.places[i]] = 1;
-                const Series::Difference off = part.series.add(i, part.run, part.place_after(i) == gone);
-                const bool within = !turn.first && (turn.counts ? off.best : off.run) <= tolerance_;
-                verdict[i] = !within                 ? Verdict::Again
-                             : off.run <= tolerance_ ? Verdict::Within
-                                                     : Verdict::WithinIfImproved;
-                improved[i] = turn.counts && (within || turn.takes_all) && part.series.has_improved(i);
-            }
-        });
-    }
-
-    // Writes those that have come to their end; returns the places in the part of those that have not.
-    std::vector<std::uint32_t> take_final(Part& part, PointSet& end, const Turn& turn, Outcome& outcome) const
-    {
-        std::vector<std::uint32_t> again, from, to;
-        const std::span<const Verdict> verdict = part.verdict;
-        const std::span<Vec3f> P = end.P().write(), v = end.v().write();
-        for (std::size_t i = 0; i < verdict.size(); ++i) {
-            const bool improved = part.improved[i];
-            const bool within = verdict[i] == Verdict::Within || (improved && verdict[i] == Verdict::WithinIfImproved);
-            if (!within) again.push_back(static_cast<std::uint32_t>(i));
-            if (!turn.counts || !(within || turn.takes_all)) continue;
-            const std::uint32_t after = part.place_after(i), place = part.places[i];
-            if (after == gone) {
-                outcome.dead.push_back(place);
-                continue;
-            }
-            if (improved) {
-                P[after] = part.run.P[i].cast<float>();
-                v[after] = part.run.v[i].cast<float>();
-            }
-            if (writes_any_) {
-                from.push_back(after);
-                to.push_back(place);
-            } else {
-                P_[place] = P[after];
-                v_[place] = v[after];
-            }
-        }
-        if (writes_any_) points_.put(to, end.select(from));
-        return again;
+        for (const auto& [substeps, some] : left) left_[substeps].append(some);
     }
 
     PointSet& points_;
     const std::span<const DynamicPtr> dynamics_;
     const SolveOptions& options_;
-    const double tolerance_;
-    const int max_substeps_;
-    const bool collides_, writes_any_;
-    const std::span<Vec3f> P_, v_;
+    const Asked asked_;
 
     Tolerated done_;
-    std::vector<std::uint32_t> dead_, left_;  // places in the set: of the points that have died, and that need more
-    Series series_;                           // of those that need more
+    std::map<int, Rest> left_;  // by the sub-steps of their next run
+    std::vector<std::uint32_t> dead_;
 };
 
 }  // namespace

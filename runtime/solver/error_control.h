@@ -12,8 +12,8 @@
 // is the last run itself; how far that is from the run before is at least its error where halving the step halves it,
 // and three times it where that quarters it. A way in closed form is solved once.
 //
-// Layout: a few thousand points take two runs while all that is known of them is in cache; those that need more are
-// gathered from everywhere for the next two.
+// Layout: a block of points takes its runs while it is in cache, as long as most of it needs them; those that need more
+// are gathered from all blocks as a set of their own.
 #pragma once
 
 #include <span>

@@ -140,10 +140,10 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
 
 class Step {
 public:
-    Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Arrivals* arrivals)
+    Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Runs* runs)
         : points_(points),
           options_(options),
-          arrivals_(arrivals),
+          runs_(runs),
           scene_(scene_of(points, dynamics, options.h)),
           P_(points.P().write()),
           v_(points.v().write()),
@@ -156,11 +156,6 @@ public:
         }
         time_.h = options.h;
         if (points.has("dt")) time_.own = points.column<float>("dt").read();
-        if (!arrivals_) return;
-        arrivals_->way.assign(points.size(), Way::Exact);
-        arrivals_->put_off.assign(points.size(), 0);
-        arrivals_->P.resize(points.size());
-        arrivals_->v.resize(points.size());
     }
 
     SolveResult run()
@@ -169,7 +164,7 @@ public:
             for_all([&](std::size_t begin, std::size_t end) { advance(begin, end); });
         else
             advance_coupled();
-        bury();
+        if (!runs_) bury();
         // Of doubles the order of a sum matters.
         std::stable_sort(energies_.begin(), energies_.end(),
                          [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -199,7 +194,7 @@ private:
     void advance(std::size_t begin, std::size_t end)
     {
         std::vector<std::uint32_t> places;
-        if (scene_.falls() && !members_.data) {
+        if (scene_.falls() && !members_.data && (!runs_ || runs_->takes_exact())) {
             const Fall::Way way = fall(begin, end, places);
             if (!way.finite) require_finite(begin, way.end, fell);
             require_finite(way.end, end, is);
@@ -228,22 +223,26 @@ private:
     // Points of one chunk, in order; all of it where forces or actions act.
     void advance_by_substeps(std::span<const std::uint32_t> places)
     {
-        Collisions collisions(scene_.obstacles, consequences());
+        Collisions counted(scene_.obstacles, consequences()), others(scene_.obstacles, consequences());
         Block block;
+        const std::unique_ptr<BlockRuns> runs = runs_ ? runs_->begin() : nullptr;
         double deepest = 0;
         for (std::size_t begin = 0; begin < places.size(); begin += block_size) {
-            block.begin(*this, places.subspan(begin, std::min(block_size, places.size() - begin)));
-            if (!scene_.obstacles.empty()) collisions.begin(block.places);
-            for (int substep = 0; substep < options_.substeps; ++substep) take(block, collisions, substep);
-            if (members_.data) block.restore_others(*this);
-            if (!scene_.obstacles.empty())
-                deepest = std::max(deepest, collisions.round(block.P, block.rounded));
-            else
-                cast(std::span<const Vec3d>(block.P), block.rounded);
-            store(block);
-            if (arrivals_) tell_arrivals(block, collisions);
+            const std::span at = places.subspan(begin, std::min(block_size, places.size() - begin));
+            if (runs) runs->begin(at);
+            deepest = std::max(deepest, advance(block, counted, at, options_.substeps));
+            if (!runs) {
+                store(block);
+                continue;
+            }
+            int substeps = runs->take(end_of(block, counted));
+            for (; substeps > 0; substeps = runs->take(end_of(block, others))) {
+                if (!dead_.empty())
+                    for (const std::uint32_t place : at) dead_[place] = 0;
+                deepest = std::max(deepest, advance(block, others, at, substeps));
+            }
         }
-        count(collisions, deepest, places.front());
+        count(counted, deepest, places.front());
     }
 
     // begin: a point of the chunk.
@@ -411,6 +410,7 @@ private:
             } else {
                 cast(std::span<const Vec3d>(block.P), block.rounded);
             }
+            require_finite(block);
             store(block);
         }
         const std::scoped_lock lock(mutex_);
@@ -436,6 +436,7 @@ private:
         std::vector<Vec3d> P, v, middle;
         std::vector<Vec3f> rounded;  // P at the beginning of the frame, and at its end
         std::vector<double> dt, time, half, after;
+        int substeps = 1;
         std::vector<double> way;  // s of dt that each is moved for: 0 for those that sleep
         std::vector<Vec3d> force;
         // Of the sub-step: the accelerations, and the linear parts, null where no force has one. Each is the scene's,
@@ -448,12 +449,16 @@ private:
         std::vector<double> rates;   // 1/s, of all drag
         DragPropagators dragged;
         Forces one;
+        // Of the run, where somebody asks.
+        std::vector<Way> ways;
+        std::vector<double> put_off;  // m
+        std::vector<std::uint8_t> dead;
 
         void begin(const Step& step, std::size_t first, std::size_t size)
         {
             run.resize(size);
             std::iota(run.begin(), run.end(), static_cast<std::uint32_t>(first));
-            begin(step, run);
+            begin(step, run, step.options_.substeps);
         }
 
         template <class F>
@@ -462,18 +467,18 @@ private:
             run.clear();
             for (std::size_t i = first; i < first + size; ++i)
                 if (!leave_out(i)) run.push_back(static_cast<std::uint32_t>(i));
-            begin(step, run);
+            begin(step, run, step.options_.substeps);
         }
 
-        void begin(const Step& step, std::span<const std::uint32_t> at)
+        void begin(const Step& step, std::span<const std::uint32_t> at, int number)
         {
             places = at;
+            substeps = number;
             const std::size_t size = at.size();
             P.resize(size);
             v.resize(size);
             dt.resize(size);
             rounded.resize(size);
-            const double substeps = step.options_.substeps;
             for (std::size_t i = 0; i < size; ++i) {
                 rounded[i] = step.P_[at[i]];
                 P[i] = rounded[i].cast<double>();
@@ -574,20 +579,25 @@ private:
         void set_time(const SolveOptions& options, int substep)
         {
             time.resize(dt.size());
-            for (std::size_t i = 0; i < dt.size(); ++i)
-                time[i] = options.time - dt[i] * (options.substeps - substep - 0.5);
+            for (std::size_t i = 0; i < dt.size(); ++i) time[i] = options.time - dt[i] * (substeps - substep - 0.5);
         }
     };
 
     // Until what became of it is known to be finite, a point has what it had before: for the message.
-    void store(const Block& block)
+    void require_finite(const Block& block) const
     {
         for (std::size_t i = 0; i < block.places.size(); ++i) {
             const Vec3f v = block.v[i].cast<float>();
             if (!block.rounded[i].allFinite() || !v.allFinite())
                 not_finite(block.places[i], block.rounded[i], v, became);
+        }
+    }
+
+    void store(const Block& block)
+    {
+        for (std::size_t i = 0; i < block.places.size(); ++i) {
             P_[block.places[i]] = block.rounded[i];
-            v_[block.places[i]] = v;
+            v_[block.places[i]] = block.v[i].cast<float>();
         }
     }
 
@@ -604,6 +614,22 @@ private:
         return a;
     }
 
+    // Takes a block through the frame; returns the deepest that one of its points is then in a shape, m.
+    double advance(Block& block, Collisions& collisions, std::span<const std::uint32_t> places, int substeps)
+    {
+        block.begin(*this, places, substeps);
+        if (!scene_.obstacles.empty()) collisions.begin(block.places);
+        for (int substep = 0; substep < substeps; ++substep) take(block, collisions, substep);
+        if (members_.data) block.restore_others(*this);
+        double deepest = 0;
+        if (!scene_.obstacles.empty())
+            deepest = collisions.round(block.P, block.rounded);
+        else
+            cast(std::span<const Vec3d>(block.P), block.rounded);
+        require_finite(block);
+        return deepest;
+    }
+
     // One sub-step of a block.
     void take(Block& block, Collisions& collisions, int substep)
     {
@@ -617,7 +643,7 @@ private:
                 block.drift(dt);
         };
         if (scene_.kills) stop_dead(block);
-        const double halves_after = 2.0 * (options_.substeps - substep - 1);
+        const double halves_after = 2.0 * (block.substeps - substep - 1);
         if (scene_.actions.empty()) {
             drift(block.way, halves_after);
         } else {
@@ -680,20 +706,22 @@ private:
         }
     }
 
-    void tell_arrivals(const Block& block, const Collisions& collisions)
+    RunEnd end_of(Block& block, const Collisions& collisions) const
     {
         // On a parabola that has met nothing sub-steps would find the same: of drag the path between is no parabola.
-        const bool parabolas = scene_.falls() && scene_.uniform.linear.is_zero();
-        for (std::size_t i = 0; i < block.places.size(); ++i) {
-            const std::uint32_t place = block.places[i];
-            arrivals_->way[place] = !scene_.obstacles.empty() && collisions.has_met(i) ? Way::Broken
-                                    : parabolas                                        ? Way::Exact
-                                    : scene_.actions.empty()                           ? Way::Smooth
-                                                                                       : Way::Acted;
-            arrivals_->put_off[place] = scene_.obstacles.empty() ? 0 : collisions.put_off(i);
-            arrivals_->P[place] = block.P[i];
-            arrivals_->v[place] = block.v[i];
+        const Way unbroken = scene_.falls() && scene_.uniform.linear.is_zero() ? Way::Exact
+                             : scene_.actions.empty()                          ? Way::Smooth
+                                                                               : Way::Acted;
+        block.ways.assign(block.places.size(), unbroken);
+        block.put_off.assign(block.places.size(), 0);
+        for (std::size_t i = 0; !scene_.obstacles.empty() && i < block.places.size(); ++i) {
+            if (collisions.has_met(i)) block.ways[i] = Way::Broken;
+            block.put_off[i] = collisions.put_off(i);
         }
+        block.dead.clear();
+        if (!dead_.empty())
+            for (const std::uint32_t place : block.places) block.dead.push_back(dead_[place]);
+        return {block.places, block.ways, block.put_off, block.dead, block.P, block.v, block.rounded, scene_.obstacles};
     }
 
     void add_accelerations(Block& block, const LocalForce& local) const
@@ -792,7 +820,7 @@ private:
 
     PointSet& points_;
     const SolveOptions& options_;
-    Arrivals* const arrivals_;  // null where nobody asks
+    Runs* const runs_;  // null: a run is what becomes of the points
     const Scene scene_;
     std::span<Vec3f> P_, v_;
     OwnTime time_;
@@ -830,14 +858,19 @@ bool is_closed_form(const PointSet& points, std::span<const DynamicPtr> dynamics
     });
 }
 
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
-                  Arrivals* arrivals)
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
     if (points.empty()) return {};
-    const SolveResult result = Step(points, dynamics, options, arrivals).run();
+    const SolveResult result = Step(points, dynamics, options, nullptr).run();
     if (auto* force = points.find<Vec3f>("force")) force->fill(Vec3f::Zero());
     return result;
+}
+
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Runs& runs)
+{
+    RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0 && !couples(dynamics));
+    return points.empty() ? SolveResult() : Step(points, dynamics, options, &runs).run();
 }
 
 }  // namespace rapid

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,7 @@
 
 namespace rapid {
 
+struct Obstacle;
 struct ShapeLoads;
 
 struct SolveOptions {
@@ -52,11 +54,37 @@ enum class Way : std::uint8_t {
     Broken,  // it has met a shape
 };
 
-// What the points of a set, as they were before the step, have come to; shapes [n].
-struct Arrivals {
-    std::vector<Way> way;
-    std::vector<double> put_off;  // by contacts that were found after a sub-step, m
-    std::vector<Vec3d> P, v;      // before they are rounded to single precision; not of exact ways
+// What the points of a block have come to in a run through the frame; spans have shape [n].
+struct RunEnd {
+    std::span<const std::uint32_t> places;  // in the set
+    std::span<const Way> way;
+    std::span<const double> put_off;     // by contacts that were found after a sub-step, m
+    std::span<const std::uint8_t> dead;  // 1: it has died; empty where none can
+    std::span<Vec3d> P, v;               // before they are rounded to single precision, for the reader to change
+    std::span<const Vec3f> rounded;      // P, on the outer side of what it lies on
+    std::span<const Obstacle> obstacles;
+};
+
+// Takes the ends of one block after the other.
+class BlockRuns {
+public:
+    virtual ~BlockRuns() = default;
+
+    // A block begins: the points at these places of the set.
+    virtual void begin(std::span<const std::uint32_t> places) = 0;
+    // How many sub-steps to go through the frame with once more, from where the points were at first; 0: no more.
+    virtual int take(const RunEnd& end) = 0;
+};
+
+// What goes through the frame with the points of a set, block by block while it is in cache, and as often as it wants
+// to. What an action or a recorded hit writes stays: with these it goes only once.
+class Runs {
+public:
+    virtual ~Runs() = default;
+
+    // Whether points may be moved at once whose way through the frame is known in closed form.
+    virtual bool takes_exact() const = 0;
+    virtual std::unique_ptr<BlockRuns> begin() = 0;  // from any thread
 };
 
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age
@@ -70,8 +98,11 @@ struct Arrivals {
 // Error: a velocity or position that is not finite before or after, with the point's id, or a force that is not, with
 // its node; a collider or force whose attribute is missing. Of several points the one nearest to the beginning of the
 // set is named.
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
-                  Arrivals* arrivals = nullptr);
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
+
+// The same of points that nothing couples, where the ends of all blocks are handed to `runs`, and nothing else is done
+// to P, v, `force` and the dead. What is counted is of the first run of each; the deepest is of all.
+SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Runs& runs);
 
 // Whether the ways of all points have a closed form for the whole frame, which sub-steps would only repeat.
 bool is_closed_form(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);

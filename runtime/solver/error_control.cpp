@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -16,6 +15,8 @@ namespace rapid {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+
+double squared(double x) { return x * x; }
 
 // Of each of some points: what its runs so far come to.
 class Series {
@@ -63,8 +64,8 @@ public:
         v_[column].resize(length_.size());
     }
 
-    // How far apart are, m, the last two runs, and the last two columns of the series: at the frame's end, or at that
-    // of the next for being too fast.
+    // How far apart are the last two runs, and the last two columns of the series: at the frame's end, or at that of
+    // the next for being too fast. Squared, m².
     struct Difference {
         double run, best;
     };
@@ -78,7 +79,7 @@ public:
         Difference off{infinity, infinity};
         if (lives && runs_ > 1)
             // Runs that find a contact at the same end of a sub-step agree on what is wrong with it.
-            off.run = off.best = std::max(apart(P - P_[0][i], v - v_[0][i]), end.put_off[i]);
+            off.run = off.best = std::max(apart2(P - P_[0][i], v - v_[0][i]), squared(end.put_off[i]));
         else if (dies && died_[i])
             off = {0, 0};
         const std::size_t known = lives && is_series ? std::min<std::size_t>(length_[i], most_columns - 1) : 0;
@@ -90,7 +91,7 @@ public:
             v_[c][i] = v;
             P += dP / (power - 1);
             v += dv / (power - 1);
-            off.best = apart(dP, dv) / std::min(power - 1, most_trust);
+            off.best = apart2(dP, dv) / squared(std::min(power - 1, most_trust));
         }
         P_[known][i] = P;
         v_[known][i] = v;
@@ -109,9 +110,9 @@ private:
     static constexpr double most_trust = 3;
     static constexpr std::size_t most_columns = 6;  // what higher powers of the step add is rounding
 
-    double apart(const Vec3d& dP, const Vec3d& dv) const
+    double apart2(const Vec3d& dP, const Vec3d& dv) const
     {
-        return std::sqrt(std::max(dP.squaredNorm(), h_ * h_ * dv.squaredNorm()));
+        return std::max(dP.squaredNorm(), squared(h_) * dv.squaredNorm());
     }
 
     double h_ = 0;  // s, of the frame
@@ -250,6 +251,7 @@ private:
     void judge(const RunEnd& end)
     {
         const bool first = asked_.is_first(substeps_), counts = asked_.counts(substeps_);
+        const double allowed = squared(asked_.tolerance);
         series_.begin_run();
         verdict_.assign(places_.size(), Verdict::Within);
         improved_.assign(places_.size(), 0);
@@ -257,10 +259,8 @@ private:
             if (end.way[i] == Way::Exact) continue;
             if (asked_.met && end.way[i] == Way::Broken) asked_.met[places_[i]] = 1;
             const Series::Difference off = series_.add(i, end);
-            const bool within = !first && (counts ? off.best : off.run) <= asked_.tolerance;
-            verdict_[i] = !within                       ? Verdict::Again
-                          : off.run <= asked_.tolerance ? Verdict::Within
-                                                        : Verdict::WithinIfImproved;
+            const bool within = !first && (counts ? off.best : off.run) <= allowed;
+            verdict_[i] = !within ? Verdict::Again : off.run <= allowed ? Verdict::Within : Verdict::WithinIfImproved;
             improved_[i] = counts && (within || asked_.takes_all(substeps_)) && series_.has_improved(i);
         }
         if (!first) keep_outside(end.obstacles, end.places, end.P, improved_);

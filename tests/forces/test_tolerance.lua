@@ -123,6 +123,22 @@ return rapid.create { fps = 24, seed = 2 }
     end
   end)
 
+  it("counts those that die in the run that is their result", function()
+    local folder = command.folder()
+    folder:write("scene.lua", [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2, center = {0, 1, 0} } } :gravity {}
+  :action("slow", function(p, step) p.v = p.v * (1 - 3 * step.dt) if p.P.y < 0.1 then p:kill() end end)
+  :solve { tolerance = 1e-5 }]])
+    assert.equal(0, command.rapid("run scene.lua -f 1-20 --stats stats.json", { cwd = folder.path }).status)
+    local points, died = nil, 0
+    for _, frame in ipairs(json.decode(folder:read "stats.json").frames) do
+      if points then assert.equal(points - frame.points, frame.died) end
+      points, died = frame.points, died + frame.died
+    end
+    assert.truthy(died > 50, died)
+  end)
+
   it("says which points it could not keep to it", function()
     local result = scene.run(orbits:format("{0.01, 0, 0}", "{0, 0, 20}", "tolerance = 1e-9, max_substeps = 4"),
       { frames = {2, 2} })

@@ -8,28 +8,26 @@
 namespace rapid {
 namespace {
 
-// J/kg, of the points at these places; nothing where there is no such energy.
-std::optional<std::vector<double>> energies_of(const PointSet& points, std::span<const std::uint32_t> places,
-                                               std::span<const DynamicPtr> dynamics)
+// J/kg; nothing where there is no such energy.
+std::optional<std::vector<double>> energies_of(const PointSet& points, std::span<const DynamicPtr> dynamics)
 {
-    const PointSet some = points.select(places);
-    std::vector<Vec3d> P(some.size()), v(some.size());
-    const Strided<Vec3f> P_of_some = some.P().read(), v_of_some = some.v().read();
-    for (std::size_t i = 0; i < some.size(); ++i) {
-        P[i] = P_of_some[i].cast<double>();
-        v[i] = v_of_some[i].cast<double>();
+    std::vector<Vec3d> P(points.size()), v(points.size());
+    const Strided<Vec3f> P_of_points = points.P().read(), v_of_points = points.v().read();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        P[i] = P_of_points[i].cast<double>();
+        v[i] = v_of_points[i].cast<double>();
     }
-    const std::vector<double> none(some.size());
-    const Chunk chunk{some, 0, P, v, none, none, 0};
-    std::vector<double> energies(some.size()), potential;
-    for (std::size_t i = 0; i < some.size(); ++i) energies[i] = 0.5 * v[i].squaredNorm();
+    const std::vector<double> none(points.size());
+    const Chunk chunk{points, 0, P, v, none, none, 0};
+    std::vector<double> energies(points.size()), potential;
+    for (std::size_t i = 0; i < points.size(); ++i) energies[i] = 0.5 * v[i].squaredNorm();
     for (const DynamicPtr& dynamic : dynamics) {
         const auto* force = dynamic_cast<const Force*>(dynamic.get());
         if (!force) continue;
-        potential.assign(some.size(), 0);
+        potential.assign(points.size(), 0);
         if (!force->add_potential(chunk, potential)) return std::nullopt;
-        const Column<std::uint8_t>* group = some.find_group(force->group);
-        for (std::size_t i = 0; i < some.size(); ++i)
+        const Column<std::uint8_t>* group = points.find_group(force->group);
+        for (std::size_t i = 0; i < points.size(); ++i)
             if (force->group.empty() || (group && (*group)[i])) energies[i] += potential[i];
     }
     return energies;
@@ -49,13 +47,13 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, std::spa
 {
     before_.clear();
     places_.clear();
-    met_.clear();
+    meets_ = false;
     const auto* force = points.find<Vec3f>("force");
     const bool forced = force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero());
     defined_ = !forced && std::none_of(dynamics.begin(), dynamics.end(), spends_energy);
     if (!defined_) return;
     if (!shadows.idle()) places_.assign(shadows.places().begin(), shadows.places().end());
-    auto energies = energies_of(points, places_, dynamics);
+    auto energies = energies_of(shadows.idle() ? points.select({}) : shadows.before(), dynamics);
     defined_ = energies.has_value();
     if (!defined_ || shadows.idle()) return;
 
@@ -72,8 +70,11 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, std::spa
     ids_.assign(shadows.ids().begin(), shadows.ids().end());
     const auto is_collider = [](const DynamicPtr& dynamic) { return dynamic_cast<const Collider*>(dynamic.get()); };
     if (std::none_of(dynamics.begin(), dynamics.end(), is_collider)) return;
-    met_.assign(points.size(), 0);
+    // Nobody looks at the others'.
+    met_.resize(points.size());
+    for (const std::uint32_t place : places_) met_[place] = 0;
     options.met = met_.data();
+    meets_ = true;
 }
 
 std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, const Shadows& shadows,
@@ -84,13 +85,16 @@ std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, cons
         return std::nullopt;
     }
     if (shadows.idle()) return std::vector<double>(solved.empty() ? 0 : 1, 0.0);  // in closed form
-    const auto after = energies_of(solved, shadows.places(), dynamics);
+    // They are far apart in memory: all of them at once, before they are looked at.
+    if (meets_)
+        for (const std::uint32_t place : places_) __builtin_prefetch(&met_[place]);
+    const auto after = energies_of(solved.select(shadows.places()), dynamics);
     if (!after) return std::nullopt;
     std::size_t kept = 0;
     for (std::size_t k = 0; k < ids_.size() && kept < shadows.ids().size(); ++k) {
         if (ids_[k] != shadows.ids()[kept]) continue;  // it has died
         const double change = (*after)[kept] - before_[k];
-        const bool counts = std::isfinite(change) && !(!met_.empty() && met_[places_[k]]);
+        const bool counts = std::isfinite(change) && !(meets_ && met_[places_[k]]);
         ids_[kept] = ids_[k];
         drift_[kept++] = drift_[k] + (counts ? change : 0);
     }

@@ -36,7 +36,8 @@ private:
     bool defined_ = false;
     std::vector<double> before_;         // energies, J/kg
     std::vector<std::uint32_t> places_;  // before Solve
-    std::vector<std::uint8_t> met_;      // by place before Solve; empty without colliders
+    bool meets_ = false;                 // there are colliders
+    std::vector<std::uint8_t> met_;      // by place before Solve, of those that have a shadow
 };
 
 }  // namespace rapid

@@ -139,7 +139,8 @@ void Shadows::begin(const PointSet& points, bool is_exact)
         dv_.push_back(Vec3d::Zero());
     }
 
-    set_ = points.select(places_);
+    before_ = points.select(places_);
+    set_ = before_;
     if (ids_.empty()) return;
     const std::span<Vec3f> P = set_.P().write(), v = set_.v().write();
     for (std::size_t k = 0; k < ids_.size(); ++k) {
@@ -169,7 +170,7 @@ std::vector<double> Shadows::compare(const PointSet& solved)
         errors[k] = 2 * dP_[k].norm();
         off_ |= !dP_[k].isZero(0) || !dv_[k].isZero(0);
     }
-    set_ = PointSet();
+    before_ = set_ = PointSet();
     return errors;
 }
 

@@ -40,6 +40,8 @@ public:
     // the one that it was given.
     std::span<const std::int64_t> ids() const { return ids_; }
     std::span<const std::uint32_t> places() const { return places_; }
+    // These points before Solve, from begin() to advance().
+    const PointSet& before() const { return before_; }
     // Whether nothing has to be done in this frame.
     bool idle() const { return idle_; }
 
@@ -51,7 +53,7 @@ private:
     std::vector<std::int64_t> ids_;         // of the points that have a shadow, ascending
     std::vector<std::uint32_t> places_;     // where these points are, or were when they were looked for last
     std::vector<Vec3d> dP_, dv_;            // the shadow less its point, after Solve
-    PointSet set_;                          // the shadows, from begin() to advance()
+    PointSet before_, set_;                 // these points and their shadows, from begin() to advance()
     bool off_ = false;                      // whether one of them is elsewhere than its point
     bool idle_ = false;                     // whether none has to be advanced in this frame
 };

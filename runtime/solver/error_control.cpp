@@ -47,7 +47,9 @@ public:
         h_ = from.h_;
         runs_ = from.runs_;
         const auto add = [&](auto& list, const auto& other) {
-            for (const std::uint32_t place : places) list.push_back(other[place]);
+            const std::size_t begin = list.size();
+            list.resize(begin + places.size());
+            for (std::size_t k = 0; k < places.size(); ++k) list[begin + k] = other[places[k]];
         };
         add(length_, from.length_);
         add(died_, from.died_);
@@ -70,10 +72,11 @@ public:
         double run, best;
     };
 
-    // What the run adds for point i: puts the best that is known now in place of its end.
-    Difference add(std::size_t i, const RunEnd& end)
+    // What the run adds for point i; P and v: the best that is known of it now.
+    Difference add(std::size_t i, const RunEnd& end, Vec3d& P, Vec3d& v)
     {
-        Vec3d &P = end.P[i], &v = end.v[i];
+        P = end.P[i];
+        v = end.v[i];
         const bool dies = !end.dead.empty() && end.dead[i];
         const bool lives = !dies && !died_[i], is_series = !dies && end.way[i] != Way::Broken;
         Difference off{infinity, infinity};
@@ -142,17 +145,6 @@ struct Asked {
 struct Rest {
     std::vector<std::uint32_t> places;
     Series series;
-
-    // Those from `begin` on, as a set of their own.
-    Rest part(std::size_t begin, std::size_t size) const
-    {
-        Rest some;
-        some.places.resize(size);
-        std::iota(some.places.begin(), some.places.end(), static_cast<std::uint32_t>(begin));
-        some.series.select(series, some.places);
-        std::iota(some.places.begin(), some.places.end(), 0u);
-        return some;
-    }
 
     void append(const Rest& other)
     {
@@ -224,6 +216,8 @@ public:
         open_.resize(size);
         std::iota(open_.begin(), open_.end(), 0u);
         fate_.assign(size, Fate::Open);
+        best_P_.resize(size);
+        best_v_.resize(size);
         P_.resize(size);
         v_.resize(size);
     }
@@ -258,12 +252,12 @@ private:
         for (const std::uint32_t i : open_) {
             if (end.way[i] == Way::Exact) continue;
             if (asked_.met && end.way[i] == Way::Broken) asked_.met[places_[i]] = 1;
-            const Series::Difference off = series_.add(i, end);
+            const Series::Difference off = series_.add(i, end, best_P_[i], best_v_[i]);
             const bool within = !first && (counts ? off.best : off.run) <= allowed;
             verdict_[i] = !within ? Verdict::Again : off.run <= allowed ? Verdict::Within : Verdict::WithinIfImproved;
             improved_[i] = counts && (within || asked_.takes_all(substeps_)) && series_.has_improved(i);
         }
-        if (!first) keep_outside(end.obstacles, end.places, end.P, improved_);
+        if (!first) keep_outside(end.obstacles, end.places, best_P_, improved_);
     }
 
     // What of that is their result. Leaves open those that need another run.
@@ -275,8 +269,8 @@ private:
             const bool within =
                 verdict_[i] == Verdict::Within || (improved_[i] && verdict_[i] == Verdict::WithinIfImproved);
             if (counts && (within || takes_all)) {
-                P_[i] = improved_[i] ? end.P[i].cast<float>() : end.rounded[i];
-                v_[i] = end.v[i].cast<float>();
+                P_[i] = improved_[i] ? best_P_[i].cast<float>() : end.rounded[i];
+                v_[i] = (improved_[i] ? best_v_[i] : end.v[i]).cast<float>();
                 fate_[i] = !end.dead.empty() && end.dead[i] ? Fate::Dead : Fate::Known;
             }
             if (!within) open_[open++] = i;
@@ -315,6 +309,7 @@ private:
     std::vector<std::uint32_t> open_;  // places in the block of those that have no result yet that is good enough
     std::vector<Verdict> verdict_;
     std::vector<std::uint8_t> improved_;  // whether the series' best is the result
+    std::vector<Vec3d> best_P_, best_v_;  // that
     std::vector<Fate> fate_;
     std::vector<Vec3f> P_, v_;  // where it is known
 };
@@ -337,11 +332,10 @@ public:
 
     Tolerated run()
     {
-        advance_all();
-        while (!left_.empty()) {
-            const auto next = left_.extract(left_.begin());
-            advance(next.mapped(), next.key());
-        }
+        if (asked_.repeats)
+            advance_blocks();
+        else
+            advance_copies();
         done_.result.died = dead_.size();
         if (!dead_.empty()) {
             std::vector<std::uint8_t> alive(points_.size(), 1);
@@ -360,67 +354,73 @@ private:
         return dynamic_cast<const Action*>(dynamic.get()) || (collider && collider->record);
     }
 
-    void advance_all()
+    // All of the set at once, then all that is left of it, and so on.
+    void advance_blocks()
     {
-        if (!asked_.repeats) {
-            Rest all;
-            all.places.resize(points_.size());
-            std::iota(all.places.begin(), all.places.end(), 0u);
-            all.series.reset(points_.size(), options_.h);
-            return advance(all, options_.substeps);
+        const std::span<Vec3f> P = points_.P().write(), v = points_.v().write();
+        std::map<int, Rest> left;  // by the sub-steps of their next run
+        const auto take = [&](Pass& pass) {
+            for (const auto& [substeps, rest] : pass.left()) left[substeps].append(rest);
+            dead_.insert(dead_.end(), pass.dead().begin(), pass.dead().end());
+        };
+        Pass all(asked_, options_.substeps, P, v, nullptr);
+        solve_once(points_, options_.substeps, all);
+        for (take(all); !left.empty();) {
+            const auto next = left.extract(left.begin());
+            PointSet some = points_.select(next.mapped().places);
+            Pass pass(asked_, next.key(), P, v, &next.mapped());
+            solve_once(some, next.key(), pass);
+            take(pass);
         }
-        Pass pass(asked_, options_.substeps, points_.P().write(), points_.v().write(), nullptr);
-        solve_once(points_, options_.substeps, pass);
-        left_ = pass.left();
-        dead_.assign(pass.dead().begin(), pass.dead().end());
     }
 
-    void advance(const Rest& rest, int substeps)
+    // Where a run writes other columns, too: on copies of a few thousand points, of which those that are done are kept.
+    void advance_copies()
     {
-        if (!asked_.repeats) return advance_copies(rest, substeps);
-        PointSet some = points_.select(rest.places);
-        Pass pass(asked_, substeps, points_.P().write(), points_.v().write(), &rest);
-        solve_once(some, substeps, pass);
-        leave(pass.left());
-        dead_.insert(dead_.end(), pass.dead().begin(), pass.dead().end());
+        constexpr std::size_t part_size = 2 * chunk_size;
+        for (std::size_t begin = 0; begin < points_.size(); begin += part_size) {
+            std::vector<std::uint32_t> places(std::min(part_size, points_.size() - begin));
+            std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
+            PointSet start = points_.select(places);
+            Series series;
+            series.reset(places.size(), options_.h);
+            for (int substeps = options_.substeps; !places.empty(); substeps *= 2)
+                advance_copy(start, places, series, substeps);
+        }
     }
 
-    // Where a run writes other columns, too: on a copy, part by part, of which those that are done are kept.
-    void advance_copies(const Rest& rest, int substeps)
+    // A run of the points at these places, which are `start`. Leaves in all three those that need another.
+    void advance_copy(PointSet& start, std::vector<std::uint32_t>& places, Series& series, int substeps)
     {
-        constexpr std::size_t part_size = 16 * chunk_size;
-        for (std::size_t begin = 0; begin < rest.places.size(); begin += part_size) {
-            const std::size_t size = std::min(part_size, rest.places.size() - begin);
-            const std::span places = std::span(rest.places).subspan(begin, size);
-            const Rest part = rest.part(begin, size);
-            const PointSet start = points_.select(places);
-            PointSet end = start;
-            std::vector<std::uint8_t> met(options_.met ? size : 0);
-            Asked asked = asked_;
-            asked.met = options_.met ? met.data() : nullptr;
-            Pass pass(asked, substeps, end.P().write(), end.v().write(), &part);
-            solve_once(end, substeps, pass);
-            std::map<int, Rest> left = pass.left();
-            std::vector<std::uint8_t> is_done(size, 1);
-            if (asked.takes_all(substeps)) {  // these are done, too, and how wrong they are is looked at
-                for (const auto& [next, some] : left) {
-                    PointSet again = start.select(some.places);
-                    Pass error(asked, next, end.P().write(), end.v().write(), &some);
-                    solve_once(again, next, error);
-                }
-                left.clear();
-            }
-            for (auto& [next, some] : left)
-                for (std::uint32_t& place : some.places) is_done[place] = 0, place = places[place];
-            leave(left);
-            for (const std::uint32_t place : pass.dead()) is_done[place] = 0, dead_.push_back(places[place]);
-            std::vector<std::uint32_t> from, to;
-            for (std::uint32_t i = 0; i < size; ++i) {
-                if (is_done[i]) from.push_back(i), to.push_back(places[i]);
-                if (options_.met && met[i]) options_.met[places[i]] = 1;
-            }
-            points_.put(to, end.select(from));
+        const std::size_t size = places.size();
+        Rest part;
+        part.places.resize(size);
+        std::iota(part.places.begin(), part.places.end(), 0u);
+        part.series = std::move(series);
+        PointSet end = start;
+        std::vector<std::uint8_t> met(options_.met ? size : 0);
+        Asked asked = asked_;
+        asked.met = options_.met ? met.data() : nullptr;
+        Pass pass(asked, substeps, end.P().write(), end.v().write(), &part);
+        solve_once(end, substeps, pass);
+
+        Rest left;
+        for (auto& [next, rest] : pass.left()) left = std::move(rest);  // all at the same next run
+        std::vector<std::uint8_t> is_done(size, asked.counts(substeps));
+        if (!asked.takes_all(substeps))
+            for (const std::uint32_t i : left.places) is_done[i] = 0;
+        for (const std::uint32_t i : pass.dead()) is_done[i] = 0, dead_.push_back(places[i]);
+        std::vector<std::uint32_t> from, to;
+        for (std::uint32_t i = 0; i < size; ++i) {
+            if (is_done[i]) from.push_back(i), to.push_back(places[i]);
+            if (options_.met && met[i]) options_.met[places[i]] = 1;
         }
+        points_.put(to, end.select(from));
+
+        if (left.places.size() < size) start = start.select(left.places);
+        for (std::size_t k = 0; k < left.places.size(); ++k) places[k] = places[left.places[k]];
+        places.resize(left.places.size());
+        series = std::move(left.series);
     }
 
     void solve_once(PointSet& set, int substeps, Pass& pass)
@@ -440,19 +440,13 @@ private:
         all.contact_energy += result.contact_energy;
     }
 
-    void leave(const std::map<int, Rest>& left)
-    {
-        for (const auto& [substeps, some] : left) left_[substeps].append(some);
-    }
-
     PointSet& points_;
     const std::span<const DynamicPtr> dynamics_;
     const SolveOptions& options_;
     const Asked asked_;
 
     Tolerated done_;
-    std::map<int, Rest> left_;  // by the sub-steps of their next run
-    std::vector<std::uint32_t> dead_;
+    std::vector<std::uint32_t> dead_;  // places
 };
 
 }  // namespace

@@ -60,7 +60,7 @@ struct RunEnd {
     std::span<const Way> way;
     std::span<const double> put_off;     // by contacts that were found after a sub-step, m
     std::span<const std::uint8_t> dead;  // 1: it has died; empty where none can
-    std::span<Vec3d> P, v;               // before they are rounded to single precision, for the reader to change
+    std::span<const Vec3d> P, v;         // before they are rounded to single precision
     std::span<const Vec3f> rounded;      // P, on the outer side of what it lies on
     std::span<const Obstacle> obstacles;
 };

@@ -87,6 +87,27 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :a
     end
   end)
 
+  it("gives the last run itself where a shape broke the way, or what the runs tend to lies in one", function()
+    local text = [[
+local P, v = {}, {}
+for i = 1, 4000 do P[i], v[i] = {i / 100, 0.1 + 2e-5 * i, 0}, {0, -3, 0} end
+return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :gravity {}
+  :turbulence { amplitude = 20, size = 0.3 }
+  :collide { shape = rapid.shape.plane {}, bounce = 0.4, method = "project" } :solve { %s }]]
+    local points = scene.run(text:format "tolerance = 3e-2", { frames = {2, 2} })[2]
+    local of_a_run = 0
+    for _, substeps in ipairs { 2, 4, 8, 16, 32, 64 } do
+      local run = scene.run(text:format("substeps = " .. substeps), { frames = {2, 2} })[2]
+      for i = 1, #points do
+        if points[i].P == run[i].P then
+          of_a_run = of_a_run + 1
+          assert.equal(run[i].v, points[i].v)
+        end
+      end
+    end
+    assert.truthy(of_a_run > 500 and of_a_run < 3900, of_a_run)
+  end)
+
   it("takes one step of what falls past a shape without meeting it, and tries two of what meets it", function()
     local function substeps(place)
       local folder = command.folder()

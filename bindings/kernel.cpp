@@ -10,6 +10,7 @@
 #include "bindings/detail.h"
 #include "bindings/script_host.h"
 #include "bindings/state.h"
+#include "runtime/graph/first_error.h"
 #include "runtime/parallel.h"
 #include "runtime/points/point_text.h"
 #include "runtime/stopwatch.h"
@@ -308,7 +309,6 @@ struct Kernel::Pass {
     const std::map<std::string, Value>& values;  // the third argument
     std::uint64_t serial;                        // of this pass: parameters are handed to each state once a pass
     std::vector<ColumnMemory> columns, groups;
-    const std::uint8_t* members = nullptr;
     std::uint8_t* kill = nullptr;
     std::uint8_t* result = nullptr;
 };
@@ -319,25 +319,26 @@ struct Kernel::Call {
     std::vector<void*> pointers;
 };
 
-void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const
+// members: of the chunk's points, where the pass is over a group.
+void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end, const std::uint8_t* members) const
 {
     Call call;
     call.chunk.size = static_cast<std::int32_t>(end - begin);
     call.chunk.first = static_cast<double>(begin);
     call.chunk.kill = pass.kill ? pass.kill + begin : nullptr;
     call.chunk.result = pass.result ? pass.result + begin : nullptr;
+    call.chunk.members = const_cast<std::uint8_t*>(members);
     call.pointers.reserve(pass.columns.size() + pass.groups.size());
     for (const ColumnMemory& memory : pass.columns) call.pointers.push_back(memory.at(begin));
     run_chunk(pass, call);
 }
 
-// The chunk's place, columns and results are set.
+// The chunk's place, members, columns and results are set.
 void Kernel::run_chunk(const Pass& pass, Call& call) const
 {
     rapid_chunk& chunk = call.chunk;
     const auto begin = static_cast<std::size_t>(chunk.first);
     for (const ColumnMemory& memory : pass.groups) call.pointers.push_back(memory.at(begin));
-    chunk.members = pass.members ? const_cast<std::uint8_t*>(pass.members) + begin : nullptr;
     chunk.random = pass.caller.random.value;
     chunk.number = static_cast<double>(pass.caller.frame.number);
     chunk.time = pass.caller.frame.time;
@@ -412,104 +413,110 @@ void Kernel::call_runner(State& state, const Pass& pass, const Call& call) const
     }
 }
 
-void Kernel::run_pass(Pass& pass) const
-{
-    const ScriptHost::Section section(host_, pass.caller.watched());
-    // The first error in the order of the points is reported, whichever thread comes upon one first.
-    std::mutex mutex;
-    std::optional<Error> first;
-    std::atomic<std::size_t> failed_at{pass.points.size()};
-    const auto visit = [&](std::size_t begin, std::size_t end) {
-        if (begin > failed_at.load(std::memory_order_relaxed)) return;
-        try {
-            run_chunk(pass, begin, end);
-        } catch (const Error& error) {
-            const std::lock_guard lock(mutex);
-            if (begin < failed_at) {
-                failed_at = begin;
-                first = error;
-            }
-        }
-    };
-    if (host_.kernel_way(pass.caller.node) == KernelOrder::Reversed)
-        visit(0, pass.points.size());  // the last chunk first, too
-    else
-        for_each_chunk(pass.points.size(), visit);
-    if (first) throw *first;
-}
-
-namespace {
-
-// Adds what a pass takes to the frame's figures.
-class ScriptTime {
-public:
-    explicit ScriptTime(FrameFigures& figures) : figures_(figures) {}
-    ~ScriptTime() { figures_.script_seconds += stopwatch_.seconds(); }
-
-private:
-    FrameFigures& figures_;
-    Stopwatch stopwatch_;
-};
-
-}  // namespace
-
 void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const
 {
-    const ScriptTime timed(now.figures);
+    const Stopwatch stopwatch;
+    const Caller caller(now);
+    const ScriptHost::Section section(host_, caller.watched());
     const KernelArguments nothing;
     const Layout layout = layout_for(points, nothing, true, false);
-    const Caller caller(now);
     Pass pass(points, caller, layout, nothing.values);
     pass.result = result.data();
-    run_pass(pass);
+    FirstError first;
+    for_each_chunk(
+        points.size(),
+        [&](std::size_t begin, std::size_t end) {
+            first.guard(0, begin, [&] { run_chunk(pass, begin, end, nullptr); });
+        },
+        chunk_of(caller, points.size()));
+    first.rethrow();
+    now.figures.script_seconds += stopwatch.seconds();
 }
 
-// The layout for a set, in which what the kernel writes is writable; none where it has no point to visit. chosen: the
-// group as it is now, since a kernel may leave the very group that chooses its points.
-std::optional<Kernel::Layout> Kernel::prepare(PointSet& points, const std::string& group,
-                                              const KernelArguments& arguments, Column<std::uint8_t>& chosen,
-                                              bool action) const
+// Points that go through a kernel together: all of the set where the order is reversed, the last chunk first, too.
+std::size_t Kernel::chunk_of(const Caller& caller, std::size_t size) const
+{
+    return host_.kernel_way(caller.node) == KernelOrder::Reversed ? std::max(size, chunk_size) : chunk_size;
+}
+
+void Kernel::prepare(PointSet& points, const std::string& group, const KernelArguments& arguments) const
 {
     for (const auto* names : {&joins_, &arguments.joins})
         for (const std::string& name : *names) points.group(name);
-    const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
-    if (points.empty() || (!group.empty() && !members)) return std::nullopt;  // nobody is in it yet
-    if (members && members->is_uniform()) {
-        if (!(*members)[0]) return std::nullopt;
-        members = nullptr;
-    }
-    const bool masked = members != nullptr;
-    if (masked) chosen = *members;
-    Layout layout = layout_for(points, arguments, false, masked);
-    for (const Layout::Entry& entry : layout.columns)
+    const std::optional<Layout> layout = layout_of_group(points, group, arguments);
+    if (!layout) return;
+    for (const Layout::Entry& entry : layout->columns)
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
-    for (const Layout::Entry& entry : layout.groups)
+    for (const Layout::Entry& entry : layout->groups)
         if (entry.writable) points.group(entry.name).write();
-    if (action) make_layout_of_action(layout, arguments);
-    return layout;
 }
 
-void Kernel::run(PointSet& points, const std::string& group, const Evaluation& now,
-                 const KernelArguments& arguments) const
+// None where it has no point to visit.
+std::optional<Kernel::Layout> Kernel::layout_of_group(const PointSet& points, const std::string& group,
+                                                      const KernelArguments& arguments) const
 {
-    const ScriptTime timed(now.figures);
-    Column<std::uint8_t> chosen;
-    const std::optional<Layout> layout = prepare(points, group, arguments, chosen, false);
-    if (!layout) return;
+    const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
+    if (points.empty() || (!group.empty() && !members)) return std::nullopt;  // nobody is in it yet
+    if (members && members->is_uniform() && !(*members)[0]) return std::nullopt;
+    return layout_for(points, arguments, false, members && !members->is_uniform());
+}
 
-    const Caller caller(now);
-    std::vector<std::uint8_t> kill(kills_ ? points.size() : 0);
-    Pass pass(points, caller, *layout, arguments.values);
-    pass.kill = kills_ ? kill.data() : nullptr;
-    pass.members = layout->masked ? std::as_const(chosen).read().data : nullptr;
-    run_pass(pass);
-
-    if (std::find(kill.begin(), kill.end(), 1) != kill.end()) {
-        for (std::uint8_t& mark : kill) mark = mark == 0;
-        const std::size_t before = points.size();
-        points.keep(kill);
-        now.figures.died += before - points.size();
+class Kernel::KernelPass : public ScriptPass {
+public:
+    KernelPass(const Kernel& kernel, PointSet& points, const Evaluation& now, Layout layout, const std::string& group,
+               KernelArguments arguments)
+        : kernel_(kernel),
+          points_(points),
+          figures_(now.figures),
+          caller_(now),
+          section_(kernel.host_, caller_.watched()),
+          layout_(std::move(layout)),
+          arguments_(std::move(arguments)),
+          kill_(kernel.kills_ ? points.size() : 0),
+          pass_(points, caller_, layout_, arguments_.values)
+    {
+        if (kernel.kills_) pass_.kill = kill_.data();
+        if (layout_.masked) members_ = std::as_const(points).find_group(group)->read().data;
     }
+
+    std::size_t chunk() const override { return kernel_.chunk_of(caller_, points_.size()); }
+
+    void visit(std::size_t begin, std::size_t end) override
+    {
+        if (!members_) return kernel_.run_chunk(pass_, begin, end, nullptr);
+        // As it is now: a kernel may leave the very group that chooses its points.
+        const std::vector<std::uint8_t> chosen(members_ + begin, members_ + end);
+        kernel_.run_chunk(pass_, begin, end, chosen.data());
+    }
+
+    void finish() override
+    {
+        if (std::find(kill_.begin(), kill_.end(), 1) == kill_.end()) return;
+        for (std::uint8_t& mark : kill_) mark = mark == 0;
+        const std::size_t before = points_.size();
+        points_.keep(kill_);
+        figures_.died += before - points_.size();
+    }
+
+private:
+    const Kernel& kernel_;
+    PointSet& points_;
+    FrameFigures& figures_;
+    const Caller caller_;
+    const ScriptHost::Section section_;
+    const Layout layout_;
+    const KernelArguments arguments_;
+    std::vector<std::uint8_t> kill_;
+    const std::uint8_t* members_ = nullptr;
+    Pass pass_;
+};
+
+std::unique_ptr<ScriptPass> Kernel::pass(PointSet& points, const std::string& group, const Evaluation& now,
+                                         KernelArguments arguments) const
+{
+    std::optional<Layout> layout = layout_of_group(points, group, arguments);
+    if (!layout) return nullptr;
+    return std::make_unique<KernelPass>(*this, points, now, std::move(*layout), group, std::move(arguments));
 }
 
 class Kernel::KernelActionPass : public ActionPass {
@@ -522,7 +529,6 @@ public:
           chosen_(std::move(chosen)),
           pass_(points, caller, layout_, values)
     {
-        if (layout_.masked) pass_.members = std::as_const(chosen_).read().data;
     }
 
     void act(const Chunk& chunk, std::span<Vec3d> force, std::span<std::uint8_t> dead) override
@@ -538,6 +544,7 @@ public:
         call.chunk.size = static_cast<std::int32_t>(chunk.size());
         call.chunk.first = static_cast<double>(chunk.first);
         call.chunk.kill = dead.data();
+        if (layout_.masked) call.chunk.members = const_cast<std::uint8_t*>(chosen_.read().data) + chunk.first;
         call.chunk.substep = chunk.substep;
         call.chunk.times = chunk.time.data();
         call.chunk.steps = chunk.dt.data();
@@ -563,9 +570,13 @@ public:
 
     std::unique_ptr<ActionPass> begin(PointSet& points) const override
     {
-        Column<std::uint8_t> chosen;
-        std::optional<Layout> layout = kernel_.prepare(points, group, arguments_, chosen, true);
+        kernel_.prepare(points, group, arguments_);
+        std::optional<Layout> layout = kernel_.layout_of_group(points, group, arguments_);
         if (!layout) return nullptr;
+        kernel_.make_layout_of_action(*layout, arguments_);
+        // As it is now: a kernel may leave the very group that chooses its points.
+        Column<std::uint8_t> chosen;
+        if (layout->masked) chosen = *points.find_group(group);
         return std::make_unique<KernelActionPass>(kernel_, points, caller_, std::move(*layout), arguments_.values,
                                                   std::move(chosen));
     }

@@ -10,9 +10,11 @@
 
 #include "bindings/state.h"
 #include "runtime/graph/point_function.h"
+#include "runtime/graph/script_edit.h"
 
 namespace rapid {
 
+struct Caller;
 class ScriptHost;
 
 // What a Lua node's kernel is given besides the points.
@@ -36,8 +38,14 @@ public:
     void uses(Uses& uses) const override;
     void test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const override;
 
-    // Runs it over the points of `group` (all when empty), in parallel. Points that it killed are removed afterwards.
-    void run(PointSet& points, const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
+    // Brings into being and makes writable what it will write, of a set in which some point is in `group` (all are when
+    // it is empty).
+    void prepare(PointSet& points, const std::string& group, const KernelArguments& arguments) const;
+    // Over the points of `group`, as it is when they are visited, of a set that is prepared; null where it has none.
+    // Points that it kills are removed at the end.
+    std::unique_ptr<ScriptPass> pass(PointSet& points, const std::string& group, const Evaluation& now,
+                                     KernelArguments arguments) const;
+    bool kills() const { return kills_; }
 
     // What it does inside Solve, at every sub-step, on the points of `group`.
     DynamicPtr action(const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
@@ -62,15 +70,16 @@ private:
     struct Layout;
     struct Pass;
     struct Call;
+    class KernelPass;
     class KernelAction;
     class KernelActionPass;
 
     Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate, bool masked) const;
     void make_layout_of_action(Layout& layout, const KernelArguments& arguments) const;
-    std::optional<Layout> prepare(PointSet& points, const std::string& group, const KernelArguments& arguments,
-                                  Column<std::uint8_t>& chosen, bool action) const;
-    void run_pass(Pass& pass) const;
-    void run_chunk(const Pass& pass, std::size_t begin, std::size_t end) const;
+    std::optional<Layout> layout_of_group(const PointSet& points, const std::string& group,
+                                          const KernelArguments& arguments) const;
+    std::size_t chunk_of(const Caller& caller, std::size_t size) const;
+    void run_chunk(const Pass& pass, std::size_t begin, std::size_t end, const std::uint8_t* members) const;
     void run_chunk(const Pass& pass, Call& call) const;
     static Call one_point(const Pass& pass, const Call& call, std::int32_t i);
     void call_runner(State& state, const Pass& pass, const Call& call) const;

@@ -35,6 +35,37 @@ void check_writable(const std::vector<std::string>& writes)
             throw Error(fmt::format("writes: {} is read only", name));
 }
 
+// What edits the points by the kernel of its fields, in their group.
+template <class Fields>
+class KernelEdit : public ScriptEdit {
+public:
+    explicit KernelEdit(std::vector<AttributeSpec> makes = {}) : makes_(std::move(makes)) {}
+
+    void* fields() override { return &fields_; }
+    void prepare(PointSet& points, const Evaluation& now) override
+    {
+        // Points that come from elsewhere, and those behind Solve, may not have them yet.
+        for (const AttributeSpec& spec : makes_)
+            if (now.keeps(spec.name)) points.add(spec);
+        fields_.kernel->prepare(points, fields_.group, fields_.of_kernel());
+    }
+    std::unique_ptr<ScriptPass> begin(PointSet& points, const Evaluation& now) override
+    {
+        return fields_.kernel->pass(points, fields_.group, now, fields_.of_kernel());
+    }
+    bool removes_points() const override { return fields_.kernel->kills(); }
+    void uses(Uses& uses) const override
+    {
+        if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
+        fields_.kernel->uses(uses, fields_.of_kernel());
+    }
+    void check() const override { fields_.check(); }
+
+private:
+    Fields fields_;
+    std::vector<AttributeSpec> makes_;
+};
+
 // points: an edit of the points, one by one, written in Lua.
 struct Points {
     std::string group;
@@ -54,9 +85,9 @@ struct Points {
             .param(&Points::writes, "writes", Value(), any_number(), "", std::string(writes_doc))
             .constant();
     }
+    static std::unique_ptr<Operator> make() { return std::make_unique<KernelEdit<Points>>(); }
     void check() const { check_writable(writes); }
-    void uses(Uses& uses) const { kernel->uses(uses, declared(reads, writes)); }
-    void edit(PointSet& points, const Evaluation& now) { kernel->run(points, group, now, declared(reads, writes)); }
+    KernelArguments of_kernel() const { return declared(reads, writes); }
 };
 RAPID_NODE(Points);
 
@@ -107,15 +138,19 @@ struct Detail {
 };
 RAPID_NODE(Detail);
 
-// A node type that rapid.node defines: its parameters' values by name, its kernel, and the attributes that it makes.
+// Of a node type that rapid.node defines: its parameters' values by name, and its kernel.
+struct ScriptFields {
+    std::string group;
+    std::shared_ptr<const Kernel> kernel;
+    KernelArguments arguments;
+
+    void check() const {}
+    const KernelArguments& of_kernel() const { return arguments; }
+};
+
+// One that is no edit of the points one by one, and the attributes that it makes.
 class ScriptOperator : public Operator {
 public:
-    struct Fields {
-        std::string group;
-        std::shared_ptr<const Kernel> kernel;
-        KernelArguments arguments;
-    };
-
     ScriptOperator(NodeKind kind, std::vector<AttributeSpec> makes) : kind_(kind), makes_(std::move(makes)) {}
 
     void* fields() override { return &fields_; }
@@ -126,10 +161,8 @@ public:
             if (now.keeps(spec.name)) inputs[0].points.add(spec);
         if (fields_.kernel->of_the_set)
             run_detail(*fields_.kernel, inputs[0], now, fields_.arguments);
-        else if (kind_ == NodeKind::Dynamic)
-            inputs[0].dynamics.push_back(fields_.kernel->action(fields_.group, now, fields_.arguments));
         else
-            fields_.kernel->run(inputs[0].points, fields_.group, now, fields_.arguments);
+            inputs[0].dynamics.push_back(fields_.kernel->action(fields_.group, now, fields_.arguments));
         return std::move(inputs[0]);
     }
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
@@ -145,14 +178,14 @@ public:
 
 private:
     const NodeKind kind_;
-    Fields fields_;
+    ScriptFields fields_;
     std::vector<AttributeSpec> makes_;
 };
 
 // The types that a parameter is declared with, and how each is checked and kept for the kernel.
 constexpr std::string_view group_type = "name of a group", attribute_type = "name of an attribute";
 
-KernelArguments& arguments_of(void* fields) { return static_cast<ScriptOperator::Fields*>(fields)->arguments; }
+KernelArguments& arguments_of(void* fields) { return static_cast<ScriptFields*>(fields)->arguments; }
 
 // The functions that a definition may have; it has one of them.
 constexpr std::string_view roles[] = {"points", "action", "detail", "expand"};
@@ -291,7 +324,7 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     param.type = known->second.shown;
     param.assign = known->second.assign;
     param.of_the_frame = !known->second.constant;
-    ScriptOperator::Fields scratch;  // a default is checked where it is declared
+    ScriptFields scratch;  // a default is checked where it is declared
     try {
         if (!param.fallback.is_nil()) param.assign(param, &scratch, param.fallback);
     } catch (const Error& error) {
@@ -331,7 +364,7 @@ NodeType read_type(const Table& definition, std::string_view role)
         group.doc = "acts on this group only";
         group.of_the_frame = false;
         group.assign = [](const Param& self, void* fields, const Value& value) {
-            read_value(self, value, static_cast<ScriptOperator::Fields*>(fields)->group);
+            read_value(self, value, static_cast<ScriptFields*>(fields)->group);
         };
         type.params.push_back(group);
     }
@@ -343,7 +376,7 @@ NodeType read_type(const Table& definition, std::string_view role)
         kernel.internal = true;
         kernel.of_the_frame = false;
         kernel.assign = [](const Param& self, void* fields, const Value& value) {
-            read_value(self, value, static_cast<ScriptOperator::Fields*>(fields)->kernel);
+            read_value(self, value, static_cast<ScriptFields*>(fields)->kernel);
         };
         type.params.push_back(kernel);
     }
@@ -359,7 +392,10 @@ NodeType read_type(const Table& definition, std::string_view role)
         }
         for (const auto& [name, value] : attributes) type.uses.makes.push_back({name, value});
     }
-    type.make = [kind = type.kind, made = type.uses.makes] { return std::make_unique<ScriptOperator>(kind, made); };
+    type.make = [edits = role == "points", kind = type.kind, made = type.uses.makes]() -> std::unique_ptr<Operator> {
+        if (edits) return std::make_unique<KernelEdit<ScriptFields>>(made);
+        return std::make_unique<ScriptOperator>(kind, made);
+    };
     return type;
 }
 
@@ -418,7 +454,7 @@ int complete_arguments(State& state)
     const Value given = state.to_value(2);
     const Table* table = given.table();
     if (!table) throw Error(fmt::format(":{} takes a table of parameters", type.name));
-    ScriptOperator::Fields fields;
+    ScriptFields fields;
     try {
         assign_arguments(type.params, table->named, &fields);
     } catch (Error& error) {

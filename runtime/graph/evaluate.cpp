@@ -1,11 +1,13 @@
 #include "runtime/graph/evaluate.h"
 
 #include <algorithm>
+#include <deque>
 #include <exception>
 #include <new>
 #include <optional>
 #include <utility>
 
+#include "runtime/graph/script_edit.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -110,49 +112,76 @@ void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size
     results.assign(plan_.nodes.size(), {});
     readers.assign(plan_.nodes.size(), 0);
     for (std::size_t i = 0; i < plan_.nodes.size(); ++i) readers[i] = plan_.nodes[i].consumers;
-    for (std::size_t i = 0; i < plan_.nodes.size(); ++i)
-        if (takes_part(plan_.nodes[i])) results[i] = evaluate(i, left, results, readers, frame);
+    for (std::size_t first = 0, last = 0; first < plan_.nodes.size(); first = last + 1) {
+        last = first;
+        if (!takes_part(plan_.nodes[first])) continue;
+        // Whoever is told of each result is told of each node by itself.
+        while (!result_ && last + 1 < plan_.nodes.size() && plan_.goes_along(last + 1)) ++last;
+        results[last] = evaluate(first, last, left, results, readers, frame);
+    }
     before.go_on(std::move(frame.figures));
     frame.figures = std::move(before);
 }
 
-Flow Evaluator::evaluate(std::size_t i, int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,
-                         FrameResult& frame)
+// What a node is told, with what that refers to.
+class Evaluator::Told {
+public:
+    Told(const Evaluator& evaluator, const PlannedNode& planned, int left, FrameResult& frame)
+        : simulation_(*evaluator.simulations_[planned.simulation]),
+          step_(simulation_.clock().step_of(evaluator.next_) - left),
+          now_(simulation_.frame(std::max(step_, simulation_.start)))
+    {
+        if (evaluator.write_ && left == 0)
+            write_ = [&](const std::string& pattern, const PointSet& points) {
+                evaluator.write_(pattern, points, now_, simulation_.fps);
+            };
+        // A simulation that begins at this frame's end, or later, has begun once.
+        const bool at_start = step_ <= simulation_.start;
+        evaluation.emplace(Evaluation{now_, at_start, planned.node->name, planned.node->location,
+                                      RandomKey(simulation_.seed, planned.node->name),
+                                      left > 0 && at_start ? again_ : frame.figures, frame.warnings, write_,
+                                      &evaluator.plan_.simulations[planned.simulation].left_out});
+    }
+    Told(const Told&) = delete;
+    Told& operator=(const Told&) = delete;
+
+    std::optional<Evaluation> evaluation;
+
+private:
+    const Simulation& simulation_;
+    const std::int64_t step_;
+    const Frame now_;
+    FrameFigures again_;
+    std::function<void(const std::string&, const PointSet&)> write_;
+};
+
+Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vector<Flow>& results,
+                         std::vector<std::size_t>& readers, FrameResult& frame)
 {
-    const PlannedNode& planned = plan_.nodes[i];
+    const PlannedNode& planned = plan_.nodes[first];
     const Node& node = *planned.node;
-    if (kept_[i]) return *kept_[i];
+    if (kept_[first]) return *kept_[first];
 
     std::vector<Flow> inputs;
     for (const std::size_t input : planned.inputs)
         inputs.push_back(--readers[input] == 0 ? std::move(results[input]) : results[input]);
     if (node.type->kind == NodeKind::Source) inputs.push_back({PointSet(), {}, simulations_[planned.simulation]});
 
-    const Simulation& simulation = *simulations_[planned.simulation];
-    const std::int64_t step = simulation.clock().step_of(next_) - left;
-    const Frame now = simulation.frame(std::max(step, simulation.start));
-    const std::function<void(const std::string&, const PointSet&)> write =
-        write_ && left == 0
-            ? [&](const std::string& pattern, const PointSet& points) { write_(pattern, points, now, simulation.fps); }
-            : std::function<void(const std::string&, const PointSet&)>();
-    // A simulation that begins at this frame's end, or later, has begun once.
-    FrameFigures again;
-    const Evaluation evaluation{now,
-                                step <= simulation.start,
-                                node.name,
-                                node.location,
-                                RandomKey(simulation.seed, node.name),
-                                left > 0 && step <= simulation.start ? again : frame.figures,
-                                frame.warnings,
-                                write,
-                                &plan_.simulations[planned.simulation].left_out};
+    const Told told(*this, planned, left, frame);
+    const Evaluation& evaluation = *told.evaluation;
     try {
         const Stopwatch stopwatch;
-        Flow result = planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source
-                          ? planned.op->start(inputs, evaluation)
-                          : planned.op->evaluate(inputs, evaluation);
+        Flow result;
+        if (planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source) {
+            result = planned.op->start(inputs, evaluation);
+        } else if (last == first) {
+            result = planned.op->evaluate(inputs, evaluation);
+        } else {
+            result = std::move(inputs[0]);
+            edit_together(first, last, left, result.points, frame);
+        }
         if (node.type->kind == NodeKind::Solve) frame.figures.solve_seconds += stopwatch.seconds();
-        if (planned.once) kept_[i] = result;
+        if (planned.once) kept_[first] = result;
         if (result_) result_(node, next_, result.points);
         return result;
     } catch (Error& error) {
@@ -163,6 +192,18 @@ Flow Evaluator::evaluate(std::size_t i, int left, std::vector<Flow>& results, st
     } catch (const std::exception& fault) {  // of a library: what it says is all that is known
         throw Error(fault.what()).in_node(node.name).at(node.location);
     }
+}
+
+void Evaluator::edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame)
+{
+    std::deque<Told> told;
+    std::vector<const Evaluation*> now;
+    std::vector<ScriptEdit*> edits;
+    for (std::size_t i = first; i <= last; ++i) {
+        now.push_back(&*told.emplace_back(*this, plan_.nodes[i], left, frame).evaluation);
+        edits.push_back(&dynamic_cast<ScriptEdit&>(*plan_.nodes[i].op));
+    }
+    rapid::edit_together(edits, now, points);
 }
 
 }  // namespace rapid

@@ -327,7 +327,8 @@ private:
 
 }  // namespace detail
 
-// Builds a declaration. Every node has `name`, and all but sources and merges have `group`.
+// Builds a declaration. T::make() makes its operator, where that is more than its fields. Every node has `name`, and
+// all but sources and merges have `group`.
 template <class T>
 class Declaration {
 public:
@@ -337,7 +338,10 @@ public:
         type_.doc = std::move(doc);
         if constexpr (detail::is_force<T> || detail::has_dynamic<T>) type_.kind = NodeKind::Dynamic;
         if constexpr (detail::is_force<T>) type_.stages = {Stage::Forces};
-        type_.make = [] { return std::make_unique<detail::OperatorOf<T>>(); };
+        if constexpr (requires { T::make(); })
+            type_.make = [] { return T::make(); };
+        else
+            type_.make = [] { return std::make_unique<detail::OperatorOf<T>>(); };
         if constexpr (requires(T t) { t.group; })
             param(&T::group, "group", Value(), any_number(), "", "acts on this group only");
     }

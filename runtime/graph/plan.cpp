@@ -6,6 +6,7 @@
 #include <set>
 
 #include "runtime/graph/registry.h"
+#include "runtime/graph/script_edit.h"
 
 namespace rapid {
 namespace {
@@ -426,12 +427,25 @@ std::set<std::string> Plan::names_of_scene() const
     return names;
 }
 
+bool Plan::goes_along(std::size_t node) const
+{
+    if (node == 0 || nodes[node].inputs != std::vector{node - 1}) return false;
+    const PlannedNode &before = nodes[node - 1], &after = nodes[node];
+    const auto* edit = dynamic_cast<const ScriptEdit*>(before.op.get());
+    return edit && !edit->removes_points() && dynamic_cast<const ScriptEdit*>(after.op.get()) &&
+           before.consumers == 1 && before.in_loop == after.in_loop && !before.once && !after.once;
+}
+
 std::vector<std::vector<std::size_t>> Plan::passes() const
 {
     std::vector<std::vector<std::size_t>> passes;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         const NodeKind kind = nodes[i].node->type->kind;
         if (kind == NodeKind::Source || kind == NodeKind::Dynamic) continue;
+        if (goes_along(i)) {
+            passes.back().push_back(i);
+            continue;
+        }
         std::set<std::size_t> pass = {i};
         if (kind == NodeKind::Solve) {
             std::vector<std::size_t> open = nodes[i].inputs;

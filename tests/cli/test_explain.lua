@@ -120,6 +120,15 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
                 plan_of("bounces.lua").passes)
   end)
 
+  it("takes neighbouring scripts over the points together, up to one that removes some", function()
+    write("scripts.lua", [[
+return rapid.create {} :emit { ]] .. source .. [[ }
+  :points("a", function(p) p.v = p.v * 0.5 end) :points("b", function(p) if p.P.y < 0 then p:kill() end end)
+  :points("c", function(p) p.v = p.v * 2 end) :points("d", function(p) p.v = p.v * 3 end) :solve {}
+]])
+    assert.same({ { "emit1" }, { "a", "b" }, { "c", "d" }, { "solve1" } }, plan_of("scripts.lua").passes)
+  end)
+
   it("keeps nothing alive for a node that no output comes from", function()
     write("unread.lua", [[
 local points = rapid.create {} :emit { ]] .. source .. [[ } :solve {}

@@ -1,0 +1,46 @@
+// The error that a loop over points in parallel reports: of those that rise, that which one loop after the other, point
+// by point, would have met, whichever thread comes upon one first.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+
+namespace rapid {
+
+class FirstError {
+public:
+    // Runs f, the part of a loop (of several, one after the other) from a point on. False where it throws, or where an
+    // error before it has made it needless.
+    template <class F>
+    bool guard(std::size_t loop, std::size_t point, const F& f)
+    {
+        const std::uint64_t place = std::uint64_t{loop} << 48 | point;
+        if (place > place_.load(std::memory_order_relaxed)) return false;
+        try {
+            f();
+            return true;
+        } catch (...) {
+            const std::lock_guard lock(mutex_);
+            if (place < place_) {
+                place_ = place;
+                error_ = std::current_exception();
+            }
+            return false;
+        }
+    }
+
+    void rethrow() const
+    {
+        if (error_) std::rethrow_exception(error_);
+    }
+
+private:
+    std::mutex mutex_;
+    std::atomic<std::uint64_t> place_{UINT64_MAX};
+    std::exception_ptr error_;
+};
+
+}  // namespace rapid

@@ -7,12 +7,10 @@
 #include "runtime/stopwatch.h"
 
 namespace rapid {
-namespace {
 
-using Passes = std::vector<std::unique_ptr<ScriptPass>>;
-
-void visit_all(const Passes& passes, std::size_t size)
+void go_over(std::span<const std::unique_ptr<ScriptPass>> passes, std::size_t size)
 {
+    if (passes.empty()) return;
     FirstError first;
     for_each_chunk(
         size,
@@ -22,9 +20,8 @@ void visit_all(const Passes& passes, std::size_t size)
         },
         passes.front()->chunk());
     first.rethrow();
+    for (const std::unique_ptr<ScriptPass>& pass : passes) pass->finish();
 }
-
-}  // namespace
 
 Flow ScriptEdit::evaluate(std::span<Flow> inputs, const Evaluation& now)
 {
@@ -37,13 +34,11 @@ Flow ScriptEdit::evaluate(std::span<Flow> inputs, const Evaluation& now)
 void edit_together(std::span<ScriptEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points)
 {
     const Stopwatch stopwatch;
-    Passes passes;
+    std::vector<std::unique_ptr<ScriptPass>> passes;
     for (std::size_t k = 0; k < edits.size(); ++k) edits[k]->prepare(points, *now[k]);
     for (std::size_t k = 0; k < edits.size(); ++k)
         if (auto pass = edits[k]->begin(points, *now[k])) passes.push_back(std::move(pass));
-    if (passes.empty()) return;
-    visit_all(passes, points.size());
-    for (const std::unique_ptr<ScriptPass>& pass : passes) pass->finish();
+    go_over(passes, points.size());
     now.front()->figures.script_seconds += stopwatch.seconds();
 }
 

@@ -22,6 +22,10 @@ public:
     virtual void finish() = 0;
 };
 
+// Takes so many points through the passes, in parallel, and ends them. Error: of the first pass that fails, at its
+// first point that does.
+void go_over(std::span<const std::unique_ptr<ScriptPass>> passes, std::size_t size);
+
 class ScriptEdit : public Operator {
 public:
     // Brings into being and makes writable what it will write.
@@ -38,7 +42,7 @@ public:
 };
 
 // All edits of the points, in their order; now: what each is told. The same as one after the other, to the bit. Error:
-// of the first edit that fails, at its first point that does.
+// as go_over().
 void edit_together(std::span<ScriptEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
 
 }  // namespace rapid

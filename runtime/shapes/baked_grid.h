@@ -103,7 +103,18 @@ public:
 
     // The same of up to `many` points at once, as vectors: to the bit what distance(P) gives.
     static constexpr int many = 64;
-    void distances(int n, const double* X, const double* Y, const double* Z, double* phi) const;
+    void distances(int n, const double* X, const double* Y, const double* Z, double* phi) const
+    {
+        sample(n, X, Y, Z, phi, [](int, float, float, float) {});
+    }
+    // And the slopes of the field along v, m/s: of its gradient, which is zero beyond the band.
+    void distances_along(int n, const double* X, const double* Y, const double* Z, const double* vx, const double* vy,
+                         const double* vz, double* phi, double* slope) const
+    {
+        sample(n, X, Y, Z, phi, [=, per_voxel = per_voxel_](int i, float dx, float dy, float dz) {
+            slope[i] = per_voxel * (double(dx) * vx[i] + double(dy) * vy[i] + double(dz) * vz[i]);
+        });
+    }
 
     // The largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where bands of
     // two surfaces meet, anything for a field that is no distance. At least 1, the slope of the bounds beyond the band.
@@ -123,6 +134,10 @@ public:
     }
 
 private:
+    template <class Differences>
+    void sample(int n, const double* X, const double* Y, const double* Z, double* phi,
+                const Differences& differences) const;
+
     static constexpr int row = BakedGrid::edge, slab = BakedGrid::edge * BakedGrid::edge;
 
     struct Cell {
@@ -166,7 +181,10 @@ private:
     Box3d surface_;
 };
 
-inline void BakedSampler::distances(int n, const double* X, const double* Y, const double* Z, double* phi) const
+// differences(i, dx, dy, dz): those of the interpolant across its cell along the axes, m.
+template <class Differences>
+void BakedSampler::sample(int n, const double* X, const double* Y, const double* Z, double* phi,
+                          const Differences& differences) const
 {
     float x[many], y[many], z[many];       // place in the cell
     std::int64_t block[many], cell[many];  // of the index; within its values
@@ -189,19 +207,36 @@ inline void BakedSampler::distances(int n, const double* X, const double* Y, con
     std::int32_t code[many];
     for (int i = 0; i < n; ++i) code[i] = index_[block[i]];
     for (int i = 0; i < n; ++i) cell[i] += std::int64_t(std::max(code[i], 0)) * BakedGrid::block_values;
+    float corner[8][many];
     for (int i = 0; i < n; ++i) {
         const float* c = values_ + cell[i];
-        const float c00 = c[0] + z[i] * (c[1] - c[0]);
-        const float c01 = c[row] + z[i] * (c[row + 1] - c[row]);
-        const float c10 = c[slab] + z[i] * (c[slab + 1] - c[slab]);
-        const float c11 = c[slab + row] + z[i] * (c[slab + row + 1] - c[slab + row]);
-        const float c0 = c00 + y[i] * (c01 - c00), c1 = c10 + y[i] * (c11 - c10);
-        phi[i] = c0 + x[i] * (c1 - c0);
+        const float* rows[] = {c, c + row, c + slab, c + slab + row};
+        for (int k = 0; k < 4; ++k) {
+            corner[2 * k][i] = rows[k][0];
+            corner[2 * k + 1][i] = rows[k][1];
+        }
     }
-    for (int i = 0; i < n; ++i) phi[i] = code[i] < 0 ? bound_of(code[i]) : phi[i];
+    // Copies, which what is written can't change.
+    const double background = background_, width = block_width_;
+    for (int i = 0; i < n; ++i) {
+        const float d00 = corner[1][i] - corner[0][i], d01 = corner[3][i] - corner[2][i];
+        const float d10 = corner[5][i] - corner[4][i], d11 = corner[7][i] - corner[6][i];
+        const float c00 = corner[0][i] + z[i] * d00, c01 = corner[2][i] + z[i] * d01;
+        const float c10 = corner[4][i] + z[i] * d10, c11 = corner[6][i] + z[i] * d11;
+        const float dy0 = c01 - c00, dy1 = c11 - c10;
+        const float c0 = c00 + y[i] * dy0, c1 = c10 + y[i] * dy1;
+        const float dz0 = d00 + y[i] * (d01 - d00), dz1 = d10 + y[i] * (d11 - d10), dx = c1 - c0;
+        const double bound = BakedGrid::sign(code[i]) * (background + BakedGrid::between(code[i]) * width);
+        phi[i] = code[i] < 0 ? bound : c0 + x[i] * dx;
+        const float in_band = code[i] < 0 ? 0.0f : 1.0f;
+        differences(i, in_band * dx, in_band * (dy0 + x[i] * (dy1 - dy0)), in_band * (dz0 + x[i] * (dz1 - dz0)));
+    }
     if (beyond > 0)
         for (int i = 0; i < n; ++i)
-            if (!within[i]) phi[i] = far_outside({X[i], Y[i], Z[i]});
+            if (!within[i]) {
+                phi[i] = far_outside({X[i], Y[i], Z[i]});
+                differences(i, 0, 0, 0);
+            }
 }
 
 }  // namespace rapid

@@ -374,7 +374,59 @@ Contact approach(const Sampler& sampler, const Path& path, double s, double leve
     return contact_at(sampler, path, s);
 }
 
+// Many paths where they begin, for a sampler that asks along many at once.
+//
+// Layout: structure of arrays; coordinates are shape [3, most].
+struct Beginnings {
+    static constexpr int most = 64;
+
+    int size = 0;
+    std::size_t path[most];
+    double f[most], slope[most];  // m above the surface, and how the field changes along the velocity, m/s
+    bool is_flush[most];          // or below the surface
+    bool is_free[most];           // it is farther from the surface than its way is long
+
+    void add(std::size_t i, const Path& from)
+    {
+        const int k = size++;
+        path[k] = i;
+        for (int axis = 0; axis < 3; ++axis) {
+            P_[axis][k] = from.P[axis];
+            v_[axis][k] = from.v[axis];
+            end_[axis][k] = from.v[axis] + from.duration * from.a[axis];
+        }
+        T_[k] = from.duration;
+        radius_[k] = from.radius;
+    }
+
+    template <class Sampler>
+    void ask(const Sampler& sampler)
+    {
+        const double rounding = rounding_of(sampler), steepest = sampler.slope_bound();
+        sampler.distances_along(size, P_[0], P_[1], P_[2], v_[0], v_[1], v_[2], f, slope);
+        for (int k = 0; k < size; ++k) {
+            f[k] -= radius_[k];
+            const double largest = std::max(std::max(std::abs(P_[0][k]), std::abs(P_[1][k])), std::abs(P_[2][k]));
+            is_flush[k] = f[k] <= 0x1p-22 * (largest + radius_[k]) + rounding;
+            // The speed is convex along the way.
+            const auto square = [&](const double(&x)[3][most]) {
+                return x[0][k] * x[0][k] + x[1][k] * x[1][k] + x[2][k] * x[2][k];
+            };
+            is_free[k] = f[k] >= T_[k] * steepest * std::sqrt(std::max(square(v_), square(end_)));
+        }
+    }
+
+private:
+    double P_[3][most], v_[3][most], end_[3][most], T_[most], radius_[most];
+};
+
 }  // namespace detail
+
+template <class Sampler>
+concept asks_along = requires(const Sampler& sampler, const double* x, double* phi)
+{
+    sampler.distances_along(1, x, x, x, x, x, x, phi, phi);
+};
 
 // The first contact of each path.
 template <class Sampler>
@@ -383,19 +435,19 @@ void first_contacts(const Sampler& sampler, std::span<const Path> paths, std::sp
     const Box3d bounds = sampler.bounds();
     const double rounding = detail::rounding_of(sampler), feature = sampler.smallest_feature();
     detail::Walks walks(sampler, paths, contacts);
-    for (std::size_t i = 0; i < paths.size(); ++i) {
+    const auto close_to = [&](const Path& path) {
+        return std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + path.radius), rounding / 16);
+    };
+    const auto begin = [&](std::size_t i) {
         const Path& path = paths[i];
-        contacts[i] = Contact();
-        if (!may_reach(path, bounds)) continue;
-
         Vec3d gradient;
         const double f = sampler.distance(path.P, gradient) - path.radius;
         const double flush = flush_within(path.P, path.radius, rounding);
         if (f < -flush) {
             contacts[i] = detail::start_inside(sampler, path, f, gradient);
-            continue;
+            return;
         }
-        const double close = std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + path.radius), rounding / 16);
+        const double close = close_to(path);
         // A point that rounding left a little below the surface goes by the level that it is on.
         const double level = path.radius + std::min(f, 0.0);
         double s = 0, ahead = f + path.radius - level;
@@ -403,7 +455,7 @@ void first_contacts(const Sampler& sampler, std::span<const Path> paths, std::sp
         if (f <= flush) {
             if (slope < 0 && !is_along(slope, path.v)) {
                 contacts[i] = detail::contact_at(sampler, path, 0);
-                continue;
+                return;
             }
             // It leaves, or is pressed inwards though it may still move outwards by less than will lift it by more than
             // rounding: the test is where it is after the time of such a hop. From there it is a path as any other,
@@ -418,7 +470,7 @@ void first_contacts(const Sampler& sampler, std::span<const Path> paths, std::sp
                 const double after = sampler.distance(place(path, hop)) - level;
                 if (after < 0) {
                     contacts[i] = detail::contact_at(sampler, path, 0, hop);
-                    continue;
+                    return;
                 }
                 s = hop, ahead = after;
             }
@@ -427,7 +479,31 @@ void first_contacts(const Sampler& sampler, std::span<const Path> paths, std::sp
             walks.begin(i, s, ahead, slope, level, close);
         else
             contacts[i] = detail::approach(sampler, path, s, level, close);
+    };
+
+    detail::Beginnings some;
+    const auto begin_some = [&] {
+        if constexpr (asks_along<Sampler>) some.ask(sampler);
+        for (int k = 0; k < some.size; ++k) {
+            const std::size_t i = some.path[k];
+            if (some.is_flush[k])
+                begin(i);
+            else if (!some.is_free[k])
+                walks.begin(i, 0, some.f[k], some.slope[k], paths[i].radius, close_to(paths[i]));
+        }
+        some.size = 0;
+    };
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        contacts[i] = Contact();
+        if (!may_reach(paths[i], bounds)) continue;
+        if constexpr (asks_along<Sampler>) {
+            some.add(i, paths[i]);
+            if (some.size == some.most) begin_some();
+        } else {
+            begin(i);
+        }
     }
+    begin_some();
     walks.finish();
 }
 

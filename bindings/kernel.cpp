@@ -483,10 +483,15 @@ public:
 
     void visit(std::size_t begin, std::size_t end) override
     {
-        if (!members_) return kernel_.run_chunk(pass_, begin, end, nullptr);
         // As it is now: a kernel may leave the very group that chooses its points.
-        const std::vector<std::uint8_t> chosen(members_ + begin, members_ + end);
-        kernel_.run_chunk(pass_, begin, end, chosen.data());
+        std::vector<std::uint8_t> chosen;
+        if (members_) chosen.assign(members_ + begin, members_ + end);
+        try {
+            kernel_.run_chunk(pass_, begin, end, members_ ? chosen.data() : nullptr);
+        } catch (Error& error) {  // of its state, too, which knows no node
+            error.in_node(caller_.node).at(caller_.location);
+            throw;
+        }
     }
 
     void finish() override
@@ -522,7 +527,7 @@ std::unique_ptr<ScriptPass> Kernel::pass(PointSet& points, const std::string& gr
 class Kernel::KernelActionPass : public ActionPass {
 public:
     KernelActionPass(const Kernel& kernel, PointSet& points, const Caller& caller, Layout layout,
-                     const std::map<std::string, Value>& values, Column<std::uint8_t> chosen)
+                     const std::map<std::string, Value>& values, std::vector<std::uint8_t> chosen)
         : kernel_(kernel),
           section_(kernel.host_, caller.watched()),
           layout_(std::move(layout)),
@@ -544,7 +549,7 @@ public:
         call.chunk.size = static_cast<std::int32_t>(chunk.size());
         call.chunk.first = static_cast<double>(chunk.first);
         call.chunk.kill = dead.data();
-        if (layout_.masked) call.chunk.members = const_cast<std::uint8_t*>(chosen_.read().data) + chunk.first;
+        if (layout_.masked) call.chunk.members = const_cast<std::uint8_t*>(chosen_.data()) + chunk.first;
         call.chunk.substep = chunk.substep;
         call.chunk.times = chunk.time.data();
         call.chunk.steps = chunk.dt.data();
@@ -555,7 +560,7 @@ private:
     const Kernel& kernel_;
     const ScriptHost::Section section_;
     const Layout layout_;
-    const Column<std::uint8_t> chosen_;
+    const std::vector<std::uint8_t> chosen_;  // of the layout's group, where it is masked
     Pass pass_;
 };
 
@@ -568,15 +573,19 @@ public:
         location = now.location;
     }
 
+    void prepare(PointSet& points) const override { kernel_.prepare(points, group, arguments_); }
+
     std::unique_ptr<ActionPass> begin(PointSet& points) const override
     {
-        kernel_.prepare(points, group, arguments_);
         std::optional<Layout> layout = kernel_.layout_of_group(points, group, arguments_);
         if (!layout) return nullptr;
         kernel_.make_layout_of_action(*layout, arguments_);
-        // As it is now: a kernel may leave the very group that chooses its points.
-        Column<std::uint8_t> chosen;
-        if (layout->masked) chosen = *points.find_group(group);
+        // Of its own: a kernel may leave the very group that chooses its points, and acts on them for the whole step.
+        std::vector<std::uint8_t> chosen;
+        if (layout->masked) {
+            const std::uint8_t* members = std::as_const(points).find_group(group)->read().data;
+            chosen.assign(members, members + points.size());
+        }
         return std::make_unique<KernelActionPass>(kernel_, points, caller_, std::move(*layout), arguments_.values,
                                                   std::move(chosen));
     }

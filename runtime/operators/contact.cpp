@@ -8,6 +8,9 @@
 namespace rapid {
 namespace {
 
+// Above it what is born in one another may fly: 10 m/s at 5, 2,700 at 8, of masses of 1 and 10 kg in 0.02 m.
+constexpr double most_scaling = 4;
+
 class ContactConstraint : public Constraint {
 public:
     std::shared_ptr<Contacts> contacts;
@@ -45,7 +48,7 @@ struct ContactNode {
                    "of the radii in one grid; where not given, a quarter of the largest")
             .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "", "the most grids for different radii")
             .param(
-                &ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, 8), "",
+                &ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, most_scaling), "",
                 "a point counts as e^mass_scaling times lighter than what it stands on, against gravity: tall stacks "
                 "hold with few sub-steps, and flow less");
     }

@@ -176,8 +176,10 @@ public:
 // An action operator (paper §2.3): changes points at every sub-step, inside Solve, while they are in cache.
 class Action : public Dynamic {
 public:
-    // Before a step, on one thread: makes the columns that act() writes writable. Limits itself to `group`. Null where
-    // there is nothing to do.
+    // Before a step, on one thread: makes the columns that act() writes writable.
+    virtual void prepare(PointSet&) const {}
+    // Once all of the step are prepared: where columns are is then known. Limits itself to `group`, as it is now. Null
+    // where there is nothing to do.
     virtual std::unique_ptr<ActionPass> begin(PointSet& points) const = 0;
 };
 

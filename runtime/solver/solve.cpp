@@ -61,14 +61,6 @@ struct Scene {
     Strided<float> mass{&unit_mass, 0};
 
     bool is_uniform() const { return forces.empty() && !force; }
-    // What all forces that are the same for many points give them, m/s²: gravity.
-    Vec3d gravity() const
-    {
-        Vec3d sum = uniform.a;
-        for (const LocalForce& local : forces)
-            if (local.uniform) sum += local.uniform->a;
-        return sum;
-    }
     // Whether what moves points that are far from shapes has a closed form for the whole frame.
     bool falls() const { return is_uniform() && actions.empty() && is_closed_form(uniform.linear); }
 };
@@ -103,11 +95,14 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
 {
     Scene scene;
     // First those that make columns writable: what is read below is then at its place.
+    std::vector<const Action*> actions;
     for (const DynamicPtr& dynamic : dynamics)
-        if (const auto* action = dynamic_cast<const Action*>(dynamic.get()))
-            at_node(*dynamic, [&] {
-                if (auto pass = action->begin(set)) scene.actions.push_back({action, std::move(pass)});
-            });
+        if (const auto* action = dynamic_cast<const Action*>(dynamic.get())) actions.push_back(action);
+    for (const Action* action : actions) at_node(*action, [&] { action->prepare(set); });
+    for (const Action* action : actions)
+        at_node(*action, [&] {
+            if (auto pass = action->begin(set)) scene.actions.push_back({action, std::move(pass)});
+        });
     const PointSet& points = set;
     for (const DynamicPtr& dynamic : dynamics)
         at_node(*dynamic, [&] {
@@ -286,8 +281,7 @@ private:
         now.dead = dead_;
         now.dt = options_.h / options_.substeps;
         now.iterations = options_.iterations;
-        const Vec3d gravity = scene_.gravity();
-        if (!gravity.isZero(0)) now.up = -gravity.normalized();
+        if (!scene_.uniform.a.isZero(0)) now.up = -scene_.uniform.a.normalized();
         std::vector<Yield> yields;
         if (!scene_.forces.empty() || !scene_.uniform.linear.is_zero()) {
             yields.assign(n, {now.dt, 0.5 * now.dt * now.dt});

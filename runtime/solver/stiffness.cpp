@@ -106,6 +106,7 @@ public:
     {
         PointSet own = set;
         std::vector<Vec3d> a(size(), Vec3d::Zero()), force = a;
+        action.prepare(own);
         const std::unique_ptr<ActionPass> pass = action.begin(own);
         if (!pass) return a;
         const std::vector<Vec3d> before(speed.begin(), speed.end());

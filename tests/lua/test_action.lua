@@ -26,6 +26,34 @@ return rapid.create { fps = 10, start = 3, points = two } :attribute { calls = 0
     assert.equal(3, points[1].last)
   end)
 
+  it("acts on the points that were in its group when the step began, whatever leaves it", function()
+    local points = scene.run([[
+return rapid.create { points = two } :attribute { n = 0, m = 0 }
+  :group { name = "g", where = function(p) return p.id > 0 end }
+  :action { name = "a", group = "g", kernel = function(p, step)
+      p.n = p.n + 1
+      if step.index == 1 then p:leave "g" end
+    end }
+  :action { name = "b", group = "g", kernel = function(p) p.m = p.m + 1 end } :solve { substeps = 4 }]],
+      { frames = {2, 2} })[2]
+    assert.same({ 0, 4 }, { points[1].n, points[2].n })
+    assert.same({ 0, 4 }, { points[1].m, points[2].m })
+    assert.equal(0, #points:group "g")
+  end)
+
+  it("reads what another writes, in whichever frame", function()
+    local text = [[
+return rapid.create { points = two } :attribute { heat = 0, seen = 0 }
+  :action("reads", function(p) p.seen = p.seen + p.heat end)
+  :action("writes", function(p) p.heat = p.heat + 1 end) :solve { substeps = 4 }]]
+    local all, last = scene.run(text, { frames = {1, 6} }), scene.run(text, { frames = {6, 6} })[6]
+    for frame = 1, 6 do
+      local calls = 4 * (frame - 1)
+      assert.equal(calls * (calls - 1) / 2, all[frame][1].seen)
+    end
+    assert.equal(190, last[2].seen)
+  end)
+
   it("that adds to the force is of second order", function()
     local coarse, fine = orbit(1, 49)[49], orbit(4, 49)[49]
     local ratio = off_circle(coarse, 2) / off_circle(fine, 2)

@@ -139,6 +139,43 @@ TEST_CASE("with mass scaling a stack bears m g / (2 sinh(k/2)) at most, as the c
     }
 }
 
+TEST_CASE("up is against what pulls all points, for mass scaling: not those of a group", "[contacts]")
+{
+    const std::size_t n = 30;
+    Granular alone = stack(n, 1), beside = stack(n, 1);
+    std::vector<std::uint8_t> members(n, 0);
+    beside.points.group("balloon") = Column<std::uint8_t>(std::span<const std::uint8_t>(members));
+    const auto lift = std::make_shared<test::UniformForce>(Vec3d(0, 20, 0));
+    lift->group = "balloon";
+    beside.dynamics.push_back(lift);
+    alone.run(12);
+    beside.run(12);
+    for (std::size_t i = 0; i < n; ++i) CHECK_THAT(beside.P(i), close_to(alone.P(i), 1e-6));
+}
+
+TEST_CASE("with mass scaling a heap that is born overlapping parts, and does not fly", "[contacts][extreme]")
+{
+    const double k = GENERATE(0.0, 2.0, 4.0);
+    const float r = 0.02f, spacing = GENERATE(0.030f, 0.035f);
+    std::vector<Vec3f> at;
+    std::vector<float> mass;
+    for (int i = 0; i < 300; ++i) {
+        at.emplace_back(spacing * static_cast<float>(i % 7), 0.02f + spacing * static_cast<float>(i % 43),
+                        spacing * static_cast<float>(i % 5));
+        mass.push_back(i % 9 == 0 ? 10.0f : 1.0f);
+    }
+    Granular scene(points(at).set<float>("pscale", alike(300, r)).set<float>("mass", mass), 0, 0.5f);
+    scene.spheres->options.mass_scaling = k;
+    scene.gravity().floor(0, 0.5f).substeps(11);
+    double fastest = 0;
+    for (int frame = 0; frame < 72; ++frame) {
+        scene.run(1);
+        for (std::size_t i = 0; i < 300; ++i) fastest = std::max(fastest, scene.v(i).norm());
+    }
+    CAPTURE(k, spacing);
+    CHECK(fastest < 1.05 * std::sqrt(2 * g * 1.6));  // of a fall from the top
+}
+
 TEST_CASE("points that are level, but for less than rounding, are alike to mass scaling", "[contacts][extreme]")
 {
     const float higher = GENERATE(0.0f, 1e-20f, -1e-20f);

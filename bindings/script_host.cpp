@@ -258,7 +258,7 @@ namespace {
 std::chrono::steady_clock::duration duration_of(double seconds)
 {
     return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-        std::chrono::duration<double>(std::min(seconds, 1e8)));
+        std::chrono::duration<double>(std::min(seconds, 1e7)));
 }
 
 }  // namespace
@@ -267,8 +267,12 @@ std::chrono::steady_clock::duration duration_of(double seconds)
 ScriptHost::Section::Section(ScriptHost& host, std::string what) : host_(host)
 {
     const std::lock_guard lock(host.watch_mutex_);
+    // Each of those that run together has its time.
+    const auto now = std::chrono::steady_clock::now();
+    const auto limit = duration_of(host.options_.script_timeout);
+    const auto others = now + limit * static_cast<int>(host.watched_.size());
+    host.deadline_ = std::clamp(host.deadline_, now, others) + limit;
     host.watched_.push_back(std::move(what));
-    host.deadline_ = std::chrono::steady_clock::now() + duration_of(host.options_.script_timeout);
 }
 
 ScriptHost::Section::~Section()

@@ -1,8 +1,8 @@
 -- clumps: a body rises out of a pile of wet sand, which tears into clumps (the paper's figure 7).
 --
 -- Shows:  :clump beside :contact: bonds between grains that have touched, which break; a collider that moves through.
--- Proves: sand that sticks is carried higher than dry sand, in clumps that hold together, and none is in the body
---         (tests/graphs/test_clumps.lua).
+-- Proves: sand whose bonds bear 40 N is carried higher than dry sand, and none is in the body; how many grains those of
+--         10 N carry is chance (tests/graphs/test_clumps.lua).
 -- Run:    rapid run graphs/clumps.lua -f 1-96 -o /tmp/clumps.####.png
 local rapid = require "rapid"
 

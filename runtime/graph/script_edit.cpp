@@ -1,5 +1,6 @@
 #include "runtime/graph/script_edit.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "runtime/graph/first_error.h"
@@ -11,6 +12,8 @@ namespace rapid {
 void go_over(std::span<const std::unique_ptr<ScriptPass>> passes, std::size_t size)
 {
     if (passes.empty()) return;
+    std::size_t chunk = 0;
+    for (const std::unique_ptr<ScriptPass>& pass : passes) chunk = std::max(chunk, pass->chunk());
     FirstError first;
     for_each_chunk(
         size,
@@ -18,7 +21,7 @@ void go_over(std::span<const std::unique_ptr<ScriptPass>> passes, std::size_t si
             for (std::size_t k = 0; k < passes.size(); ++k)
                 if (!first.guard(k, begin, [&] { passes[k]->visit(begin, end); })) return;
         },
-        passes.front()->chunk());
+        chunk);
     first.rethrow();
     for (const std::unique_ptr<ScriptPass>& pass : passes) pass->finish();
 }
@@ -35,9 +38,18 @@ void edit_together(std::span<ScriptEdit* const> edits, std::span<const Evaluatio
 {
     const Stopwatch stopwatch;
     std::vector<std::unique_ptr<ScriptPass>> passes;
-    for (std::size_t k = 0; k < edits.size(); ++k) edits[k]->prepare(points, *now[k]);
-    for (std::size_t k = 0; k < edits.size(); ++k)
-        if (auto pass = edits[k]->begin(points, *now[k])) passes.push_back(std::move(pass));
+    const auto for_each_edit = [&](const auto& f) {
+        for (std::size_t k = 0; k < edits.size(); ++k) try {
+                f(*edits[k], *now[k]);
+            } catch (Error& error) {
+                error.in_node(now[k]->node).at(now[k]->location);
+                throw;
+            }
+    };
+    for_each_edit([&](ScriptEdit& edit, const Evaluation& told) { edit.prepare(points, told); });
+    for_each_edit([&](ScriptEdit& edit, const Evaluation& told) {
+        if (auto pass = edit.begin(points, told)) passes.push_back(std::move(pass));
+    });
     go_over(passes, points.size());
     now.front()->figures.script_seconds += stopwatch.seconds();
 }

@@ -52,8 +52,13 @@ public:
     {
         if (block.bytes <= most / blocks_.size()) {
             const std::lock_guard lock(mutex_);
-            std::swap(block, blocks_[oldest_]);
-            oldest_ = (oldest_ + 1) % blocks_.size();
+            const auto empty = std::find_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return !b.begin; });
+            if (empty == blocks_.end()) {
+                std::swap(block, blocks_[next_]);
+                next_ = (next_ + 1) % blocks_.size();
+            } else {
+                std::swap(block, *empty);
+            }
         }
         if (block.begin) munmap(block.begin, block.bytes);
     }
@@ -63,7 +68,7 @@ private:
 
     std::mutex mutex_;
     std::array<Block, 4> blocks_;
-    std::size_t oldest_ = 0;
+    std::size_t next_ = 0;  // of those that are there, to make room
 };
 
 SparePages& spare_pages()

@@ -445,7 +445,8 @@ TEST_CASE("the search finds the pairs that OpenVDB's point index grid finds", "[
     CHECK(found > 2 * n);
 }
 
-TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they, however many are above", "[contacts]")
+TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they, however many are above",
+          "[contacts][long]")
 {
     const float r = 0.01f;
     // Grains a second through a square hole of that width in the floor of a box; those below are taken to the top

@@ -103,7 +103,8 @@ TEST_CASE("most piles sleep six seconds after their fall, and all after ten", "[
     CHECK(early >= 3);
 }
 
-TEST_CASE("piles that fall asleep and are woken come to the same bits on any number of threads", "[sleep][threads]")
+TEST_CASE("piles that fall asleep and are woken come to the same bits on any number of threads",
+          "[sleep][threads][long]")
 {
     const auto run = [](int threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,

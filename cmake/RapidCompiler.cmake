@@ -42,18 +42,13 @@ if(RAPID_SANITIZE)
   target_link_options(rapid_private INTERFACE -fsanitize=${RAPID_SANITIZE})
 endif()
 
-# ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so; and
-# paths are taken relative to the sources, or to the build folder where that lies elsewhere, so that two checkouts share
-# their objects.
+# ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so. Two
+# checkouts share nothing (no CCACHE_BASEDIR): a precompiled header holds the absolute paths of the one it was made in,
+# and g++ then takes the other's headers for different ones and reads them again.
 find_program(CCACHE ccache)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  cmake_path(IS_PREFIX PROJECT_SOURCE_DIR ${PROJECT_BINARY_DIR} NORMALIZE builds_inside)
-  set(ccache_base ${PROJECT_BINARY_DIR})
-  if(builds_inside)
-    set(ccache_base ${PROJECT_SOURCE_DIR})
-  endif()
   set(CMAKE_CXX_COMPILER_LAUNCHER
-    ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR=${ccache_base} ${CCACHE})
+    ${CMAKE_COMMAND} -E env --unset=CCACHE_BASEDIR CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(rapid_private INTERFACE -fpch-preprocess)
   endif()

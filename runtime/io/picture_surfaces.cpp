@@ -346,6 +346,15 @@ struct Ground {
         return towards != 0 && t > 0 && std::isfinite(t) ? t : infinite;
     }
 
+    // Whether it is a wall that the eye is behind and most points are not: then it is looked through.
+    bool stands_before(const PointSet& points, const Vec3f& eye) const
+    {
+        if (normal.dot(eye) >= offset) return false;
+        std::size_t free = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) free += normal.dot(points.P()[i]) >= offset;
+        return 2 * free > points.size();
+    }
+
     Vec3f shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind, const Light& light) const
     {
         const float slope = std::max(0.02f, std::abs(normal.dot(ray.normalized())));
@@ -435,8 +444,11 @@ Surfaces draw_surfaces(const PointSet& points, const PictureOptions& options, co
     const Lens lens = Lens::of_camera(view.camera, width, height);
 
     std::vector<Ground> grounds;
-    for (const PictureScene::Plane& plane : scene.planes) grounds.emplace_back(plane, view.bounds, true);
-    if (grounds.empty() && options.grid) grounds.emplace_back(PictureScene::Plane(), view.bounds, false);
+    for (const PictureScene::Plane& plane : scene.planes) {
+        const Ground ground(plane, view.bounds, true);
+        if (!ground.stands_before(points, lens.origin)) grounds.push_back(ground);
+    }
+    if (scene.planes.empty() && options.grid) grounds.emplace_back(PictureScene::Plane(), view.bounds, false);
 
     // Once a pixel: lines on the ground are smooth as they are computed. Depths are a sample's own.
     for_each_band(options.height, [&](int begin, int end) {

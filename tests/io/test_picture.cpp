@@ -139,6 +139,21 @@ TEST_CASE("a plane of the scene hides what is under it", "[io][picture]")
     CHECK_FALSE(is_green(at({2, -2, 0})));
 }
 
+TEST_CASE("a wall between the camera and the points is looked through, and one behind them is seen", "[io][picture]")
+{
+    const PointSet points = balls({{0, 0, 0}}, {red}, 0.3f);
+    const auto seen = [&](const std::vector<PictureScene::Plane>& planes) {
+        PictureScene scene;
+        scene.planes = planes;
+        return render(points, small, scene, front_view());
+    };
+    const Picture open = seen({});
+    CHECK(seen({{Vec3d(0, 0, -1), -3}}).rgb == open.rgb);  // free below z = 3; the camera is above
+    const Picture behind = seen({{Vec3d(0, 0, 1), -3}});   // free above z = -3
+    CHECK(is_red(behind.pixel(160, 100)));
+    CHECK(behind.rgb != open.rgb);
+}
+
 TEST_CASE("points without colour are coloured by speed, faster ones lighter", "[io][picture]")
 {
     PointSet points;

@@ -18,7 +18,7 @@ namespace {
 // The set that a function runs on; of the main state, one at a time.
 struct Detail {
     PointSet& points;
-    std::map<double, std::unique_ptr<Neighbours>> neighbours;  // by radius, of the places when first asked for
+    std::map<double, std::unique_ptr<const Neighbours>> neighbours;  // by radius, of the places when first asked for
 
     void changed() { neighbours.clear(); }
 };
@@ -108,7 +108,7 @@ int neighbours(State& state)
     if (!grid) {
         std::vector<Vec3f> places(detail.points.size());
         for (std::size_t i = 0; i < places.size(); ++i) places[i] = P[i];
-        grid = std::make_unique<Neighbours>(places, radius);
+        grid = index_neighbours(places, radius);
     }
     std::vector<std::uint32_t> found;
     grid->find(P[place].cast<double>(), found);

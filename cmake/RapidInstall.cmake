@@ -1,4 +1,4 @@
-# bin/rapid, the library, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the package
+# bin/rapid, the library and its deferred part, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the package
 # config for find_package(rapid).
 include(CMakePackageConfigHelpers)
 
@@ -6,6 +6,7 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/rapid)
 
 install(TARGETS rapid rapid_public EXPORT rapidTargets)
 install(TARGETS rapid_command)
+install(TARGETS rapid_deferred LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 # Headers that bring OpenVDB are the library's own.
 rapid_openvdb_headers(own)
 set(excluded "")

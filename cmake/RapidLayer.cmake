@@ -2,9 +2,11 @@
 #
 # A layer of the runtime as an OBJECT library rapid_NAME: so it builds alone, and links whole, with the nodes and formats
 # that register themselves and that nothing refers to by name. Sources that include OpenVDB, directly or by a header of
-# ours, are compiled apart (rapid_NAME_openvdb) with its headers precompiled: they take seconds, each time.
+# ours, or Assimp are compiled apart (rapid_NAME_deferred), with OpenVDB's headers precompiled: they take seconds, each
+# time. They are the part of the library that is loaded when it is first needed (runtime/deferred.h).
 #
-# rapid_link_layers(TARGET NAME...) links layers into a target.
+# rapid_link_layers(TARGET NAME...) links layers into a target, with both parts; rapid_link_parts(TARGET PART...) links
+# parts.
 
 # The headers of ours that bring OpenVDB with them.
 function(rapid_openvdb_headers result)
@@ -20,7 +22,7 @@ function(rapid_openvdb_headers result)
   set(${result} ${found} PARENT_SCOPE)
 endfunction()
 
-function(rapid_split_openvdb with without)
+function(rapid_split_deferred with without)
   rapid_openvdb_headers(headers)
   list(TRANSFORM headers PREPEND "|\"")
   list(TRANSFORM headers APPEND "\"")
@@ -28,7 +30,7 @@ function(rapid_split_openvdb with without)
   set(result_with "")
   set(result_without "")
   foreach(source ${ARGN})
-    file(STRINGS ${source} line REGEX "#include (<openvdb/${headers})" LIMIT_COUNT 1)
+    file(STRINGS ${source} line REGEX "#include (<openvdb/|<assimp/${headers})" LIMIT_COUNT 1)
     if(line)
       list(APPEND result_with ${source})
     else()
@@ -40,7 +42,7 @@ function(rapid_split_openvdb with without)
 endfunction()
 
 function(rapid_layer name)
-  rapid_split_openvdb(with without ${ARGN})
+  rapid_split_deferred(with without ${ARGN})
   set(parts "")
   if(without)
     add_library(rapid_${name} OBJECT ${without})
@@ -49,20 +51,23 @@ function(rapid_layer name)
     list(APPEND parts rapid_${name})
   endif()
   if(with)
-    add_library(rapid_${name}_openvdb OBJECT ${with})
-    target_link_libraries(rapid_${name}_openvdb PRIVATE rapid_private OpenVDB::openvdb)
-    target_precompile_headers(rapid_${name}_openvdb REUSE_FROM rapid_precompiled_openvdb)
-    list(APPEND parts rapid_${name}_openvdb)
+    add_library(rapid_${name}_deferred OBJECT ${with})
+    target_link_libraries(rapid_${name}_deferred PRIVATE rapid_private OpenVDB::openvdb)
+    target_precompile_headers(rapid_${name}_deferred REUSE_FROM rapid_precompiled_openvdb)
+    list(APPEND parts rapid_${name}_deferred)
   endif()
   set_property(GLOBAL PROPERTY rapid_parts_of_${name} ${parts})
+endfunction()
+
+function(rapid_link_parts target)
+  # The linker takes of the libraries what the parts refer to.
+  target_link_libraries(${target} PRIVATE ${ARGN} OpenVDB::openvdb assimp::assimp PNG::PNG ${CMAKE_DL_LIBS})
+  target_link_options(${target} PRIVATE -Wl,--as-needed)
 endfunction()
 
 function(rapid_link_layers target)
   foreach(name ${ARGN})
     get_property(parts GLOBAL PROPERTY rapid_parts_of_${name})
-    target_link_libraries(${target} PRIVATE ${parts})
+    rapid_link_parts(${target} ${parts})
   endforeach()
-  # The linker takes of these what the layers refer to.
-  target_link_libraries(${target} PRIVATE OpenVDB::openvdb assimp::assimp PNG::PNG)
-  target_link_options(${target} PRIVATE -Wl,--as-needed)
 endfunction()

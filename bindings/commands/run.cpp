@@ -12,6 +12,7 @@
 #include "bindings/commands/walls.h"
 #include "bindings/commands/watch.h"
 #include "bindings/threads.h"
+#include "runtime/deferred.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
@@ -55,7 +56,10 @@ public:
         if (watch_ && untrusted_) throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
         if (untrusted_ && !within_walls_) enter_walls(openings());
-        if (untrusted_) close_walls();
+        if (untrusted_) {
+            load_deferred();  // which needs what walls take
+            close_walls();
+        }
         std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
         std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
         Threads threads(common.threads);

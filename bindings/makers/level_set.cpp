@@ -161,11 +161,11 @@ struct CombineLevelSets {
     }
     ObjectPtr make(MakeContext& context) const
     {
-        return combined(levelset, other,
-                        how == "union"       ? Combine::Union
-                        : how == "intersect" ? Combine::Intersect
-                                             : Combine::Subtract,
-                        context.warnings);
+        return combine_level_sets(levelset, other,
+                                  how == "union"       ? Combine::Union
+                                  : how == "intersect" ? Combine::Intersect
+                                                       : Combine::Subtract,
+                                  context.warnings);
     }
 };
 RAPID_MAKER(CombineLevelSets);
@@ -182,7 +182,7 @@ struct OffsetLevelSet {
             .param(&OffsetLevelSet::metres, "metres", Value(), any_number(), "m", "outwards; inwards where below 0")
             .required();
     }
-    ObjectPtr make(MakeContext&) const { return offset(levelset, metres); }
+    ObjectPtr make(MakeContext&) const { return offset_level_set(levelset, metres); }
 };
 RAPID_MAKER(OffsetLevelSet);
 
@@ -198,7 +198,7 @@ struct SmoothLevelSet {
             .param(&SmoothLevelSet::width, "width", 1.0, between(1, 64), "voxels", "of the filter")
             .param(&SmoothLevelSet::iterations, "iterations", 1.0, between(1, 1000), "", "times that it is applied");
     }
-    ObjectPtr make(MakeContext&) const { return smoothed(levelset, width, iterations); }
+    ObjectPtr make(MakeContext&) const { return smooth_level_set(levelset, width, iterations); }
 };
 RAPID_MAKER(SmoothLevelSet);
 
@@ -214,7 +214,7 @@ struct ResampleLevelSet {
             .param(&ResampleLevelSet::voxel, "voxel", Value(), above(0), "m", "edge of a voxel")
             .required();
     }
-    ObjectPtr make(MakeContext&) const { return resampled(levelset, voxel); }
+    ObjectPtr make(MakeContext&) const { return resample_level_set(levelset, voxel); }
 };
 RAPID_MAKER(ResampleLevelSet);
 

@@ -101,7 +101,7 @@ struct Transform {
         if (const auto shape = std::dynamic_pointer_cast<const Shape>(object)) {
             if (motion->varies()) return std::make_shared<AnimatedShape>(shape, motion);
             if (const auto level_set = std::dynamic_pointer_cast<const LevelSet>(shape))
-                return transformed(level_set, motion->at({}));
+                return move_level_set(level_set, motion->at({}));
             return placed(shape, motion->at({}));
         }
         throw Error(fmt::format("{} can't be moved; it must be a mesh or a shape", describe(object)));

@@ -32,6 +32,7 @@
 #include "runtime/io/file.h"
 #include "runtime/io/format.h"
 #include "runtime/io/id_order.h"
+#include "runtime/io/vdb.h"
 #include "runtime/parallel.h"
 
 namespace rapid {
@@ -539,7 +540,7 @@ PointSet read_vdb(const std::filesystem::path& path)
     }
 }
 
-RAPID_FORMAT(Format{".vdb", "OpenVDB points, read by Houdini; keeps every bit", write_vdb, read_vdb});
+const bool defined = vdb_writer.define(write_vdb) && vdb_reader.define(read_vdb);
 
 }  // namespace
 }  // namespace rapid

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/deferred.h"
 #include "runtime/shapes/mesh.h"
 #include "runtime/shapes/shape.h"
 
@@ -40,16 +41,18 @@ using LevelSetPtr = std::shared_ptr<const LevelSet>;
 // Warnings are collected in `warnings` where something is doubtful but usable (a mesh with holes, faces turned inside
 // out), with the numbers. Errors: a voxel that would make over 2^31 voxels, or that is larger than the mesh (nothing
 // would be left of it), an empty mesh.
-LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options,
-                                std::vector<std::string>& warnings);
+RAPID_DEFERRED(level_set_from_mesh,
+               LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings));
 // Another shape of a mesh of which that has been made before: its faces and what holds of them, `open`, are known.
-LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open);
-LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetOptions& options);
-LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options);
-LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options);
+RAPID_DEFERRED(level_set_of_same_faces,
+               LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open));
+RAPID_DEFERRED(level_set_sphere, LevelSetPtr(double radius, const Vec3d& center, const LevelSetOptions& options));
+RAPID_DEFERRED(level_set_box, LevelSetPtr(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options));
+RAPID_DEFERRED(level_set_torus,
+               LevelSetPtr(double radius, double tube, const Vec3d& center, const LevelSetOptions& options));
 
 // `grid` empty: the only level set in the file. Error: no such file, not a .vdb, no such grid (with the names there
 // are), not a float level set, an empty grid, a map that is not uniform scale and translation.
-LevelSetPtr read_level_set(const std::filesystem::path& path, const std::string& grid);
+RAPID_DEFERRED(read_level_set, LevelSetPtr(const std::filesystem::path& path, const std::string& grid));
 
 }  // namespace rapid

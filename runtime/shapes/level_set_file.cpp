@@ -49,9 +49,7 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
     }
 }
 
-}  // namespace
-
-LevelSetPtr read_level_set(const std::filesystem::path& path, const std::string& name)
+LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
 {
     if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
@@ -78,6 +76,10 @@ LevelSetPtr read_level_set(const std::filesystem::path& path, const std::string&
                                 grid->getName(), path.string(), grid->activeVoxelCount()));
     return level_set;
 }
+
+const bool defined = read_level_set.define(read);
+
+}  // namespace
 
 void GridLevelSet::write(const std::filesystem::path& path, const std::string& name) const
 {

@@ -67,9 +67,7 @@ void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& o
                         thin, pieces.size(), mesh.name, options.voxel));
 }
 
-}  // namespace
-
-LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)
+LevelSetPtr of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)
 {
     const bool balanced = open.unbalanced_edges == 0;
     const auto rebuild = [mesh, balanced, voxel = options.voxel](double half_width) {
@@ -91,7 +89,7 @@ LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& opti
     return level_set;
 }
 
-LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
+LevelSetPtr from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
 {
     require_legal(options);
     if (mesh->triangles.empty())
@@ -99,9 +97,12 @@ LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& opti
     initialize_openvdb();
 
     const Mesh::Openness open = mesh->openness();
-    LevelSetPtr level_set = level_set_from_mesh(mesh, options, open);
+    LevelSetPtr level_set = of_same_faces(mesh, options, open);
     warn(*mesh, open, options, warnings);
     return level_set;
 }
 
+const bool defined = level_set_from_mesh.define(from_mesh) && level_set_of_same_faces.define(of_same_faces);
+
+}  // namespace
 }  // namespace rapid

@@ -30,10 +30,7 @@ struct Balls {
     }
 };
 
-}  // namespace
-
-LevelSetPtr level_set_from_points(std::span<const Vec3f> P, std::span<const float> radius,
-                                  const LevelSetOptions& options)
+LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius, const LevelSetOptions& options)
 {
     constexpr double least = 1.5;  // voxels: a smaller ball can fall between the voxels
     require_legal(options);
@@ -75,4 +72,7 @@ LevelSetPtr level_set_from_points(std::span<const Vec3f> P, std::span<const floa
     return std::make_shared<GridLevelSet>(build(options.half_width * voxel), build);
 }
 
+const bool defined = level_set_from_points.define(from_points);
+
+}  // namespace
 }  // namespace rapid

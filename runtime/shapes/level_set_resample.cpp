@@ -62,6 +62,8 @@ FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Trans
     return grid;
 }
 
+namespace {
+
 LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
 {
     const double half_width = shape->band() / shape->voxel();
@@ -79,4 +81,7 @@ LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
     return std::make_shared<GridLevelSet>(build(half_width * voxel), build);
 }
 
+const bool defined = resample_level_set.define(resampled);
+
+}  // namespace
 }  // namespace rapid

@@ -30,7 +30,7 @@ constexpr double same_place = 1e-4;
 GridPtr on_axes(const LevelSetPtr& shape)
 {
     if (auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid;
-    return std::dynamic_pointer_cast<const GridLevelSet>(resampled(shape, shape->voxel()));
+    return std::dynamic_pointer_cast<const GridLevelSet>(resample_level_set(shape, shape->voxel()));
 }
 
 LevelSetPtr finished(FloatGrid::Ptr grid, GridLevelSet::Rebuild rebuild, const std::string& what)
@@ -116,8 +116,6 @@ FloatGrid::Ptr combine(const GridPtr& a, const LevelSetPtr& b, Combine how, doub
     return openvdb::tools::csgDifferenceCopy(*first, *second);
 }
 
-}  // namespace
-
 LevelSetPtr combined(const LevelSetPtr& a, const LevelSetPtr& b, Combine how, std::vector<std::string>& warnings)
 {
     if (std::abs(a->voxel() - b->voxel()) > same_size * a->voxel())
@@ -160,7 +158,7 @@ LevelSetPtr smoothed(const LevelSetPtr& shape, int width, int iterations)
         fmt::format("the level set smoothed {} times by {} voxels", iterations, width));
 }
 
-LevelSetPtr transformed(const LevelSetPtr& shape, const Pose& pose)
+LevelSetPtr moved(const LevelSetPtr& shape, const Pose& pose)
 {
     if (const auto turned = std::dynamic_pointer_cast<const PlacedLevelSet>(shape))
         return std::make_shared<PlacedLevelSet>(turned->rest(), pose * turned->pose());
@@ -176,4 +174,8 @@ LevelSetPtr transformed(const LevelSetPtr& shape, const Pose& pose)
     return finished(build(pose.scale * grid->band()), build, "the moved level set");
 }
 
+const bool defined = combine_level_sets.define(combined) && offset_level_set.define(offset) &&
+                     smooth_level_set.define(smoothed) && move_level_set.define(moved);
+
+}  // namespace
 }  // namespace rapid

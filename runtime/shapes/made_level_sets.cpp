@@ -116,9 +116,7 @@ void require_length(const char* shape, const char* name, double value)
 
 Box3d box_around(const Vec3d& center, const Vec3d& half) { return {center - half, center + half}; }
 
-}  // namespace
-
-LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetOptions& options)
+LevelSetPtr sphere(double radius, const Vec3d& center, const LevelSetOptions& options)
 {
     require_length("sphere", "radius", radius);
     return make_level_set({fmt::format("a level set sphere of radius {:g} m", radius),
@@ -127,7 +125,7 @@ LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetO
                           options);
 }
 
-LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options)
+LevelSetPtr box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options)
 {
     for (int axis = 0; axis < 3; ++axis) require_length("box", "size", size[axis]);
     const Vec3d half = size / 2;
@@ -141,7 +139,7 @@ LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSet
                           options);
 }
 
-LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options)
+LevelSetPtr torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options)
 {
     require_length("torus", "radius", radius);
     require_length("torus", "tube", tube);
@@ -158,4 +156,7 @@ LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, con
         options);
 }
 
+const bool defined = level_set_sphere.define(sphere) && level_set_box.define(box) && level_set_torus.define(torus);
+
+}  // namespace
 }  // namespace rapid

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "runtime/deferred.h"
 #include "runtime/shapes/mesh.h"
 
 namespace rapid {
@@ -18,7 +19,7 @@ struct MeshFile {
 };
 
 // Error: no such file, what the reader could not understand, a coordinate that is not finite.
-MeshFile read_mesh_file(const std::filesystem::path& path);
+RAPID_DEFERRED(read_mesh_file, MeshFile(const std::filesystem::path& path));
 
 // For each corner the vertex that it becomes: corners at one place are one vertex, numbered in the order of the file.
 std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions);

@@ -23,14 +23,36 @@ struct PointList {
 
 using openvdb::tools::PointIndexGrid;
 
-}  // namespace
+class IndexedNeighbours final : public Neighbours {
+public:
+    explicit IndexedNeighbours(PointList points)
+        : points_(std::move(points)),
+          index_(openvdb::tools::createPointIndexGrid<PointIndexGrid>(points_, /*voxel=*/1.0))
+    {
+    }
 
-struct Neighbours::Grid {
-    PointList points;
-    PointIndexGrid::Ptr index;
+    void find(const Vec3d& X, std::vector<std::uint32_t>& places) const override
+    {
+        places.clear();
+        auto accessor = index_->getConstAccessor();
+        const double radius = points_.radius;
+        const openvdb::Vec3d at = openvdb::Vec3d(X.x(), X.y(), X.z()) / radius;
+        const auto& transform = index_->transform();
+        const openvdb::Vec3d reach(1 + 0x1p-20);
+        openvdb::tools::PointIndexIterator<> near(openvdb::CoordBBox(transform.worldToIndexCellCentered(at - reach),
+                                                                     transform.worldToIndexCellCentered(at + reach)),
+                                                  accessor);
+        for (; near; ++near)
+            if ((points_.P[*near].cast<double>() - X).squaredNorm() <= radius * radius) places.push_back(*near);
+        std::sort(places.begin(), places.end());
+    }
+
+private:
+    PointList points_;
+    PointIndexGrid::Ptr index_;
 };
 
-Neighbours::Neighbours(std::span<const Vec3f> P, double radius)
+std::unique_ptr<const Neighbours> make(std::span<const Vec3f> P, double radius)
 {
     float largest = 0;
     for (const Vec3f& x : P) largest = std::max(largest, x.cwiseAbs().maxCoeff());
@@ -39,29 +61,10 @@ Neighbours::Neighbours(std::span<const Vec3f> P, double radius)
             fmt::format("neighbours within {:g} m of points up to {:g} m from the origin; the radius must be "
                         "above 0, and above {:g} m there",
                         radius, largest, largest * 0x1p-30));
-    auto grid = std::make_unique<Grid>();
-    grid->points.P.assign(P.begin(), P.end());
-    grid->points.radius = radius;
-    grid->index = openvdb::tools::createPointIndexGrid<PointIndexGrid>(grid->points, /*voxel=*/1.0);
-    grid_ = std::move(grid);
+    return std::make_unique<IndexedNeighbours>(PointList{{P.begin(), P.end()}, radius});
 }
 
-Neighbours::~Neighbours() = default;
+const bool defined = index_neighbours.define(make);
 
-void Neighbours::find(const Vec3d& X, std::vector<std::uint32_t>& places) const
-{
-    places.clear();
-    auto accessor = grid_->index->getConstAccessor();
-    const double radius = grid_->points.radius;
-    const openvdb::Vec3d at = openvdb::Vec3d(X.x(), X.y(), X.z()) / radius;
-    const auto& transform = grid_->index->transform();
-    const openvdb::Vec3d reach(1 + 0x1p-20);
-    openvdb::tools::PointIndexIterator<> near(openvdb::CoordBBox(transform.worldToIndexCellCentered(at - reach),
-                                                                 transform.worldToIndexCellCentered(at + reach)),
-                                              accessor);
-    for (; near; ++near)
-        if ((grid_->points.P[*near].cast<double>() - X).squaredNorm() <= radius * radius) places.push_back(*near);
-    std::sort(places.begin(), places.end());
-}
-
+}  // namespace
 }  // namespace rapid

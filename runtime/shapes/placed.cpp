@@ -111,7 +111,7 @@ LevelSetPtr PlacedLevelSet::with_band(double metres) const
 
 void PlacedLevelSet::write(const std::filesystem::path& path, const std::string& grid) const
 {
-    resampled(std::make_shared<PlacedLevelSet>(rest(), pose()), voxel())->write(path, grid);
+    resample_level_set(std::make_shared<PlacedLevelSet>(rest(), pose()), voxel())->write(path, grid);
 }
 
 ShapePtr placed(const ShapePtr& rest, const Pose& pose) { return std::make_shared<PlacedOf<Shape>>(rest, pose); }

@@ -59,9 +59,7 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
                             grids_of(vectors)));
 }
 
-}  // namespace
-
-VectorGridPtr read_vector_grid(const std::filesystem::path& path, const std::string& name)
+VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
 {
     if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
@@ -80,8 +78,7 @@ VectorGridPtr read_vector_grid(const std::filesystem::path& path, const std::str
     }
 }
 
-VectorGridPtr make_vector_grid(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes,
-                               std::span<const Vec3f> values)
+VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes, std::span<const Vec3f> values)
 {
     initialize_openvdb();
     auto grid = Vec3SGrid::create();
@@ -97,4 +94,7 @@ VectorGridPtr make_vector_grid(const Vec3d& origin, double voxel, const Eigen::V
     return std::make_shared<OpenVectorGrid>(grid);
 }
 
+const bool defined = read_vector_grid.define(read) && make_vector_grid.define(make);
+
+}  // namespace
 }  // namespace rapid

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 
+#include "runtime/deferred.h"
 #include "runtime/object.h"
 #include "runtime/vec.h"
 
@@ -28,10 +29,10 @@ using VectorGridPtr = std::shared_ptr<const VectorGrid>;
 
 // The grid of that name in a .vdb file; the only grid of three floats, where the name is empty. Error: what is wrong
 // with the file, and which grids it has.
-VectorGridPtr read_vector_grid(const std::filesystem::path& path, const std::string& name);
+RAPID_DEFERRED(read_vector_grid, VectorGridPtr(const std::filesystem::path& path, const std::string& name));
 
 // A lattice of nodes `voxel` metres apart, from `origin` on along each axis. values: shape [nodes x, y, z], z fastest.
-VectorGridPtr make_vector_grid(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes,
-                               std::span<const Vec3f> values);
+RAPID_DEFERRED(make_vector_grid, VectorGridPtr(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes,
+                                               std::span<const Vec3f> values));
 
 }  // namespace rapid

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include "runtime/parallel.h"
@@ -50,7 +49,7 @@ public:
             members_.push_back(static_cast<std::uint32_t>(i));
             places.push_back(P_[i]);
         }
-        if (!members_.empty()) grid_.emplace(places, interaction.radius);
+        if (!members_.empty()) grid_ = index_neighbours(places, interaction.radius);
     }
 
     // The change of each member's velocity, m/s.
@@ -135,9 +134,9 @@ private:
     Strided<std::int64_t> id_;
     Strided<float> separation_, cohesion_, alignment_, drag_;
     Strided<float> mass_{&unit_mass, 0}, own_dt_{nullptr, 0};
-    std::vector<std::uint32_t> members_;  // their places in the set
-    std::optional<Neighbours> grid_;      // of the members
-    std::vector<double> weights_;         // Σ w, of each member
+    std::vector<std::uint32_t> members_;      // their places in the set
+    std::unique_ptr<const Neighbours> grid_;  // of the members
+    std::vector<double> weights_;             // Σ w, of each member
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "runtime/graph/registry.h"
 #include "runtime/io/format.h"
 #include "runtime/points/point_set.h"
+#include "runtime/shapes/level_set.h"
 #include "runtime/shapes/mesh.h"
 
 namespace {
@@ -34,6 +35,9 @@ int main()
     const rapid::MeshPtr mesh = rapid::transformed(rapid::make_box({1, 1, 1}, {0, 0, 0}), map);
     expect(std::abs(mesh->signed_volume() - 8) < 1e-9, "a cube that is scaled by 2 has 8 times the volume");
     expect((mesh->bounds().center() - rapid::Vec3f(10, 0, 0)).norm() < 1e-6f, "a mesh is where it was moved to");
+
+    const rapid::LevelSetPtr ball = rapid::level_set_sphere(1, {0, 0, 0}, {0.1, 3});
+    expect(std::abs(ball->surface()->signed_volume() - 4.19) < 0.1, "what needs OpenVDB is loaded when it is called");
 
     expect(rapid::Registry().find("gravity") != nullptr, "the nodes are linked");
     expect(rapid::format_of("drop.csv").read != nullptr, "the formats are linked");

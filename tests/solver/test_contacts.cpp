@@ -432,11 +432,11 @@ TEST_CASE("the search finds the pairs that OpenVDB's point index grid finds", "[
     Pairs pairs;
     ContactSearch().find(exact, {&radius, 0}, RadiusGrids({&radius, 0}, n, 0, 1), pairs);
 
-    const Neighbours index(at, 2.0 * radius);
+    const std::unique_ptr<const Neighbours> index = index_neighbours(at, 2.0 * radius);
     std::vector<std::uint32_t> near;
     std::size_t found = 0;
     for (std::uint32_t i = 0; i < n; ++i) {
-        index.find(exact[i], near);
+        index->find(exact[i], near);
         std::erase_if(near, [&](std::uint32_t j) { return j <= i; });
         const auto of = pairs.of(i);
         CHECK(std::equal(near.begin(), near.end(), of.begin(), of.end()));

@@ -1,0 +1,66 @@
+#include "runtime/deferred.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+struct Table {
+    std::mutex mutex;
+    std::map<std::string, DeferredFunctions::Any> functions;
+};
+
+Table& table()
+{
+    static Table all;  // before what is defined while the program starts
+    return all;
+}
+
+DeferredFunctions::Any defined(const char* name)
+{
+    const std::lock_guard lock(table().mutex);
+    const auto found = table().functions.find(name);
+    return found == table().functions.end() ? nullptr : found->second;
+}
+
+std::filesystem::path library()
+{
+    Dl_info here{};
+    dladdr(reinterpret_cast<const void*>(&load_deferred), &here);
+    return std::filesystem::path(here.dli_fname ? here.dli_fname : "").parent_path() / RAPID_DEFERRED_LIBRARY;
+}
+
+}  // namespace
+
+void load_deferred()
+{
+    static std::once_flag once;
+    std::call_once(once, [] {
+        if (!dlopen(library().c_str(), RTLD_NOW | RTLD_LOCAL))
+            throw Error(fmt::format("the part of Rapid that needs OpenVDB can't be loaded: {}", dlerror()));
+    });
+}
+
+void DeferredFunctions::define(const char* name, Any function)
+{
+    const std::lock_guard lock(table().mutex);
+    table().functions[name] = function;
+}
+
+DeferredFunctions::Any DeferredFunctions::find(const char* name)
+{
+    if (Any function = defined(name)) return function;
+    load_deferred();
+    if (Any function = defined(name)) return function;
+    throw Error(fmt::format("\"{}\" is of another version of Rapid: it has no {}", library().string(), name));
+}
+
+}  // namespace rapid

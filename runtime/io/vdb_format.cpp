@@ -1,0 +1,17 @@
+// .vdb among the formats; its reader and writer (vdb.cpp) are loaded when they are needed.
+#include "runtime/io/vdb.h"
+
+namespace rapid {
+namespace {
+
+void write_vdb(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame)
+{
+    vdb_writer(path, points, frame);
+}
+
+PointSet read_vdb(const std::filesystem::path& path) { return vdb_reader(path); }
+
+RAPID_FORMAT(Format{".vdb", "OpenVDB points, read by Houdini; keeps every bit", write_vdb, read_vdb});
+
+}  // namespace
+}  // namespace rapid

@@ -6,6 +6,7 @@
 // A bond that breaks is gone; the points stick again when they have been apart and touch anew. Points that are pressed
 // together further are contact's matter, not that of bonds: a bond only pulls.
 #include "runtime/graph/node.h"
+#include "runtime/points/members.h"
 #include "runtime/solver/contact_search.h"
 #include "runtime/solver/rows.h"
 

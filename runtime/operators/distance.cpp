@@ -4,6 +4,7 @@
 //
 // Chains and trees of pairs are solved directly (solver/forest.h), whatever their length.
 #include "runtime/graph/node.h"
+#include "runtime/points/members.h"
 #include "runtime/solver/contact_search.h"
 #include "runtime/solver/rows.h"
 

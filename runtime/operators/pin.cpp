@@ -3,6 +3,7 @@
 // Rigid, a pinned point has its place and velocity given, and no other constraint moves it: what hangs from it hangs
 // from a wall. With a compliance it is three springs, one along each axis.
 #include "runtime/graph/node.h"
+#include "runtime/points/members.h"
 #include "runtime/shapes/animated.h"
 #include "runtime/shapes/motion.h"
 #include "runtime/solver/rows.h"

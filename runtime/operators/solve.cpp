@@ -9,6 +9,7 @@
 #include "runtime/graph/node.h"
 #include "runtime/operators/aging.h"
 #include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/shapes/deforming.h"
 #include "runtime/shapes/level_set.h"
 #include "runtime/shapes/moving.h"
@@ -203,12 +204,7 @@ private:
         const float immortal = std::numeric_limits<float>::infinity();
         const Strided<float> life = lives ? lives->read() : Strided<float>{&immortal, 0};
 
-        const std::uint8_t everybody = 1, nobody = 0;
-        Strided<std::uint8_t> members{&everybody, 0};
-        if (!group.empty()) {
-            const Column<std::uint8_t>* column = points.find_group(group);
-            members = column ? column->read() : Strided<std::uint8_t>{&nobody, 0};
-        }
+        const Strided<std::uint8_t> members = members_of(points, group);
 
         const auto keep = std::make_unique_for_overwrite<std::uint8_t[]>(points.size());
         const std::span<float> age = ages->write();

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/solver/response.h"
 
@@ -41,8 +42,6 @@ constexpr double held = 1e-6;
 // The shortest pieces of a slide, as parts of the sub-step: where friction turns, and where a surface without a
 // smallest feature does.
 constexpr double least_turning = 1.0 / 256, least_bending = 1.0 / 4096;
-
-const std::uint8_t everybody = 1, nobody = 0;
 
 // s, of a piece along a curved surface
 double least_piece(const Obstacle& obstacle, const Path& path, double dt)
@@ -109,12 +108,8 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points)
       bounce(collider.bounce.read(points)),
       friction(collider.friction.read(points)),
       radius(radii_of(collider.radius, points)),
-      members{&everybody, 0}
+      members(members_of(points, collider.group))
 {
-    if (!collider.group.empty()) {
-        const Column<std::uint8_t>* group = points.find_group(collider.group);
-        members = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};
-    }
 }
 
 void Collisions::begin(std::span<const std::uint32_t> places)

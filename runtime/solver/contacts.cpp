@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/solver/rows.h"
 #include "runtime/stopwatch.h"
 

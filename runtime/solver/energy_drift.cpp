@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/points/members.h"
 #include "runtime/solver/interaction.h"
 
 namespace rapid {
@@ -26,9 +27,9 @@ std::optional<std::vector<double>> energies_of(const PointSet& points, std::span
         if (!force) continue;
         potential.assign(points.size(), 0);
         if (!force->add_potential(chunk, potential)) return std::nullopt;
-        const Column<std::uint8_t>* group = points.find_group(force->group);
+        const Strided<std::uint8_t> members = members_of(points, force->group);
         for (std::size_t i = 0; i < points.size(); ++i)
-            if (force->group.empty() || (group && (*group)[i])) energies[i] += potential[i];
+            if (members[i]) energies[i] += potential[i];
     }
     return energies;
 }

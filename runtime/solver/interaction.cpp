@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/random.h"
 #include "runtime/shapes/neighbours.h"
 
@@ -35,10 +36,10 @@ public:
         if (const auto* masses = std::as_const(points).find<float>("mass")) mass_ = masses->read();
         if (const auto* own = std::as_const(points).find<float>("dt")) own_dt_ = own->read();
 
-        const Column<std::uint8_t>* group = points.find_group(interaction.group);
+        const Strided<std::uint8_t> members = members_of(points, interaction.group);
         std::vector<Vec3f> places;
         for (std::size_t i = 0; i < points.size(); ++i) {
-            if (!interaction.group.empty() && !(group && (*group)[i])) continue;
+            if (!members[i]) continue;
             if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve says so, with the point's name
                 members_.clear();
                 return;
@@ -149,11 +150,11 @@ void interact(PointSet& points, std::span<const DynamicPtr> dynamics, const Solv
         try {
             Neighbourhood neighbourhood(*interaction, points, options);
             const std::vector<Vec3d> kicks = neighbourhood.kicks();
-            const Column<std::uint8_t>* advanced = options.group.empty() ? nullptr : points.find_group(options.group);
+            const Strided<std::uint8_t> advanced = members_of(points, options.group);
             const std::span<Vec3f> v = points.v().write();
             for (std::size_t m = 0; m < kicks.size(); ++m) {
                 const std::size_t i = neighbourhood.members()[m];
-                if (!options.group.empty() && !(advanced && (*advanced)[i])) continue;
+                if (!advanced[i]) continue;
                 v[i] = (v[i].cast<double>() + kicks[m]).cast<float>();
             }
         } catch (Error& error) {

@@ -1,11 +1,6 @@
 #include "runtime/solver/rows.h"
 
 namespace rapid {
-namespace {
-
-const std::uint8_t everybody = 1, nobody = 0;
-
-}  // namespace
 
 PlacesById::PlacesById(const Column<std::int64_t>& ids) : ids_(ids.read()), size_(ids.size())
 {
@@ -32,13 +27,6 @@ std::uint32_t PlacesById::operator[](std::int64_t id) const
             high = middle;
     }
     return low < size_ && ids_[low] == id ? static_cast<std::uint32_t>(low) : none;
-}
-
-Strided<std::uint8_t> members_of(const PointSet& points, const std::string& group)
-{
-    if (group.empty()) return {&everybody, 0};
-    const Column<std::uint8_t>* column = points.find_group(group);
-    return column ? column->read() : Strided<std::uint8_t>{&nobody, 0};
 }
 
 }  // namespace rapid

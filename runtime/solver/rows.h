@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/solver/colours.h"
 #include "runtime/solver/constraint.h"
 #include "runtime/solver/forest.h"
@@ -45,9 +46,6 @@ private:
     std::size_t size_;
     std::vector<std::pair<std::int64_t, std::uint32_t>> sorted_;  // empty where the ids ascend already
 };
-
-// Limits to a group: 1 for all points where the name is empty, 0 where nothing made the group.
-Strided<std::uint8_t> members_of(const PointSet& points, const std::string& group);
 
 template <class Kind>
 class Rows : public Coupling {

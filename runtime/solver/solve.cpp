@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/points/point_text.h"
 #include "runtime/solver/collide.h"
 #include "runtime/solver/damped_motion.h"
@@ -76,8 +77,6 @@ void at_node(const Dynamic& dynamic, const F& f)
     }
 }
 
-const std::uint8_t nobody = 0;
-
 // Adds the values, if all of them are finite; shapes [n].
 bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
 {
@@ -123,9 +122,7 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
                     scene.uniform.linear.add(uniform->linear);
                     return;
                 }
-                const Column<std::uint8_t>* group = points.find_group(force->group);
-                scene.forces.push_back(
-                    {force, uniform, group ? group->read() : Strided<std::uint8_t>{&nobody, 0}, force->group.empty()});
+                scene.forces.push_back({force, uniform, members_of(points, force->group), force->group.empty()});
             }
         });
     scene.force = forces_of(points);
@@ -145,10 +142,7 @@ public:
           dead_(scene_.actions.empty() && !scene_.kills ? 0 : points.size())
     {
         if (scene_.records) hits_.emplace(points, options.begins_frame);
-        if (!options.group.empty()) {
-            const Column<std::uint8_t>* group = points.find_group(options.group);
-            members_ = group ? group->read() : Strided<std::uint8_t>{&nobody, 0};
-        }
+        if (!options.group.empty()) members_ = members_of(points, options.group);
         time_.h = options.h;
         if (points.has("dt")) time_.own = points.column<float>("dt").read();
     }

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 
+#include "runtime/points/members.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {
@@ -33,11 +34,7 @@ constexpr double rounding = 1e-6;  // of a step's number, by these differences: 
 // Evenly from all that the step advances.
 std::vector<std::uint32_t> sample_of(const PointSet& points, const std::string& group)
 {
-    const std::uint8_t everybody = 1, nobody = 0;
-    const Column<std::uint8_t>* column = points.find_group(group);
-    const Strided<std::uint8_t> members = group.empty() ? Strided<std::uint8_t>{&everybody, 0}
-                                          : column      ? column->read()
-                                                        : Strided<std::uint8_t>{&nobody, 0};
+    const Strided<std::uint8_t> members = members_of(points, group);
     std::size_t count = 0, met = 0;
     for (std::size_t i = 0; i < points.size(); ++i) count += members[i];
     const std::size_t n = std::min(count, most_asked);
@@ -71,12 +68,7 @@ public:
 
     std::size_t size() const { return P.size(); }
 
-    bool is_member(const Dynamic& dynamic, std::size_t i) const
-    {
-        if (dynamic.group.empty()) return true;
-        const Column<std::uint8_t>* group = set.find_group(dynamic.group);
-        return group && (*group)[i];
-    }
+    bool is_member(const Dynamic& dynamic, std::size_t i) const { return members_of(set, dynamic.group)[i]; }
 
     void ask(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed, Forces& forces) const
     {

@@ -10,10 +10,8 @@
 #include "bindings/detail.h"
 #include "bindings/script_host.h"
 #include "bindings/state.h"
-#include "runtime/graph/first_error.h"
-#include "runtime/parallel.h"
+#include "runtime/points/members.h"
 #include "runtime/points/point_text.h"
-#include "runtime/stopwatch.h"
 
 extern "C" {
 #include "lua/chunk.h"
@@ -81,6 +79,17 @@ struct Kernel::Layout {
     bool predicate = false, masked = false, action = false;
     std::string key;  // equal for layouts that one runner serves
 
+    // Once columns stay where they are. mask: it runs on some points of a chunk alone.
+    void settle(const PointSet& points, bool mask)
+    {
+        masked = mask;
+        // What is written is writable by now, each point with a value of its own.
+        for (Entry& e : columns)
+            e.uniform = !e.writable && std::visit([](const auto& c) { return c.is_uniform(); }, *points.find(e.name));
+        for (Entry& e : groups) e.uniform = !e.writable && points.find_group(e.name)->is_uniform();
+        finish();
+    }
+
     void finish()
     {
         key = fmt::format("{}{}{}", predicate ? 'p' : '-', masked ? 'm' : '-', action ? 'a' : '-');
@@ -106,6 +115,7 @@ void Kernel::analyse()
     asks_ = keys_of(L, "asks");
     asks_any_ = flag_of(L, "asks_any");
     kills_ = flag_of(L, "kills");
+    asks_places_ = flag_of(L, "computes_names") || reads_.count("index") || may_.count("index");
 
     for (const std::string& name : keys_of(L, "calls")) {
         lua_getfield(L, -1, "calls");
@@ -189,28 +199,23 @@ void Kernel::uses(Uses& uses) const
     if (of_the_set || asks_any_) uses.reads_all = true;
 }
 
-Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate,
-                                  bool masked) const
+// The names that it sees, of those that are there now. To be settled.
+Kernel::Layout Kernel::layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate) const
 {
     Layout layout;
     layout.predicate = predicate;
-    layout.masked = masked;
     for (const auto& [name, column] : points.columns()) {
         const bool named = writes_.count(name) || may_write_.count(name) || arguments.writes.count(name);
         const bool written = !predicate && named && name != "id" && name != "dt";
         // p:rand needs the id.
         if (!written && !reads_.count(name) && !may_.count(name) && !arguments.reads.count(name) && name != "id")
             continue;
-        const bool uniform = std::visit([](const auto& c) { return c.is_uniform(); }, column);
-        // What is written will be made writable, each point with a value of its own.
-        layout.columns.push_back({name, std::string(type_name(type_of(column))), written, uniform && !written});
+        layout.columns.push_back({name, std::string(type_name(type_of(column))), written});
     }
     for (const auto& [name, members] : points.groups()) {
         const bool written = !predicate && (joins_.count(name) || arguments.joins.count(name));
-        if (written || asks_any_ || asks_.count(name))
-            layout.groups.push_back({name, "", written, members.is_uniform() && !written});
+        if (written || asks_any_ || asks_.count(name)) layout.groups.push_back({name, "", written});
     }
-    layout.finish();
     return layout;
 }
 
@@ -309,8 +314,6 @@ struct Kernel::Pass {
     const std::map<std::string, Value>& values;  // the third argument
     std::uint64_t serial;                        // of this pass: parameters are handed to each state once a pass
     std::vector<ColumnMemory> columns, groups;
-    std::uint8_t* kill = nullptr;
-    std::uint8_t* result = nullptr;
 };
 
 // What a runner is given: pointers are to the first point's value in the layout's columns, and then in its groups.
@@ -319,21 +322,17 @@ struct Kernel::Call {
     std::vector<void*> pointers;
 };
 
-// members: of the chunk's points, where the pass is over a group.
-void Kernel::run_chunk(const Pass& pass, std::size_t begin, std::size_t end, const std::uint8_t* members) const
+// The chunk's place, members and results are set.
+void Kernel::run_chunk(const Pass& pass, const rapid_chunk& chunk) const
 {
-    Call call;
-    call.chunk.size = static_cast<std::int32_t>(end - begin);
-    call.chunk.first = static_cast<double>(begin);
-    call.chunk.kill = pass.kill ? pass.kill + begin : nullptr;
-    call.chunk.result = pass.result ? pass.result + begin : nullptr;
-    call.chunk.members = const_cast<std::uint8_t*>(members);
+    Call call{chunk, {}};
     call.pointers.reserve(pass.columns.size() + pass.groups.size());
-    for (const ColumnMemory& memory : pass.columns) call.pointers.push_back(memory.at(begin));
+    for (const ColumnMemory& memory : pass.columns)
+        call.pointers.push_back(memory.at(static_cast<std::size_t>(chunk.first)));
     run_chunk(pass, call);
 }
 
-// The chunk's place, members, columns and results are set.
+// So are its columns.
 void Kernel::run_chunk(const Pass& pass, Call& call) const
 {
     rapid_chunk& chunk = call.chunk;
@@ -413,115 +412,132 @@ void Kernel::call_runner(State& state, const Pass& pass, const Call& call) const
     }
 }
 
-void Kernel::test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const
-{
-    const Stopwatch stopwatch;
-    const Caller caller(now);
-    const ScriptHost::Section section(host_, caller.watched());
-    const KernelArguments nothing;
-    const Layout layout = layout_for(points, nothing, true, false);
-    Pass pass(points, caller, layout, nothing.values);
-    pass.result = result.data();
-    FirstError first;
-    for_each_chunk(
-        points.size(),
-        [&](std::size_t begin, std::size_t end) {
-            first.guard(0, begin, [&] { run_chunk(pass, begin, end, nullptr); });
-        },
-        chunk_of(caller, points.size()));
-    first.rethrow();
-    now.figures.script_seconds += stopwatch.seconds();
-}
-
 // Points that go through a kernel together: all of the set where the order is reversed, the last chunk first, too.
 std::size_t Kernel::chunk_of(const Caller& caller, std::size_t size) const
 {
     return host_.kernel_way(caller.node) == KernelOrder::Reversed ? std::max(size, chunk_size) : chunk_size;
 }
 
-void Kernel::prepare(PointSet& points, const std::string& group, const KernelArguments& arguments) const
-{
-    for (const auto* names : {&joins_, &arguments.joins})
-        for (const std::string& name : *names) points.group(name);
-    const std::optional<Layout> layout = layout_of_group(points, group, arguments);
-    if (!layout) return;
-    for (const Layout::Entry& entry : layout->columns)
-        if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
-    for (const Layout::Entry& entry : layout->groups)
-        if (entry.writable) points.group(entry.name).write();
-}
-
-// None where it has no point to visit.
-std::optional<Kernel::Layout> Kernel::layout_of_group(const PointSet& points, const std::string& group,
-                                                      const KernelArguments& arguments) const
-{
-    const Column<std::uint8_t>* members = group.empty() ? nullptr : points.find_group(group);
-    if (points.empty() || (!group.empty() && !members)) return std::nullopt;  // nobody is in it yet
-    if (members && members->is_uniform() && !(*members)[0]) return std::nullopt;
-    return layout_for(points, arguments, false, members && !members->is_uniform());
-}
-
-class Kernel::KernelPass : public ScriptPass {
+class Kernel::KernelTest : public PointTest {
 public:
-    KernelPass(const Kernel& kernel, PointSet& points, const Evaluation& now, Layout layout, const std::string& group,
-               KernelArguments arguments)
+    KernelTest(const Kernel& kernel, const PointSet& points, const Evaluation& now)
         : kernel_(kernel),
           points_(points),
-          figures_(now.figures),
           caller_(now),
           section_(kernel.host_, caller_.watched()),
-          layout_(std::move(layout)),
-          arguments_(std::move(arguments)),
-          kill_(kernel.kills_ ? points.size() : 0),
-          pass_(points, caller_, layout_, arguments_.values)
+          layout_(kernel.layout_for(points, arguments_, true))
     {
-        if (kernel.kills_) pass_.kill = kill_.data();
-        if (layout_.masked) members_ = std::as_const(points).find_group(group)->read().data;
+    }
+
+    void begin(bool of_all) override
+    {
+        layout_.settle(points_, !of_all);
+        pass_.emplace(points_, caller_, layout_, arguments_.values);
     }
 
     std::size_t chunk() const override { return kernel_.chunk_of(caller_, points_.size()); }
 
-    void visit(std::size_t begin, std::size_t end) override
+    void test(std::size_t begin, std::span<std::uint8_t> selected) const override
     {
-        // As it is now: a kernel may leave the very group that chooses its points.
-        std::vector<std::uint8_t> chosen;
-        if (members_) chosen.assign(members_ + begin, members_ + end);
-        try {
-            kernel_.run_chunk(pass_, begin, end, members_ ? chosen.data() : nullptr);
-        } catch (Error& error) {  // of its state, too, which knows no node
-            error.in_node(caller_.node).at(caller_.location);
-            throw;
-        }
-    }
-
-    void finish() override
-    {
-        if (std::find(kill_.begin(), kill_.end(), 1) == kill_.end()) return;
-        for (std::uint8_t& mark : kill_) mark = mark == 0;
-        const std::size_t before = points_.size();
-        points_.keep(kill_);
-        figures_.died += before - points_.size();
+        rapid_chunk chunk{};
+        chunk.size = static_cast<std::int32_t>(selected.size());
+        chunk.first = static_cast<double>(begin);
+        chunk.members = layout_.masked ? selected.data() : nullptr;
+        chunk.result = selected.data();
+        kernel_.run_chunk(*pass_, chunk);
     }
 
 private:
     const Kernel& kernel_;
-    PointSet& points_;
-    FrameFigures& figures_;
+    const PointSet& points_;
     const Caller caller_;
     const ScriptHost::Section section_;
-    const Layout layout_;
     const KernelArguments arguments_;
-    std::vector<std::uint8_t> kill_;
-    const std::uint8_t* members_ = nullptr;
-    Pass pass_;
+    Layout layout_;
+    std::optional<Pass> pass_;
 };
 
-std::unique_ptr<ScriptPass> Kernel::pass(PointSet& points, const std::string& group, const Evaluation& now,
-                                         KernelArguments arguments) const
+std::unique_ptr<PointTest> Kernel::test_of(const PointSet& points, const Evaluation& now) const
 {
-    std::optional<Layout> layout = layout_of_group(points, group, arguments);
+    return std::make_unique<KernelTest>(*this, points, now);
+}
+
+// None where it has no point to visit.
+std::optional<Kernel::Layout> Kernel::make_writable(PointSet& points, const std::string& group,
+                                                    const KernelArguments& arguments) const
+{
+    for (const auto* names : {&joins_, &arguments.joins})
+        for (const std::string& name : *names) points.group(name);
+    const Strided<std::uint8_t> members = members_of(points, group);
+    if (points.empty() || (members.stride == 0 && !members[0])) return std::nullopt;
+    Layout layout = layout_for(points, arguments, false);
+    for (const Layout::Entry& entry : layout.columns)
+        if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
+    for (const Layout::Entry& entry : layout.groups)
+        if (entry.writable) points.group(entry.name).write();
+    return layout;
+}
+
+class Kernel::KernelPass : public EditPass {
+public:
+    KernelPass(const Kernel& kernel, const PointSet& points, const std::string& group, const Evaluation& told,
+               const KernelArguments& arguments, const Before& before, Layout layout)
+        : EditPass(told),
+          kernel_(kernel),
+          points_(points),
+          group_(group),
+          before_(before),
+          caller_(told),
+          section_(kernel.host_, caller_.watched()),
+          arguments_(arguments),
+          layout_(std::move(layout))
+    {
+    }
+
+    void begin() override
+    {
+        members_ = members_of(points_, group_);
+        layout_.settle(points_, members_.stride != 0 || before_.removals);
+        pass_.emplace(points_, caller_, layout_, arguments_.values);
+    }
+
+    std::size_t chunk() const override { return kernel_.chunk_of(caller_, points_.size()); }
+    bool is_script() const override { return true; }
+
+    void visit(const Stretch& stretch) override
+    {
+        // As it is now: a kernel may leave the very group that chooses its points.
+        std::vector<std::uint8_t> chosen;
+        if (layout_.masked) chosen = stretch.choose(members_);
+        std::vector<std::uint8_t> killed(kernel_.kills_ ? stretch.size() : 0);
+        rapid_chunk chunk{};
+        chunk.size = static_cast<std::int32_t>(stretch.size());
+        chunk.first = static_cast<double>(stretch.begin);
+        chunk.members = chosen.empty() ? nullptr : chosen.data();
+        chunk.kill = killed.empty() ? nullptr : killed.data();
+        kernel_.run_chunk(*pass_, chunk);
+        stretch.remove(killed);
+    }
+
+private:
+    const Kernel& kernel_;
+    const PointSet& points_;
+    const std::string group_;
+    const Before before_;
+    const Caller caller_;
+    const ScriptHost::Section section_;
+    const KernelArguments arguments_;
+    Layout layout_;
+    Strided<std::uint8_t> members_{nullptr, 0};
+    std::optional<Pass> pass_;
+};
+
+std::unique_ptr<EditPass> Kernel::prepare(PointSet& points, const std::string& group, const Evaluation& now,
+                                          const KernelArguments& arguments, const Before& before) const
+{
+    std::optional<Layout> layout = make_writable(points, group, arguments);
     if (!layout) return nullptr;
-    return std::make_unique<KernelPass>(*this, points, now, std::move(*layout), group, std::move(arguments));
+    return std::make_unique<KernelPass>(*this, points, group, now, arguments, before, std::move(*layout));
 }
 
 class Kernel::KernelActionPass : public ActionPass {
@@ -573,20 +589,19 @@ public:
         location = now.location;
     }
 
-    void prepare(PointSet& points) const override { kernel_.prepare(points, group, arguments_); }
+    void prepare(PointSet& points) const override { kernel_.make_writable(points, group, arguments_); }
 
     std::unique_ptr<ActionPass> begin(PointSet& points) const override
     {
-        std::optional<Layout> layout = kernel_.layout_of_group(points, group, arguments_);
-        if (!layout) return nullptr;
-        kernel_.make_layout_of_action(*layout, arguments_);
+        const Strided<std::uint8_t> members = members_of(points, group);
+        if (points.empty() || (members.stride == 0 && !members[0])) return nullptr;
+        Layout layout = kernel_.layout_for(points, arguments_, false);
+        layout.settle(points, members.stride != 0);
+        kernel_.make_layout_of_action(layout, arguments_);
         // Of its own: a kernel may leave the very group that chooses its points, and acts on them for the whole step.
         std::vector<std::uint8_t> chosen;
-        if (layout->masked) {
-            const std::uint8_t* members = std::as_const(points).find_group(group)->read().data;
-            chosen.assign(members, members + points.size());
-        }
-        return std::make_unique<KernelActionPass>(kernel_, points, caller_, std::move(*layout), arguments_.values,
+        if (layout.masked) chosen.assign(members.data, members.data + points.size());
+        return std::make_unique<KernelActionPass>(kernel_, points, caller_, std::move(layout), arguments_.values,
                                                   std::move(chosen));
     }
 

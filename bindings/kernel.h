@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bindings/state.h"
+#include "runtime/graph/point_edit.h"
 #include "runtime/graph/point_function.h"
-#include "runtime/graph/script_edit.h"
 
 namespace rapid {
 
@@ -36,15 +36,12 @@ public:
     static constexpr std::string_view set_function_type = "function of the points";
 
     void uses(Uses& uses) const override;
-    void test(const PointSet& points, const Evaluation& now, std::span<std::uint8_t> result) const override;
+    bool asks_places() const override { return asks_places_; }
+    std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const override;
 
-    // Brings into being and makes writable what it will write, of a set in which some point is in `group` (all are when
-    // it is empty).
-    void prepare(PointSet& points, const std::string& group, const KernelArguments& arguments) const;
-    // Over the points of `group`, as it is when they are visited, of a set that is prepared; null where it has none.
-    // Points that it kills are removed at the end.
-    std::unique_ptr<ScriptPass> pass(PointSet& points, const std::string& group, const Evaluation& now,
-                                     KernelArguments arguments) const;
+    // As PointEdit's, of the points of `group` (all when it is empty) as it is when they are visited.
+    std::unique_ptr<EditPass> prepare(PointSet& points, const std::string& group, const Evaluation& now,
+                                      const KernelArguments& arguments, const Before& before) const;
     bool kills() const { return kills_; }
 
     // What it does inside Solve, at every sub-step, on the points of `group`.
@@ -70,16 +67,17 @@ private:
     struct Layout;
     struct Pass;
     struct Call;
+    class KernelTest;
     class KernelPass;
     class KernelAction;
     class KernelActionPass;
 
-    Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate, bool masked) const;
+    Layout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate) const;
     void make_layout_of_action(Layout& layout, const KernelArguments& arguments) const;
-    std::optional<Layout> layout_of_group(const PointSet& points, const std::string& group,
-                                          const KernelArguments& arguments) const;
+    std::optional<Layout> make_writable(PointSet& points, const std::string& group,
+                                        const KernelArguments& arguments) const;
     std::size_t chunk_of(const Caller& caller, std::size_t size) const;
-    void run_chunk(const Pass& pass, std::size_t begin, std::size_t end, const std::uint8_t* members) const;
+    void run_chunk(const Pass& pass, const rapid_chunk& chunk) const;
     void run_chunk(const Pass& pass, Call& call) const;
     static Call one_point(const Pass& pass, const Call& call, std::int32_t i);
     void call_runner(State& state, const Pass& pass, const Call& call) const;
@@ -88,7 +86,7 @@ private:
     ScriptHost& host_;
 
     std::set<std::string> reads_, writes_, may_, may_write_, joins_, asks_;
-    bool kills_ = false, asks_any_ = false;
+    bool kills_ = false, asks_any_ = false, asks_places_ = false;
 };
 
 }  // namespace rapid

@@ -35,37 +35,6 @@ void check_writable(const std::vector<std::string>& writes)
             throw Error(fmt::format("writes: {} is read only", name));
 }
 
-// What edits the points by the kernel of its fields, in their group.
-template <class Fields>
-class KernelEdit : public ScriptEdit {
-public:
-    explicit KernelEdit(std::vector<AttributeSpec> makes = {}) : makes_(std::move(makes)) {}
-
-    void* fields() override { return &fields_; }
-    void prepare(PointSet& points, const Evaluation& now) override
-    {
-        // Points that come from elsewhere, and those behind Solve, may not have them yet.
-        for (const AttributeSpec& spec : makes_)
-            if (now.keeps(spec.name)) points.add(spec);
-        fields_.kernel->prepare(points, fields_.group, fields_.of_kernel());
-    }
-    std::unique_ptr<ScriptPass> begin(PointSet& points, const Evaluation& now) override
-    {
-        return fields_.kernel->pass(points, fields_.group, now, fields_.of_kernel());
-    }
-    bool removes_points() const override { return fields_.kernel->kills(); }
-    void uses(Uses& uses) const override
-    {
-        if (!fields_.group.empty()) uses.reads_groups.push_back(fields_.group);
-        fields_.kernel->uses(uses, fields_.of_kernel());
-    }
-    void check() const override { fields_.check(); }
-
-private:
-    Fields fields_;
-    std::vector<AttributeSpec> makes_;
-};
-
 // points: an edit of the points, one by one, written in Lua.
 struct Points {
     std::string group;
@@ -85,9 +54,15 @@ struct Points {
             .param(&Points::writes, "writes", Value(), any_number(), "", std::string(writes_doc))
             .constant();
     }
-    static std::unique_ptr<Operator> make() { return std::make_unique<KernelEdit<Points>>(); }
+    static std::unique_ptr<Operator> make() { return std::make_unique<PointEditOf<Points>>(); }
     void check() const { check_writable(writes); }
-    KernelArguments of_kernel() const { return declared(reads, writes); }
+    void uses(Uses& uses) const { kernel->uses(uses, declared(reads, writes)); }
+    bool removes_points() const { return kernel->kills(); }
+    bool asks_places() const { return kernel->asks_places(); }
+    std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
+    {
+        return kernel->prepare(points, group, now, declared(reads, writes), before);
+    }
 };
 RAPID_NODE(Points);
 
@@ -138,27 +113,40 @@ struct Detail {
 };
 RAPID_NODE(Detail);
 
-// Of a node type that rapid.node defines: its parameters' values by name, and its kernel.
+// Of a node type that rapid.node defines: its parameters' values by name, its kernel, and the attributes that it makes.
 struct ScriptFields {
     std::string group;
     std::shared_ptr<const Kernel> kernel;
     KernelArguments arguments;
+    std::vector<AttributeSpec> makes;
 
-    void check() const {}
-    const KernelArguments& of_kernel() const { return arguments; }
+    // Points that come from elsewhere, and those behind Solve, may not have them yet.
+    void add_attributes(PointSet& points, const Evaluation& now) const
+    {
+        for (const AttributeSpec& spec : makes)
+            if (now.keeps(spec.name)) points.add(spec);
+    }
+
+    // Where it edits the points, one by one.
+    void uses(Uses& uses) const { kernel->uses(uses, arguments); }
+    bool removes_points() const { return kernel->kills(); }
+    bool asks_places() const { return kernel->asks_places(); }
+    std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
+    {
+        add_attributes(points, now);
+        return kernel->prepare(points, group, now, arguments, before);
+    }
 };
 
-// One that is no edit of the points one by one, and the attributes that it makes.
+// One that does something else.
 class ScriptOperator : public Operator {
 public:
-    ScriptOperator(NodeKind kind, std::vector<AttributeSpec> makes) : kind_(kind), makes_(std::move(makes)) {}
+    ScriptOperator(NodeKind kind, ScriptFields fields) : kind_(kind), fields_(std::move(fields)) {}
 
     void* fields() override { return &fields_; }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
     {
-        // Points that come from elsewhere, and those behind Solve, may not have them yet.
-        for (const AttributeSpec& spec : makes_)
-            if (now.keeps(spec.name)) inputs[0].points.add(spec);
+        fields_.add_attributes(inputs[0].points, now);
         if (fields_.kernel->of_the_set)
             run_detail(*fields_.kernel, inputs[0], now, fields_.arguments);
         else
@@ -179,7 +167,6 @@ public:
 private:
     const NodeKind kind_;
     ScriptFields fields_;
-    std::vector<AttributeSpec> makes_;
 };
 
 // The types that a parameter is declared with, and how each is checked and kept for the kernel.
@@ -393,8 +380,10 @@ NodeType read_type(const Table& definition, std::string_view role)
         for (const auto& [name, value] : attributes) type.uses.makes.push_back({name, value});
     }
     type.make = [edits = role == "points", kind = type.kind, made = type.uses.makes]() -> std::unique_ptr<Operator> {
-        if (edits) return std::make_unique<KernelEdit<ScriptFields>>(made);
-        return std::make_unique<ScriptOperator>(kind, made);
+        ScriptFields fields;
+        fields.makes = made;
+        if (edits) return std::make_unique<PointEditOf<ScriptFields>>(std::move(fields));
+        return std::make_unique<ScriptOperator>(kind, std::move(fields));
     };
     return type;
 }

@@ -8,6 +8,7 @@
 --   may              names indexed anywhere in helpers, and on values that are not known to be no point
 --   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
 --                    are the calls of a method `join` of anything
+--   computes_names   whether it indexes the point, or what may be it, by what is no constant
 --   calls            names on the point itself that it calls as if they were methods
 --   kills            whether `kill` is called or could be
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
@@ -170,6 +171,8 @@ local function step(f, pc, regs, found, outer, call)
     elseif object and object.kind == "shared" then
       analyse_inside(object.value, found)
       result = { kind = "shared", value = name == "TGETB" and field(object.value, c) or nil }
+    elseif name == "TGETV" and (not object or object == point) then
+      found.computes_names = true
     end
   elseif name == "TSETS" then
     local object, key = regs[b], string_constant(f, c)

@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/graph/script_edit.h"
+#include "runtime/graph/point_edit.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -116,7 +116,7 @@ void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
         // Whoever is told of each result is told of each node by itself.
-        while (!result_ && last + 1 < plan_.nodes.size() && plan_.goes_along(last + 1)) ++last;
+        if (!result_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);
     }
     before.go_on(std::move(frame.figures));
@@ -198,10 +198,10 @@ void Evaluator::edit_together(std::size_t first, std::size_t last, int left, Poi
 {
     std::deque<Told> told;
     std::vector<const Evaluation*> now;
-    std::vector<ScriptEdit*> edits;
+    std::vector<PointEdit*> edits;
     for (std::size_t i = first; i <= last; ++i) {
         now.push_back(&*told.emplace_back(*this, plan_.nodes[i], left, frame).evaluation);
-        edits.push_back(&dynamic_cast<ScriptEdit&>(*plan_.nodes[i].op));
+        edits.push_back(&dynamic_cast<PointEdit&>(*plan_.nodes[i].op));
     }
     rapid::edit_together(edits, now, points);
 }

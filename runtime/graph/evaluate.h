@@ -1,7 +1,7 @@
 // Runs a plan, frame by frame.
 //
 // At each frame the nodes are evaluated in the order of the plan; a result goes to its last reader without a copy, and
-// what never changes is evaluated once; neighbouring scripts edit the points together. At the first frame the nodes
+// what never changes is evaluated once; neighbouring edits go over the points together. At the first frame the nodes
 // between Create and Solve do not run. With sub-frames all that is upstream of a Solve is evaluated so many times a
 // frame, and what comes after it once, at the frame's end.
 #pragma once
@@ -51,7 +51,7 @@ public:
 private:
     // A step of the next frame, `left` steps before its end. The results of the nodes, and who has not read them yet.
     void take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);
-    // The nodes from first to last: several where they go together (Plan::goes_along). The result of the last.
+    // The nodes from first to last: several where they go together (Plan::last_together). The result of the last.
     Flow evaluate(std::size_t first, std::size_t last, int left, std::vector<Flow>& results,
                   std::vector<std::size_t>& readers, FrameResult& frame);
     void edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame);

@@ -14,7 +14,7 @@
 //
 // What the node does is the member function that its struct has; one of
 //
-//   void edit(PointSet&, const Evaluation&)                  a point node: changes points at once
+//   void edit(PointSet&, const Evaluation&)                  changes points at once (one by one: see point_edit.h)
 //   void contribute(const Chunk&, Forces&) const             a force: Solve calls it (solver/dynamics.h)
 //   std::optional<Uniform> uniform() const                   a force that is uniform; also besides contribute()
 //   bool add_potential(const Chunk&, std::span<double>) const    besides these: the energy of which it is the slope

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
+#include "runtime/graph/point_edit.h"
 #include "runtime/graph/registry.h"
-#include "runtime/graph/script_edit.h"
 
 namespace rapid {
 namespace {
@@ -427,13 +427,19 @@ std::set<std::string> Plan::names_of_scene() const
     return names;
 }
 
-bool Plan::goes_along(std::size_t node) const
+std::size_t Plan::last_together(std::size_t first) const
 {
-    if (node == 0 || nodes[node].inputs != std::vector{node - 1}) return false;
-    const PlannedNode &before = nodes[node - 1], &after = nodes[node];
-    const auto* edit = dynamic_cast<const ScriptEdit*>(before.op.get());
-    return edit && !edit->removes_points() && dynamic_cast<const ScriptEdit*>(after.op.get()) &&
-           before.consumers == 1 && before.in_loop == after.in_loop && !before.once && !after.once;
+    const auto* edit = dynamic_cast<const PointEdit*>(nodes[first].op.get());
+    bool removed = false;
+    for (std::size_t last = first; edit; ++last) {
+        removed |= edit->removes_points();
+        if (last + 1 == nodes.size() || nodes[last + 1].inputs != std::vector{last}) return last;
+        const PlannedNode &before = nodes[last], &after = nodes[last + 1];
+        edit = dynamic_cast<const PointEdit*>(after.op.get());
+        if (!edit || (removed && edit->asks_places())) return last;
+        if (before.consumers > 1 || before.in_loop != after.in_loop || before.once || after.once) return last;
+    }
+    return first;
 }
 
 std::vector<std::vector<std::size_t>> Plan::passes() const
@@ -442,11 +448,8 @@ std::vector<std::vector<std::size_t>> Plan::passes() const
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         const NodeKind kind = nodes[i].node->type->kind;
         if (kind == NodeKind::Source || kind == NodeKind::Dynamic) continue;
-        if (goes_along(i)) {
-            passes.back().push_back(i);
-            continue;
-        }
         std::set<std::size_t> pass = {i};
+        for (const std::size_t last = last_together(i); i < last;) pass.insert(++i);
         if (kind == NodeKind::Solve) {
             std::vector<std::size_t> open = nodes[i].inputs;
             std::set<std::size_t> seen;

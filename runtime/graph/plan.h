@@ -96,12 +96,13 @@ public:
     std::vector<AttributeSpec> columns_of(std::size_t simulation) const;
     std::vector<std::string> groups_of(std::size_t simulation) const;
 
-    // Whether a node goes over the points together with the one before it: both edit them by scripts, one by one, the
-    // first removes none, and nothing else takes its result.
-    bool goes_along(std::size_t node) const;
+    // The last of the nodes that go over the points together with this one, the first of them: neighbours that edit
+    // them one by one, whose results nothing else takes, and none of which asks for places behind one that removes
+    // points.
+    std::size_t last_together(std::size_t first) const;
 
     // The nodes that go over the points together, in the order of the passes: a Solve takes the dynamics upstream of it
-    // along, and neighbouring scripts each other.
+    // along, and neighbouring edits each other.
     std::vector<std::vector<std::size_t>> passes() const;
 
     // The names that outputs get without asking for one, of all simulations; groups without the prefix.

@@ -1,41 +1,29 @@
 #include "runtime/graph/selection.h"
 
-#include <algorithm>
+#include <cstring>
+
+#include "runtime/points/members.h"
 
 namespace rapid {
-namespace {
 
-std::vector<std::uint8_t> members_of(const PointSet& points, std::string_view group)
+Selection::Selection(const PointSet& points, std::string group, const PointFunction* where, const Evaluation& now,
+                     const Before& before)
+    : points_(points), group_(std::move(group)), before_(before), test_(where ? where->test_of(points, now) : nullptr)
 {
-    std::vector<std::uint8_t> members(points.size(), 0);
-    const Column<std::uint8_t>* column = points.find_group(group);
-    if (!column) return members;
-    const Strided<std::uint8_t> member = column->read();
-    for (std::size_t i = 0; i < members.size(); ++i) members[i] = member[i];
-    return members;
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> select(const PointSet& points, std::string_view group, const PointFunction* where,
-                                 const Evaluation& now)
+void Selection::begin()
 {
-    std::vector<std::uint8_t> selected =
-        group.empty() ? std::vector<std::uint8_t>(points.size(), 1) : members_of(points, group);
-    if (!where) return selected;
+    members_ = members_of(points_, group_);
+    const bool all = members_.stride == 0 && members_[0] && !before_.removals;
+    if (test_) test_->begin(all);
+}
 
-    const auto members = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), 1));
-    if (members == points.size()) {
-        where->test(points, now, selected);
-        return selected;
-    }
-    PointSet asked = points;
-    asked.keep(selected);
-    std::vector<std::uint8_t> answers(members);
-    where->test(asked, now, answers);
-    auto answer = answers.begin();
-    for (std::uint8_t& one : selected)
-        if (one) one = *answer++;
+std::vector<std::uint8_t> Selection::of(const Stretch& stretch) const
+{
+    std::vector<std::uint8_t> selected = stretch.choose(members_);
+    const bool any = std::memchr(selected.data(), 1, selected.size()) != nullptr;
+    if (test_ && any) test_->test(stretch.begin, selected);
     return selected;
 }
 

@@ -2,16 +2,36 @@
 #pragma once
 
 #include <cstdint>
-#include <string_view>
+#include <memory>
+#include <string>
 #include <vector>
 
+#include "runtime/graph/point_edit.h"
 #include "runtime/graph/point_function.h"
+#include "runtime/points/column.h"
 
 namespace rapid {
 
-// 1 for each point of `group` (all when it is empty) for which `where` is true (all when it is null), else 0; shape
-// [size]. `where` is asked only about points of the group.
-std::vector<std::uint8_t> select(const PointSet& points, std::string_view group, const PointFunction* where,
-                                 const Evaluation& now);
+class Selection {
+public:
+    // Of `group` (all when it is empty) those for which `where` is true (all when it is null): it is asked only about
+    // points of the group. The set and `now` outlive it.
+    Selection(const PointSet& points, std::string group, const PointFunction* where, const Evaluation& now,
+              const Before& before);
+
+    void begin();  // see EditPass, also for the next two
+    std::size_t chunk() const { return test_ ? test_->chunk() : chunk_size; }
+    bool is_script() const { return test_ != nullptr; }
+
+    // 1 for each selected point that is alive, else 0; shape [size].
+    std::vector<std::uint8_t> of(const Stretch& stretch) const;
+
+private:
+    const PointSet& points_;
+    const std::string group_;
+    const Before before_;
+    std::unique_ptr<PointTest> test_;
+    Strided<std::uint8_t> members_{nullptr, 0};
+};
 
 }  // namespace rapid

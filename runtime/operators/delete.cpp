@@ -1,10 +1,21 @@
 // delete: removes the points of a group, or those for which `where` is true; with both, those for which both hold.
 #include "runtime/graph/selection.h"
 
-#include <algorithm>
-
 namespace rapid {
 namespace {
+
+class DeletePass : public EditPass {
+public:
+    DeletePass(const Evaluation& told, Selection selection) : EditPass(told), selection_(std::move(selection)) {}
+
+    void begin() override { selection_.begin(); }
+    std::size_t chunk() const override { return selection_.chunk(); }
+    bool is_script() const override { return selection_.is_script(); }
+    void visit(const Stretch& stretch) override { stretch.remove(selection_.of(stretch)); }
+
+private:
+    Selection selection_;
+};
 
 struct Delete {
     std::string group;
@@ -17,6 +28,8 @@ struct Delete {
             .constant();
     }
 
+    static std::unique_ptr<Operator> make() { return std::make_unique<PointEditOf<Delete>>(); }
+
     void uses(Uses& uses) const
     {
         if (where) where->uses(uses);
@@ -27,13 +40,12 @@ struct Delete {
         if (group.empty() && !where) throw Error("nothing says which points to remove; give group, where or both");
     }
 
-    void edit(PointSet& points, const Evaluation& now) const
+    bool removes_points() const { return true; }
+    bool asks_places() const { return where && where->asks_places(); }
+
+    std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
     {
-        std::vector<std::uint8_t> mask = select(points, group, where.get(), now);
-        for (std::uint8_t& keep : mask) keep ^= 1;
-        const std::size_t before = points.size();
-        points.keep(mask);
-        now.figures.died += before - points.size();
+        return std::make_unique<DeletePass>(now, Selection(points, group, where.get(), now, before));
     }
 };
 RAPID_NODE(Delete);

@@ -4,8 +4,38 @@
 // that no longer qualifies is out.
 #include "runtime/graph/selection.h"
 
+#include <algorithm>
+
 namespace rapid {
 namespace {
+
+class GroupPass : public EditPass {
+public:
+    GroupPass(const Evaluation& told, Selection selection, Column<std::uint8_t>& members)
+        : EditPass(told), selection_(std::move(selection)), members_(members)
+    {
+        members_.write();
+    }
+
+    void begin() override
+    {
+        selection_.begin();
+        to_ = members_.write();
+    }
+    std::size_t chunk() const override { return selection_.chunk(); }
+    bool is_script() const override { return selection_.is_script(); }
+    // The group that limits it, or that `where` asks for, may be the one that is made: the answers are of before.
+    void visit(const Stretch& stretch) override
+    {
+        const std::vector<std::uint8_t> selected = selection_.of(stretch);
+        std::copy(selected.begin(), selected.end(), to_.begin() + static_cast<std::ptrdiff_t>(stretch.begin));
+    }
+
+private:
+    Selection selection_;
+    Column<std::uint8_t>& members_;
+    std::span<std::uint8_t> to_;
+};
 
 struct Group {
     std::string name, group;
@@ -22,6 +52,8 @@ struct Group {
             .constant();
     }
 
+    static std::unique_ptr<Operator> make() { return std::make_unique<PointEditOf<Group>>(); }
+
     void uses(Uses& uses) const
     {
         uses.makes_groups.push_back(name);
@@ -33,12 +65,15 @@ struct Group {
         if (name.empty()) throw Error("name = \"\" names no group; give it at least one letter");
     }
 
-    void edit(PointSet& points, const Evaluation& now) const
+    bool asks_places() const { return where && where->asks_places(); }
+
+    std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
     {
-        if (!now.keeps_group(name)) return;
-        if (group.empty() && !where) return points.group(name).fill(1);
-        const std::vector<std::uint8_t> members = select(points, group, where.get(), now);
-        points.group(name) = Column<std::uint8_t>(std::span<const std::uint8_t>(members));
+        if (!now.keeps_group(name)) return nullptr;
+        Column<std::uint8_t>& members = points.group(name);
+        if (group.empty() && !where && !before.edits) return members.fill(1), nullptr;
+        Selection selection(points, group, where.get(), now, before);
+        return std::make_unique<GroupPass>(now, std::move(selection), members);
     }
 };
 RAPID_NODE(Group);

@@ -1,7 +1,8 @@
 // write: hands the points, as they are here, to be written to a file of each frame; they go on unchanged.
 //
 // At the first frame it writes too, wherever it stands in the chain: a sequence of files begins where the frames do.
-#include "runtime/graph/selection.h"
+#include "runtime/graph/node.h"
+#include "runtime/points/members.h"
 
 #include <algorithm>
 
@@ -41,7 +42,7 @@ struct Write {
         PointSet written = points;
         written.remove("dt");
         if (!attributes.empty()) keep_columns(written);
-        if (!group.empty()) written.keep(select(written, group, nullptr, now));
+        if (!group.empty()) keep_members(written);
         now.write(file, written);
     }
 
@@ -52,6 +53,14 @@ struct Write {
     }
 
 private:
+    void keep_members(PointSet& set) const
+    {
+        const Strided<std::uint8_t> members = members_of(set, group);
+        std::vector<std::uint8_t> mask(set.size());
+        for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = members[i];
+        set.keep(mask);
+    }
+
     void keep_columns(PointSet& set) const
     {
         for (const std::string& name : set.column_names())

@@ -127,9 +127,8 @@ public:
     void run(std::size_t kernel)
     {
         const Evaluation now{{2, dt, dt}, false, node_, location_, RandomKey(1, node_), figures_, warnings_, nothing_};
-        host->kernels[kernel]->prepare(sets[kernel], "", {});
-        const auto pass = host->kernels[kernel]->pass(sets[kernel], "", now, {});
-        go_over({&pass, 1}, sets[kernel].size());
+        const auto pass = host->kernels[kernel]->prepare(sets[kernel], "", now, {}, {});
+        go_over({&pass, 1}, sets[kernel], false);
     }
 
     Columns columns()

@@ -120,13 +120,27 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
                 plan_of("bounces.lua").passes)
   end)
 
-  it("takes neighbouring scripts over the points together, up to one that removes some", function()
-    write("scripts.lua", [[
+  it("takes neighbouring edits over the points together, up to a node that is none", function()
+    write("edits.lua", [[
 return rapid.create {} :emit { ]] .. source .. [[ }
-  :points("a", function(p) p.v = p.v * 0.5 end) :points("b", function(p) if p.P.y < 0 then p:kill() end end)
-  :points("c", function(p) p.v = p.v * 2 end) :points("d", function(p) p.v = p.v * 3 end) :solve {}
+  :points("a", function(p) p.v = p.v * 0.5 end) :group { name = "low", where = function(p) return p.P.y < 0 end }
+  :delete { group = "low" } :points("b", function(p) if p.P.x < 0 then p:kill() end end) :attribute { heat = 1 }
+  :jitter {} :detail("c", function() end) :points("d", function(p) p.v = p.v * 3 end) :solve {}
+  :points("e", function(p) p.v = p.v * 3 end)
 ]])
-    assert.same({ { "emit1" }, { "a", "b" }, { "c", "d" }, { "solve1" } }, plan_of("scripts.lua").passes)
+    assert.same({ { "emit1" }, { "a", "group1", "delete1", "b", "attribute1", "jitter1" }, { "c" }, { "d" },
+                  { "solve1" }, { "e" } }, plan_of("edits.lua").passes)
+  end)
+
+  it("ends a pass where a result is asked for by others, and where a place is asked for behind a removal", function()
+    write("split.lua", [[
+local edited = rapid.create {} :emit { ]] .. source .. [[ } :solve {} :points("a", function(p) p.v = p.v * 2 end)
+return { high = edited:delete { where = function(p) return p.P.y < 0 end },
+         low = edited:points("b", function(p) if p.P.y > 0 then p:kill() end end)
+           :points("c", function(p) p.v = vec3(p.index, 0, 0) end) :points("d", function(p) p.v = p.v * 3 end) }
+]])
+    assert.same({ { "emit1" }, { "solve1" }, { "a" }, { "delete1" }, { "b" }, { "c", "d" } },
+                plan_of("split.lua").passes)
   end)
 
   it("keeps nothing alive for a node that no output comes from", function()

@@ -303,48 +303,6 @@ return rapid.create { points = rapid.points.grid { size = {40, 40, 40}, spacing 
   end)
 end)
 
-describe("neighbouring kernels", function()
-  -- With a node between them that is no script, each goes over all points by itself.
-  local function texts(count, kernels)
-    local head = ("return rapid.create { points = rapid.points.grid { size = {%d, 20, 20}, spacing = 1 } } " ..
-      ":attribute { heat = 0, seen = 0 } " ..
-      ":group { name = 'g', where = function(p) return p.id %% 3 == 0 end }"):format(count)
-    return head .. table.concat(kernels, " ") .. " :solve {}",
-           head .. table.concat(kernels, " :attribute { heat = 0 } ") .. " :solve {}"
-  end
-
-  it("go over the points together as if one after the other", function()
-    local together, apart = texts(40, {
-      ":points('a', function(p) p.heat = p.heat + p.id if p:rand(1) < 0.5 then p:join 'new' p:leave 'g' end end)",
-      ":points { name = 'b', group = 'new', " ..
-      "kernel = function(p) p.v = p.v + vec3(p.heat, p:rand(2), 0) p:leave 'new' end }",
-      ":points { name = 'c', group = 'g', kernel = function(p) p.seen = p.seen + (p:within 'new' and 10 or 1) end }",
-      ":points('d', function(p) p.heat = p.heat + p.v.y if p.id % 7 == 0 then p:kill() end end)",
-      ":points('e', function(p) p.seen = p.seen + 100 * p.index end)",
-      ":points('f', function(p) p.v = p.v * 0.5 + vec3(p.seen, 0, 0) end)",
-    })
-    local expected = scene.run(apart, { frames = {4, 4}, threads = 1 })[4]
-    assert.equal(13714, #expected)
-    for _, threads in ipairs { 1, 2, 7 } do
-      local points = scene.run(together, { frames = {4, 4}, threads = threads })[4]
-      for _, name in ipairs { "id", "P", "v", "heat", "seen" } do
-        assert.same(values(expected, name), values(points, name))
-      end
-      for _, group in ipairs { "g", "new" } do assert.equal(#expected:group(group), #points:group(group)) end
-    end
-  end)
-
-  it("make the first one's error known, wherever in the points it is", function()
-    local together, apart = texts(40, {
-      ":points('a', function(p) if p.id == 15000 then error 'late' end end)",
-      ":points('b', function(p) if p.id == 10 then error 'early' end end)",
-    })
-    local message = scene.error(apart, { threads = 1 })
-    assert.truthy(message:find("late (point id 15000, frame 2)", 1, true), message)
-    for _, threads in ipairs { 1, 2, 7 } do assert.equal(message, scene.error(together, { threads = threads })) end
-  end)
-end)
-
 describe("a test of a point", function()
   it("can't change it", function()
     assert.equal('scene.lua:1: node "delete1": assigns "v"; a test must not change its point (point id 0, frame 1)',

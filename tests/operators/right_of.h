@@ -11,15 +11,32 @@ class RightOf : public PointFunction {
 public:
     explicit RightOf(float limit) : limit_(limit) {}
     void uses(Uses& uses) const override { uses.reads.push_back("P"); }
-    void test(const PointSet& points, const Evaluation&, std::span<std::uint8_t> result) const override
+    bool asks_places() const override { return false; }
+    std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation&) const override
     {
-        for (std::size_t i = 0; i < points.size(); ++i) {
-            if (points.P()[i].x() == 100) throw Error("asked about a point outside the group");
-            result[i] = points.P()[i].x() > limit_;
-        }
+        return std::make_unique<Test>(points, limit_);
     }
 
 private:
+    class Test : public PointTest {
+    public:
+        Test(const PointSet& points, float limit) : points_(points), limit_(limit) {}
+        void begin(bool) override {}
+        void test(std::size_t begin, std::span<std::uint8_t> selected) const override
+        {
+            for (std::size_t i = 0; i < selected.size(); ++i) {
+                if (!selected[i]) continue;
+                const float x = points_.P()[begin + i].x();
+                if (x == 100) throw Error("asked about a point outside the group");
+                selected[i] = x > limit_;
+            }
+        }
+
+    private:
+        const PointSet& points_;
+        const float limit_;
+    };
+
     float limit_;
 };
 

@@ -1,0 +1,93 @@
+#include "runtime/graph/point_edit.h"
+
+#include <algorithm>
+#include <functional>
+
+#include "runtime/graph/first_error.h"
+#include "runtime/stopwatch.h"
+
+namespace rapid {
+namespace {
+
+template <class F>
+void at_node_of(const Evaluation& now, const F& f)
+{
+    try {
+        f();
+    } catch (Error& error) {
+        error.in_node(now.node).at(now.location);
+        throw;
+    }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> Stretch::choose(Strided<std::uint8_t> members) const
+{
+    std::vector<std::uint8_t> chosen(size(), members[begin]);
+    if (members.stride != 0) std::copy_n(members.data + begin, size(), chosen.begin());
+    if (alive) std::transform(chosen.begin(), chosen.end(), alive, chosen.begin(), std::bit_and<>());
+    return chosen;
+}
+
+void Stretch::remove(std::span<const std::uint8_t> marks) const
+{
+    std::transform(marks.begin(), marks.end(), alive, alive,
+                   [](std::uint8_t mark, std::uint8_t here) -> std::uint8_t { return here & ~mark; });
+}
+
+void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove)
+{
+    if (passes.empty() || points.empty()) return;
+    std::size_t chunk = 0;
+    for (const std::unique_ptr<EditPass>& pass : passes) {
+        at_node_of(pass->now, [&] { pass->begin(); });
+        chunk = std::max(chunk, pass->chunk());
+    }
+    const auto alive = remove ? std::make_unique_for_overwrite<std::uint8_t[]>(points.size()) : nullptr;
+    FirstError first;
+    for_each_chunk(
+        points.size(),
+        [&](std::size_t begin, std::size_t end) {
+            const Stretch stretch{begin, end, alive ? alive.get() + begin : nullptr};
+            if (alive) std::fill_n(stretch.alive, stretch.size(), std::uint8_t{1});
+            for (std::size_t k = 0; k < passes.size(); ++k) {
+                const auto visit = [&] { at_node_of(passes[k]->now, [&] { passes[k]->visit(stretch); }); };
+                if (!first.guard(k, begin, visit)) return;
+            }
+        },
+        chunk);
+    first.rethrow();
+    if (!remove) return;
+    const std::size_t size = points.size();
+    points.keep({alive.get(), size});
+    passes.front()->now.figures.died += size - points.size();
+}
+
+Flow PointEdit::evaluate(std::span<Flow> inputs, const Evaluation& now)
+{
+    PointEdit* const self = this;
+    const Evaluation* const told = &now;
+    edit_together({&self, 1}, {&told, 1}, inputs[0].points);
+    return std::move(inputs[0]);
+}
+
+void edit_together(std::span<PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points)
+{
+    const Stopwatch stopwatch;
+    std::vector<std::unique_ptr<EditPass>> passes;
+    Before before;
+    for (std::size_t k = 0; k < edits.size(); ++k)
+        at_node_of(*now[k], [&] {
+            auto pass = edits[k]->prepare(points, *now[k], before);
+            if (!pass) return;
+            passes.push_back(std::move(pass));
+            before.edits = true;
+            before.removals |= edits[k]->removes_points();
+        });
+    go_over(passes, points, before.removals);
+    if (std::any_of(passes.begin(), passes.end(), [](const auto& pass) { return pass->is_script(); }))
+        now.front()->figures.script_seconds += stopwatch.seconds();
+}
+
+}  // namespace rapid

@@ -5,12 +5,13 @@
 -- Run:    rapid run graphs/embers.lua -f 1-120 -o /tmp/embers.####.png
 local rapid = require "rapid"
 
+local rate = rapid.param("rate", 900, "embers born per second")
 local draught = rapid.param("draught", 2.2, "upward pull of the hottest embers, m/s²")
 
 local coals = rapid.mesh.box { size = {1.6, 0.15, 0.5}, center = {0, 0.075, 0} }
 
 return rapid.create { fps = 24, seed = 3 }
-  :emit      { source = coals, from = "volume", rate = 900, birth = "random", velocity = {0, 0.4, 0}, spread = 60,
+  :emit      { source = coals, from = "volume", rate = rate, birth = "random", velocity = {0, 0.4, 0}, spread = 60,
                attributes = { heat = 1, Cd = {1, 0.7, 0.3} } }
   :points    ("wander", function(p, frame)
       -- Each ember swings at a pace and phase of its own: p:rand(k) is the same in every frame.

@@ -5,6 +5,7 @@
 -- Run:    rapid run graphs/magic.lua -f 1-96 -o /tmp/magic.####.png
 local rapid = require "rapid"
 
+local rate = rapid.param("rate", 6000, "lights born per second at each wand")
 local turn = rapid.param("turn", 5, "radians a second about the axis")
 
 -- Twelve places on a circle, each with a velocity of its own that its children inherit.
@@ -19,9 +20,9 @@ local function wand(radius, height, lift)
 end
 
 return rapid.create { fps = 24, seed = 5 }
-  :emit    { source = wand(0.7, 0.1, 1.1), rate = 6000, birth = "even", life = {1.2, 2}, speed = 0, spread = 0,
+  :emit    { source = wand(0.7, 0.1, 1.1), rate = rate, birth = "even", life = {1.2, 2}, speed = 0, spread = 0,
              attributes = { Cd = {0.35, 0.55, 1} } }
-  :emit    { source = wand(0.35, 2.3, -1.1), rate = 6000, birth = "even", life = {1.2, 2},
+  :emit    { source = wand(0.35, 2.3, -1.1), rate = rate, birth = "even", life = {1.2, 2},
              attributes = { Cd = {1, 0.4, 0.8} } }
   :points  ("wind", function(p)
       -- Turn the place itself about the y axis, and draw the ring together.

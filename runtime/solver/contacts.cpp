@@ -57,12 +57,6 @@ Vec3d somewhere(std::uint32_t i, std::uint32_t j)
     return Vec3d(1.0 + (mixed & 255), 1.0 + (mixed >> 8 & 255), 1.0 + (mixed >> 16 & 255)).normalized();
 }
 
-inline Vec3d direction(std::uint32_t i, std::uint32_t j, const Vec3d& d)
-{
-    const double length = d.norm();
-    return length > 0 ? Vec3d(1 / length * d) : somewhere(i, j);
-}
-
 }  // namespace
 
 void Contacts::follow(const PointSet& points, const ContactOptions& options, const std::string& group)
@@ -144,7 +138,6 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     }
     batches_.assign(1, 0);
     colours_.clear();
-    touching_in_.clear();
 }
 
 void Contacts::search(const Substep& now)
@@ -226,8 +219,8 @@ void Contacts::schedule()
 
     pairs_.resize(m);
     slot_.resize(m);
-    rows_.resize(m);
-    touching_in_.assign(batches_.size() - 1, 0);
+    reach_.resize(m + lanes);
+    if (octets_.size() < batches_.size()) octets_.resize(batches_.size());
     each_batch(false, [&](std::size_t b) { take_turns(b); });
 }
 
@@ -248,6 +241,7 @@ void Contacts::take_turns(std::size_t block)
         for (auto [t, end] : going) {
             const auto [i, k] = turn_[t];
             slot_[k] = slot;
+            reach_[slot] = static_cast<float>(double(radius_[i]) + double(radius_[near_.other[k]]));
             pairs_[slot++] = {i, near_.other[k]};
             going[left] = {t + 1, end};
             left += t + 1 < end;
@@ -285,26 +279,42 @@ template <class F>
 void Contacts::sweep(const F& f)
 {
     each_batch(true, [&](std::size_t b) {
-        Row* rows = rows_.data() + batches_[b];
-        const std::size_t count = touching_in_[b];
+        std::vector<Octet>& octets = octets_[b];
         if (backwards_)
-            for (std::size_t r = count; r-- > 0;) f(rows[r]);
+            std::for_each(octets.rbegin(), octets.rend(), f);
         else
-            for (std::size_t r = 0; r < count; ++r) f(rows[r]);
+            std::for_each(octets.begin(), octets.end(), f);
     });
 }
 
-// Calls f(weights), where weights(row, a, b) are the inverse masses of a row's points, as the row takes them. Of
+template <class F>
+void Contacts::each_row(const Octet& octet, const F& f) const
+{
+    for (std::uint32_t l = 0; l < octet.rows; ++l)
+        f(Row{octet.i[l], octet.j[l], octet.pair[l], octet.reach[l], octet.allowed[l], octet.n[l]});
+}
+
+template <class F>
+void Contacts::each_row(const F& f) const
+{
+    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
+        for (const Octet& octet : octets_[b]) each_row(octet, f);
+}
+
+// Calls f(weights), where weights(octet, a, b) are the inverse masses of the rows' points, as the rows take them. Of
 // another type where they are not scaled: that costs nothing.
 template <class F>
 void Contacts::weighed(const F& f)
 {
-    if (lightness_.empty())
-        f([](const Row&, const Place& a, const Place& b) { return std::array{a.w, b.w}; });
+    struct Weights {
+        Doubles a, b;
+    };
+    if (!scales_)
+        f([](const Octet&, const Places& a, const Places& b) { return Weights{a.w, b.w}; });
     else
-        f([this](const Row& row, const Place& a, const Place& b) {
-            const auto [i, j] = lightness_[static_cast<std::size_t>(&row - rows_.data())];
-            return std::array{i * a.w, j * b.w};
+        f([](const Octet& octet, const Places& a, const Places& b) {
+            const Doubles lighter = widen(octet.lighter);
+            return Weights{lighter * a.w, b.w / lighter};
         });
 }
 
@@ -313,55 +323,115 @@ void Contacts::weighed(const F& f)
 void Contacts::touch(const Substep& now)
 {
     const double at_rest = resting * now.pull * now.dt;
-    lightness_.resize(mass_scaling_ > 0 && !now.up.isZero(0) ? rows_.size() : 0);
-    each_batch(false, [&](std::size_t b) {
+    scales_ = mass_scaling_ > 0 && !now.up.isZero(0);
+    taken_.assign(now.size(), {});
+    each_batch(true, [&](std::size_t b) {
         thread_local std::vector<std::uint32_t> close;
         const std::uint32_t first = batches_[b], last = batches_[b + 1];
-        close.resize(last - first + 1);
+        close.resize(last - first + lanes);
         std::size_t found = 0;
-        for (std::uint32_t k = first; k < last; ++k) {
-            const auto [i, j] = pairs_[k];
-            const double most = near * (double(radius_[i]) + double(radius_[j]));
-            close[found] = k;
-            found += ((now.at[i].P - now.at[j].P).squaredNorm() <= most * most) | (pressed_[k] > 0);
+        for (std::uint32_t k = first; k < last; k += lanes) {
+            const std::uint32_t count = std::min(lanes, last - k);
+            Indices i, j;
+            for (std::uint32_t l = 0; l < lanes; ++l) {
+                const Pair& pair = pairs_[k + std::min(l, count - 1)];
+                i[l] = pair[0], j[l] = pair[1];
+            }
+            Floats reach;
+            std::memcpy(&reach, &reach_[k], sizeof reach);
+            const Vectors<Doubles> d = gather(now.at, i).P - gather(now.at, j).P;
+            const Doubles farthest = near * widen(reach);
+            const std::uint64_t are_near = bytes(dot(d, d) <= farthest * farthest);
+            for (std::uint32_t l = 0; l < count; ++l) {
+                close[found] = k + l;
+                found += (are_near >> 8 * l & 1) | (pressed_[k + l] > 0);
+            }
         }
-        Row* row = rows_.data() + first;
-        for (const std::uint32_t k : std::span(close).first(found)) row += enter(*row, k, at_rest, now);
-        touching_in_[b] = static_cast<std::uint32_t>(row - rows_.data()) - first;
+        const auto end = std::remove_if(close.begin(), close.begin() + static_cast<std::ptrdiff_t>(found),
+                                        [&](std::uint32_t k) { return !may_touch(k, now); });
+        pack({close.begin(), end}, octets_[b]);
+        for (Octet& octet : octets_[b]) enter(octet, at_rest, now);
     });
 }
 
-// Whether the pair k has a row, and what it is.
-bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& now)
+// Whether the pair k has a row where it is near.
+bool Contacts::may_touch(std::uint32_t k, const Substep& now) const
 {
     const auto [i, j] = pairs_[k];
-    const Place &a = now.at[i], &b = now.at[j];
-    if (!(a.w + b.w > 0) && !now.sleepers) return false;
     if (!now.lives(i) || !now.lives(j)) return false;
-    if (!(a.w + b.w > 0)) {
-        // What no constraint moves, and goes its way, wakes a sleeper in it.
-        if (now.v[i] != now.v[j]) now.sleepers->wake(i), now.sleepers->wake(j);
-        return false;
+    if (now.at[i].w + now.at[j].w > 0) return true;
+    // What no constraint moves, and goes its way, wakes a sleeper in it.
+    if (now.sleepers && now.v[i] != now.v[j]) now.sleepers->wake(i), now.sleepers->wake(j);
+    return false;
+}
+
+// Each pair into the first octet with room that comes after those which its points are in: what comes of it is then
+// what would come of one pair after the other, in their order. Octets are open by 64; a pair that finds none of them
+// begins others, so that each takes the same time to find its own.
+void Contacts::pack(std::span<const std::uint32_t> pairs, std::vector<Octet>& octets)
+{
+    octets.clear();
+    std::uint32_t window = 0;  // the number of the open ones: 1 more than that of their first pair
+    std::uint64_t room = 0;    // which of them have any
+    std::size_t first = 0;
+    for (const std::uint32_t k : pairs) {
+        const auto [i, j] = pairs_[k];
+        Taken &a = taken_[i], &b = taken_[j];
+        const std::uint64_t taken = (a.window == window ? a.octets : 0) | (b.window == window ? b.octets : 0);
+        std::uint64_t free = room & ~taken;
+        if (free == 0) {
+            window = k + 1;
+            first = octets.size();
+            free = room = ~std::uint64_t{0};
+        }
+        const auto o = static_cast<std::size_t>(std::countr_zero(free));
+        if (first + o == octets.size()) octets.emplace_back().rows = 0;
+        Octet& octet = octets[first + o];
+        const std::uint32_t l = octet.rows++;
+        octet.i[l] = i, octet.j[l] = j, octet.pair[l] = k;
+        if (octet.rows == lanes) room &= ~(std::uint64_t{1} << o);
+        a = b = {window, (std::uint64_t{2} << o) - 1};
     }
-    const Vec3d apart = now.begin[i] - now.begin[j];
-    const double reach = double(radius_[i]) + double(radius_[j]);
-    row.i = i;
-    row.j = j;
-    row.pair = k;
-    row.reach = static_cast<float>(reach);
-    row.allowed = std::min(0.0f, static_cast<float>(apart.norm() - reach));
-    row.n = direction(i, j, a.P - b.P).cast<float>();
-    row.pressed = row.held = 0.5f * pressed_[k];
-    const Vec3f& rubbed = rubbed_[k];
-    row.rubbed = rubbed - row.n.dot(rubbed) * row.n;
-    row.friction = root_friction_[i] * root_friction_[j];
-    row.per_w = static_cast<float>(1 / (a.w + b.w));
-    if (!lightness_.empty()) scale_masses(row, now);
-    row.leaves = 0;
-    if (!bounces_) return true;
-    const double approach = direction(i, j, apart).dot(now.v[i] - now.v[j]);
-    if (approach < -at_rest) row.leaves = -std::max(bounce_[i], bounce_[j]) * static_cast<float>(approach);
-    return true;
+    for (Octet& octet : octets) octet.repeat_first();
+}
+
+// What the rows are, of pairs that are known.
+void Contacts::enter(Octet& octet, double at_rest, const Substep& now) const
+{
+    const auto directions = [&](const Vectors<Doubles>& d) {
+        const Doubles length = sqrt(dot(d, d));
+        Vectors<Doubles> n = (1 / length) * d;
+        if (any(!(length > 0)))
+            for (std::uint32_t l = 0; l < lanes; ++l)
+                if (!(length[l] > 0)) n.set(l, somewhere(octet.i[l], octet.j[l]));
+        return n;
+    };
+    Doubles reach;
+    Floats pressed, friction;
+    Vectors<Floats> rubbed;
+    for (std::uint32_t l = 0; l < lanes; ++l) {
+        const std::uint32_t i = octet.i[l], j = octet.j[l], k = octet.pair[l];
+        reach[l] = double(radius_[i]) + double(radius_[j]);
+        pressed[l] = pressed_[k];
+        friction[l] = root_friction_[i] * root_friction_[j];
+        rubbed.x[l] = rubbed_[k].x(), rubbed.y[l] = rubbed_[k].y(), rubbed.z[l] = rubbed_[k].z();
+    }
+    const Places a = gather(now.at, octet.i), b = gather(now.at, octet.j);
+    const Vectors<Doubles> apart = gather(now.begin, octet.i) - gather(now.begin, octet.j);
+    octet.reach = narrow(reach);
+    octet.allowed = narrow(least(sqrt(dot(apart, apart)) - reach, Doubles{}));
+    octet.n = narrow(directions(a.P - b.P));
+    octet.pressed = octet.held = 0.5f * pressed;
+    octet.rubbed = rubbed - dot(octet.n, rubbed) * octet.n;
+    octet.friction = friction;
+    octet.per_w = narrow(1 / (a.w + b.w));
+    if (scales_) scale_masses(octet, a, b, now);
+    octet.leaves = Floats{};
+    if (!bounces_) return;
+    const Doubles approach = dot(directions(apart), gather(now.v, octet.i) - gather(now.v, octet.j));
+    for (std::uint32_t l = 0; l < lanes; ++l)
+        if (approach[l] < -at_rest)
+            octet.leaves[l] = -std::max(bounce_[octet.i[l]], bounce_[octet.j[l]]) * static_cast<float>(approach[l]);
 }
 
 // With c = n·up, the upper point is taken as e^(k c) times lighter than the lower: in touch, as if mass fell by
@@ -371,15 +441,15 @@ bool Contacts::enter(Row& row, std::uint32_t k, double at_rest, const Substep& n
 //
 // under a stack of any height, w = 1/m. What is above that, as a fall leaves it, is not carried over: released, it
 // would throw the light ones, as a whip does its end.
-void Contacts::scale_masses(Row& row, const Substep& now)
+void Contacts::scale_masses(Octet& octet, const Places& a, const Places& b, const Substep& now) const
 {
-    const Place &a = now.at[row.i], &b = now.at[row.j];
-    const double k = mass_scaling_, c = row.n.cast<double>().dot(now.up), lighter = std::exp(0.5 * k * c);
-    lightness_[static_cast<std::size_t>(&row - rows_.data())] = {static_cast<float>(lighter),
-                                                                 static_cast<float>(1 / lighter)};
-    row.per_w = static_cast<float>(1 / (lighter * a.w + b.w / lighter));
-    const double borne = now.pull * now.dt / ((c > 0 ? a.w : b.w) * std::abs(c * (lighter - 1 / lighter)));
-    row.pressed = row.held = std::min(row.pressed, static_cast<float>(0.5 * borne));
+    for (std::uint32_t l = 0; l < lanes; ++l) {
+        const double k = mass_scaling_, c = octet.n[l].dot(now.up), lighter = std::exp(0.5 * k * c);
+        octet.lighter[l] = static_cast<float>(lighter);
+        octet.per_w[l] = static_cast<float>(1 / (lighter * a.w[l] + b.w[l] / lighter));
+        const double borne = now.pull * now.dt / ((c > 0 ? a.w[l] : b.w[l]) * std::abs(c * (lighter - 1 / lighter)));
+        octet.pressed[l] = octet.held[l] = std::min(octet.pressed[l], static_cast<float>(0.5 * borne));
+    }
 }
 
 void Contacts::rouse(Substep& now)
@@ -409,17 +479,15 @@ bool Contacts::shock(Substep& now)
 {
     const double at_rest = resting * now.pull * now.dt;
     shock_.clear();
-    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
-        for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
-            const Row& row = rows_[r];
-            const bool first = now.asleep(row.i);
-            if (first == now.asleep(row.j)) continue;
-            const double closing = -row.n.cast<double>().dot(now.v[row.i] - now.v[row.j]);
-            if (closing < at_rest || row.n.cast<double>().dot(now.at[row.i].P - now.at[row.j].P) > row.reach) continue;
-            if (shock_.empty()) shock_.assign(now.size(), 0);
-            const std::uint32_t hit = first ? row.i : row.j, by = first ? row.j : row.i;
-            shock_[hit] = std::max(shock_[hit], closing / now.at[by].w);
-        }
+    each_row([&](const Row& row) {
+        const bool first = now.asleep(row.i);
+        if (first == now.asleep(row.j)) return;
+        const double closing = -row.n.dot(now.v[row.i] - now.v[row.j]);
+        if (closing < at_rest || row.n.dot(now.at[row.i].P - now.at[row.j].P) > row.reach) return;
+        if (shock_.empty()) shock_.assign(now.size(), 0);
+        const std::uint32_t hit = first ? row.i : row.j, by = first ? row.j : row.i;
+        shock_[hit] = std::max(shock_[hit], closing / now.at[by].w);
+    });
     if (shock_.empty()) return false;
     const auto moves = [&](std::size_t i) { return shock_[i] * now.sleepers->inverse_mass(i) >= at_rest; };
     for (bool spreads = true; spreads;) {
@@ -446,13 +514,16 @@ bool Contacts::shock(Substep& now)
     return any;
 }
 
+// N s, on i.
+Vec3f Contacts::impulse(const Row& row) const { return pressed_[row.pair] * row.n.cast<float>() + rubbed_[row.pair]; }
+
 // Wakes the sleeper of a pair that is pressed otherwise than it was.
 void Contacts::disturb(const Row& row, const Substep& now) const
 {
     const bool first = now.asleep(row.i);
     if (first == now.asleep(row.j)) return;
     const std::uint32_t sleeper = first ? row.i : row.j;
-    Vec3f change = pressed_[row.pair] * row.n + rubbed_[row.pair];
+    Vec3f change = impulse(row);
     if (!borne_.empty()) change -= borne_[row.pair];
     if (change.norm() > disturbed * now.dt * now.sleepers->burden(sleeper)) now.sleepers->wake(sleeper);
 }
@@ -461,15 +532,20 @@ void Contacts::prepare(Substep& now)
 {
     const double dt = now.dt;
     weighed([&](const auto& weights) {
-        sweep([&](Row& row) {
-            if (!(row.pressed > 0)) return;
-            Place &a = now.at[row.i], &b = now.at[row.j];
-            const auto [wa, wb] = weights(row, a, b);
-            const Vec3d half = (row.pressed * row.n + 0.5f * row.rubbed).cast<double>();
-            a.P += wa * dt * half;
-            b.P -= wb * dt * half;
-            now.v[row.i] += wa * half;
-            now.v[row.j] -= wb * half;
+        sweep([&](const Octet& octet) {
+            if (!any(widen(octet.pressed) > 0)) return;
+            Places a = gather(now.at, octet.i), b = gather(now.at, octet.j);
+            Vectors<Doubles> va = gather(now.v, octet.i), vb = gather(now.v, octet.j);
+            const auto [wa, wb] = weights(octet, a, b);
+            const Vectors<Doubles> half = widen(octet.pressed * octet.n + 0.5f * octet.rubbed);
+            a.P += (wa * dt) * half;
+            b.P -= (wb * dt) * half;
+            va += wa * half;
+            vb -= wb * half;
+            scatter(a, now.at, octet.i, octet.rows);
+            scatter(b, now.at, octet.j, octet.rows);
+            scatter(va, now.v, octet.i, octet.rows);
+            scatter(vb, now.v, octet.j, octet.rows);
         });
     });
 }
@@ -478,16 +554,19 @@ void Contacts::project(Substep& now)
 {
     const double dt = now.dt, per_dt = per_dt_;
     weighed([&](const auto& weights) {
-        sweep([&](Row& row) {
-            Place &a = now.at[row.i], &b = now.at[row.j];
-            const auto [wa, wb] = weights(row, a, b);
-            const Vec3d n = row.n.cast<double>();
-            const double C = n.dot(a.P - b.P) - row.reach - row.allowed;
-            const double pressed = std::max(0.0, row.pressed - C * per_dt * row.per_w);
-            const double change = dt * (pressed - row.pressed);
-            row.pressed = static_cast<float>(pressed);
-            a.P += wa * change * n;
-            b.P -= wb * change * n;
+        sweep([&](Octet& octet) {
+            Places a = gather(now.at, octet.i), b = gather(now.at, octet.j);
+            const auto [wa, wb] = weights(octet, a, b);
+            const Vectors<Doubles> n = widen(octet.n);
+            const Doubles before = widen(octet.pressed);
+            const Doubles C = dot(n, a.P - b.P) - widen(octet.reach) - widen(octet.allowed);
+            const Doubles pressed = most(before - C * per_dt * widen(octet.per_w), Doubles{});
+            const Doubles change = dt * (pressed - before);
+            octet.pressed = narrow(pressed);
+            a.P += (wa * change) * n;
+            b.P -= (wb * change) * n;
+            scatter(a, now.at, octet.i, octet.rows);
+            scatter(b, now.at, octet.j, octet.rows);
         });
     });
 }
@@ -504,7 +583,7 @@ void Contacts::settle(Substep& now)
 
 void Contacts::take_back(Substep& now)
 {
-    if (uneven_) sweep([&](const Row& row) { take_back(row, now); });
+    if (uneven_) sweep([&](const Octet& octet) { each_row(octet, [&](const Row& row) { take_back(row, now); }); });
 }
 
 // A heavy point on a light one that a shape bears, itself or through others, would go through it: in a sweep the shape
@@ -533,57 +612,64 @@ void Contacts::settle_once(Substep& now, bool last, const Weights& weights)
 {
     const double dt = now.dt;
     const bool watched = last && now.sleepers && now.sleepers->any();
-    // In one piece: with a call for each sum of vectors it takes a third longer.
-    const auto solve = [&](Row & row) __attribute__((flatten))
-    {
-        float& pressed = pressed_[row.pair];
-        Vec3f& rubs = rubbed_[row.pair];
-        Place &a = now.at[row.i], &b = now.at[row.j];
-        const Vec3d n = row.n.cast<double>();
-        const double before = double(row.pressed) + double(row.held);
-        const double overlap = row.reach - n.dot(a.P - b.P);
-        if (!(before > 0) && !(overlap > 0)) {
-            pressed = 0;
-            rubs.setZero();
-            return;
-        }
-        Vec3d &va = now.v[row.i], &vb = now.v[row.j];
+    const auto solve = [&](Octet& octet) {
+        Places a = gather(now.at, octet.i), b = gather(now.at, octet.j);
+        const Vectors<Doubles> n = widen(octet.n), had = widen(octet.rubbed);
+        const Doubles before = widen(octet.pressed) + widen(octet.held), reach = widen(octet.reach);
+        const Doubles overlap = reach - dot(n, a.P - b.P), per_w = widen(octet.per_w);
+        Vectors<Doubles> va = gather(now.v, octet.i), vb = gather(now.v, octet.j);
 
-        const Vec3d relative = va - vb;
-        const double closing = n.dot(relative);
-        const double p = std::max(0.0, before + (row.leaves - closing) * row.per_w);
-        Vec3d push = (p - before) * n, shift = Vec3d::Zero();
-        pressed = row.pressed = static_cast<float>(p);
-        row.held = 0;
-        if (row.friction > 0) {
-            const Vec3d had = row.rubbed.cast<double>();
-            const Vec3d held = had - (relative - closing * n) * row.per_w;
-            const double most = row.friction * p;  // of nothing, a part that is no number: min leaves it out
-            const Vec3d rubbed = std::min(1.0, most / held.norm()) * held, change = rubbed - had;
-            push += change;
-            shift = 0.5 * dt * change;
-            rubs = row.rubbed = rubbed.cast<float>();
-        }
-        const auto [wa, wb] = weights(row, a, b);
+        const Vectors<Doubles> relative = va - vb;
+        const Doubles closing = dot(n, relative);
+        const Flags touches = (before > 0) | (overlap > 0);
+        const Doubles p = touches ? most(before + (widen(octet.leaves) - closing) * per_w, Doubles{}) : Doubles{};
+        const Vectors<Doubles> held = had - per_w * (relative - closing * n);
+        const Doubles size = sqrt(dot(held, held)), bound = widen(octet.friction) * p;
+        const Vectors<Doubles> rubbed = (bound < size ? bound / size : Doubles{} + 1) * held, change = rubbed - had;
+        octet.pressed = narrow(p);
+        octet.rubbed = narrow(rubbed);
+        octet.held = Floats{};
+
+        const Vectors<Doubles> push = (p - before) * n + change;
+        Vectors<Doubles> shift = (0.5 * dt) * change;
+        const auto [wa, wb] = weights(octet, a, b);
         va += wa * push;
         vb -= wb * push;
         if (last) {
-            const bool from_sleeper = watched && (now.asleep(row.i) || now.asleep(row.j));
-            const double part = from_sleeper ? recovery_asleep : recovery;
-            shift += part * std::max(0.0, overlap - left_over * row.reach) * row.per_w * n;
+            Doubles part = Doubles{} + recovery;
+            if (watched)
+                for (std::uint32_t l = 0; l < lanes; ++l)
+                    if (now.asleep(octet.i[l]) || now.asleep(octet.j[l])) part[l] = recovery_asleep;
+            shift += (part * most(overlap - left_over * reach, Doubles{}) * per_w) * n;
         }
         a.P += wa * shift;
         b.P -= wb * shift;
-        if (!last || !(p > 0)) return;
-        const std::uint8_t bi = now.borne[row.i], bj = now.borne[row.j];
-        std::uint8_t &fi = now.found_borne[row.i], &fj = now.found_borne[row.j];
+        scatter(a, now.at, octet.i, octet.rows);
+        scatter(b, now.at, octet.j, octet.rows);
+        scatter(va, now.v, octet.i, octet.rows);
+        scatter(vb, now.v, octet.j, octet.rows);
+        if (!last) return;
+        for (std::uint32_t l = 0; l < octet.rows; ++l) {
+            pressed_[octet.pair[l]] = octet.pressed[l];
+            rubbed_[octet.pair[l]] = octet.rubbed[l].cast<float>();
+        }
+        if (uneven_) bear(octet, now);
+        if (watched) each_row(octet, [&](const Row& row) { disturb(row, now); });
+    };
+    sweep(solve);
+}
+
+// What presses bears, as it is borne.
+void Contacts::bear(const Octet& octet, Substep& now) const
+{
+    for (std::uint32_t l = 0; l < octet.rows; ++l) {
+        if (!(octet.pressed[l] > 0)) continue;
+        const std::uint32_t i = octet.i[l], j = octet.j[l];
+        const std::uint8_t bi = now.borne[i], bj = now.borne[j];
+        std::uint8_t &fi = now.found_borne[i], &fj = now.found_borne[j];
         fi = std::max<std::uint8_t>(fi, std::max<std::uint8_t>(bj, 1) - 1);
         fj = std::max<std::uint8_t>(fj, std::max<std::uint8_t>(bi, 1) - 1);
-    };
-    if (watched)
-        sweep([&](Row& row) { solve(row), disturb(row, now); });
-    else
-        sweep(solve);
+    }
 }
 
 // These, and all that they touch.
@@ -591,12 +677,10 @@ void Contacts::keep_awake(std::span<const std::uint32_t> deep, const Substep& no
 {
     std::vector<std::uint8_t> is_deep(now.size());
     for (const std::uint32_t i : deep) is_deep[i] = 1;
-    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
-        for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
-            const Row& row = rows_[r];
-            if (!is_deep[row.i] && !is_deep[row.j]) continue;
-            for (const std::uint32_t i : {row.i, row.j}) now.sleepers->keep_awake(i);
-        }
+    each_row([&](const Row& row) {
+        if (!is_deep[row.i] && !is_deep[row.j]) return;
+        for (const std::uint32_t i : {row.i, row.j}) now.sleepers->keep_awake(i);
+    });
 }
 
 Residual Contacts::close(Substep& now)
@@ -610,19 +694,17 @@ Residual Contacts::close(Substep& now)
         result.worst = std::max(result.worst, overlap);
         result.loose += overlap > 0.1 * std::min(radius_[i], radius_[j]);
     };
-    for (std::size_t b = 0; b + 1 < batches_.size(); ++b)
-        for (std::uint32_t r = batches_[b]; r < batches_[b] + touching_in_[b]; ++r) {
-            const Row& row = rows_[r];
-            if (now.asleep(row.i) && now.asleep(row.j)) continue;
-            const double overlap = row.reach - (now.at[row.i].P - now.at[row.j].P).norm();
-            count(row.i, row.j, overlap, pressed_[row.pair] > 0);
-            if (!now.sleepers) continue;
-            const Vec3f borne = pressed_[row.pair] * row.n + rubbed_[row.pair];
-            for (const std::uint32_t of : {row.i, row.j}) now.sleepers->load(of, borne.norm() * per_dt_);
-            if (overlap > too_deep_to_sleep * std::min(radius_[row.i], radius_[row.j]))
-                deep.insert(deep.end(), {row.i, row.j});
-            if (!now.asleep(row.i) && !now.asleep(row.j)) borne_[row.pair] = borne;
-        }
+    each_row([&](const Row& row) {
+        if (now.asleep(row.i) && now.asleep(row.j)) return;
+        const double overlap = row.reach - (now.at[row.i].P - now.at[row.j].P).norm();
+        count(row.i, row.j, overlap, pressed_[row.pair] > 0);
+        if (!now.sleepers) return;
+        const Vec3f borne = impulse(row);
+        for (const std::uint32_t of : {row.i, row.j}) now.sleepers->load(of, borne.norm() * per_dt_);
+        if (overlap > too_deep_to_sleep * std::min(radius_[row.i], radius_[row.j]))
+            deep.insert(deep.end(), {row.i, row.j});
+        if (!now.asleep(row.i) && !now.asleep(row.j)) borne_[row.pair] = borne;
+    });
     if (!deep.empty()) keep_awake(deep, now);
     // Pairs that sleep have no row.
     for (std::size_t k = 0; now.sleepers && k < pairs_.size(); ++k) {

@@ -17,7 +17,8 @@
 // after.
 //
 // Rows are ordered by blocks of space, of which every eighth is solved at the same time: neighbours never are, so that
-// the result is the same bits on any number of threads, and momentum is kept.
+// the result is the same bits on any number of threads, and momentum is kept. Those of a block are solved eight at
+// once, packed so that no two of the eight share a point.
 #pragma once
 
 #include <array>
@@ -28,6 +29,7 @@
 
 #include "runtime/solver/constraint.h"
 #include "runtime/solver/contact_search.h"
+#include "runtime/solver/lanes.h"
 #include "runtime/solver/searched_places.h"
 
 namespace rapid {
@@ -61,17 +63,33 @@ public:
 private:
     using Pair = std::array<std::uint32_t, 2>;
 
-    // A pair that touches in this sub-step. A cache line holds it.
+    // Eight pairs that touch in this sub-step and share no point: a row in each lane. Lanes beyond `rows` repeat the
+    // first, and what comes of them is dropped.
+    struct alignas(64) Octet {
+        Indices i, j, pair;
+        std::uint32_t rows;
+        Floats reach;            // m: r_i + r_j
+        Floats allowed;          // m: the overlap at the beginning of the sub-step, at most 0
+        Floats pressed, held;    // N s along n: by places, by velocities
+        Floats friction;         // μ
+        Floats leaves;           // m/s, along n: what a bounce gives it
+        Floats per_w;            // kg: 1 / (w_i + w_j)
+        Floats lighter;          // what w_i is multiplied by, and w_j divided, where masses are scaled
+        Vectors<Floats> n;       // from j to i, unit
+        Vectors<Floats> rubbed;  // N s, across n
+
+        // To all lanes but the first `rows`.
+        void repeat_first()
+        {
+            for (std::uint32_t l = rows; l < lanes; ++l) i[l] = i[0], j[l] = j[0], pair[l] = pair[0];
+        }
+    };
+
+    // One of them, for what is asked now and then.
     struct Row {
         std::uint32_t i, j, pair;
-        float reach;          // m: r_i + r_j
-        float allowed;        // m: the overlap at the beginning of the sub-step, at most 0
-        float pressed, held;  // N s along n: by places, by velocities
-        float friction;       // μ
-        float leaves;         // m/s, along n: what a bounce gives it
-        float per_w;          // kg: 1 / (w_i + w_j)
-        Vec3f n;              // from j to i, unit
-        Vec3f rubbed;         // N s, across n
+        double reach, allowed;
+        Vec3d n;
     };
 
     template <class F>
@@ -79,12 +97,20 @@ private:
     template <class F>
     void sweep(const F& f);
     template <class F>
+    void each_row(const Octet& octet, const F& f) const;
+    template <class F>
+    void each_row(const F& f) const;
+    template <class F>
     void weighed(const F& f);
     void touch(const Substep& now);
-    bool enter(Row& row, std::uint32_t pair, double at_rest, const Substep& now);
-    void scale_masses(Row& row, const Substep& now);
+    bool may_touch(std::uint32_t pair, const Substep& now) const;
+    void pack(std::span<const std::uint32_t> pairs, std::vector<Octet>& octets);
+    void enter(Octet& octet, double at_rest, const Substep& now) const;
+    void scale_masses(Octet& octet, const Places& a, const Places& b, const Substep& now) const;
     bool shock(Substep& now);
+    Vec3f impulse(const Row& row) const;
     void disturb(const Row& row, const Substep& now) const;
+    void bear(const Octet& octet, Substep& now) const;
     void keep_awake(std::span<const std::uint32_t> deep, const Substep& now) const;
     void search(const Substep& now);
     void schedule();
@@ -110,12 +136,18 @@ private:
     // and both together at the end of the last frame in which both were awake, where any may sleep.
     std::vector<float> pressed_, pressed_before_;
     std::vector<Vec3f> rubbed_, rubbed_before_, borne_, borne_before_;
+    std::vector<float> reach_;                // m, of each pair, with room for a few lanes more
     std::vector<std::uint32_t> batches_;      // the beginning of each block's pairs, and the end
     std::vector<std::uint32_t> colours_;      // the beginning of each colour's blocks, and the end
-    std::vector<Row> rows_;                   // of each block, at the place of its pairs
-    std::vector<std::uint32_t> touching_in_;  // of each block, how many
-    // Of each row, what its points' inverse masses are multiplied by; empty where masses are not scaled.
-    std::vector<std::array<float, 2>> lightness_;
+    std::vector<std::vector<Octet>> octets_;  // of each block; beyond these kept for their memory
+    bool scales_ = false;                     // masses, in this sub-step
+
+    // Of a packing: the open octets up to the last that a point is in, by bits, if they are the same ones still.
+    struct Taken {
+        std::uint32_t window = 0;
+        std::uint64_t octets = 0;
+    };
+    std::vector<Taken> taken_;
 
     // Of a search.
     std::vector<std::uint16_t> owner_;  // of each pair, its block

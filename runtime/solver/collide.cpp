@@ -753,9 +753,12 @@ void Collisions::meet(Traveller& t, const Vec3d& P, const Vec3d& v, const Vec3d&
     const double when = consequences_.time - after_[t.i] - t.left;
 
     const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature, ac};
-    if (g < 0 && vn >= -tangential * relative.norm()) {
-        // Flush with the surface, and drawn off it: the next moments belong to the path. (An approach by rounding alone
-        // would be met here again and again, at the same moment.)
+    if (g < 0 && vn >= -tangential * relative.norm() && contact.flat) {
+        // Flush with the surface, and drawn off it. (An approach by rounding alone would be met here again and again,
+        // at the same moment.) What it rests on besides bears it still.
+        v_[t.i] -= std::min(vn, 0.0) * n;
+    } else if (g < 0 && vn >= -tangential * relative.norm()) {
+        // As flush as a field knows: the next moments belong to the path.
         const double s = std::min(t.left, least_bending * dt);
         P_[t.i] += s * (v + 0.5 * s * a);
         v_[t.i] += s * a;

@@ -1,6 +1,7 @@
 // Collision against closed forms: bouncing, sliding, resting; many contacts and many shapes; extremes.
 #include "runtime/solver/collide.h"
 
+#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -256,6 +257,48 @@ TEST_CASE("a point in a corner of three planes rests there", "[collide]")
         .run(480);
     CHECK(scene.P() == Vec3d(0, 0, 0));
     CHECK(scene.v() == Vec3d(0, 0, 0));
+}
+
+// A plane that counts the paths that it is asked about.
+class AskedPlane final : public Shape {
+public:
+    AskedPlane(const Vec3d& normal, double offset) : plane_(make_plane(normal, offset)) {}
+
+    mutable std::atomic<std::size_t> asked = 0;
+
+    Box3d bounds() const override { return plane_->bounds(); }
+    void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
+    {
+        plane_->distance(P, phi, gradient);
+    }
+    void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
+    {
+        asked += paths.size();
+        plane_->first_contact(paths, contacts);
+    }
+
+private:
+    ShapePtr plane_;
+};
+
+TEST_CASE("a point at the foot of a wall that it nears by rounding alone slides along it to a stop", "[collide]")
+{
+    const double overhang = GENERATE(0.0, 1e-10, 1e-9, 1e-8, -1e-8);  // radians
+    const float approach = GENERATE(0.0f, 1e-17f, 1e-14f, 1e-12f, 1e-10f), speed = GENERATE(0.0f, 0.01f, 1.0f);  // m/s
+    const int substeps = GENERATE(1, 8);
+    CAPTURE(overhang, approach, speed, substeps);
+    constexpr float friction = 0.25f, r = 0.0625f;
+    Scene scene(points({{0, r, r}}).v({{speed, 0, -approach}}).set<float>("pscale", {r}));
+    const auto floor = std::make_shared<AskedPlane>(Vec3d(0, 1, 0), 0.0);
+    const auto wall = std::make_shared<AskedPlane>(Vec3d(0, -overhang, 1), 0.0);
+    scene.gravity().collide(floor, 0, friction).collide(wall, 0, friction).substeps(substeps).run(24);
+
+    CHECK_THAT(scene.P(), close_to(Vec3d(speed * speed / (2 * friction * g), r, r), 1e-6));
+    CHECK(scene.P().y() == double(r));
+    CHECK(scene.v() == Vec3d(0, 0, 0));
+    CHECK(scene.penetration_max < 1e-8);
+    // A path or two a sub-step: not at each moment anew, of the floor and of the wall by turns.
+    CHECK(floor->asked + wall->asked < 4u * 24u * static_cast<unsigned>(substeps));
 }
 
 TEST_CASE("a point slides along a wall at the speed that it has along it", "[collide]")

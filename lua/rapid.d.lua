@@ -893,7 +893,7 @@ function Node:randomize(params) end
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, at least 1, default 1]
 ---@field iterations? integer|fun(frame: rapid.Frame): integer  of the constraints, a sub-step [integer, at least 1, default 1]
----@field sleep? number|fun(frame: rapid.Frame): number  at rest, after which points with contacts sleep until something acts on them; math.huge: never [number, s, above 0, default 0.25]
+---@field sleep? number|fun(frame: rapid.Frame): number  at rest, after which points with constraints sleep until something acts on them; math.huge: never [number, s, above 0, default 0.25]
 ---@field tolerance? number|fun(frame: rapid.Frame): number  each point takes as many sub-steps, twice as many and so on, as its own estimated error needs [number, m a frame, above 0]
 ---@field max_substeps? integer|fun(frame: rapid.Frame): integer  the most, with a tolerance [integer, at least 1, default 64]
 ---@field name? string  what the node is called in messages [string]

@@ -1,7 +1,7 @@
 // clump: points that have touched stick together, until they are torn apart (paper, figure 7: wet sand, snow, dirt).
 //
-//   C = |P_i - P_j| - rest, with the distance that the two had when they first touched; breaks where it pulls with more
-//   than `strength` (N)
+//   C = |P_i - P_j| - rest, with the distance that the two had when they first touched, at least the sum of their
+//   radii; breaks where it pulls with more than `strength` (N)
 //
 // A bond that breaks is gone; the points stick again when they have been apart and touch anew. Points that are pressed
 // together further are contact's matter, not that of bonds: a bond only pulls.
@@ -18,6 +18,7 @@ namespace {
 struct Bond {
     static constexpr int points = 2;
     static constexpr bool one_sided = true;  // C = rest - distance >= 0: pulls only
+    static constexpr bool rests = true;
 
     double rest = 0;  // m
 
@@ -34,7 +35,18 @@ struct Bond {
 // The bonds of a node, over a run. New ones are looked for once a frame, where it begins.
 struct Bonds {
     Rows<Bond> rows;
+    double strength = 0;                           // N, of the last frame
     std::set<std::array<std::int64_t, 2>> parted;  // broken, and not yet apart: by id, the smaller first
+
+    // What the last search has seen: where all sleep, there is nothing new.
+    struct Searched {
+        std::vector<std::int64_t> ids;
+        std::vector<Vec3d> at;
+        std::vector<float> reach;
+
+        bool operator==(const Searched&) const = default;
+    };
+    Searched searched;
 };
 
 class ClumpCoupling : public Coupling {
@@ -42,9 +54,11 @@ public:
     ClumpCoupling(std::shared_ptr<Bonds> bonds, double strength) : bonds_(std::move(bonds)), strength_(strength) {}
 
     void tie(std::span<std::uint8_t> tied) const override { bonds_->rows.tie(tied); }
+    void bind(Islands& islands) const override { bonds_->rows.bind(islands); }
     void resume(Substep& now) override { bonds_->rows.resume(now); }
     void prepare(Substep& now) override { bonds_->rows.prepare(now); }
     void project(Substep& now) override { bonds_->rows.project(now); }
+    void suspend(Substep& now) override { bonds_->rows.suspend(now); }
     void settle(Substep& now) override
     {
         bonds_->rows.settle(now);
@@ -65,8 +79,9 @@ public:
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
-        bonds->rows.follow(points, group);
         bond(points);
+        bonds->rows.follow(points, group);
+        if (strength < std::exchange(bonds->strength, strength)) bonds->rows.rouse_all();
         return std::make_shared<ClumpCoupling>(bonds, strength);
     }
 
@@ -79,32 +94,33 @@ private:
         const Strided<std::uint8_t> members = members_of(points, group);
         // What rests on another touches it within rounding, and what solving leaves.
         constexpr float touch = 1.02f;
-        std::vector<float> reach(n);
-        std::vector<Vec3d> at(n);
+        const Strided<std::int64_t> id = points.id().read();
+        Bonds::Searched now{std::vector<std::int64_t>(n), std::vector<Vec3d>(n), std::vector<float>(n)};
+        auto& [ids, at, reach] = now;
         float largest = 0;
         for (std::size_t i = 0; i < n; ++i) {
             reach[i] = members[i] ? touch * given[i] : 0;
+            ids[i] = id[i];
             at[i] = points.P()[i].cast<double>();
             largest = std::max(largest, reach[i]);
         }
+        if (now == bonds->searched) return;
         Pairs near;
         ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, largest / 4, 8), near);
 
-        const Strided<std::int64_t> id = points.id().read();
         std::set<std::array<std::int64_t, 2>> touching;
-        bool any = false;
         for (std::size_t i = 0; i < n; ++i)
             for (const std::uint32_t j : near.of(i)) {
                 const std::array<std::int64_t, 2> pair{std::min(id[i], id[j]), std::max(id[i], id[j])};
                 if (bonds->parted.count(pair)) {
                     touching.insert(pair);
                 } else if (!bonds->rows.has(pair)) {
-                    bonds->rows.add(pair, {(at[i] - at[j]).norm()}, 0);
-                    any = true;
+                    const double touch_at = double(given[i]) + double(given[j]);
+                    bonds->rows.add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
                 }
             }
         bonds->parted = std::move(touching);
-        if (any) bonds->rows.follow(points, group);
+        bonds->searched = std::move(now);
     }
 };
 

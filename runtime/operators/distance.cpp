@@ -31,6 +31,7 @@ namespace {
 
 struct Tie {
     static constexpr int points = 2;
+    static constexpr bool rests = true;
 
     double rest = 0;                                        // m
     double most = std::numeric_limits<double>::infinity();  // m, at which it breaks
@@ -61,7 +62,7 @@ public:
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
         rows_->follow(points, group);
-        return rows_->size() > 0 ? rows_ : nullptr;
+        return rows_->size() > 0 || rows_->rouses() ? rows_ : nullptr;
     }
 
 private:

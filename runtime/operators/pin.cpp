@@ -40,6 +40,7 @@ struct Pin {
 
 struct Along {
     static constexpr int points = 1;
+    static constexpr bool rests = true;  // a target that moves is the coupling's matter
     const Pin* pin;
     int axis;
 
@@ -52,6 +53,7 @@ struct Along {
 
 struct Pins {
     std::map<std::int64_t, Pin> by_id;  // a pin stays where it is in memory
+    std::vector<std::int64_t> held;     // in the last frame
     Rows<Along> springs;                // of all, where they have a compliance
 };
 
@@ -63,6 +65,7 @@ public:
     }
 
     void hold_at(std::size_t i, Pin& pin) { held_.push_back({i, &pin}); }
+    void keep_awake(std::uint32_t i) { awake_.push_back(i); }  // it is held otherwise than it was
 
     void hold(Substep& now) override
     {
@@ -77,11 +80,19 @@ public:
 
     void tie(std::span<std::uint8_t> tied) const override
     {
-        for (const auto& [i, pin] : held_) tied[i] = 1;
+        for (const std::uint32_t i : awake_) tied[i] = 1;
+        pins_->springs.tie(tied);
+    }
+    void bind(Islands& islands) const override
+    {
+        pins_->springs.bind(islands);
+        for (const auto& [i, pin] : held_)
+            if (rigid_) islands.hold(static_cast<std::uint32_t>(i));
     }
     void resume(Substep& now) override { pins_->springs.resume(now); }
     void prepare(Substep& now) override { pins_->springs.prepare(now); }
     void project(Substep& now) override { pins_->springs.project(now); }
+    void suspend(Substep& now) override { pins_->springs.suspend(now); }
     void settle(Substep& now) override { pins_->springs.settle(now); }
     Residual close(Substep& now) override { return pins_->springs.close(now); }
 
@@ -97,7 +108,15 @@ private:
     bool rigid_;
     double h_;  // s, the frame's length
     std::vector<std::pair<std::size_t, Pin*>> held_;
+    std::vector<std::uint32_t> awake_;
 };
+
+bool is_still(const MotionTrack& track)
+{
+    return std::all_of(track.pieces().begin(), track.pieces().end(), [](const MotionTrack::Piece& piece) {
+        return piece.only_translates() && piece.v.isZero(0) && piece.a.isZero(0);
+    });
+}
 
 class PinConstraint : public Constraint {
 public:
@@ -113,10 +132,11 @@ public:
         const Strided<Vec3f> P = points.P().read();
         const Strided<std::int64_t> id = points.id().read();
         const Strided<Vec3f> target = place ? place->read(points) : P;
-        bool any = false;
+        const bool moves = track && !is_still(*track);
+        std::vector<std::int64_t> held;
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!members[i]) continue;
-            any = true;
+            held.push_back(id[i]);
             Pin& pin = pins->by_id[id[i]];
             const Vec3d to = target[i].cast<double>();
             if (!pin.taken) {
@@ -130,9 +150,26 @@ public:
                 pin.to = to;
             }
             coupling->hold_at(i, pin);
+            if (moves || pin.from != pin.to) coupling->keep_awake(static_cast<std::uint32_t>(i));
         }
         pins->springs.follow(points, group);
+        std::sort(held.begin(), held.end());
+        if (held != pins->held) keep_changed_awake(*coupling, PlacesById(points.id()), held);
+        const bool any = !held.empty() || !pins->held.empty();
+        pins->held = std::move(held);
         return any ? coupling : nullptr;
+    }
+
+private:
+    // Points that are held in only one of two frames; their ids ascend.
+    void keep_changed_awake(PinCoupling& coupling, const PlacesById& places,
+                            const std::vector<std::int64_t>& held) const
+    {
+        std::vector<std::int64_t> changed;
+        std::set_symmetric_difference(held.begin(), held.end(), pins->held.begin(), pins->held.end(),
+                                      std::back_inserter(changed));
+        for (const std::int64_t id : changed)
+            if (places[id] != PlacesById::none) coupling.keep_awake(places[id]);
     }
 };
 

@@ -46,7 +46,7 @@ struct Solve {
             .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
             .param(&Solve::iterations, "iterations", 1.0, at_least(1), "", "of the constraints, a sub-step")
             .param(&Solve::sleep, "sleep", 0.25, or_infinity(above(0)), "s",
-                   "at rest, after which points with contacts sleep until something acts on them; math.huge: never")
+                   "at rest, after which points with constraints sleep until something acts on them; math.huge: never")
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
                    "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")
             .param(&Solve::max_substeps, "max_substeps", 64.0, at_least(1), "", "the most, with a tolerance")

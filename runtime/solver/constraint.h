@@ -9,7 +9,8 @@
 //   prepare()                       what the rows did before
 //   project()                       P = x~ + Δx, as often as the solve has iterations; Δx = w ∇C Δλ
 //   v+ = v + a dt + Δx/dt           never the difference of stored positions
-//   settle()                        velocities: friction, restitution; v+ + Δx/(2dt) between sub-steps, 0 at rest
+//   suspend()                       v+ + Δx/(2dt) between sub-steps: 0 at rest
+//   settle()                        velocities: friction, restitution
 //   take_back()                     what shapes have had the last word on, and has come out too far off
 //
 // w is the inverse mass times v_of_a / dt, with v_of_a what a constant acceleration does to the velocity of a point
@@ -91,8 +92,10 @@ public:
     virtual ~Coupling() = default;
 
     // Places and velocities become those that the projection starts from: without half of what the rows did in the
-    // sub-step before, which settle() adds again. So velocities between sub-steps are what they seem, 0 at rest.
+    // sub-step before, which suspend() adds again. So velocities between sub-steps are what they seem, 0 at rest, and
+    // what others settle is all of them.
     virtual void resume(Substep&) {}
+    virtual void suspend(Substep&) {}
 
     virtual void hold(Substep&) {}
     virtual void rouse(Substep&) {}
@@ -104,6 +107,8 @@ public:
     // Before the first sub-step: sets to 1 the points that are not to sleep in this frame. All, but where a coupling
     // knows better.
     virtual void tie(std::span<std::uint8_t> tied) const { std::fill(tied.begin(), tied.end(), std::uint8_t{1}); }
+    // And which of them are to fall asleep and wake as one.
+    virtual void bind(Islands&) const {}
 
     // The last sub-step is over. What the next frame begins with is kept.
     virtual Residual close(Substep& now) = 0;

@@ -506,11 +506,9 @@ bool Contacts::shock(Substep& now)
     for (std::size_t i = 0; i < now.size(); ++i) {
         if (!now.asleep(i) || !moves(i)) continue;
         any = true;
-        now.sleepers->wake(i);
-        now.at[i].w = now.sleepers->inverse_mass(i) * now.yield_of(i).v / now.dt;
-        now.at[i].P += now.yield_of(i).x * now.sleepers->pull(i);
-        now.v[i] += now.yield_of(i).v * now.sleepers->pull(i);
+        now.sleepers->rouse(i, now);
     }
+    now.sleepers->rouse(now);
     return any;
 }
 

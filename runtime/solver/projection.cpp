@@ -34,6 +34,7 @@ void Projection::open(const Substep& now, const ShapeLoads* loads, const Column<
 void Projection::advance(Substep& now)
 {
     if (!(now.dt > 0)) return;
+    if (now.sleepers) now.sleepers->rouse(now);
     each([&](Coupling& coupling) { coupling.resume(now); });
     each([&](Coupling& coupling) { coupling.hold(now); });
     find_borne(now);
@@ -50,6 +51,7 @@ void Projection::advance(Substep& now)
     for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) now.v[i] += (now.at[i].P - free_[i]) / now.dt;
     });
+    each([&](Coupling& coupling) { coupling.suspend(now); });
     each([&](Coupling& coupling) { coupling.settle(now); });
     if (shapes_) shapes_->settle(now);
     each([&](Coupling& coupling) { coupling.take_back(now); });

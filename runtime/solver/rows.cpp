@@ -18,6 +18,10 @@ std::uint32_t PlacesById::operator[](std::int64_t id) const
         const auto found = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair(id, std::uint32_t{0}));
         return found != sorted_.end() && found->first == id ? found->second : none;
     }
+    if (size_ > 0) {  // where none has died yet
+        const auto nth = static_cast<std::uint64_t>(id) - static_cast<std::uint64_t>(ids_[0]);
+        if (nth < size_ && ids_[nth] == id) return static_cast<std::uint32_t>(nth);
+    }
     std::size_t low = 0, high = size_;
     while (low < high) {
         const std::size_t middle = (low + high) / 2;

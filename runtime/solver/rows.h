@@ -3,6 +3,8 @@
 //   Δλ = (-C - α~ λ) / (Σ w |∇C|² + α~),   Δx = w ∇C Δλ,   α~ = α / dt²
 //
 // The multiplier λ is accumulated over the iterations of a sub-step: reset in each, it would make every spring rigid.
+// One-sided rows begin with that of the sub-step before, as contacts do (contacts.h): what presses and what pulls in a
+// heap is then in balance before it is iterated.
 // A kind is
 //
 //   struct Tie {
@@ -11,6 +13,8 @@
 //                                                                                       compliance to go with it
 //       static constexpr bool one_sided = true;   where C >= 0 satisfies it (pushes only); false if not said
 //       bool breaks(double residual) const;       where it can: asked at the end of every sub-step
+//       static constexpr bool rests = true;       where its points may sleep (sleep.h): what it does depends on nothing
+//                                                 but their places and its own members; false if not said
 //       Eigen::Matrix3d curvature(const std::array<Vec3d, 2>& P) const;   where it has one: the second derivative of
 //                                                             the residual by P[0] - P[1]; keeps taut ropes stable
 //   };
@@ -71,6 +75,7 @@ public:
     {
         const PlacesById place(points.id());
         const Strided<std::uint8_t> members = members_of(points, group);
+        roused_.clear();
         for (Row& row : rows_) {
             row.acts = true;
             for (int k = 0; k < arity; ++k) {
@@ -79,8 +84,10 @@ public:
                 row.at[k] = i;
                 row.acts &= i != PlacesById::none && members[i];
             }
-            changed_ |= row.acts != row.acted;
+            const bool other = row.acts != row.acted;
+            changed_ |= other;
             row.acted = row.acts;
+            if (rests && (other || (row.acts && differs(row, points)))) note(row);
         }
         drop([](const Row& row) { return std::find(row.at.begin(), row.at.end(), PlacesById::none) != row.at.end(); });
         if (std::exchange(listed_, true)) return;
@@ -95,28 +102,45 @@ public:
     {
         const double most = force * now.dt * now.dt;
         drop([&](const Row& row) {
-            if (!row.acts || !(std::abs(row.lambda) > most)) return false;
+            if (!row.acts || row.sleeps || !(std::abs(row.lambda) > most)) return false;
             tell(row.ids);
+            let_go(row, now);
             return true;
         });
     }
 
+    // Whether points are not what they were, as follow() has found: they are to be told of, even by no row.
+    bool rouses() const { return !roused_.empty(); }
+    // Those of all rows are to be looked at anew in this frame.
+    void rouse_all()
+    {
+        for (const Row& row : rows_) note(row);
+    }
+
     void tie(std::span<std::uint8_t> tied) const override
     {
+        for (const std::uint32_t i : roused_) tied[i] = 1;
+        if (rests) return;
         for (const Row& row : rows_)
             for (int k = 0; row.acts && k < arity; ++k) tied[row.at[k]] = 1;
     }
 
-    void resume(Substep& now) override
+    void bind(Islands& islands) const override
     {
         for (const Row& row : rows_)
-            for (int k = 0; row.acts && k < arity; ++k) {
-                const std::uint32_t i = row.at[k];
-                if (!(now.at[i].w > 0)) continue;
-                const Yield by = now.yield_of(i);
-                now.at[i].P -= (by.v * now.dt - by.x) * row.pull[k];
-                now.v[i] -= 0.5 * by.v * row.pull[k];
-            }
+            if (rests && row.acts && !(one_sided && row.lambda == 0)) islands.bind(row.at);
+    }
+
+    void resume(Substep& now) override
+    {
+        keep_forces(now.dt);
+        for (Row& row : rows_) {
+            row.sleeps = sleeps(row, now);
+            if (row.sleeps)
+                wake_by_moving(row, now);
+            else
+                resume(row, now);
+        }
     }
 
     void prepare(Substep& now) override
@@ -125,13 +149,20 @@ public:
             for (Row& row : rows_)
                 for (const std::uint32_t i : row.at) changed_ |= row.acts && now.dead[i], row.acts &= !now.dead[i];
         }
+        // What a shock has woken since.
+        for (Row& row : rows_)
+            if (row.sleeps && !sleeps(row, now)) row.sleeps = false, resume(row, now);
         schedule(now);
         std::array<Vec3d, arity> P;
         for (Row& row : rows_) {
-            if (!row.acts) continue;
+            if (!row.acts || row.sleeps) continue;
             for (int k = 0; k < arity; ++k) P[k] = now.begin[row.at[k]];
             row.kind.residual(P, row.along);
-            row.before = std::exchange(row.lambda, 0);
+            row.before = row.lambda;
+            if (one_sided)
+                for (int k = 0; k < arity; ++k) now.at[row.at[k]].P += now.at[row.at[k]].w * row.lambda * row.along[k];
+            else
+                row.lambda = 0;
         }
     }
 
@@ -148,32 +179,42 @@ public:
         for (const std::uint32_t r : order.last(colours_.in_turn)) solve(rows_[r], now, per_dt2);
     }
 
-    void settle(Substep& now) override
+    void suspend(Substep& now) override
     {
         const double per_dt2 = 1 / (now.dt * now.dt);
         for (Row& row : rows_)
-            for (int k = 0; row.acts && k < arity; ++k) {
+            for (int k = 0; row.acts && !row.sleeps && k < arity; ++k) {
                 const std::uint32_t i = row.at[k];
                 const Yield by = now.yield_of(i);
                 row.pull[k] = now.at[i].w * (now.dt / by.v) * row.lambda * per_dt2 * row.along[k];
                 now.v[i] += 0.5 * by.v * row.pull[k];
             }
+    }
+
+    void settle(Substep& now) override
+    {
+        if (one_sided && now.sleepers && now.sleepers->any()) disturb(now);
         if constexpr (requires(const Kind& kind) { kind.breaks(0.0); })
             drop([&](const Row& row) {
                 std::array<Vec3d, arity> gradient;
-                return row.acts && row.kind.breaks(evaluate(row, now, gradient));
+                const bool breaks = row.acts && !row.sleeps && row.kind.breaks(evaluate(row, now, gradient));
+                if (breaks) let_go(row, now);
+                return breaks;
             });
     }
 
     Residual close(Substep& now) override
     {
+        keep_forces(now.dt);
         Residual result;
         const double per_dt2 = 1 / (now.dt * now.dt);
         std::array<Vec3d, arity> gradient;
-        for (const Row& row : rows_) {
+        for (Row& row : rows_) {
             if (!row.acts) continue;
             ++result.rows;
-            double C = evaluate(row, now, gradient) + row.compliance * per_dt2 * row.lambda;
+            const double residual = evaluate(row, now, gradient);
+            if (!row.exact) row.left = residual;
+            double C = residual + row.compliance * per_dt2 * row.lambda;
             if (one_sided) C = std::min(C, 0.0);
             result.worst = std::max(result.worst, std::abs(C));
             if constexpr (arity > 1)
@@ -185,6 +226,11 @@ public:
 private:
     static constexpr bool one_sided = [] {
         if constexpr (requires { Kind::one_sided; }) return Kind::one_sided;
+        return false;
+    }();
+
+    static constexpr bool rests = [] {
+        if constexpr (requires { Kind::rests; }) return Kind::rests;
         return false;
     }();
 
@@ -203,6 +249,10 @@ private:
         std::array<Vec3d, arity> along = zero();  // the gradient that it acts along
         std::array<Vec3d, arity> pull = zero();   // m/s², of each point at the end of a sub-step
         bool acts = true, acted = false;
+        bool sleeps = false;  // in this sub-step: none of its points moves, as one of them sleeps
+        // The residual as the last frame left it; to the bit where it began with all points without velocity.
+        double left = std::numeric_limits<double>::quiet_NaN();
+        bool exact = false;
 
         static std::array<Vec3d, arity> zero()
         {
@@ -217,6 +267,80 @@ private:
             return places;
         }
     };
+
+    void note(const Row& row)
+    {
+        for (const std::uint32_t i : row.at)
+            if (i != PlacesById::none) roused_.push_back(i);
+    }
+
+    // Whether what holds points that may be asleep is not what it was: one that no row moves has moved.
+    static bool differs(Row& row, const PointSet& points)
+    {
+        const Strided<Vec3f> places = points.P().read(), v = points.v().read();
+        std::array<Vec3d, arity> P, gradient;
+        for (int k = 0; k < arity; ++k) {
+            if (!v[row.at[k]].isZero(0)) return row.exact = false;
+            P[k] = places[row.at[k]].template cast<double>();
+        }
+        const double C = row.kind.residual(P, gradient);
+        double rounding = 0;
+        for (int k = 0; k < arity && !row.exact; ++k) rounding += 0x1p-22 * P[k].norm() * gradient[k].norm();
+        const double change = std::abs(C - row.left);
+        row.left = C;
+        row.exact = true;
+        return change > rounding;
+    }
+
+    static bool sleeps(const Row& row, const Substep& now)
+    {
+        if (!rests || !row.acts || !now.sleepers) return false;
+        bool any = false;
+        for (const std::uint32_t i : row.at) {
+            if (now.at[i].w > 0) return false;
+            any |= now.asleep(i);
+        }
+        return any;
+    }
+
+    // What no row moves, and goes its way, wakes the sleepers that are tied to it.
+    static void wake_by_moving(const Row& row, const Substep& now)
+    {
+        const bool moves = std::any_of(row.at.begin(), row.at.end(),
+                                       [&](std::uint32_t i) { return !now.asleep(i) && !now.v[i].isZero(0); });
+        if (!moves) return;
+        for (const std::uint32_t i : row.at) now.sleepers->wake(i);
+    }
+
+    // Wakes sleepers that a row begins to act on which did not when they fell asleep.
+    void disturb(const Substep& now) const
+    {
+        constexpr double disturbed = 0.1;  // of what they bear
+        for (const Row& row : rows_)
+            for (int k = 0; row.acts && !row.sleeps && row.lambda > 0 && k < arity; ++k) {
+                const std::uint32_t i = row.at[k];
+                if (now.asleep(i) && row.lambda > disturbed * now.dt * now.dt * now.sleepers->burden(i))
+                    now.sleepers->wake(i);
+            }
+    }
+
+    // The points of a row that is gone do not fall asleep in this frame.
+    static void let_go(const Row& row, const Substep& now)
+    {
+        if (now.sleepers)
+            for (const std::uint32_t i : row.at) now.sleepers->keep_awake(i);
+    }
+
+    static void resume(const Row& row, Substep& now)
+    {
+        for (int k = 0; row.acts && k < arity; ++k) {
+            const std::uint32_t i = row.at[k];
+            if (!(now.at[i].w > 0)) continue;
+            const Yield by = now.yield_of(i);
+            now.at[i].P -= (by.v * now.dt - by.x) * row.pull[k];
+            now.v[i] -= 0.5 * by.v * row.pull[k];
+        }
+    }
 
     static double evaluate(const Row& row, const Substep& now, std::array<Vec3d, arity>& gradient)
     {
@@ -303,6 +427,14 @@ private:
                           [&](const auto& range) { solve_trees(range.begin(), range.end()); });
     }
 
+    // Sleepers keep their forces, which multipliers are but for dt².
+    void keep_forces(double dt)
+    {
+        if (dt_ > 0 && dt_ != dt)
+            for (Row& row : rows_) row.lambda *= dt / dt_ * (dt / dt_);
+        dt_ = dt;
+    }
+
     template <class F>
     void drop(const F& gone)
     {
@@ -320,7 +452,8 @@ private:
 
         std::vector<std::uint32_t> acting, ends;
         for (std::uint32_t r = 0; r < rows_.size(); ++r)
-            if (rows_[r].acts) acting.push_back(r), ends.insert(ends.end(), rows_[r].at.begin(), rows_[r].at.end());
+            if (rows_[r].acts && !rows_[r].sleeps)
+                acting.push_back(r), ends.insert(ends.end(), rows_[r].at.begin(), rows_[r].at.end());
         forest_ = {};
         if constexpr (direct) {
             forest_ = Forest(ends, now.size(), fixed_);
@@ -339,6 +472,8 @@ private:
     std::vector<Ids> known_;  // sorted
     bool listed_ = false;     // all rows are in known_
     bool changed_ = true;
+    double dt_ = 0;                      // s, of the last sub-step
+    std::vector<std::uint32_t> roused_;  // points whose rows are not what they were
     std::vector<std::uint8_t> fixed_;
     Forest forest_;
     Colours colours_;

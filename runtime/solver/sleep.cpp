@@ -17,8 +17,12 @@ namespace {
 // of it a second after it has stopped; more would hold a slope that still slides, less be reached much later.
 constexpr double still_way = 0.05, still_speed = 0.25;
 
-// How much a pull may change until it is another, as a part of it.
-constexpr double another_pull = 0.1;
+// What hangs is still that, in the time that it takes to fall asleep, gains no more speed than this part of what pulls
+// it would give it. So a pendulum stays awake that is off by 2e-4 of its length, by any number of sub-steps.
+constexpr double still_hanging = 1e-4;
+
+// How much a pull may change until it is another, as a part of it: friction holds what lies, and nothing what hangs.
+constexpr double another_pull = 0.1, another_pull_bound = 1e-3;
 
 // A shape is touched that is as near as this, in radii: what rests on one is flush with it.
 constexpr double touch = 0.01;
@@ -31,9 +35,10 @@ constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 }  // namespace
 
 Sleepers::Sleepers(PointSet& points, const SleepMemory& memory, std::span<const double> weight,
-                   std::span<const std::uint8_t> tied, double after)
+                   std::span<const std::uint8_t> tied, const Islands& islands, double after)
     : points_(points),
       weight_(weight),
+      islands_(islands),
       asleep_(points.size()),
       tied_(tied.begin(), tied.end()),
       pull_(points.size(), Vec3d::Constant(unknown)),
@@ -45,15 +50,50 @@ Sleepers::Sleepers(PointSet& points, const SleepMemory& memory, std::span<const 
     const Strided<Vec3f> P = std::as_const(points).P().read(), v = std::as_const(points).v().read();
     for (std::size_t i = 0; i < asleep_.size(); ++i)
         asleep_[i] = still[i] >= after_ && weight_[i] > 0 && !tied_[i] && v[i].isZero(0);
+    for (std::size_t k = 0; k < islands_.size(); ++k) {
+        const std::span<const std::uint32_t> island = islands_[k];
+        slept_.push_back(
+            std::all_of(island.begin(), island.end(), [&](std::uint32_t i) { return still[i] >= after_; }));
+    }
     const PlacesById place(points.id());
     for (const SleepMemory::Bed& bed : memory.beds) {
         const std::uint32_t i = place[bed.id];
         if (i == PlacesById::none) continue;
-        if (P[i] != bed.P) asleep_[i] = 0;
+        if (P[i] != bed.P || weight_[i] != bed.weight) asleep_[i] = 0;
         pull_[i] = bed.pull.cast<double>();
         grip_[i] = bed.grip;
         load_[i] = bed.load;
     }
+    for (std::size_t k = 0; k < islands_.size(); ++k) spread(k);
+}
+
+// Wakes all of an island unless all of it sleeps.
+void Sleepers::spread(std::size_t k)
+{
+    const std::span<const std::uint32_t> island = islands_[k];
+    if (std::all_of(island.begin(), island.end(), [&](std::uint32_t i) { return asleep_[i] != 0; })) return;
+    for (const std::uint32_t i : island) asleep_[i] = 0;
+}
+
+void Sleepers::rouse(Substep& now)
+{
+    if (!woken_) return;
+    for (std::size_t k = 0; k < islands_.size(); ++k) {
+        const std::span<const std::uint32_t> island = islands_[k];
+        spread(k);
+        if (asleep_[island.front()]) continue;
+        for (const std::uint32_t i : island)
+            if (!(now.at[i].w > 0)) rouse(i, now);
+    }
+}
+
+void Sleepers::rouse(std::size_t i, Substep& now)
+{
+    wake(i);
+    if (islands_.holds(i)) return;
+    now.at[i].w = weight_[i] * now.yield_of(i).v / now.dt;
+    now.at[i].P += now.yield_of(i).x * pull_[i];
+    now.v[i] += now.yield_of(i).v * pull_[i];
 }
 
 // Which shapes each point touches, and how they hold it: 1 and the friction for each.
@@ -98,10 +138,14 @@ void Sleepers::begin(const Substep& now, std::span<const Obstacle> obstacles)
         sleepers.clear();
         for (std::size_t i = 0; i < asleep_.size(); ++i)
             if (asleep_[i]) sleepers.push_back(static_cast<std::uint32_t>(i));
-        count_ = sleepers.size();
+        count_ = still_ = sleepers.size();
+        for (std::size_t i = 0; i < asleep_.size(); ++i) still_ += !(weight_[i] > 0) && !tied_[i] && now.v[i].isZero(0);
     };
     list();
-    if (sleepers.empty()) return;
+    if (sleepers.empty()) {
+        woken_ = false;
+        return;
+    }
 
     std::vector<Vec3d> P(asleep_.size());
     for (const std::uint32_t i : sleepers) P[i] = now.at[i].P;
@@ -110,7 +154,7 @@ void Sleepers::begin(const Substep& now, std::span<const Obstacle> obstacles)
         for (std::size_t k = 0; k < sleepers.size(); ++k) {
             float& known = grip_[sleepers[k]];
             if (std::isnan(known)) known = found[k];
-            if (known != found[k]) asleep_[sleepers[k]] = 0;
+            if (known != found[k]) wake(sleepers[k]);
         }
     }
     for (const Obstacle& obstacle : obstacles) {
@@ -130,12 +174,15 @@ void Sleepers::begin(const Substep& now, std::span<const Obstacle> obstacles)
             }
         });
     }
+    for (std::size_t k = 0; woken_ && k < islands_.size(); ++k) spread(k);
+    woken_ = false;
     list();
 }
 
 void Sleepers::feel(std::size_t i, const Vec3d& pull)
 {
-    if (asleep_[i] && pull_[i].allFinite() && (pull - pull_[i]).norm() > another_pull * pull_[i].norm()) wake(i);
+    const double another = islands_.binds(i) ? another_pull_bound : another_pull;
+    if (asleep_[i] && pull_[i].allFinite() && (pull - pull_[i]).norm() > another * pull_[i].norm()) wake(i);
     if (!asleep_[i] || !pull_[i].allFinite()) pull_[i] = pull;
 }
 
@@ -145,25 +192,56 @@ void Sleepers::unload()
         if (!asleep_[i]) load_[i] = 0;
 }
 
+// Those of islands in which nothing lies on a shape or on another point.
+std::vector<std::uint8_t> Sleepers::find_hanging(const Substep& now) const
+{
+    std::vector<std::uint8_t> hangs(islands_.size() > 0 ? asleep_.size() : 0);
+    for (std::size_t k = 0; k < islands_.size() && !now.found_borne.empty(); ++k) {
+        const std::span<const std::uint32_t> island = islands_[k];
+        if (std::none_of(island.begin(), island.end(),
+                         [&](std::uint32_t i) { return load_[i] > 0 || now.found_borne[i] > 0; }))
+            for (const std::uint32_t i : island) hangs[i] = 1;
+    }
+    return hangs;
+}
+
 void Sleepers::close(Substep& now, std::span<const Vec3f> begin, const OwnTime& lived)
 {
-    const double h = lived.h;
+    const auto h = static_cast<float>(lived.h);
     const std::span<float> still = points_.column<float>("still").write();
-    const double speed = now.pull * now.dt;
+    const double gained = now.pull * now.dt;  // m/s, in a sub-step
+    const double hanging = still_hanging * now.pull * after_;
+    for (std::size_t k = 0; k < islands_.size(); ++k) spread(k);
+    const std::vector<std::uint8_t> hangs = find_hanging(now);
     for_each_chunk(asleep_.size(), [&](std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i) {
             if (asleep_[i]) continue;
+            const bool bound = islands_.binds(i);
+            const double most = bound && hangs[i] ? hanging : std::numeric_limits<double>::infinity();
             const double way = (now.at[i].P - begin[i].cast<double>()).norm();
-            const bool is_still = weight_[i] > 0 && !tied_[i] && now.lives(i) && !(lived(i) < h) &&
-                                  way <= still_way * speed * h && now.v[i].norm() <= still_speed * speed && speed > 0;
+            const bool is_still = weight_[i] > 0 && !tied_[i] && now.lives(i) && !(lived(i) < lived.h) && gained > 0 &&
+                                  way <= std::min(still_way * gained, most) * lived.h &&
+                                  now.v[i].norm() <= std::min(still_speed * gained, most);
             // A sleeper that has woken begins anew.
-            still[i] = is_still && still[i] < after_ ? still[i] + static_cast<float>(h) : 0;
-            if (!(still[i] >= after_)) continue;
-            asleep_[i] = 1;
-            grip_[i] = unknown;
-            now.v[i].setZero();
+            still[i] = is_still && (bound || still[i] < after_) ? still[i] + h : 0;
+            if (!bound && still[i] >= after_) rest(i, now);
         }
     });
+    for (std::size_t k = 0; k < islands_.size(); ++k) {
+        const std::span<const std::uint32_t> island = islands_[k];
+        if (asleep_[island.front()]) continue;
+        if (slept_[k])
+            for (const std::uint32_t i : island) still[i] = 0;
+        if (std::all_of(island.begin(), island.end(), [&](std::uint32_t i) { return still[i] >= after_; }))
+            for (const std::uint32_t i : island) rest(i, now);
+    }
+}
+
+void Sleepers::rest(std::size_t i, Substep& now)
+{
+    asleep_[i] = 1;
+    grip_[i] = unknown;
+    now.v[i].setZero();
 }
 
 void Sleepers::remember(SleepMemory& memory, const PointSet& points, const Substep& now,
@@ -182,7 +260,8 @@ void Sleepers::remember(SleepMemory& memory, const PointSet& points, const Subst
     memory.beds.clear();
     const Strided<std::int64_t> id = points.id().read();
     for (std::size_t i = 0; i < asleep_.size(); ++i)
-        if (asleep_[i]) memory.beds.push_back({id[i], rounded[i], pull_[i].cast<float>(), grip_[i], load_[i]});
+        if (asleep_[i])
+            memory.beds.push_back({id[i], rounded[i], weight_[i], pull_[i].cast<float>(), grip_[i], load_[i]});
 }
 
 }  // namespace rapid

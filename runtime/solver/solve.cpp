@@ -282,11 +282,16 @@ private:
             now.yields = yields;
         }
         projection.open(now, options_.loads, ids);
+        Islands islands(weight);
         std::optional<Sleepers> sleepers;
         if (options_.beds && std::isfinite(options_.sleep) && points_.has("still")) {
             std::vector<std::uint8_t> tied(n);
-            for (const LocalConstraint& local : scene_.constraints) local.coupling->tie(tied);
-            sleepers.emplace(points_, *options_.beds, weight, tied, options_.sleep);
+            for (const LocalConstraint& local : scene_.constraints) {
+                local.coupling->tie(tied);
+                local.coupling->bind(islands);
+            }
+            islands.close();
+            sleepers.emplace(points_, *options_.beds, weight, tied, islands, options_.sleep);
             now.sleepers = &*sleepers;
         }
         for (int substep = 0; substep < options_.substeps; ++substep) {

@@ -28,6 +28,22 @@ local function same(a, b)
   return true
 end
 
+-- A net of 36 knots in air that hangs on pins at its corners, by frames; with what is given in place of the default.
+local function net(with, last)
+  local text = [[
+local places = {}
+for i = 0, 5 do for j = 0, 5 do places[#places + 1] = {0.09 * i, 0, 0.09 * j} end end
+local corners = { [0] = true, [5] = true, [30] = true, [35] = true }
+return rapid.create { fps = 24, points = rapid.points.from { P = places } }
+  :points ("script", function(p, frame) SCRIPT end)
+  :gravity {} :drag { linear = 4 } :wind { velocity = WIND, drag = 1 } :distance { within = 0.1, rest = 0.1 }
+  :group { name = "corner", where = function(p, frame) return corners[p.id] and HELD end }
+  :pin { group = "corner", PIN } :solve { substeps = 8 }]]
+  local default = { SCRIPT = "", WIND = "{0, 0, 0}", HELD = "true", PIN = "" }
+  text = text:gsub("%u%u+", function(name) return with[name] or default[name] end)
+  return scene.run(text, { frames = {1, last} })
+end
+
 describe("sleep", function()
   it("leaves a heap that rests as it is, and out of what is written", function()
     local result = scene.run(heap(floor), { frames = {96, 144} })
@@ -74,5 +90,87 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}}, 
       if (P - result[60][i].P):length() > 0.05 then moved = moved + 1 end
     end
     assert.truthy(moved > 20, moved)
+  end)
+end)
+
+describe("sleep of what is tied", function()
+  -- Whether the net of these frames sleeps at frame 300, and has moved again 24 frames later, by how much at most.
+  local function moved(with)
+    local result = net(with, 324)
+    for f = 276, 300 do
+      assert.equal(vec3(0, 0, 0), result[f]:max("v"), f)
+      assert.is_true(same(result[276], result[f]), f)
+    end
+    local most = 0
+    for i = 1, 36 do most = math.max(most, (result[324][i].P - result[300][i].P):length()) end
+    return most, result
+  end
+
+  it("comes over a net on pins that hangs in balance, and lasts", function()
+    local still, result = moved {}
+    assert.equal(0, still)
+    local low = 0
+    for i = 1, 36 do low = math.min(low, result[300][i].P.y) end
+    assert.truthy(low < -0.05, low)
+    for _, i in ipairs { 0, 5, 30, 35 } do assert.equal(0, result[300][i + 1].P.y) end
+    -- As it hangs without pins that hold it still: its mirror image in both axes is itself.
+    for i = 0, 5 do
+      for j = 0, 5 do
+        assert.near(result[300][6 * i + j + 1].P.y, result[300][6 * (5 - i) + j + 1].P.y, 1e-3)
+        assert.near(result[300][6 * i + j + 1].P.y, result[300][6 * j + i + 1].P.y, 1e-3)
+      end
+    end
+  end)
+
+  it("ends when wind rises", function()
+    assert.truthy(moved { WIND = "function(frame) return {frame.number > 300 and 2 or 0, 0, 0} end" } > 0.01)
+  end)
+
+  it("ends when what it is pinned to moves", function()
+    local most, result = moved {
+      PIN = "transform = function(frame) return rapid.translate(0.01 * math.max(0, frame.number - 300), 0, 0) end" }
+    assert.near(0.24, result[324][1].P.x - result[300][1].P.x, 1e-5)
+    assert.truthy(most > 0.23, most)
+  end)
+
+  it("ends when a pin lets go", function()
+    local _, result = moved { HELD = "(p.id ~= 0 or frame.number <= 300)" }
+    assert.truthy(result[324][1].P.y < -0.1, result[324][1].P.y)
+    assert.equal(0, result[324][6].P.y)
+  end)
+
+  it("ends for all of it when a script moves one of its points", function()
+    local _, result = moved { SCRIPT = "if p.id == 14 and frame.number == 301 then p.P = p.P + vec3(0, 0.05, 0) end" }
+    for i = 1, 36 do
+      if i ~= 1 and i ~= 6 and i ~= 31 and i ~= 36 then assert.truthy(result[302][i].v:length() > 0, i) end
+    end
+  end)
+
+  it("ends when the target of a spring moves", function()
+    local result = scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}} } }
+  :gravity {} :drag { linear = 5 }
+  :pin { target = function(frame) return {frame.number > 100 and 1 or 0, 0, 0} end, compliance = 1e-3 }
+  :solve { substeps = 8 }]], { frames = {1, 200} })
+    for f = 90, 100 do assert.equal(vec3(0, 0, 0), result[f][1].v, f) end
+    assert.near({0, -9.81e-3, 0}, result[100][1].P, 1e-5)
+    assert.near({1, -9.81e-3, 0}, result[200][1].P, 1e-5)
+  end)
+
+  it("ends when a bond no longer bears what hangs from it", function()
+    local result = scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0, -0.2, 0}}, pscale = {0.1, 0.1} } }
+  :gravity {} :clump { strength = function(frame) return frame.number > 48 and 8 or 12 end }
+  :group { name = "top", where = function(p) return p.id == 0 end } :pin { group = "top" }
+  :solve { substeps = 8 }]], { frames = {1, 72} })
+    for f = 36, 48 do assert.is_true(same(result[36], result[f]), f) end
+    assert.near(-0.2, result[48][2].P.y, 1e-4)
+    assert.truthy(result[72][2].P.y < -4, result[72][2].P.y)
+  end)
+
+  it("comes over a heap of clumps", function()
+    local result = scene.run(heap(floor .. " :clump { strength = 20 }"), { frames = {276, 300} })
+    for f = 277, 300 do assert.is_true(same(result[276], result[f]), f) end
+    assert.equal(vec3(0, 0, 0), result[300]:max("v"))
   end)
 end)

@@ -24,7 +24,6 @@ public:
 class Granular : public Scene {
 public:
     ShapeLoads loads;
-    SleepMemory beds;
     std::shared_ptr<Spheres> spheres = std::make_shared<Spheres>();
 
     explicit Granular(PointSet set, float bounce = 0, float friction = 0) : Scene(std::move(set))
@@ -34,15 +33,6 @@ public:
         spheres->options.bounce = bounce;
         spheres->options.friction = friction;
         dynamics.push_back(spheres);
-    }
-
-    // Points at rest sleep after so many seconds.
-    Granular& sleep(double after = 0.25)
-    {
-        if (!points.has("still")) points.add({"still", 0.0f});
-        options.sleep = after;
-        options.beds = &beds;
-        return *this;
     }
 
     Vec3d momentum() const

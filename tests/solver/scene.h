@@ -31,6 +31,7 @@ public:
     PointSet points;
     std::vector<DynamicPtr> dynamics;
     SolveOptions options;
+    SleepMemory beds;
     SolveResult last;              // of the last frame
     std::uint64_t collisions = 0;  // of all frames
     double penetration_max = 0;    // of all frames, m
@@ -74,6 +75,15 @@ public:
     Scene& frame_length(double h)
     {
         options.h = h;
+        return *this;
+    }
+
+    // Points at rest sleep after so many seconds.
+    Scene& sleep(double after = 0.25)
+    {
+        if (!points.has("still")) points.add({"still", 0.0f});
+        options.sleep = after;
+        options.beds = &beds;
         return *this;
     }
 

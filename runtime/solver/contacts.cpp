@@ -529,23 +529,26 @@ void Contacts::disturb(const Row& row, const Substep& now) const
 void Contacts::prepare(Substep& now)
 {
     const double dt = now.dt;
+    const auto each_point = [&](const auto& f) {
+        for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) f(i);
+        });
+    };
+    before_.resize(now.size());
+    each_point([&](std::size_t i) { before_[i] = now.at[i].P; });
     weighed([&](const auto& weights) {
         sweep([&](const Octet& octet) {
             if (!any(widen(octet.pressed) > 0)) return;
             Places a = gather(now.at, octet.i), b = gather(now.at, octet.j);
-            Vectors<Doubles> va = gather(now.v, octet.i), vb = gather(now.v, octet.j);
             const auto [wa, wb] = weights(octet, a, b);
             const Vectors<Doubles> half = widen(octet.pressed * octet.n + 0.5f * octet.rubbed);
             a.P += (wa * dt) * half;
             b.P -= (wb * dt) * half;
-            va += wa * half;
-            vb -= wb * half;
             scatter(a, now.at, octet.i, octet.rows);
             scatter(b, now.at, octet.j, octet.rows);
-            scatter(va, now.v, octet.i, octet.rows);
-            scatter(vb, now.v, octet.j, octet.rows);
         });
     });
+    each_point([&](std::size_t i) { now.v[i] += per_dt_ * (now.at[i].P - before_[i]); });
 }
 
 void Contacts::project(Substep& now)

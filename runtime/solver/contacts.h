@@ -148,6 +148,7 @@ private:
         std::uint64_t octets = 0;
     };
     std::vector<Taken> taken_;
+    std::vector<Vec3d> before_;  // places, before a sweep
 
     // Of a search.
     std::vector<std::uint16_t> owner_;  // of each pair, its block

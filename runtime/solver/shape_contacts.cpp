@@ -27,7 +27,8 @@ ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t si
       size_(size),
       rows_((size + points_a_task - 1) / points_a_task),
       before_(rows_.size()),
-      clearance_(obstacles.size() * size, -1.0f)
+      clearance_(obstacles.size() * size, -1.0f),
+      room_(size, -1.0f)
 {
 }
 
@@ -80,16 +81,28 @@ void ShapeContacts::prepare(Substep& now, std::span<const Vec3d> free)
 void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::span<const Vec3d> free, std::size_t begin,
                          std::size_t end)
 {
-    thread_local std::vector<std::uint32_t> asked;
+    thread_local std::vector<std::uint32_t> open, asked;
     thread_local std::vector<Vec3d> P, gradient;
     thread_local std::vector<double> phi, time, own, since_asked;
     const double since = (now.index + 1) * now.dt;  // s, since the frame began
 
+    // Most are known to be far from all shapes, or close to one for long: without a branch.
+    const bool any_moves = std::any_of(obstacles_.begin(), obstacles_.end(), [](const Obstacle& o) { return o.moves; });
+    open.resize(end - begin + 1);
+    std::size_t near_any = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+        // At least (|own way| + |way since asked|)².
+        const double gone2 = 2 * ((free[i] - now.begin[i]).squaredNorm() + (free[i] - asked_at_[i]).squaredNorm());
+        open[near_any] = static_cast<std::uint32_t>(i);
+        near_any += any_moves | !(room_[i] > 0 && double(room_[i]) * double(room_[i]) > gone2);
+    }
+    open.resize(near_any);
     own.resize(end - begin);
     since_asked.resize(end - begin);
-    for (std::size_t i = begin; i < end; ++i) {
+    for (const std::uint32_t i : open) {
         own[i - begin] = (free[i] - now.begin[i]).norm();
         since_asked[i - begin] = (free[i] - asked_at_[i]).norm();
+        room_[i] = std::numeric_limits<float>::infinity();
     }
     rows.clear();
     std::size_t old = 0;
@@ -98,11 +111,10 @@ void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::sp
         if (obstacle.response == Response::Die) continue;
         float* clearance = clearance_.data() + o * size_;
         const auto reach = [&](std::size_t i) { return push * obstacle.radius[i] + own[i - begin]; };
-        // Most are known to be far from it, or close to it for long: without a branch.
-        asked.resize(end - begin + 1);
+        asked.resize(open.size() + 1);
         std::size_t near = 0;
-        for (std::size_t i = begin; i < end; ++i) {
-            asked[near] = static_cast<std::uint32_t>(i);
+        for (const std::uint32_t i : open) {
+            asked[near] = i;
             near += obstacle.moves | (clearance[i] < since_asked[i - begin] + reach(i));
         }
         asked.resize(near);
@@ -145,6 +157,9 @@ void ShapeContacts::find(Batch& rows, Batch& before, const Substep& now, std::sp
             }
             rows.push_back(row);
         }
+        for (const std::uint32_t i : open)
+            if (obstacle.members[i])
+                room_[i] = std::min(room_[i], clearance[i] - static_cast<float>(push) * obstacle.radius[i]);
         if (now.sleepers) keep_of_sleepers(rows, rows_before, before, o, now);
     }
 }

@@ -63,6 +63,7 @@ private:
     std::vector<Batch> rows_, before_;  // a chunk of points each
     std::vector<float> clearance_;      // m, [obstacles, size]: at least as far off is a point from it
     std::vector<Vec3d> asked_at_;       // where that was
+    std::vector<float> room_;           // m: as far a point may go, and be pushed, before it can be near any of them
 };
 
 }  // namespace rapid

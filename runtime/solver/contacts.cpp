@@ -590,7 +590,8 @@ void Contacts::take_back(Substep& now)
 // A heavy point on a light one that a shape bears, itself or through others, would go through it: in a sweep the shape
 // gives back no more than the lighter weighs. Where that has left it too deep it is taken back, with the lighter as a
 // wall. So it is where it wedges a light one that something bears: what parts them moves the light one, and that is put
-// back.
+// back. Of its velocity what is its own into the lighter is taken off; a light one that is squeezed out, or thrown,
+// does not give it more than weight takes, which is what a shape that lifts both has to.
 void Contacts::take_back(const Row& row, Substep& now) const
 {
     const bool first = now.at[row.i].w < now.at[row.j].w;  // is the heavier
@@ -605,7 +606,8 @@ void Contacts::take_back(const Row& row, Substep& now) const
     if (now.borne[light] <= now.borne[heavy] && !wedged) return;
     const Vec3d n = d / distance;
     now.at[heavy].P += depth * n;
-    now.v[heavy] += std::max(0.0, -n.dot(now.v[heavy] - now.v[light])) * n;
+    const double own = -n.dot(now.v[heavy]), closing = own + n.dot(now.v[light]);
+    now.v[heavy] += std::clamp(closing, 0.0, std::max(own, resting * now.pull * now.dt)) * n;
 }
 
 template <class Weights>

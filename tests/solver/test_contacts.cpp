@@ -210,6 +210,29 @@ TEST_CASE("points that are born in each other part, and fly nowhere", "[contacts
     CHECK(scene.momentum().norm() < 1e-6);
 }
 
+TEST_CASE("points of 1 : 10^6 kg that are born in each other, in a pipe, do not fly", "[contacts][extreme]")
+{
+    const std::size_t n = GENERATE(2, 3, 4);
+    const float overlap = GENERATE(0.1f, 0.3f, 0.5f, 0.9f), ratio = GENERATE(1e3f, 1e6f), r = 0.05f;
+    const bool by_turns = GENERATE(false, true);  // or the uppermost is the heavy one
+    CAPTURE(n, overlap, ratio, by_turns);
+    std::vector<Vec3f> at;
+    std::vector<float> mass;
+    for (std::size_t k = 0; k < n; ++k) {
+        at.emplace_back(0.0f, r * (1 + (2 - overlap) * static_cast<float>(k)), 0.0f);
+        mass.push_back((by_turns ? k % 2 == 1 : k + 1 == n) ? ratio : 1.0f);
+    }
+    Granular scene(points(at).set<float>("pscale", alike(n, r)).set<float>("mass", mass), 0, 0.3f);
+    scene.gravity().floor(0, 0.3f).substeps(10);
+    for (const Vec3d& normal : {Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 0, 1), Vec3d(0, 0, -1)})
+        scene.collide(make_plane(normal, -double(r)), 0.0f);
+    for (int frame = 0; frame < 24; ++frame) {
+        scene.run(1);
+        // Of two free falls from where they are.
+        for (std::size_t i = 0; i < n; ++i) CHECK(0.5 * scene.v(i).squaredNorm() < 2 * g * double(at[i].y()));
+    }
+}
+
 TEST_CASE("points that are all in one place part", "[contacts][extreme]")
 {
     Granular scene(points(std::vector<Vec3f>(20, Vec3f(1, 2, 3))).set<float>("pscale", alike(20, 0.1f)));

@@ -120,6 +120,7 @@ void Collisions::begin(std::span<const std::uint32_t> places)
     const std::size_t size = size_ = places.size();
     met_.assign(size, 0);
     put_off_.assign(size, 0);
+    put_out_.clear();
     stuck_.assign(size, 0);
     held_.clear();
     touched_.clear();
@@ -932,6 +933,7 @@ void Collisions::settle(Traveller& t, const Support& support, const Vec3d& v)
 void Collisions::leave_shape(Traveller& t, const Contact& contact, int o, const Vec3d& a)
 {
     t.supports = 0;
+    const Vec3d before = P_[t.i];
     if (++t.rescues > most_rescues) {
         lost_.push_back(t.i);
         t.left = 0;
@@ -954,6 +956,7 @@ void Collisions::leave_shape(Traveller& t, const Contact& contact, int o, const 
             P_[t.i] -= above.back * down;
         }
     }
+    put_out_.push_back({t.i, P_[t.i] - before});
 }
 
 // The path is free up to its end.

@@ -91,6 +91,13 @@ public:
 
     // Whether a point of the block has met a shape since begin().
     bool has_met(std::size_t i) const { return met_[i] != 0; }
+    // The points of the block that were in a shape, and by how much they have been put out since begin(), m: at once,
+    // which is no motion.
+    struct PutOut {
+        std::uint32_t i;
+        Vec3d by;
+    };
+    std::span<const PutOut> put_out() const { return put_out_; }
     // How far off a contact that was found at the end of a sub-step, not on the path, may have put it since begin(), m.
     double put_off(std::size_t i) const { return put_off_[i]; }
 
@@ -203,11 +210,12 @@ private:
     Flight flight_;
 
     // By point of the block.
-    std::span<const double> after_;      // s, to the end of the frame
-    std::vector<std::uint8_t> stuck_;    // whether it is held by a shape that it sticks to
-    std::vector<Vec3d> start_;           // where it was at the beginning of the sub-step
-    std::vector<std::uint8_t> met_;      // whether it has met a shape since begin()
-    std::vector<double> put_off_;        // m
+    std::span<const double> after_;    // s, to the end of the frame
+    std::vector<std::uint8_t> stuck_;  // whether it is held by a shape that it sticks to
+    std::vector<Vec3d> start_;         // where it was at the beginning of the sub-step
+    std::vector<std::uint8_t> met_;    // whether it has met a shape since begin()
+    std::vector<double> put_off_;      // m
+    std::vector<PutOut> put_out_;
     std::vector<int> near_count_;        // how many shapes it may come near
     std::vector<int> obstacle_;          // the first that the path meets, or -1
     std::vector<Contact> contact_;       // with it

@@ -340,6 +340,8 @@ private:
             }
             if (!scene_.obstacles.empty()) collisions.begin(block.places);
             take(block, collisions, now.index);
+            // Others that they are put into are to be left without speed, as those that are born in one another.
+            for (const auto& [k, by] : collisions.put_out()) begin[block.places[k]] += by;
             for (std::size_t k = 0; k < block.places.size(); ++k) {
                 const std::uint32_t i = block.places[k];
                 Place& at = now.at[i];

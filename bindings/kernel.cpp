@@ -115,7 +115,7 @@ void Kernel::analyse()
     asks_ = keys_of(L, "asks");
     asks_any_ = flag_of(L, "asks_any");
     kills_ = flag_of(L, "kills");
-    asks_places_ = flag_of(L, "computes_names") || reads_.count("index") || may_.count("index");
+    asks_places_ = flag_of(L, "asks_places") || flag_of(L, "computes_names");
 
     for (const std::string& name : keys_of(L, "calls")) {
         lua_getfield(L, -1, "calls");

@@ -9,6 +9,8 @@
 --   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
 --                    are the calls of a method `join` of anything
 --   computes_names   whether it indexes the point, or what may be it, by what is no constant
+--   asks_places      whether it may ask a point for its place: whether it says `index` of anything, or indexes by what
+--                    is no constant what is not known
 --   calls            names on the point itself that it calls as if they were methods
 --   kills            whether `kill` is called or could be
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
@@ -136,6 +138,7 @@ local function step(f, pc, regs, found, outer, call)
     refuse(("the kernel %s; %s"):format(what, found.remedy))
   end
   local function index_read(object, key)
+    if key == "index" then found.asks_places = true end
     if object == point then
       if methods[key] then
         if key == "kill" then found.kills = true end
@@ -157,6 +160,7 @@ local function step(f, pc, regs, found, outer, call)
     result = regs[d]
   elseif name == "KSTR" then
     result = { kind = "string", value = string_constant(f, d) }
+    if result.value == "index" then found.asks_places = true end
   elseif name == "UGET" then
     result = upvalue_of(f, d, outer)
   elseif name == "GGET" then
@@ -169,6 +173,7 @@ local function step(f, pc, regs, found, outer, call)
     if name == "TGETV" and key and key.kind == "string" then
       result = index_read(object, key.value)
     elseif object and object.kind == "shared" then
+      if name == "TGETV" and object.value == nil then found.asks_places = true end
       analyse_inside(object.value, found)
       result = { kind = "shared", value = name == "TGETB" and field(object.value, c) or nil }
     elseif name == "TGETV" and (not object or object == point) then

@@ -35,7 +35,10 @@ std::filesystem::path library()
 {
     Dl_info here{};
     dladdr(reinterpret_cast<const void*>(&load_deferred), &here);
-    return std::filesystem::path(here.dli_fname ? here.dli_fname : "").parent_path() / RAPID_DEFERRED_LIBRARY;
+    // What a link names, as the two lie side by side.
+    std::error_code missing;
+    const auto file = std::filesystem::canonical(here.dli_fname ? here.dli_fname : "", missing);
+    return file.parent_path() / RAPID_DEFERRED_LIBRARY;
 }
 
 }  // namespace

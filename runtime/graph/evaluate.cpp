@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <deque>
-#include <exception>
-#include <new>
 #include <optional>
 #include <utility>
 
+#include "runtime/graph/at_node.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/stopwatch.h"
 
@@ -169,7 +168,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
 
     const Told told(*this, planned, left, frame);
     const Evaluation& evaluation = *told.evaluation;
-    try {
+    return at_node(node.name, node.location, [&] {
         const Stopwatch stopwatch;
         Flow result;
         if (planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source) {
@@ -184,14 +183,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
         if (planned.once) kept_[first] = result;
         if (result_) result_(node, next_, result.points);
         return result;
-    } catch (Error& error) {
-        error.in_node(node.name).at(node.location);
-        throw;
-    } catch (const std::bad_alloc&) {
-        throw Error("out of memory").in_node(node.name).at(node.location);
-    } catch (const std::exception& fault) {  // of a library: what it says is all that is known
-        throw Error(fault.what()).in_node(node.name).at(node.location);
-    }
+    });
 }
 
 void Evaluator::edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame)

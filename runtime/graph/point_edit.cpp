@@ -3,25 +3,11 @@
 #include <algorithm>
 #include <functional>
 
+#include "runtime/graph/at_node.h"
 #include "runtime/graph/first_error.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
-namespace {
-
-template <class F>
-void at_node_of(const Evaluation& now, const F& f)
-{
-    try {
-        f();
-    } catch (Error& error) {
-        error.in_node(now.node).at(now.location);
-        throw;
-    }
-}
-
-}  // namespace
-
 std::vector<std::uint8_t> Stretch::choose(Strided<std::uint8_t> members) const
 {
     std::vector<std::uint8_t> chosen(size(), members[begin]);
@@ -41,7 +27,7 @@ void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points
     if (passes.empty() || points.empty()) return;
     std::size_t chunk = 0;
     for (const std::unique_ptr<EditPass>& pass : passes) {
-        at_node_of(pass->now, [&] { pass->begin(); });
+        at_node(pass->now.node, pass->now.location, [&] { pass->begin(); });
         chunk = std::max(chunk, pass->chunk());
     }
     const auto alive = remove ? std::make_unique_for_overwrite<std::uint8_t[]>(points.size()) : nullptr;
@@ -52,7 +38,9 @@ void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points
             const Stretch stretch{begin, end, alive ? alive.get() + begin : nullptr};
             if (alive) std::fill_n(stretch.alive, stretch.size(), std::uint8_t{1});
             for (std::size_t k = 0; k < passes.size(); ++k) {
-                const auto visit = [&] { at_node_of(passes[k]->now, [&] { passes[k]->visit(stretch); }); };
+                const auto visit = [&] {
+                    at_node(passes[k]->now.node, passes[k]->now.location, [&] { passes[k]->visit(stretch); });
+                };
                 if (!first.guard(k, begin, visit)) return;
             }
         },
@@ -78,7 +66,7 @@ void edit_together(std::span<PointEdit* const> edits, std::span<const Evaluation
     std::vector<std::unique_ptr<EditPass>> passes;
     Before before;
     for (std::size_t k = 0; k < edits.size(); ++k)
-        at_node_of(*now[k], [&] {
+        at_node(now[k]->node, now[k]->location, [&] {
             auto pass = edits[k]->prepare(points, *now[k], before);
             if (!pass) return;
             passes.push_back(std::move(pass));

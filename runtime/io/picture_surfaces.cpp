@@ -346,14 +346,8 @@ struct Ground {
         return towards != 0 && t > 0 && std::isfinite(t) ? t : infinite;
     }
 
-    // Whether it is a wall that the eye is behind and most points are not: then it is looked through.
-    bool stands_before(const PointSet& points, const Vec3f& eye) const
-    {
-        if (normal.dot(eye) >= offset) return false;
-        std::size_t free = 0;
-        for (std::size_t i = 0; i < points.size(); ++i) free += normal.dot(points.P()[i]) >= offset;
-        return 2 * free > points.size();
-    }
+    // Whether it is a wall that the eye is behind and the scene is not: then it is looked through.
+    bool stands_before(const Vec3f& eye) const { return normal.dot(eye) < offset && normal.dot(center) >= offset; }
 
     Vec3f shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind, const Light& light) const
     {
@@ -446,7 +440,7 @@ Surfaces draw_surfaces(const PointSet& points, const PictureOptions& options, co
     std::vector<Ground> grounds;
     for (const PictureScene::Plane& plane : scene.planes) {
         const Ground ground(plane, view.bounds, true);
-        if (!ground.stands_before(points, lens.origin)) grounds.push_back(ground);
+        if (!ground.stands_before(lens.origin)) grounds.push_back(ground);
     }
     if (scene.planes.empty() && options.grid) grounds.emplace_back(PictureScene::Plane(), view.bounds, false);
 
@@ -458,23 +452,18 @@ Surfaces draw_surfaces(const PointSet& points, const PictureOptions& options, co
                 const Vec3f ray =
                     lens.ray((static_cast<float>(x) + 0.5f) * to_sample, (static_cast<float>(y) + 0.5f) * to_sample);
                 const Vec3f open = backdrop(x, y, options);
-                Vec3f colour = open;
                 const Ground* nearest = nullptr;
-                float depth = infinite;
-                for (const Ground& ground : grounds) {
-                    const float t = ground.depth(lens.origin, ray);
-                    if (t >= depth) continue;
-                    colour = ground.shade(lens.origin + ray * t, t, lens.focal / to_sample, ray, open, light);
-                    if (!ground.solid) continue;
-                    depth = t;
-                    nearest = &ground;
-                }
+                float t = infinite;
+                for (const Ground& ground : grounds)
+                    if (const float depth = ground.depth(lens.origin, ray); depth < t) t = depth, nearest = &ground;
+                const Vec3f colour =
+                    nearest ? nearest->shade(lens.origin + ray * t, t, lens.focal / to_sample, ray, open, light) : open;
                 for (int j = 0; j < surface_samples; ++j)
                     for (int i = 0; i < surface_samples; ++i) {
                         const int sx = x * surface_samples + i, sy = y * surface_samples + j;
                         const std::size_t here = static_cast<std::size_t>(sy) * width + sx;
                         result.colour[here] = colour;
-                        if (nearest)
+                        if (nearest && nearest->solid)
                             result.depth[here] = nearest->depth(
                                 lens.origin, lens.ray(static_cast<float>(sx) + 0.5f, static_cast<float>(sy) + 0.5f));
                     }

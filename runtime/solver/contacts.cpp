@@ -77,6 +77,9 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
         if (!(radius[i] >= 0) || !std::isfinite(radius[i]))
             throw Error(fmt::format("point {}: its radius is {:g}; it must be finite and at least 0", points.id()[i],
                                     radius[i]));
+        if (!(friction[i] >= 0))
+            throw Error(
+                fmt::format("point {}: its friction is {:g}; it must be at least 0", points.id()[i], friction[i]));
         radius_[i] = members[i] ? radius[i] : 0;
         root_friction_[i] = std::sqrt(friction[i]);
         bounce_[i] = bounce[i];

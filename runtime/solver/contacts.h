@@ -46,7 +46,7 @@ struct ContactOptions {
 class Contacts : public Coupling {
 public:
     // Takes over what it knows of the points that it has met before, by id. Error: a radius that is negative or not
-    // finite, with the point's id; an attribute is missing.
+    // finite, a friction below 0, with the point's id; an attribute is missing.
     void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
 
     void tie(std::span<std::uint8_t> tied) const override

@@ -418,8 +418,8 @@ private:
         const float mass = scene_.mass[i];
         if (!(mass > 0))
             throw Error(
-                fmt::format("{}: its mass is {:g}; with constraints it must be above 0, or math.huge for a "
-                            "point that they do not move",
+                fmt::format("{}: its mass is {:g}; with constraints it must be above 0 (:pin is for a point "
+                            "that they do not move)",
                             name_of(i), mass));
         return 1.0 / mass;
     }

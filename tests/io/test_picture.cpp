@@ -139,7 +139,7 @@ TEST_CASE("a plane of the scene hides what is under it", "[io][picture]")
     CHECK_FALSE(is_green(at({2, -2, 0})));
 }
 
-TEST_CASE("a wall between the camera and the points is looked through, and one behind them is seen", "[io][picture]")
+TEST_CASE("a wall between the camera and the scene is looked through, and one behind it is seen", "[io][picture]")
 {
     const PointSet points = balls({{0, 0, 0}}, {red}, 0.3f);
     const auto seen = [&](const std::vector<PictureScene::Plane>& planes) {

@@ -5,6 +5,7 @@ local scene = require "testing.scene"
 
 local head = "local ball = rapid.levelset.sphere { radius = 5, voxel = 1 } " ..
   "local function named(p, name) return p[name] end " ..
+  "local noted = { index = -1 } local function either(a, b) if a.heat > 0 then return a end return b end " ..
   "return rapid.create { points = rapid.points.grid { size = {26, 20, 20}, spacing = 1 } } " ..
   ":attribute { heat = 0, seen = 0 } "
 
@@ -104,6 +105,13 @@ describe("neighbouring edits of points", function()
       ":points('b', function(p) p.heat = named(p, 'index') end)",
       ":points('b', function(p) local t = setmetatable({}, { __index = p }) p.heat = t.index end)",
       ":delete { where = function(p) return p.index % 5 == 0 end }",
+      -- of what may be the point, or something that all share
+      ":points('b', function(p) local q = p.id > 5 and p or { index = 3 } p.heat = q.index end)",
+      ":points('b', function(p) local q = p.id > 5 and p or noted p.heat = q.index end)",
+      ":points('b', function(p) local q = noted for _ = 1, 2 do p.heat = q.index q = p end end)",
+      ":points('b', function(p) p.heat = either(p, noted).index end)",
+      ":points('b', function(p) p.heat = assert(p, noted).index end)",
+      ":points('b', function(p) local q = p.id > 5 and p or noted p.heat = q['in' .. 'dex'] end)",
     } do
       check_same { kill, ":points('c', function(p) p.seen = 1 end)", asks }
     end

@@ -230,8 +230,8 @@ TEST_CASE("a mass of 0 is refused, with the point", "[constraints]")
         text = error.what();
     }
     CHECK(text ==
-          "point 0, frame 1: its mass is 0; with constraints it must be above 0, or math.huge for a point that "
-          "they do not move");
+          "point 0, frame 1: its mass is 0; with constraints it must be above 0 (:pin is for a point that they do "
+          "not move)");
 }
 
 }  // namespace

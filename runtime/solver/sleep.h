@@ -11,8 +11,8 @@
 //   when a row that acts on it comes, goes or changes, or what holds it moves.
 //
 // What rows hold together (islands.h) falls asleep when all of it is still, and wakes at once when any of it wakes. If
-// it only hangs, it has to be stiller than what lies, which friction holds: a pendulum is slow where it turns, too, and
-// so is a mobile that is nearly in balance. What rows hold whose kind does not say that it rests (rows.h) never sleeps.
+// it only hangs, it has to be stiller than what lies, which friction holds: a pendulum is slow where it turns, too.
+// What rows hold whose kind does not say that it rests (rows.h) never sleeps.
 //
 // How long a point has been still is the column `still` (s), and all that decides who sleeps; what a sleeper fell
 // asleep under is kept by id from frame to frame, and where it is lost, what is found is taken for it.

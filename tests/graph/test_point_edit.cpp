@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <new>
 #include <random>
+#include <stdexcept>
 
 #include "tests/graph/graph_under_test.h"
 
@@ -173,6 +175,20 @@ TEST_CASE("the error of edits that go together is that of the first edit that fa
         }
         CHECK(test::error_of([&] { scene.run(); }) == first);
     }
+}
+
+TEST_CASE("a fault of a library in one of the edits names that edit", "[point_edit]")
+{
+    const bool memory = GENERATE(false, true);
+    Together scene;
+    scene.edits.emplace_back([](PointSet&, std::size_t) { return false; });
+    scene.edits.emplace_back([=](PointSet&, std::size_t i) -> bool {
+        if (i == 10000 && memory) throw std::bad_alloc();
+        if (i == 10000) throw std::runtime_error("a fault");
+        return false;
+    });
+    CHECK(test::error_of([&] { scene.run(); }) ==
+          std::string("scene.lua:2: node \"edit1\": ") + (memory ? "out of memory" : "a fault"));
 }
 
 }  // namespace

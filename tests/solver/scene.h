@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -102,5 +103,12 @@ public:
     Vec3d P(std::size_t i = 0) const { return std::as_const(points).P()[i].cast<double>(); }
     Vec3d v(std::size_t i = 0) const { return std::as_const(points).v()[i].cast<double>(); }
 };
+
+// Whether places and velocities are.
+inline bool same_bits(const PointSet& a, const PointSet& b)
+{
+    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
+           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
+}
 
 }  // namespace rapid::test

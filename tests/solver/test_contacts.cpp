@@ -5,7 +5,6 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <cstring>
 #include <random>
 #include <set>
 
@@ -18,16 +17,11 @@ namespace {
 using test::close_to;
 using test::Granular;
 using test::points;
+using test::same_bits;
 
 constexpr double g = 9.81;
 
 std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
-
-bool same_bits(const PointSet& a, const PointSet& b)
-{
-    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
-           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
-}
 
 TEST_CASE("a head-on impact keeps the momentum, and bounces back by its restitution", "[contacts]")
 {

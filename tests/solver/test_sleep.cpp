@@ -5,7 +5,6 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <cstring>
 #include <random>
 
 #include "tests/solver/granular.h"
@@ -16,15 +15,10 @@ namespace {
 using test::close_to;
 using test::Granular;
 using test::points;
+using test::same_bits;
 
 constexpr double g = 9.81;
 constexpr float r = 0.05f;
-
-bool same_bits(const PointSet& a, const PointSet& b)
-{
-    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
-           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
-}
 
 // n spheres that fall into a box of the floor's friction, from a loose lattice.
 class Box : public Granular {

@@ -3,7 +3,6 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "runtime/solver/sleep.h"
 #include "tests/solver/granular.h"
@@ -17,15 +16,10 @@ using test::immovable;
 using test::links_of_chain;
 using test::points;
 using test::rods;
+using test::same_bits;
 using test::Scene;
 
 constexpr double g = 9.81;
-
-bool same_bits(const PointSet& a, const PointSet& b)
-{
-    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
-           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
-}
 
 class Drag : public Force {
 public:

@@ -1,7 +1,7 @@
 -- align_to_velocity: darts look where they fly: their colour is the direction in which their z axis points.
 --
 -- Shows:  :align_to_velocity; the picture is frame 36.
--- Proves: tests/nodes/test_align_to_velocity.lua has its closed form.
+-- Proves: tests/lua/nodes/test_align_to_velocity.lua has its closed form.
 -- Run:    rapid run graphs/nodes/align_to_velocity.lua -f 36 --size 288x162 -o /tmp/align_to_velocity.png
 local rapid = require "rapid"
 

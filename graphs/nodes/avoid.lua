@@ -1,7 +1,7 @@
 -- avoid: a stream parts before a ball that it never touches.
 --
 -- Shows:  :avoid; the picture is frame 60.
--- Proves: tests/nodes/test_avoid.lua has its closed form.
+-- Proves: tests/lua/nodes/test_avoid.lua has its closed form.
 -- Run:    rapid run graphs/nodes/avoid.lua -f 60 --size 288x162 -o /tmp/avoid.png
 local rapid = require "rapid"
 

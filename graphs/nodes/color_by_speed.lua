@@ -1,7 +1,7 @@
 -- color_by_speed: a fountain is white where it is fast, and blue at the top.
 --
 -- Shows:  :color_by_speed; the picture is frame 60.
--- Proves: tests/nodes/test_color_by_speed.lua has its closed form.
+-- Proves: tests/lua/nodes/test_color_by_speed.lua has its closed form.
 -- Run:    rapid run graphs/nodes/color_by_speed.lua -f 60 --size 288x162 -o /tmp/color_by_speed.png
 local rapid = require "rapid"
 

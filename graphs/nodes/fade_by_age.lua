@@ -1,7 +1,7 @@
 -- fade_by_age: bubbles shrink in the second half of their lives.
 --
 -- Shows:  :fade_by_age; the picture is frame 60.
--- Proves: tests/nodes/test_fade_by_age.lua has its closed form.
+-- Proves: tests/lua/nodes/test_fade_by_age.lua has its closed form.
 -- Run:    rapid run graphs/nodes/fade_by_age.lua -f 60 --size 288x162 -o /tmp/fade_by_age.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- follow_curve: a ribbon of sparks runs along a curve.
 --
 -- Shows:  :follow_curve; the picture is frame 48.
--- Proves: tests/nodes/test_follow_curve.lua has its closed form.
+-- Proves: tests/lua/nodes/test_follow_curve.lua has its closed form.
 -- Run:    rapid run graphs/nodes/follow_curve.lua -f 48 --size 288x162 -o /tmp/follow_curve.png
 local rapid = require "rapid"
 

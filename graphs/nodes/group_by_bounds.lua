@@ -1,7 +1,7 @@
 -- group_by_bounds: falling points burn while they are in a box, and only there.
 --
 -- Shows:  :group_by_bounds; the picture is frame 40.
--- Proves: tests/nodes/test_group_by_bounds.lua has its closed form.
+-- Proves: tests/lua/nodes/test_group_by_bounds.lua has its closed form.
 -- Run:    rapid run graphs/nodes/group_by_bounds.lua -f 40 --size 288x162 -o /tmp/group_by_bounds.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- group_by_shape: points near a torus light up as they drift through it.
 --
 -- Shows:  :group_by_shape; the picture is frame 48.
--- Proves: tests/nodes/test_group_by_shape.lua has its closed form.
+-- Proves: tests/lua/nodes/test_group_by_shape.lua has its closed form.
 -- Run:    rapid run graphs/nodes/group_by_shape.lua -f 48 --size 288x162 -o /tmp/group_by_shape.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- jitter: a drop of ink spreads as its grains are kicked about.
 --
 -- Shows:  :jitter; the picture is frame 36.
--- Proves: tests/nodes/test_jitter.lua has its closed form.
+-- Proves: tests/lua/nodes/test_jitter.lua has its closed form.
 -- Run:    rapid run graphs/nodes/jitter.lua -f 36 --size 288x162 -o /tmp/jitter.png
 local rapid = require "rapid"
 

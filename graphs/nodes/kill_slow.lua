@@ -1,7 +1,7 @@
 -- kill_slow: debris rolls out on the floor and vanishes where it comes to rest.
 --
 -- Shows:  :kill_slow; the picture is frame 40.
--- Proves: tests/nodes/test_kill_slow.lua has its closed form.
+-- Proves: tests/lua/nodes/test_kill_slow.lua has its closed form.
 -- Run:    rapid run graphs/nodes/kill_slow.lua -f 40 --size 288x162 -o /tmp/kill_slow.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- lift: embers rise by their heat, cool, and sink again.
 --
 -- Shows:  :lift; the picture is frame 60.
--- Proves: tests/nodes/test_lift.lua has its closed form.
+-- Proves: tests/lua/nodes/test_lift.lua has its closed form.
 -- Run:    rapid run graphs/nodes/lift.lua -f 60 --size 288x162 -o /tmp/lift.png
 local rapid = require "rapid"
 

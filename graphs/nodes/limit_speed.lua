@@ -1,7 +1,7 @@
 -- limit_speed: a burst that a bound keeps in a dome: whatever is thrown, no point is faster than 1.2 m/s.
 --
 -- Shows:  :limit_speed; the picture is frame 20.
--- Proves: tests/nodes/test_limit_speed.lua has its closed form.
+-- Proves: tests/lua/nodes/test_limit_speed.lua has its closed form.
 -- Run:    rapid run graphs/nodes/limit_speed.lua -f 20 --size 288x162 -o /tmp/limit_speed.png
 local rapid = require "rapid"
 

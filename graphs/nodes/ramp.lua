@@ -1,7 +1,7 @@
 -- ramp: a flame runs from white over yellow and red to soot.
 --
 -- Shows:  :ramp; the picture is frame 60.
--- Proves: tests/nodes/test_ramp.lua has its closed form.
+-- Proves: tests/lua/nodes/test_ramp.lua has its closed form.
 -- Run:    rapid run graphs/nodes/ramp.lua -f 60 --size 288x162 -o /tmp/ramp.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- randomize: a bed of gravel: few large stones, many small ones.
 --
 -- Shows:  :randomize; the picture is frame 3.
--- Proves: tests/nodes/test_randomize.lua has its closed form.
+-- Proves: tests/lua/nodes/test_randomize.lua has its closed form.
 -- Run:    rapid run graphs/nodes/randomize.lua -f 3 --size 288x162 -o /tmp/randomize.png
 local rapid = require "rapid"
 

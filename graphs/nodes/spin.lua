@@ -1,7 +1,7 @@
 -- spin: a field of coins, each turning at its own rate: bright where it faces up.
 --
 -- Shows:  :spin; the picture is frame 30.
--- Proves: tests/nodes/test_spin.lua has its closed form.
+-- Proves: tests/lua/nodes/test_spin.lua has its closed form.
 -- Run:    rapid run graphs/nodes/spin.lua -f 30 --size 288x162 -o /tmp/spin.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- swirl: a column of smoke turns about its axis as it rises.
 --
 -- Shows:  :swirl; the picture is frame 48.
--- Proves: tests/nodes/test_swirl.lua has its closed form.
+-- Proves: tests/lua/nodes/test_swirl.lua has its closed form.
 -- Run:    rapid run graphs/nodes/swirl.lua -f 48 --size 288x162 -o /tmp/swirl.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- wander: dust over a table is carried along by a turbulent flow.
 --
 -- Shows:  :wander; the picture is frame 72.
--- Proves: tests/nodes/test_wander.lua has its closed form.
+-- Proves: tests/lua/nodes/test_wander.lua has its closed form.
 -- Run:    rapid run graphs/nodes/wander.lua -f 72 --size 288x162 -o /tmp/wander.png
 local rapid = require "rapid"
 

@@ -1,7 +1,7 @@
 -- wrap: snow falls for ever through a box of air.
 --
 -- Shows:  :wrap; the picture is frame 48.
--- Proves: tests/nodes/test_wrap.lua has its closed form.
+-- Proves: tests/lua/nodes/test_wrap.lua has its closed form.
 -- Run:    rapid run graphs/nodes/wrap.lua -f 48 --size 288x162 -o /tmp/wrap.png
 local rapid = require "rapid"
 

@@ -1,6 +1,6 @@
 // A plugin with a node of each sort: a constraint (rail), an action inside Solve (brake), one that edits points (paint).
 #include "runtime/graph/plugin.h"
-#include "runtime/solver/rows.h"
+#include "runtime/solver/constraints/rows.h"
 
 RAPID_PLUGIN;
 

@@ -44,10 +44,10 @@
 #include "runtime/graph/adopted_ids.h"
 #include "runtime/graph/param.h"
 #include "runtime/random.h"
-#include "runtime/solver/constraint.h"
-#include "runtime/solver/contact_energy.h"
+#include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/dynamics.h"
-#include "runtime/solver/stiffness.h"
+#include "runtime/solver/estimate/stiffness.h"
 
 namespace rapid {
 

@@ -15,7 +15,7 @@
 #include "runtime/error.h"
 #include "runtime/graph/value.h"
 #include "runtime/points/per_point.h"
-#include "runtime/shapes/motion.h"
+#include "runtime/shapes/motion/motion.h"
 
 namespace rapid {
 

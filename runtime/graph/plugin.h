@@ -15,7 +15,7 @@
 
 #include "runtime/graph/abi.h"
 #include "runtime/graph/node.h"
-#include "runtime/solver/constraint.h"
+#include "runtime/solver/constraints/constraint.h"
 
 #define RAPID_PLUGIN_MARK "rapid plugin, built with "
 #define RAPID_PLUGIN                                                                        \

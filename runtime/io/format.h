@@ -2,31 +2,15 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "runtime/picture/frame_info.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {
-
-struct PictureOptions;
-struct PictureScene;
-struct PictureView;
-
-// What a writer may want to know of the frame besides its points.
-struct FrameInfo {
-    int number = 1;
-    double time = 0;  // s since the start
-    double fps = 24;
-
-    // For pictures (runtime/io/picture.h). Null: the usual ones; the points alone; fitted to this one frame.
-    std::shared_ptr<const PictureOptions> picture = nullptr;
-    std::shared_ptr<const PictureScene> scene = nullptr;
-    std::shared_ptr<const PictureView> view = nullptr;  // FrameWriter keeps one over a sequence
-};
 
 struct Format {
     std::string extension;  // with the dot, lower case: ".vdb"

@@ -7,7 +7,7 @@
 
 #include "runtime/io/file.h"
 #include "runtime/io/format.h"
-#include "runtime/io/picture.h"
+#include "runtime/picture/picture.h"
 
 namespace rapid {
 namespace {

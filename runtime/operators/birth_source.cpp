@@ -6,7 +6,7 @@
 
 #include "runtime/graph/points_object.h"
 #include "runtime/graph/value.h"
-#include "runtime/shapes/deforming.h"
+#include "runtime/shapes/motion/deforming.h"
 
 namespace rapid {
 namespace {

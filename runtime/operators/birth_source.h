@@ -10,9 +10,9 @@
 
 #include "runtime/object.h"
 #include "runtime/points/point_set.h"
-#include "runtime/shapes/body_path.h"
-#include "runtime/shapes/mesh.h"
-#include "runtime/shapes/scatter.h"
+#include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/motion/body_path.h"
+#include "runtime/shapes/scatter/scatter.h"
 
 namespace rapid {
 

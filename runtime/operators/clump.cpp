@@ -7,8 +7,8 @@
 // together further are contact's matter, not that of bonds: a bond only pulls.
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
-#include "runtime/solver/contact_search.h"
-#include "runtime/solver/rows.h"
+#include "runtime/solver/constraints/contact_search.h"
+#include "runtime/solver/constraints/rows.h"
 
 #include <set>
 

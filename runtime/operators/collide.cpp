@@ -7,8 +7,8 @@
 
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
-#include "runtime/shapes/deforming.h"
-#include "runtime/solver/hits.h"
+#include "runtime/shapes/motion/deforming.h"
+#include "runtime/solver/collision/hits.h"
 
 namespace rapid {
 namespace {

@@ -3,7 +3,7 @@
 // Pairs are found in sparse grids of cells, one for each cluster of radii: `max_difference` and `max_grids` trade the
 // time of many grids for that of wide cells (Algorithm 1; solver/contact_search.h).
 #include "runtime/graph/node.h"
-#include "runtime/solver/contacts.h"
+#include "runtime/solver/constraints/contacts.h"
 
 namespace rapid {
 namespace {

@@ -5,8 +5,8 @@
 // Chains and trees of pairs are solved directly (solver/forest.h), whatever their length.
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
-#include "runtime/solver/contact_search.h"
-#include "runtime/solver/rows.h"
+#include "runtime/solver/constraints/contact_search.h"
+#include "runtime/solver/constraints/rows.h"
 
 #include <fmt/format.h>
 

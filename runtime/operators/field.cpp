@@ -6,7 +6,7 @@
 //
 // The value is that of the middle of the step: of second order in how the field varies along the way.
 #include "runtime/graph/node.h"
-#include "runtime/shapes/vector_grid.h"
+#include "runtime/shapes/level_set/vector_grid.h"
 
 namespace rapid {
 namespace {

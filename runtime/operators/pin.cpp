@@ -4,9 +4,9 @@
 // from a wall. With a compliance it is three springs, one along each axis.
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
-#include "runtime/shapes/animated.h"
-#include "runtime/shapes/motion.h"
-#include "runtime/solver/rows.h"
+#include "runtime/shapes/motion/animated.h"
+#include "runtime/shapes/motion/motion.h"
+#include "runtime/solver/constraints/rows.h"
 
 #include <map>
 

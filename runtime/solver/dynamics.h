@@ -14,7 +14,7 @@
 #include "runtime/error.h"
 #include "runtime/points/per_point.h"
 #include "runtime/points/point_set.h"
-#include "runtime/shapes/motion.h"
+#include "runtime/shapes/motion/motion.h"
 #include "runtime/shapes/shape.h"
 
 namespace rapid {

@@ -8,8 +8,8 @@
 
 #include "runtime/parallel.h"
 #include "runtime/points/members.h"
+#include "runtime/points/neighbours.h"
 #include "runtime/random.h"
-#include "runtime/shapes/neighbours.h"
 
 namespace rapid {
 namespace {

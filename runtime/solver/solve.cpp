@@ -12,10 +12,10 @@
 #include "runtime/parallel.h"
 #include "runtime/points/members.h"
 #include "runtime/points/point_text.h"
-#include "runtime/solver/collide.h"
-#include "runtime/solver/damped_motion.h"
-#include "runtime/solver/fall.h"
-#include "runtime/solver/projection.h"
+#include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/constraints/projection.h"
+#include "runtime/solver/motion/ballistic_batch.h"
+#include "runtime/solver/motion/damped_motion.h"
 
 namespace rapid {
 namespace {

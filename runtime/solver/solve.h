@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/constraint.h"
-#include "runtime/solver/contact_energy.h"
+#include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {

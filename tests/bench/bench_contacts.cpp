@@ -15,12 +15,12 @@
 #include <memory>
 #include <random>
 
-#include "runtime/shapes/analytic.h"
-#include "runtime/solver/contacts.h"
-#include "runtime/solver/searched_places.h"
-#include "runtime/solver/shape_contacts.h"
+#include "runtime/shapes/analytic/analytic.h"
+#include "runtime/solver/constraints/contacts.h"
+#include "runtime/solver/constraints/neighbour_list.h"
+#include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/solve.h"
-#include "tests/solver/uniform_force.h"
+#include "tests/solver/motion/uniform_force.h"
 
 namespace rapid {
 namespace {

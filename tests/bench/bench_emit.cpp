@@ -11,7 +11,7 @@
 
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
-#include "runtime/shapes/animated.h"
+#include "runtime/shapes/motion/animated.h"
 
 namespace rapid {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
-#include "runtime/solver/shadow.h"
+#include "runtime/solver/estimate/shadow.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {

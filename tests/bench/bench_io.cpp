@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "runtime/io/format.h"
-#include "runtime/io/picture.h"
+#include "runtime/picture/picture.h"
 
 namespace {
 

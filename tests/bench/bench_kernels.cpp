@@ -17,8 +17,8 @@
 #include <fstream>
 #include <random>
 
-#include "bindings/script_host.h"
-#include "bindings/threads.h"
+#include "bindings/host/script_host.h"
+#include "bindings/host/threads.h"
 
 namespace rapid {
 namespace {

@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "runtime/parallel.h"
-#include "runtime/shapes/deforming.h"
-#include "runtime/shapes/scatter.h"
+#include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/scatter/scatter.h"
 
 namespace rapid {
 namespace {

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "runtime/parallel.h"
-#include "runtime/shapes/analytic.h"
-#include "runtime/shapes/level_set.h"
+#include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/level_set/level_set.h"
 #include "runtime/solver/solve.h"
-#include "tests/solver/uniform_force.h"
+#include "tests/solver/motion/uniform_force.h"
 
 namespace rapid {
 namespace {

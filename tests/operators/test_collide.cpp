@@ -1,4 +1,4 @@
-#include "runtime/shapes/analytic.h"
+#include "runtime/shapes/analytic/analytic.h"
 #include "tests/operators/node_test.h"
 
 namespace rapid {

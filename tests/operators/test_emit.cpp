@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
-#include "runtime/shapes/mesh.h"
-#include "runtime/shapes/scatter.h"
+#include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/scatter/scatter.h"
 #include "runtime/shapes/shape.h"
 #include "tests/operators/node_test.h"
 

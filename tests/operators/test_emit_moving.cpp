@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include "runtime/shapes/analytic.h"
-#include "runtime/shapes/animated.h"
+#include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/motion/animated.h"
 #include "tests/operators/node_test.h"
 
 namespace rapid {

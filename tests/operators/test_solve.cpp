@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "runtime/shapes/level_set.h"
+#include "runtime/shapes/level_set/level_set.h"
 #include "tests/operators/node_test.h"
 
 namespace rapid {

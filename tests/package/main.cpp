@@ -6,8 +6,8 @@
 #include "runtime/graph/registry.h"
 #include "runtime/io/format.h"
 #include "runtime/points/point_set.h"
-#include "runtime/shapes/level_set.h"
-#include "runtime/shapes/mesh.h"
+#include "runtime/shapes/level_set/level_set.h"
+#include "runtime/shapes/mesh/mesh.h"
 
 namespace {
 

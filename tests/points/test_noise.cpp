@@ -157,7 +157,7 @@ TEST_CASE("noise is defined everywhere, and known to the bit", "[noise]")
         CHECK(std::abs(noise(Vec3d(x, 0.3, x), {0.1, 2})) <= 1);
         CHECK(curl_noise(Vec3d(0.3, x, x), {0.1, 2}).allFinite());
     }
-    // The same numbers stand in tests/lua/test_math.lua.
+    // The same numbers stand in tests/host/test_math.lua.
     CHECK(noise(Vec3d(0.25, 1.5, -2.75), {}) == -0x1.a2a589f959c42p-2);
     CHECK(noise(Vec3d(100.1, -200.2, 300.3), {0.7, 3, 42}) == -0x1.1c09a79019806p-3);
     CHECK(curl_noise(Vec3d(0.25, 1.5, -2.75), {0.7, 3, 42}) ==

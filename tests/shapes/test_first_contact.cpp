@@ -3,8 +3,8 @@
 #include <cmath>
 #include <random>
 
-#include "runtime/shapes/analytic.h"
-#include "runtime/shapes/level_set.h"
+#include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/level_set/level_set.h"
 #include "tests/test.h"
 
 namespace rapid {

@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "runtime/shapes/analytic.h"
+#include "runtime/shapes/analytic/analytic.h"
 #include "runtime/solver/solve.h"
-#include "tests/solver/uniform_force.h"
+#include "tests/solver/motion/uniform_force.h"
 #include "tests/test.h"
 
 namespace rapid::test {

@@ -1,0 +1,24 @@
+#include "bindings/command/cache_files.h"
+
+#include <fmt/format.h>
+
+#include "runtime/io/frame_pattern.h"
+
+namespace rapid {
+
+CacheFiles find_cache(const std::string& text)
+{
+    // A file may be called like a pattern; then it is meant.
+    if (std::filesystem::is_directory(text))
+        throw Error("is a folder; name a file, or a sequence such as cache.####.vdb").at({text, 0});
+    if (std::filesystem::exists(text)) return {text, false, {{0, text}}};
+    const FramePattern pattern(text);
+    if (!pattern.has_frame()) throw Error("no such file").at({text, 0});
+    CacheFiles found{text, true, pattern.existing()};
+    if (found.frames.empty())
+        throw Error(fmt::format("no frame of this sequence is there; the first would be {}", pattern.expand(1)))
+            .at({text, 0});
+    return found;
+}
+
+}  // namespace rapid

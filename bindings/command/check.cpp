@@ -1,0 +1,104 @@
+// rapid check: everything that can be wrong before the first frame, without running one, and what is stiff; with
+// --races, whether kernels keep something from point to point, by running two.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "bindings/command/command.h"
+#include "bindings/command/frame_files.h"
+#include "bindings/command/graph_options.h"
+#include "bindings/command/races.h"
+#include "bindings/host/threads.h"
+#include "runtime/report/statistics.h"
+
+namespace rapid {
+namespace {
+
+class Check : public Command {
+public:
+    std::string name() const override { return "check"; }
+    std::string doc() const override { return "finds what is wrong with a graph, without running it"; }
+
+    void declare(CLI::App& app) override
+    {
+        graph_.declare(app);
+        files_.declare(app);
+        app.add_flag("--races", races_,
+                     "runs two frames in other orders of the points and in two states, and compares the bits");
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        if (races_ && common.threads > 1)
+            throw Error("--races goes over the points in orders of its own, on one thread; leave --threads out");
+        Threads threads(races_ ? 1 : common.threads);
+        return threads.run([&] {
+            const auto on_timeout = [&](const std::string& message) {
+                print_error(Error(message), common.verbose);
+                _exit(status_failed);
+            };
+            const std::unique_ptr<Session> session = graph_.load(false, on_timeout);
+            for (const std::string& warning : session->warnings()) print_warning(warning);
+            PlanOptions options = files_.plan_options(graph_.seed());
+            options.keep_all = races_;  // what no file asks for may be what tells
+            const Plan plan(session->graph(), options);
+            for (const std::string& warning : plan.warnings) print_warning(warning);
+            files_.resolve(plan, true);
+            if (races_ && !is_free_of_races(plan, options, on_timeout, common.verbose)) return status_failed;
+            print(text_of(*session, plan));
+            if (!races_) print(advice_on(plan));
+            return status_done;
+        });
+    }
+
+private:
+    bool is_free_of_races(const Plan& plan, const PlanOptions& options,
+                          const std::function<void(const std::string& message)>& on_timeout, bool verbose) const
+    {
+        try {
+            const std::optional<Error> race = find_race(graph_, plan, options, on_timeout);
+            if (race) print_error(*race, verbose);
+            return !race;
+        } catch (const Error& error) {  // while a frame ran
+            print_error(error, verbose);
+            return false;
+        }
+    }
+
+    // The first frame is tried out for it, with a sample of the points. What is wrong there is for the run to tell.
+    static std::string advice_on(const Plan& plan)
+    {
+        try {
+            return advice(Evaluator(plan).try_out());
+        } catch (const Error&) {
+            return "";
+        }
+    }
+
+    std::string text_of(const Session& session, const Plan& plan) const
+    {
+        std::string text;
+        for (const Session::Parameter& parameter : session.parameters()) {
+            text += fmt::format("param {} = {}", parameter.name, describe(parameter.value));
+            if (describe(parameter.value) != describe(parameter.fallback))
+                text += fmt::format(" (default {})", describe(parameter.fallback));
+            text += parameter.doc.empty() ? "\n" : fmt::format("  {}\n", parameter.doc);
+        }
+        std::vector<std::string> outputs;
+        for (const auto& [name, place] : plan.outputs) outputs.push_back(name);
+        text += fmt::format("{}: OK, {} of {} nodes reached from {} {}\n", graph_.file(), plan.nodes.size(),
+                            session.graph().nodes.size(), outputs.size() == 1 ? "output" : "outputs",
+                            fmt::join(outputs, ", "));
+        if (races_)
+            text += fmt::format("frames {} to {}: the same bits in every order of the points, and in two states\n",
+                                plan.first_frame() + 1, plan.first_frame() + frames_compared);
+        return text;
+    }
+
+    GraphOptions graph_;
+    FrameFiles files_;
+    bool races_ = false;
+};
+RAPID_COMMAND(Check);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,93 @@
+#include "bindings/command/command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+namespace rapid {
+namespace {
+
+// A function's static, so that it is there before the first registration, whichever file that is in.
+std::vector<std::unique_ptr<Command> (*)()>& makers()
+{
+    static std::vector<std::unique_ptr<Command> (*)()> all;
+    return all;
+}
+
+// The number that `text` is, all of it.
+template <class T>
+bool parse(std::string_view text, T& value)
+{
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+CommandRegistration::CommandRegistration(std::unique_ptr<Command> (*make)()) { makers().push_back(make); }
+
+std::vector<std::unique_ptr<Command>> make_commands()
+{
+    std::vector<std::unique_ptr<Command>> commands;
+    for (const auto make : makers()) commands.push_back(make());
+    std::sort(commands.begin(), commands.end(), [](const auto& a, const auto& b) { return a->name() < b->name(); });
+    return commands;
+}
+
+void print(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stdout); }
+
+void print_error(const Error& error, bool verbose)
+{
+    std::fflush(stdout);
+    std::string text = std::string(error.what()) + '\n';
+    if (verbose && !error.trace().empty()) text += error.trace() + '\n';
+    std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+void print_warning(const std::string& warning)
+{
+    std::fflush(stdout);
+    const std::string text = fmt::format("warning: {}\n", warning);
+    std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+std::int64_t read_whole(const std::string& option, const std::string& text, std::int64_t least)
+{
+    std::int64_t value = 0;
+    if (!parse(text, value) || value < least)
+        throw Error(fmt::format("{} = \"{}\"; it must be a whole number, at least {}", option, text, least));
+    return value;
+}
+
+std::uint64_t read_seed(const std::string& text)
+{
+    std::uint64_t value = 0;
+    if (!parse(text, value))
+        throw Error(fmt::format("--seed = \"{}\"; it must be a whole number from 0 to 2^64 - 1", text));
+    return value;
+}
+
+double read_positive(const std::string& option, const std::string& text)
+{
+    double value = 0;
+    if (!parse(text, value) || !(value > 0) || !std::isfinite(value))
+        throw Error(fmt::format("{} = \"{}\"; it must be a number above 0", option, text));
+    return value;
+}
+
+std::size_t read_bytes(const std::string& option, const std::string& text)
+{
+    constexpr std::string_view units = "KMG";
+    const std::size_t unit = text.empty() ? std::string_view::npos : units.find(text.back());
+    const int shift = unit == std::string_view::npos ? 0 : 10 * (static_cast<int>(unit) + 1);
+    std::uint64_t value = 0;
+    const bool number = parse(std::string_view(text).substr(0, text.size() - (shift > 0)), value);
+    if (!number || value == 0 || value > (UINT64_MAX >> shift))
+        throw Error(fmt::format("{} = \"{}\"; it must be bytes above 0, such as 1073741824, 512M or 1G", option, text));
+    return value << shift;
+}
+
+}  // namespace rapid

@@ -1,0 +1,107 @@
+// rapid diff: compares two cache files, or two sequences frame by frame, point by point of the same id.
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "bindings/command/cache_files.h"
+#include "bindings/command/command.h"
+#include "bindings/host/threads.h"
+#include "runtime/io/compare.h"
+#include "runtime/io/format.h"
+
+namespace rapid {
+namespace {
+
+using nlohmann::ordered_json;
+
+class Diff : public Command {
+public:
+    std::string name() const override { return "diff"; }
+    std::string doc() const override { return "compares two cache files or sequences by id"; }
+
+    void declare(CLI::App& app) override
+    {
+        app.add_option("A", a_, "a file, or a sequence such as cache.####.vdb")->type_name("")->required();
+        app.add_option("B", b_, "the other")->type_name("")->required();
+        app.add_option_function<std::string>(
+               "--tolerance", [this](const std::string& text) { tolerance_ = read_tolerance(text); },
+               "of P: times the diagonal of the bounds; of the rest: relative [default 1e-6]")
+            ->type_name("X");
+        app.add_flag("--json", json_, "as JSON");
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        Threads threads(common.threads);
+        return threads.run([&] {
+            const CacheFiles a = find_cache(a_), b = find_cache(b_);
+            if (a.sequence != b.sequence)
+                throw Error(fmt::format("{} is a sequence and {} is a file; name two of a kind", a.sequence ? a_ : b_,
+                                        a.sequence ? b_ : a_));
+            return a.sequence ? compare_sequences(a, b) : compare_files();
+        });
+    }
+
+private:
+    static double read_tolerance(const std::string& text)
+    {
+        double value = 0;
+        const auto parsed = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool whole = parsed.ec == std::errc() && parsed.ptr == text.data() + text.size();
+        if (!whole || !(value >= 0) || !std::isfinite(value))
+            throw Error(fmt::format("--tolerance = \"{}\"; it must be a number, at least 0", text));
+        return value;
+    }
+
+    int compare_files() const
+    {
+        const Comparison comparison = compare(read_points(a_), read_points(b_), tolerance_);
+        print(json_ ? to_json(comparison).dump(2) + '\n' : to_text(comparison));
+        return comparison.same ? status_done : status_failed;
+    }
+
+    // A frame that one sequence alone has is a difference.
+    int compare_sequences(const CacheFiles& a, const CacheFiles& b) const
+    {
+        std::vector<int> both, only_a, only_b;
+        for (const auto& [frame, path] : a.frames) (b.frames.count(frame) ? both : only_a).push_back(frame);
+        for (const auto& [frame, path] : b.frames)
+            if (!a.frames.count(frame)) only_b.push_back(frame);
+
+        std::size_t different = 0;
+        ordered_json frames = ordered_json::array();
+        for (const int frame : both) {
+            const Comparison comparison =
+                compare(read_points(a.frames.at(frame)), read_points(b.frames.at(frame)), tolerance_);
+            different += !comparison.same;
+            if (json_) {
+                ordered_json json = {{"frame", frame}};
+                json.update(to_json(comparison));
+                frames.push_back(std::move(json));
+            } else if (!comparison.same) {
+                print(fmt::format("frame {}\n{}", frame, to_text(comparison)));
+            }
+        }
+        const bool same = different == 0 && only_a.empty() && only_b.empty();
+        if (json_) {
+            print(ordered_json{{"same", same}, {"only_a", only_a}, {"only_b", only_b}, {"frames", frames}}.dump(2) +
+                  '\n');
+        } else {
+            if (!only_a.empty()) print(fmt::format("only in {}: frames {}\n", a_, fmt::join(only_a, ", ")));
+            if (!only_b.empty()) print(fmt::format("only in {}: frames {}\n", b_, fmt::join(only_b, ", ")));
+            print(fmt::format("{} of {} common frames are the same\n", both.size() - different, both.size()));
+        }
+        return same ? status_done : status_failed;
+    }
+
+    std::string a_, b_;
+    double tolerance_ = 1e-6;
+    bool json_ = false;
+};
+RAPID_COMMAND(Diff);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,234 @@
+// rapid explain: what of a scene is kept and what is left out, and why; and what one scene needs that another does not.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "bindings/command/command.h"
+#include "bindings/command/frame_files.h"
+#include "bindings/command/graph_options.h"
+#include "bindings/host/threads.h"
+#include "runtime/graph/explain.h"
+
+namespace rapid {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json json_of(const Explanation::ExplainedNode& node)
+{
+    ordered_json json = {{"name", node.name},
+                         {"type", node.type},
+                         {"kept", node.kept},
+                         {"evaluated", node.evaluated},
+                         {"why", node.why}};
+    if (!node.changes.empty()) json["changes"] = node.changes;
+    return json;
+}
+
+ordered_json json_of(const Explanation::ExplainedAttribute& attribute)
+{
+    ordered_json json = {{"name", attribute.name},
+                         {"simulation", attribute.simulation},
+                         {"kept", attribute.kept},
+                         {"bytes_per_point", attribute.bytes_per_point},
+                         {"why", attribute.why}};
+    if (!attribute.brought_in_by.empty()) json["brought_in_by"] = attribute.brought_in_by;
+    return json;
+}
+
+ordered_json json_of(const Explanation::ExplainedStage& stage)
+{
+    return {{"name", stage.name}, {"kept", stage.kept}, {"why", stage.why}};
+}
+
+template <class T>
+ordered_json json_of(const std::vector<T>& all)
+{
+    ordered_json json = ordered_json::array();
+    for (const T& one : all) json.push_back(json_of(one));
+    return json;
+}
+
+ordered_json json_of(const Explanation& plan)
+{
+    return {{"nodes", json_of(plan.nodes)},
+            {"attributes", json_of(plan.attributes)},
+            {"stages", json_of(plan.stages)},
+            {"passes", plan.passes},
+            {"bytes_per_point", plan.bytes_per_point()}};
+}
+
+// Rows of a table: a name, and what is said of it, in columns.
+class Rows {
+public:
+    void add(std::string name, std::string fact, std::string why)
+    {
+        rows_.push_back({std::move(name), std::move(fact), std::move(why)});
+    }
+
+    std::string text(const std::string& heading) const
+    {
+        if (rows_.empty()) return {};
+        std::size_t name = 0, fact = 0;
+        for (const Row& row : rows_) name = std::max(name, row.name.size()), fact = std::max(fact, row.fact.size());
+        std::string text = heading + '\n';
+        for (const Row& row : rows_)
+            text += fact == 0 ? fmt::format("  {:{}}  {}\n", row.name, name, row.why)
+                              : fmt::format("  {:{}}  {:{}}  {}\n", row.name, name, row.fact, fact, row.why);
+        return text;
+    }
+
+private:
+    struct Row {
+        std::string name, fact, why;
+    };
+    std::vector<Row> rows_;
+};
+
+std::string bytes(std::size_t count) { return fmt::format("{} B", count); }
+
+// The name of an attribute, with its simulation where there are several.
+std::string shown(const Explanation::ExplainedAttribute& attribute, const Explanation& plan)
+{
+    const bool several = attribute.simulation != plan.attributes.front().simulation ||
+                         attribute.simulation != plan.attributes.back().simulation;
+    return several ? fmt::format("{} of {}", attribute.name, attribute.simulation) : attribute.name;
+}
+
+std::string text_of(const Explanation& plan, bool kept)
+{
+    Rows nodes, attributes, stages;
+    for (const auto& node : plan.nodes)
+        if (node.kept == kept)
+            nodes.add(node.name, kept ? node.evaluated : "",
+                      node.changes.empty() ? node.why : fmt::format("{}; {}", node.why, node.changes));
+    for (const auto& attribute : plan.attributes) {
+        if (attribute.kept != kept) continue;
+        const bool usual = kept || attribute.brought_in_by == usual_way_in(attribute.name);
+        attributes.add(
+            shown(attribute, plan), kept ? bytes(attribute.bytes_per_point) : "",
+            usual ? attribute.why : fmt::format("{}; {} brings it in", attribute.why, attribute.brought_in_by));
+    }
+    for (const auto& stage : plan.stages)
+        if (stage.kept == kept) stages.add(stage.name, "", stage.why);
+    const std::string of_attributes = kept
+                                          ? fmt::format(" attributes, {} bytes a point at most", plan.bytes_per_point())
+                                          : fmt::format(" attributes ({} brings one in)", usual_way_in("NAME"));
+    return (kept ? "KEPT\n" : "\nLEFT OUT\n") + nodes.text(" nodes") + attributes.text(of_attributes) +
+           stages.text(" stages");
+}
+
+std::string text_of(const Explanation& plan)
+{
+    std::string text = text_of(plan, true);
+    text += " passes over the points\n";
+    for (const std::vector<std::string>& pass : plan.passes) text += fmt::format("  {}\n", fmt::join(pass, ", "));
+    return text + text_of(plan, false);
+}
+
+// What `one` keeps that `other` does not: nodes by type, as their names are each scene's own.
+Explanation surplus(const Explanation& one, const Explanation& other)
+{
+    const auto lacks = [](const auto& all, const auto& key, const std::string& value) {
+        return std::none_of(all.begin(), all.end(), [&](const auto& x) { return x.kept && key(x) == value; });
+    };
+    const auto type = [](const Explanation::ExplainedNode& node) { return node.type; };
+    const auto name = [](const auto& named) { return named.name; };
+    Explanation result;
+    for (const auto& node : one.nodes)
+        if (node.kept && lacks(other.nodes, type, node.type)) result.nodes.push_back(node);
+    for (const auto& attribute : one.attributes)
+        if (attribute.kept && lacks(other.attributes, name, attribute.name)) result.attributes.push_back(attribute);
+    for (const auto& stage : one.stages)
+        if (stage.kept && lacks(other.stages, name, stage.name)) result.stages.push_back(stage);
+    return result;
+}
+
+std::string text_of_surplus(const std::string& file, const std::string& other, const Explanation& surplus)
+{
+    Rows nodes, attributes, stages;
+    for (const auto& node : surplus.nodes) nodes.add(node.name, node.type, node.evaluated);
+    for (const auto& attribute : surplus.attributes)
+        attributes.add(attribute.name, bytes(attribute.bytes_per_point), attribute.why);
+    for (const auto& stage : surplus.stages) stages.add(stage.name, "", stage.why);
+    const std::string all = nodes.text(" node types") + attributes.text(" attributes") + stages.text(" stages");
+    return fmt::format("{} NEEDS, AND {} DOES NOT\n{}", file, other, all.empty() ? "  nothing\n" : all);
+}
+
+ordered_json json_of_surplus(const Explanation& surplus)
+{
+    return {{"nodes", json_of(surplus.nodes)},
+            {"attributes", json_of(surplus.attributes)},
+            {"stages", json_of(surplus.stages)}};
+}
+
+class Explain : public Command {
+public:
+    std::string name() const override { return "explain"; }
+    std::string doc() const override { return "tells what a graph's plan keeps and leaves out, and why"; }
+
+    void declare(CLI::App& app) override
+    {
+        graph_.declare(app);
+        files_.declare(app);
+        app.add_option("--against", against_, "tells what one of two graphs needs and the other does not")
+            ->type_name("GRAPH");
+        app.add_flag("--json", json_, "as JSON");
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        Threads threads(common.threads);
+        return threads.run([&] {
+            const auto on_timeout = [&](const std::string& message) {
+                print_error(Error(message), common.verbose);
+                _exit(status_failed);
+            };
+            const Explanation here = explained(*graph_.load(false, on_timeout));
+            if (against_.empty()) {
+                print(json_ ? json_of(here).dump(2) + '\n' : text_of(here));
+                return status_done;
+            }
+            const Explanation there = explained(*graph_.load_other(against_, on_timeout));
+            const Explanation more = surplus(here, there), less = surplus(there, here);
+            if (json_)
+                print(ordered_json{{"graph", graph_.file()},
+                                   {"against", against_},
+                                   {"only_graph", json_of_surplus(more)},
+                                   {"only_against", json_of_surplus(less)},
+                                   {"bytes_per_point", {here.bytes_per_point(), there.bytes_per_point()}}}
+                          .dump(2) +
+                      '\n');
+            else
+                print(text_of_surplus(graph_.file(), against_, more) + '\n' +
+                      text_of_surplus(against_, graph_.file(), less) +
+                      fmt::format("\nbytes a point at most: {} and {}\n", here.bytes_per_point(),
+                                  there.bytes_per_point()));
+            return status_done;
+        });
+    }
+
+private:
+    Explanation explained(const Session& session)
+    {
+        for (const std::string& warning : session.warnings()) print_warning(warning);
+        PlanOptions options = files_.plan_options(graph_.seed());
+        // Without -o: as an output that names no attributes.
+        if (files_.names().empty()) options.all_made = true;
+        const Plan plan(session.graph(), options);
+        for (const std::string& warning : plan.warnings) print_warning(warning);
+        files_.resolve(plan, true);
+        return explain(plan, files_.names());
+    }
+
+    GraphOptions graph_;
+    FrameFiles files_;
+    std::string against_;
+    bool json_ = false;
+};
+RAPID_COMMAND(Explain);
+
+}  // namespace
+}  // namespace rapid

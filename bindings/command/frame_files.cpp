@@ -1,0 +1,255 @@
+#include "bindings/command/frame_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+namespace rapid {
+namespace {
+
+// "1,2.5,-3": numbers alone, between commas.
+std::vector<double> read_numbers(const std::string& text)
+{
+    std::vector<double> numbers;
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    while (true) {
+        double number = 0;
+        const auto parsed = std::from_chars(at, end, number);
+        if (parsed.ec != std::errc() || !std::isfinite(number)) return {};
+        numbers.push_back(number);
+        if (parsed.ptr == end) return numbers;
+        if (*parsed.ptr != ',') return {};
+        at = parsed.ptr + 1;
+    }
+}
+
+void read_camera(const std::string& text, PictureOptions& picture)
+{
+    const std::vector<double> n = read_numbers(text);
+    const bool right = (n.size() == 6 || n.size() == 7) && (n.size() == 6 || (n[6] > 0 && n[6] < 180));
+    if (!right || Vec3d(n[0], n[1], n[2]) == Vec3d(n[3], n[4], n[5]))
+        throw Error(
+            fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
+                        "another that it looks at, and its vertical angle of view, in degrees",
+                        text));
+    picture.position = Vec3d(n[0], n[1], n[2]);
+    picture.target = Vec3d(n[3], n[4], n[5]);
+    if (n.size() == 7) picture.fov = n[6] * M_PI / 180;
+}
+
+void read_size(const std::string& text, PictureOptions& picture)
+{
+    constexpr int most = 16384;  // pixels an edge: a picture of 3 GiB
+    const char* const end = text.data() + text.size();
+    const auto width = std::from_chars(text.data(), end, picture.width);
+    const bool has_x = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+    const auto height = has_x ? std::from_chars(width.ptr + 1, end, picture.height) : width;
+    if (!has_x || height.ec != std::errc() || height.ptr != end || std::min(picture.width, picture.height) < 1 ||
+        std::max(picture.width, picture.height) > most)
+        throw Error(fmt::format("--size = \"{}\"; it must be WIDTHxHEIGHT, each from 1 to {}", text, most));
+}
+
+int frame_number(std::int64_t number)
+{
+    if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
+        throw Error(fmt::format("frame {} can't be written; numbers must fit 32 bits", number));
+    return static_cast<int>(number);
+}
+
+std::string key_of(const OutputTarget& to)
+{
+    return to.attributes ? fmt::format("{}:{}", to.pattern, fmt::join(*to.attributes, ",")) : to.pattern;
+}
+
+}  // namespace
+
+void FrameFiles::declare(CLI::App& app)
+{
+    app.add_option_function<std::vector<std::string>>(
+           "-o,--output",
+           [this](const std::vector<std::string>& texts) {
+               for (const std::string& text : texts) targets_.push_back({parse_output_target(text), text, {}});
+           },
+           "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .ply .csv .png); "
+           "attributes behind a colon are written besides P, v and id, without them all are")
+        ->type_name("PATTERN[:ATTR,ATTR]")
+        ->allow_extra_args(false);
+    app.add_option_function<std::string>(
+           "--camera", [this](const std::string& text) { read_camera(text, *picture_); },
+           "for pictures: the camera's place, what it looks at, and its vertical angle of view in degrees")
+        ->type_name("PX,PY,PZ,TX,TY,TZ[,FOV]");
+    app.add_option_function<std::string>(
+           "--size", [this](const std::string& text) { read_size(text, *picture_); }, "for pictures [default 1280x720]")
+        ->type_name("WIDTHxHEIGHT");
+}
+
+std::vector<std::filesystem::path> FrameFiles::folders() const
+{
+    std::vector<std::filesystem::path> folders;
+    for (const Target& target : targets_) {
+        std::filesystem::path folder = target.to.pattern.substr(0, target.to.pattern.find_first_of("#{$"));
+        folder = folder.has_parent_path() ? folder.parent_path() : std::filesystem::path(".");
+        std::error_code error;
+        std::filesystem::create_directories(folder, error);
+        if (error) throw Error(fmt::format("-o {}: can't make {}: {}", target.text, folder.string(), error.message()));
+        folders.push_back(folder);
+    }
+    return folders;
+}
+
+PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
+{
+    PlanOptions options;
+    options.seed = seed;
+    options.all_made = false;
+    for (const Target& target : targets_) {
+        if (const auto& names = target.to.attributes)
+            options.attributes.insert(options.attributes.end(), names->begin(), names->end());
+        else
+            options.all_made = true;
+    }
+    return options;
+}
+
+std::vector<std::string> FrameFiles::names() const
+{
+    std::vector<std::string> names;
+    for (const Target& target : targets_) names.push_back(target.text);
+    return names;
+}
+
+void FrameFiles::resolve(const Plan& plan, bool several_frames)
+{
+    scene_ = std::make_unique<SceneOfPlan>(plan);
+    const std::set<std::string> of_scene = plan.names_of_scene();
+    for (const PlannedSimulation& simulation : plan.simulations)
+        for (const PlannedAttribute& attribute : simulation.attributes)
+            if (attribute.kept && !attribute.group && !of_scene.count(attribute.name)) unasked_.insert(attribute.name);
+    std::set<std::string> patterns;
+    const auto check = [&](const std::string& pattern) {
+        format_of(pattern);
+        if (several_frames && !FramePattern(pattern).has_frame())
+            throw Error("several frames go to one file; put the frame's number into its name, as ####");
+        if (!patterns.insert(pattern).second)
+            throw Error("the same files are written twice; give each its own pattern");
+    };
+    for (const PlannedNode& planned : plan.nodes) {
+        const auto file = planned.node->arguments.find("file");
+        if (planned.node->type->name != "write" || file == planned.node->arguments.end()) continue;
+        try {
+            if (const std::string* pattern = file->second.get<std::string>()) check(*pattern);
+        } catch (const Error& error) {
+            throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()))
+                .in_node(planned.node->name)
+                .at(planned.node->location);
+        }
+    }
+    for (Target& target : targets_) {
+        try {
+            check(target.to.pattern);
+            resolve(target, plan);
+        } catch (const Error& error) {
+            throw Error(fmt::format("-o {}: {}", target.text, error.message()));
+        }
+    }
+}
+
+void FrameFiles::resolve(Target& target, const Plan& plan) const
+{
+    std::vector<std::string> outputs;
+    for (const auto& [name, place] : plan.outputs) outputs.push_back(name);
+    if (FramePattern(target.to.pattern).has_output() || outputs.size() == 1)
+        target.outputs = outputs;
+    else if (plan.outputs.count("main"))
+        target.outputs = {"main"};
+    else
+        throw Error(
+            fmt::format("the graph has several outputs and none is called main ({}); put {{output}} into the "
+                        "pattern",
+                        fmt::join(outputs, ", ")));
+
+    const std::set<std::string> in_scene = plan.names_of_scene();
+    const std::vector<std::string> known(in_scene.begin(), in_scene.end());
+    for (const std::string& name : target.to.attributes.value_or(std::vector<std::string>()))
+        if (!in_scene.count(name) && !known_attribute(name))
+            throw Error(fmt::format("no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
+}
+
+void FrameFiles::remove_unasked(PointSet& points) const
+{
+    for (const std::string& name : unasked_) points.remove(name);
+}
+
+FrameInfo FrameFiles::info_of(std::int64_t number, double time, double fps, const OutputTarget& to)
+{
+    FrameInfo info;
+    info.number = frame_number(number);
+    info.time = time;
+    info.fps = fps;
+    info.picture = picture_;
+    if (format_of(to.pattern).extension == ".png") info.scene = scene_->at(number);
+    return info;
+}
+
+void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output)
+{
+    const std::string key = key_of(to);
+    if (named_.insert(key + '\n' + output).second)
+        first_names_.push_back(FramePattern(to.pattern).expand(info.number, output));
+    FrameWriter* writer = nullptr;
+    {
+        const std::lock_guard lock(mutex_);
+        std::unique_ptr<FrameWriter>& entry = writers_[key];
+        if (!entry) entry = std::make_unique<FrameWriter>(std::vector<OutputTarget>{to});
+        writer = entry.get();
+    }
+    writer->submit(std::move(points), std::move(info), output);
+}
+
+void FrameFiles::write(const FrameResult& result)
+{
+    for (const Target& target : targets_)
+        for (const std::string& output : target.outputs) {
+            PointSet points = result.outputs.at(output);
+            if (!target.to.attributes) remove_unasked(points);
+            submit(target.to, std::move(points),
+                   info_of(result.frame, result.time.at(output), result.fps.at(output), target.to), output);
+        }
+}
+
+void FrameFiles::write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)
+{
+    const OutputTarget to{pattern, std::nullopt};
+    PointSet written = points;
+    remove_unasked(written);
+    submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main");
+}
+
+void FrameFiles::finish()
+{
+    // All of them, also where one failed: what the others hold is not lost for it.
+    std::exception_ptr first;
+    for (auto& [key, writer] : writers_) try {
+            writer->finish();
+        } catch (...) {
+            if (!first) first = std::current_exception();
+        }
+    if (first) std::rethrow_exception(first);
+}
+
+std::vector<FrameWriter::Written> FrameFiles::written() const
+{
+    const std::lock_guard lock(mutex_);
+    std::vector<FrameWriter::Written> all;
+    for (const auto& [key, writer] : writers_) {
+        const std::vector<FrameWriter::Written> files = writer->written();
+        all.insert(all.end(), files.begin(), files.end());
+    }
+    return all;
+}
+
+}  // namespace rapid

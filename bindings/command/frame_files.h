@@ -1,0 +1,76 @@
+// What a run writes: the files of -o and those of `:write` nodes, each pattern by a writer of its own.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings/command/command.h"
+#include "bindings/command/picture_scene.h"
+#include "runtime/graph/evaluate.h"
+#include "runtime/io/frame_writer.h"
+
+namespace rapid {
+
+class FrameFiles {
+public:
+    // -o, --camera, --size.
+    void declare(CLI::App& app);
+
+    // The folders that -o writes to, which are made where they are missing; of a pattern with a part that changes from
+    // output to output, the one above. Error: one can't be made.
+    std::vector<std::filesystem::path> folders() const;
+
+    // What the plan must keep alive for what -o asks for.
+    PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
+
+    // The -o as the user gave them.
+    std::vector<std::string> names() const;
+
+    // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames,
+    // or for no output of the graph; two that write the same files.
+    void resolve(const Plan& plan, bool several_frames);
+
+    // Queues the files of a frame. Error: one of an earlier frame that could not be written.
+    void write(const FrameResult& result);
+    // Queues the file of a `:write` node.
+    void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
+
+    // Waits until all is written. Error: what could not be.
+    void finish();
+
+    // The first name of each pattern and output, once it is known; then no more.
+    std::vector<std::string> take_first_names() { return std::exchange(first_names_, {}); }
+
+    // The files that are complete. From any thread.
+    std::vector<FrameWriter::Written> written() const;
+
+private:
+    struct Target {
+        OutputTarget to;
+        std::string text;                  // as the user gave it
+        std::vector<std::string> outputs;  // whose points it takes
+    };
+    void resolve(Target& target, const Plan& plan) const;
+    FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
+    void remove_unasked(PointSet& points) const;
+    void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output);
+
+    std::vector<Target> targets_;
+    std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
+    std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
+    std::unique_ptr<SceneOfPlan> scene_;
+
+    std::set<std::string> named_;
+    std::vector<std::string> first_names_;
+
+    mutable std::mutex mutex_;  // for written(), while a frame adds a writer
+    std::map<std::string, std::unique_ptr<FrameWriter>> writers_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,42 @@
+#include "bindings/command/frame_selection.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+FrameSelection read_frames(const std::string& text)
+{
+    const auto wrong = [&](const char* what) {
+        return Error(fmt::format("-f {}: {}; it must be a frame (12), a range (1-48), or a range and a step (1-48x2)",
+                                 text, what));
+    };
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    const auto number = [&] {
+        std::int32_t value = 0;  // as far as file formats and names go
+        const auto parsed = std::from_chars(at, end, value);
+        if (parsed.ec == std::errc::result_out_of_range) throw wrong("a frame's number must fit 32 bits");
+        if (parsed.ec != std::errc()) throw wrong("a number is missing");
+        at = parsed.ptr;
+        return std::int64_t{value};
+    };
+
+    FrameSelection range{number(), 0};
+    range.last = range.first;
+    if (at == end) return range;
+    if (*at++ != '-') throw wrong("a - is missing");
+    range.last = number();
+    if (range.last < range.first) throw wrong("it ends before it begins");
+    if (at == end) return range;
+    if (*at++ != 'x') throw wrong("an x is missing");
+    range.step = number();
+    if (range.step < 1) throw wrong("the step must be at least 1");
+    if (at != end) throw wrong("there is more behind it");
+    return range;
+}
+
+}  // namespace rapid

@@ -1,0 +1,67 @@
+#include "bindings/command/graph_options.h"
+
+#include <fmt/format.h>
+
+namespace rapid {
+
+void GraphOptions::declare(CLI::App& app)
+{
+    app.add_option("GRAPH", file_, "the graph file, such as graphs/first.lua")->type_name("")->required();
+    app.add_option_function<std::vector<std::string>>(
+           "--set",
+           [this](const std::vector<std::string>& texts) {
+               for (const std::string& text : texts) {
+                   const std::size_t equals = text.find('=');
+                   if (equals == std::string::npos || equals == 0)
+                       throw Error(fmt::format("--set \"{}\"; it must be NAME=VALUE", text));
+                   session_.set[text.substr(0, equals)] = text.substr(equals + 1);
+               }
+           },
+           "gives a rapid.param of the graph a value")
+        ->type_name("NAME=VALUE")
+        ->allow_extra_args(false);
+    app.add_option_function<std::string>(
+           "--seed", [this](const std::string& text) { seed_ = read_seed(text); }, "replaces the seed of every create")
+        ->type_name("N");
+    app.add_option_function<std::string>(
+           "--script-timeout",
+           [this](const std::string& text) { session_.script_timeout = read_positive("--script-timeout", text); },
+           "time that scripts may take, a frame [default 600]")
+        ->type_name("SECONDS");
+    app.add_option_function<std::string>(
+           "--script-memory",
+           [this](const std::string& text) { session_.script_memory = read_bytes("--script-memory", text); },
+           "memory that a script's state may take: bytes, or 512M, 1G [default 1G]")
+        ->type_name("BYTES");
+}
+
+std::unique_ptr<Session> GraphOptions::load(bool may_write, std::function<void(const std::string& message)> on_timeout,
+                                            std::function<void(const std::filesystem::path& file)> on_read) const
+{
+    SessionOptions options = session_;
+    options.may_write = may_write;
+    options.on_timeout = std::move(on_timeout);
+    options.on_read = std::move(on_read);
+    return std::make_unique<Session>(file_, std::move(options));
+}
+
+std::unique_ptr<Session> GraphOptions::load_other(const std::string& file,
+                                                  std::function<void(const std::string& message)> on_timeout) const
+{
+    SessionOptions options = session_;
+    options.set.clear();
+    options.on_timeout = std::move(on_timeout);
+    return std::make_unique<Session>(file, std::move(options));
+}
+
+std::unique_ptr<Session> GraphOptions::load_again(const KernelOrder& order,
+                                                  std::function<void(const std::string& message)> on_timeout) const
+{
+    SessionOptions options = session_;
+    options.quiet = true;
+    options.kernel_order = order;
+    options.on_timeout = std::move(on_timeout);
+    return std::make_unique<Session>(file_, std::move(options));
+}
+
+}  // namespace rapid

@@ -1,0 +1,56 @@
+// rapid info: what a cache file holds, or each file of a sequence.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "bindings/command/cache_files.h"
+#include "bindings/command/command.h"
+#include "bindings/host/threads.h"
+#include "runtime/io/describe.h"
+#include "runtime/io/format.h"
+
+namespace rapid {
+namespace {
+
+using nlohmann::ordered_json;
+
+class Info : public Command {
+public:
+    std::string name() const override { return "info"; }
+    std::string doc() const override { return "tells what a cache file or sequence holds"; }
+
+    void declare(CLI::App& app) override
+    {
+        app.add_option("FILE", file_, "a file, or a sequence such as cache.####.vdb")->type_name("")->required();
+        app.add_flag("--json", json_, "as JSON");
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        Threads threads(common.threads);
+        const CacheFiles cache = find_cache(file_);
+        ordered_json all = ordered_json::array();
+        for (const auto& [frame, path] : cache.frames) {
+            const PointSummary summary = threads.run([&, &file = path] { return describe(read_points(file)); });
+            if (json_) {
+                ordered_json json = {{"file", path.string()}};
+                if (cache.sequence) json["frame"] = frame;
+                json.update(to_json(summary));
+                all.push_back(std::move(json));
+            } else {
+                if (cache.sequence) print(path.string() + "\n");
+                print(to_text(summary));
+            }
+        }
+        if (json_) print((cache.sequence ? all : all.front()).dump(2) + '\n');
+        return status_done;
+    }
+
+private:
+    std::string file_;
+    bool json_ = false;
+};
+RAPID_COMMAND(Info);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,165 @@
+// The command `rapid`: finds the command among the arguments, reads its options and runs it.
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+#include "bindings/command/command.h"
+#include "runtime/graph/plugin.h"
+
+namespace rapid {
+namespace {
+
+using Arguments = std::vector<std::string>;
+
+CLI::App* find_subcommand(CLI::App& app, const std::string& name)
+{
+    for (CLI::App* command : app.get_subcommands({}))
+        if (command->get_name() == name) return command;
+    return nullptr;
+}
+
+// Whether an argument is an option, of any command, that takes a value from the next one.
+bool takes_value(CLI::App& app, const std::string& argument)
+{
+    if (!argument.starts_with('-')) return false;
+    for (const CLI::App* command : app.get_subcommands({}))
+        if (const CLI::Option* option = command->get_option_no_throw(argument))
+            if (option->get_items_expected_max() > 0) return true;
+    return false;
+}
+
+// The place of the command's name: the first argument that is one, and that is not another option's value. The order of
+// options never matters, so they may stand before the name as well.
+std::size_t find_command(CLI::App& app, const Arguments& arguments)
+{
+    for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i)
+        if (find_subcommand(app, arguments[i]) && (i == 0 || !takes_value(app, arguments[i - 1]))) return i;
+    return arguments.size();
+}
+
+Error no_command(CLI::App& app, const Arguments& arguments)
+{
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+    for (const std::string& argument : arguments) {
+        if (argument.starts_with('-')) continue;
+        if (argument.ends_with(".lua"))
+            return Error(fmt::format("no command; to run the graph, type: rapid run {}", argument));
+        const std::string near = did_you_mean(argument, names);
+        return Error(fmt::format("unknown command \"{}\"{}", argument,
+                                 near.empty() ? fmt::format("; it must be one of {}", fmt::join(names, ", ")) : near));
+    }
+    return Error(fmt::format("no command; it must be one of {}", fmt::join(names, ", ")));
+}
+
+// Arguments that no option took.
+void refuse_rest(const CLI::App& command)
+{
+    for (const std::string& argument : command.remaining()) {
+        if (argument == "--") continue;
+        if (!argument.starts_with('-')) throw Error(fmt::format("unexpected argument \"{}\"", argument));
+        std::vector<std::string> names;
+        for (const CLI::Option* option : command.get_options())
+            for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+        const std::string name = argument.substr(0, argument.find('='));
+        throw Error(fmt::format("unknown option \"{}\"{}", name, did_you_mean(name, names)));
+    }
+}
+
+int finish(int status)
+{
+    // A reader that has gone (`rapid nodes | head`) wanted no more.
+    if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return status;
+    if (errno == EPIPE) return status;
+    print_error(Error(fmt::format("standard output can't be written: {}", std::strerror(errno))), false);
+    return status == status_done ? status_failed : status;
+}
+
+int run(Arguments arguments)
+{
+    CLI::App app("Rapid: particles from Lua graphs, without a user interface.", "rapid");
+    app.set_version_flag("--version", "rapid " RAPID_VERSION);
+    app.footer(
+        "`rapid COMMAND --help` tells more. Exit status: 0 done; 1 found while a frame ran, a failed test, a\n"
+        "difference; 2 found before (usage, a mistake in the graph, a missing file).");
+
+    CommonOptions common;
+    const std::vector<std::unique_ptr<Command>> commands = make_commands();
+    for (const auto& command : commands) {
+        CLI::App* sub = app.add_subcommand(command->name(), command->doc());
+        command->declare(*sub);
+        sub->add_option_function<std::string>(
+               "--threads",
+               [&](const std::string& text) {
+                   constexpr int most = 4096;  // a typing error, not a machine
+                   const std::int64_t threads = read_whole("--threads", text, 0);
+                   if (threads > most) throw Error(fmt::format("--threads = {}; it must be at most {}", text, most));
+                   common.threads = static_cast<int>(threads);
+               },
+               "threads to use; 0, the default, is all that the machine has")
+            ->type_name("N");
+        sub->add_option_function<std::vector<std::string>>(
+               "--plugin", [&](const std::vector<std::string>& files) { common.plugins = files; },
+               "loads nodes from a library built against Rapid; so does RAPID_PLUGIN_PATH, a list of files and folders")
+            ->type_name("FILE")
+            ->allow_extra_args(false);
+        sub->add_flag("--verbose", common.verbose, "with the script's call stack, where an error has one");
+        sub->allow_extras();
+    }
+
+    if (arguments.empty()) {
+        print(app.help());
+        return finish(status_done);
+    }
+    std::string who = "rapid";
+    try {
+        const std::size_t place = find_command(app, arguments);
+        CLI::App* chosen = place < arguments.size() ? app.get_subcommand(arguments[place]) : nullptr;
+        if (chosen) {
+            who += " " + chosen->get_name();
+            std::rotate(arguments.begin(), arguments.begin() + static_cast<std::ptrdiff_t>(place),
+                        arguments.begin() + static_cast<std::ptrdiff_t>(place) + 1);
+        } else if (arguments.front() != "--help" && arguments.front() != "-h" && arguments.front() != "--version") {
+            throw no_command(app, arguments);
+        }
+        std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
+        app.parse(arguments);
+        refuse_rest(*chosen);
+    } catch (const CLI::Success& request) {  // --help, --version
+        return app.exit(request), finish(status_done);
+    } catch (const CLI::ParseError& error) {
+        print_error(Error(fmt::format("{}: {}; see \"{} --help\"", who, error.what(), who)), false);
+        return status_refused;
+    } catch (const Error& error) {
+        print_error(Error(fmt::format("{}: {}", who, error.what())), false);
+        return status_refused;
+    }
+
+    for (const auto& command : commands) {
+        if (!app.got_subcommand(command->name())) continue;
+        try {
+            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
+            for (const std::string& file : common.plugins) load_plugin(file);
+            return finish(command->run(common));
+        } catch (const Error& error) {
+            print_error(error, common.verbose);
+            return status_refused;
+        } catch (const std::bad_alloc&) {
+            print_error(Error("out of memory"), false);
+            return status_failed;
+        } catch (const std::exception& error) {  // of a library: what it says is all that is known
+            print_error(Error(error.what()), false);
+            return status_failed;
+        }
+    }
+    return status_refused;
+}
+
+}  // namespace
+}  // namespace rapid
+
+int main(int argc, char** argv) { return rapid::run({argv + 1, argv + argc}); }

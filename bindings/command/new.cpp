@@ -1,0 +1,111 @@
+// rapid new: a scene that runs and a test that passes, to begin with; and what editors and luacheck need to know Rapid.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bindings/command/command.h"
+#include "bindings/host/script_host.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file of lua/new, with the scene's name for NAME.
+std::string fill_in(const char* file, const std::string& name)
+{
+    const fs::path path = lua_folder() / "new" / file;
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) throw Error("can't be read: Rapid's own Lua files are missing").at({path.string(), 0});
+    std::stringstream text;
+    text << stream.rdbuf();
+    std::string filled = text.str();
+    constexpr std::string_view placeholder = "NAME";
+    for (std::size_t at = 0; (at = filled.find(placeholder, at)) != std::string::npos; at += name.size())
+        filled.replace(at, placeholder.size(), name);
+    return filled;
+}
+
+// Makes a file that is not there yet. False: it is. Error: it can't be written; nothing is left of it.
+bool make_file(const std::string& file, const std::string& text)
+{
+    const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor < 0 && errno == EEXIST) return false;
+    const bool written =
+        descriptor >= 0 && write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+    const int error = errno;
+    if (descriptor >= 0) close(descriptor);
+    if (written) return true;
+    if (descriptor >= 0) unlink(file.c_str());
+    throw Error(fmt::format("can't be written: {}", std::strerror(error))).at({file, 0});
+}
+
+class New : public Command {
+public:
+    std::string name() const override { return "new"; }
+    std::string doc() const override { return "makes a scene and its test in this folder, to begin with"; }
+
+    void declare(CLI::App& app) override
+    {
+        app.add_option("NAME", name_, "of the scene, such as sparks: makes sparks.lua and test_sparks.lua")
+            ->type_name("")
+            ->required();
+    }
+
+    int run(const CommonOptions&) override
+    {
+        check_name();
+        const std::string scene = name_ + ".lua", test = "test_" + name_ + ".lua";
+        for (const std::string& file : {scene, test})
+            if (std::error_code none; fs::exists(fs::symlink_status(file, none)))
+                throw Error("is there already and is left as it is; take another name").at({file, 0});
+
+        make(scene, fill_in("scene.lua", name_));
+        make(test, fill_in("test.lua", name_));
+        make(".luacheckrc", fill_in("luacheckrc", name_));
+        const nlohmann::ordered_json editor = {{"runtime.version", "LuaJIT"},
+                                               {"workspace.library", {(lua_folder() / "rapid.d.lua").string()}}};
+        make(".luarc.json", editor.dump(2) + '\n');
+        print(fmt::format("now: rapid run {} -f 1-96 -o {}.####.png\n     rapid test {}\n", scene, name_, test));
+        return status_done;
+    }
+
+private:
+    void check_name() const
+    {
+        const bool word = !name_.empty() && (std::isalpha(static_cast<unsigned char>(name_[0])) || name_[0] == '_') &&
+                          std::all_of(name_.begin(), name_.end(),
+                                      [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
+        if (!word)
+            throw Error(
+                fmt::format("rapid new: \"{}\" is no name of a scene; it must be made of letters, digits, _ and "
+                            "-, and begin with a letter",
+                            name_));
+        if (Session::all_node_types().find(name_))
+            throw Error(
+                fmt::format("rapid new: \"{0}\" is the name of a node, and {0}.lua would hide it from scenes "
+                            "beside it; take another name",
+                            name_));
+    }
+
+    // What is there stays: a second scene in a folder finds .luacheckrc and .luarc.json.
+    static void make(const std::string& file, const std::string& text)
+    {
+        if (make_file(file, text)) print(fmt::format("made {}\n", file));
+    }
+
+    std::string name_;
+};
+RAPID_COMMAND(New);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,94 @@
+#include "bindings/command/picture_scene.h"
+
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "runtime/shapes/motion/deforming.h"
+
+namespace rapid {
+namespace {
+
+// A shape without a surface mesh is infinite. Of those a picture can show a plane: its distance is n · x - offset, and
+// five points tell whether it is.
+std::optional<PictureScene::Plane> plane_of(const Shape& shape)
+{
+    const std::array<Vec3d, 5> P = {Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, 0, 1), Vec3d(-3, 5, 7)};
+    std::array<double, 5> phi{};
+    shape.distance(P, phi, {});
+    const PictureScene::Plane plane{Vec3d(phi[1], phi[2], phi[3]) - Vec3d::Constant(phi[0]), -phi[0]};
+    // Each of them is rounded where it is computed: as far as |offset| from zero.
+    const double rounding = 1e-9 * (1 + std::abs(phi[0]));
+    const bool linear = std::abs(plane.normal.dot(P[4]) - plane.offset - phi[4]) <= 100 * rounding;
+    if (!linear || std::abs(plane.normal.norm() - 1) > rounding) return std::nullopt;
+    return plane;
+}
+
+}  // namespace
+
+void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place,
+                      PictureScene::Body::Role role)
+{
+    const bool moved = !place.matrix().isIdentity(0);
+    if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) {
+        scene.bodies.push_back({moved ? transformed(mesh, place) : mesh, role});
+        return;
+    }
+    const auto shape = std::dynamic_pointer_cast<const Shape>(object);
+    if (!shape) return;
+    const auto [entry, fresh] = surfaces_.try_emplace(object);
+    if (fresh) entry->second = shape->surface();
+    if (entry->second) {
+        scene.bodies.push_back({moved ? transformed(entry->second, place) : entry->second, role});
+    } else if (std::optional<PictureScene::Plane> plane = plane_of(*shape)) {
+        const Vec3d on = place * (plane->offset * plane->normal);
+        plane->normal = (place.linear() * plane->normal).normalized();
+        plane->offset = plane->normal.dot(on);
+        scene.planes.push_back(*plane);
+    }
+}
+
+std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
+{
+    if (still_) return still_;
+    auto scene = std::make_shared<PictureScene>();
+    bool moves = false;
+    for (const PlannedNode& planned : plan_.nodes) {
+        // What adds a dynamic is in the points' way; anything else is where they come from.
+        const auto role =
+            planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
+        const PlannedSimulation& simulation = plan_.simulations[planned.simulation];
+        const FrameClock clock{simulation.fps, simulation.start, simulation.subframes};
+        const Frame now = clock.at(static_cast<double>(frame));
+        Eigen::Affine3d place = Eigen::Affine3d::Identity();
+        if (const auto transform = planned.node->arguments.find("transform");
+            transform != planned.node->arguments.end()) {
+            MotionPtr motion;
+            read_value(*planned.node->type->find("transform"), transform->second, motion);
+            if (motion) place = motion->at(now).affine();
+            moves = moves || (motion && motion->varies());
+        }
+        for (const auto& [name, value] : planned.node->arguments) {
+            if (name == "transform") continue;
+            const FrameFunction* function = value.function();
+            const Value given = function ? function->call(now) : value;
+            moves = moves || function;
+            if (const auto body = given.object<AnimatedMesh>()) {
+                moves = true;
+                add(*scene, body->at(clock, frame), place, role);
+            } else if (const auto shape = given.object<AnimatedShape>()) {
+                moves = true;
+                add(*scene, shape->rest(), place * shape->motion()->at(now).affine(), role);
+            } else if (const auto deforming = given.object<DeformingLevelSet>()) {
+                moves = true;
+                add(*scene, deforming->mesh().at(clock, frame), place, role);
+            } else if (const ObjectPtr* object = given.get<ObjectPtr>()) {
+                add(*scene, *object, place, role);
+            }
+        }
+    }
+    if (!moves) still_ = scene;
+    return scene;
+}
+
+}  // namespace rapid

@@ -1,0 +1,28 @@
+// What a picture shows besides the points: the shapes that a plan's points collide with or are born from.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "runtime/graph/plan.h"
+#include "runtime/picture/picture.h"
+
+namespace rapid {
+
+class SceneOfPlan {
+public:
+    explicit SceneOfPlan(const Plan& plan) : plan_(plan) {}
+
+    // Arguments that are functions, and motions, are asked at the frame's time. Level sets are turned into meshes, each
+    // once.
+    std::shared_ptr<const PictureScene> at(std::int64_t frame);
+
+private:
+    void add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place, PictureScene::Body::Role role);
+
+    const Plan& plan_;
+    std::map<ObjectPtr, MeshPtr> surfaces_;
+    std::shared_ptr<const PictureScene> still_;  // where nothing moves
+};
+
+}  // namespace rapid

@@ -1,0 +1,201 @@
+#include "bindings/command/races.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <vector>
+
+#include "runtime/graph/evaluate.h"
+#include "runtime/graph/point_function.h"
+
+namespace rapid {
+namespace {
+
+// What a node left at a frame.
+struct Result {
+    std::string node;
+    Location location;
+    std::int64_t frame;
+    PointSet points;
+};
+
+struct Difference {
+    const Result* result;           // of the run in order, after which the sets differ
+    std::string what, here, there;  // "heat of point id 3", "1", "2"
+};
+
+std::string text_of(float value) { return fmt::format("{:.9g}", value); }
+std::string text_of(double value) { return fmt::format("{:.17g}", value); }
+std::string text_of(std::int32_t value) { return fmt::format("{}", value); }
+std::string text_of(std::int64_t value) { return fmt::format("{}", value); }
+std::string text_of(const Vec3f& v) { return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z()); }
+std::string text_of(const Vec3d& v) { return fmt::format("vec3({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z()); }
+std::string text_of(const Quatf& q)
+{
+    return fmt::format("quat({:.9g}, {:.9g}, {:.9g}, {:.9g})", q.x(), q.y(), q.z(), q.w());
+}
+std::string text_of(const DetailValue& value)
+{
+    return std::visit([](const auto& v) { return text_of(v); }, value);
+}
+
+template <class T>
+std::optional<std::size_t> first_unequal(const Column<T>& a, const Column<T>& b)
+{
+    const Strided<T> here = a.read(), there = b.read();
+    for (std::size_t i = 0; i < a.size(); ++i)
+        if (std::memcmp(&here[i], &there[i], sizeof(T)) != 0) return i;
+    return std::nullopt;
+}
+
+std::optional<Difference> compare_columns(const PointSet& a, const PointSet& b)
+{
+    for (const auto& [name, column] : a.columns()) {
+        const AnyColumn* other = b.find(name);
+        if (!other || other->index() != column.index())
+            return Difference{nullptr, fmt::format("the attribute {}", name), "there",
+                              other ? "of another type" : "not"};
+        auto found = std::visit(
+            [&, &name = name]<class T>(const Column<T>& here) -> std::optional<Difference> {
+                const auto& there = std::get<Column<T>>(*other);
+                const std::optional<std::size_t> i = first_unequal(here, there);
+                if (!i) return std::nullopt;
+                return Difference{nullptr, fmt::format("{} of point id {}", name, a.id()[*i]), text_of(here[*i]),
+                                  text_of(there[*i])};
+            },
+            column);
+        if (found) return found;
+    }
+    return std::nullopt;
+}
+
+std::optional<Difference> compare_groups(const PointSet& a, const PointSet& b)
+{
+    for (const auto& [name, members] : a.groups()) {
+        const Column<std::uint8_t>* other = b.find_group(name);
+        if (!other) return Difference{nullptr, fmt::format("the group {}", name), "there", "not"};
+        if (const auto i = first_unequal(members, *other))
+            return Difference{nullptr, fmt::format("point id {}", a.id()[*i]),
+                              fmt::format("{} the group {}", members[*i] ? "in" : "out of", name),
+                              members[*i] ? "out of it" : "in it"};
+    }
+    return std::nullopt;
+}
+
+std::optional<Difference> compare_details(const PointSet& a, const PointSet& b)
+{
+    for (const auto& [name, value] : a.details) {
+        const auto other = b.details.find(name);
+        const std::string there = other == b.details.end() ? "not there" : text_of(other->second);
+        if (text_of(value) != there)
+            return Difference{nullptr, fmt::format("the detail value {}", name), text_of(value), there};
+    }
+    return std::nullopt;
+}
+
+// The first difference of two sets that should be the same, bit by bit.
+std::optional<Difference> compare(const PointSet& a, const PointSet& b)
+{
+    // Where points were killed or sorted, the values beside their ids are of no interest.
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+        if (a.id()[i] != b.id()[i])
+            return Difference{nullptr, fmt::format("the id at place {}", i + 1), text_of(a.id()[i]),
+                              text_of(b.id()[i])};
+    if (a.size() != b.size())
+        return Difference{nullptr, "the number of points", fmt::format("{}", a.size()), fmt::format("{}", b.size())};
+    if (auto found = compare_columns(a, b)) return found;
+    if (auto found = compare_groups(a, b)) return found;
+    return compare_details(a, b);
+}
+
+void advance_all(Evaluator& evaluator)
+{
+    for (std::int64_t frame = 0; frame <= frames_compared; ++frame) evaluator.advance();
+}
+
+std::vector<Result> results_in_order(const Plan& plan)
+{
+    std::vector<Result> results;
+    Evaluator evaluator(plan, {}, [&](const Node& node, std::int64_t frame, const PointSet& points) {
+        results.push_back({node.name, node.location, frame, points});
+    });
+    advance_all(evaluator);
+    return results;
+}
+
+struct Trials {
+    const GraphOptions& graph;
+    const PlanOptions& options;
+    const std::function<void(const std::string& message)>& on_timeout;
+    const std::vector<Result>& expected;
+
+    // Computes the frames in another order; each node's result is compared as soon as it is there.
+    std::optional<Difference> run(const KernelOrder& order) const
+    {
+        const std::unique_ptr<Session> session = graph.load_again(order, on_timeout);
+        const Plan plan(session->graph(), options);
+        std::optional<Difference> first;
+        std::size_t next = 0;
+        Evaluator evaluator(plan, {}, [&](const Node&, std::int64_t, const PointSet& points) {
+            const Result& result = expected[next++];
+            if (first) return;
+            first = compare(result.points, points);
+            if (first) first->result = &result;
+        });
+        advance_all(evaluator);
+        return first;
+    }
+};
+
+bool has_kernel(const Node& node)
+{
+    for (const auto& [name, argument] : node.arguments) {
+        const auto* object = argument.get<ObjectPtr>();
+        if (object && std::dynamic_pointer_cast<const PointFunction>(*object)) return true;
+    }
+    return false;
+}
+
+// What an action does shows only after its Solve, and what a kernel does to the points that another one then asks for
+// may show late: each kernel of the plan is put into the other order alone, and the first that makes a difference is
+// the one.
+std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan& plan, const Difference& seen,
+                                                KernelOrder order)
+{
+    const Node* last = nullptr;
+    for (const PlannedNode& planned : plan.nodes) {
+        if (planned.node->name == seen.result->node) last = planned.node.get();
+        if (!has_kernel(*planned.node)) continue;
+        order.node = planned.node->name;
+        if (const auto alone = trials.run(order)) return {*alone, planned.node.get()};
+    }
+    return {seen, last};
+}
+
+}  // namespace
+
+std::optional<Error> find_race(const GraphOptions& graph, const Plan& plan, const PlanOptions& options,
+                               const std::function<void(const std::string& message)>& on_timeout)
+{
+    const std::vector<Result> expected = results_in_order(plan);
+    const Trials trials{graph, options, on_timeout, expected};
+    for (const KernelOrder::Way way : {KernelOrder::Reversed, KernelOrder::TwoStates}) {
+        const KernelOrder order{way, ""};
+        const std::optional<Difference> seen = trials.run(order);
+        if (!seen) continue;
+        const auto [found, culprit] = find_culprit(trials, plan, *seen, order);
+        const std::string after =
+            culprit->name == found.result->node ? "" : fmt::format(" after node \"{}\"", found.result->node);
+        Error error(fmt::format(
+            "frame {}: {}{} is {} in the order of the points, and {} {}; a kernel must not remember other points: keep "
+            "what it needs in an attribute of the point, or find it once for the whole set in :detail",
+            found.result->frame, found.what, after, found.here, found.there,
+            way == KernelOrder::Reversed ? "in reverse order"
+                                         : "where every other point is worked on in another state"));
+        error.at(culprit->location).in_node(culprit->name);
+        return error;
+    }
+    return std::nullopt;
+}
+
+}  // namespace rapid

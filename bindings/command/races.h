@@ -1,0 +1,27 @@
+// What a kernel hides: whether what it does to a point depends on the points before it.
+//
+// Two frames are computed three times on one thread: in the order of the points, from the last point to the first, and
+// in two states of Lua by turns. A kernel that sees its own point alone gives the same bits each time. What it keeps
+// from point to point otherwise (in a table that its bytecode does not betray, in a coroutine) shows at the first node
+// after which two of the sets differ.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "bindings/command/graph_options.h"
+#include "runtime/graph/plan.h"
+
+namespace rapid {
+
+// The frames behind the first, at which the nodes before Solve do not run, that are compared.
+inline constexpr std::int64_t frames_compared = 2;
+
+// plan: of a session in the order of the points, on one thread. Returns the first difference, with the node, the
+// attribute, the point and both values. Error: what a frame raises.
+std::optional<Error> find_race(const GraphOptions& graph, const Plan& plan, const PlanOptions& options,
+                               const std::function<void(const std::string& message)>& on_timeout);
+
+}  // namespace rapid

@@ -1,0 +1,161 @@
+// rapid run: computes the frames in order and writes them.
+#include <fmt/format.h>
+
+#include <csignal>
+
+#include "bindings/command/command.h"
+#include "bindings/command/frame_files.h"
+#include "bindings/command/frame_selection.h"
+#include "bindings/command/graph_options.h"
+#include "bindings/command/process_sandbox.h"
+#include "bindings/command/run_report.h"
+#include "bindings/command/signals.h"
+#include "bindings/command/watch.h"
+#include "bindings/host/threads.h"
+#include "runtime/deferred.h"
+#include "runtime/graph/evaluate.h"
+
+namespace rapid {
+namespace {
+
+class Run : public Command {
+public:
+    std::string name() const override { return "run"; }
+    std::string doc() const override { return "computes the frames of a graph and writes them"; }
+
+    void declare(CLI::App& app) override
+    {
+        graph_.declare(app);
+        app.add_option_function<std::string>(
+               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+               "the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too [default: "
+               "48 from the first]")
+            ->type_name("FRAMES");
+        files_.declare(app);
+        app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
+        app.add_flag("--keep-all", keep_all_,
+                     "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
+                     "the same");
+        app.add_flag("--quiet", quiet_, "no progress and no summary");
+        app.add_flag(
+            "--untrusted", untrusted_,
+            "keeps the process from all files but the graph's folder, --allow-read and the outputs' folders, from "
+            "sockets and from other processes");
+        app.add_flag(within_walls, within_walls_)->group("");  // our own: the run itself
+        app.add_option("--allow-read", allowed_, "a file or folder that an --untrusted graph may read, too")
+            ->type_name("PATH")
+            ->allow_extra_args(false);
+        app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
+        app.add_flag(Watch::tell_option, tell_)->group("");  // our own: a run of --watch
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        if (!allowed_.empty() && !untrusted_)
+            throw Error("--allow-read is for --untrusted; a graph reads what it names");
+        if (watch_ && untrusted_) throw Error("--watch starts processes, which --untrusted forbids; give one of them");
+        if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
+        if (untrusted_ && !within_walls_) enter_walls(openings());
+        if (untrusted_) {
+            load_deferred();  // which needs what walls take
+            close_walls();
+        }
+        std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
+        std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
+        Threads threads(common.threads);
+        RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose},
+                         [this] { return files_.written(); });
+        const SignalThread signals([&](int signal) { report.abandon(128 + signal, "interrupted"); });
+
+        return threads.run([&] {
+            const std::unique_ptr<Session> session = graph_.load(
+                true, [&](const std::string& message) { report.abandon(status_failed, message); },
+                tell_ ? Watch::tell : nullptr);
+            for (const std::string& warning : session->warnings()) report.warning(warning);
+            PlanOptions options = files_.plan_options(graph_.seed());
+            options.keep_all = keep_all_;
+            const Plan plan(session->graph(), options);
+            for (const std::string& warning : plan.warnings) report.warning(warning);
+
+            const FrameSelection frames = range_of(plan);
+            files_.resolve(plan, !frames.single());
+            report.begin(plan.first_frame(), frames.last);
+            return compute(plan, frames, report);
+        });
+    }
+
+private:
+    // What the run itself needs, besides what is allowed.
+    Openings openings() const
+    {
+        const auto folder_of = [](const std::filesystem::path& file) {
+            return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+        };
+        Openings openings;
+        openings.readable = {folder_of(graph_.file())};
+        openings.readable.insert(openings.readable.end(), allowed_.begin(), allowed_.end());
+        openings.writable = files_.folders();
+        if (!stats_.empty()) {
+            openings.writable.push_back(folder_of(stats_));
+            std::filesystem::create_directories(openings.writable.back());
+        }
+        return openings;
+    }
+
+    FrameSelection range_of(const Plan& plan) const
+    {
+        const std::int64_t start = plan.first_frame();
+        const FrameSelection range = frames_.value_or(FrameSelection{start, start + default_frames - 1});
+        if (range.first < start)
+            throw Error(fmt::format("-f: frame {} is before the scene's first, {}", range.first, start));
+        return range;
+    }
+
+    int compute(const Plan& plan, const FrameSelection& frames, RunReport& report)
+    {
+        try {
+            Evaluator evaluator(
+                plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame, double fps) {
+                    if (frames.contains(std::llround(frame.number))) files_.write_node(pattern, points, frame, fps);
+                });
+            while (evaluator.next_frame() <= frames.last) {
+                const FrameResult result = evaluator.advance();
+                for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
+                if (frames.contains(result.frame)) files_.write(result);
+                for (const std::string& name : files_.take_first_names()) report.line("writing " + name);
+                report.frame(result);
+            }
+            files_.finish();
+            report.finish();
+            return status_done;
+        } catch (const Error& error) {
+            finish_files(error, report);
+            return report.fail(error);
+        } catch (const std::exception& error) {  // of a library
+            const Error known(dynamic_cast<const std::bad_alloc*>(&error) ? "out of memory" : error.what());
+            finish_files(known, report);
+            return report.fail(known);
+        }
+    }
+
+    // The frames before the one that failed are complete: they are written, or it is said why not.
+    void finish_files(const Error& reason, RunReport& report)
+    {
+        try {
+            files_.finish();
+        } catch (const std::exception& error) {
+            if (std::string_view(error.what()) != reason.what()) report.warning(error.what());
+        }
+    }
+
+    GraphOptions graph_;
+    FrameFiles files_;
+    std::optional<FrameSelection> frames_;
+    std::string stats_;
+    bool keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, within_walls_ = false;
+    std::vector<std::string> allowed_;
+};
+RAPID_COMMAND(Run);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,113 @@
+#include "bindings/command/run_report.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+
+#include "runtime/io/file.h"
+#include "runtime/report/memory.h"
+
+namespace rapid {
+
+RunReport::RunReport(Options options, std::function<std::vector<FrameWriter::Written>()> written)
+    : options_(std::move(options)), written_(std::move(written))
+{
+    run_.graph = options_.graph;
+    run_.threads = options_.threads;
+}
+
+double RunReport::now() const { return stopwatch_.seconds(); }
+
+void RunReport::begin(std::int64_t first, std::int64_t last)
+{
+    const std::lock_guard lock(mutex_);
+    progress_.emplace(stdout, options_.quiet ? ProgressStyle::None : progress_style(stdout), first, last);
+}
+
+void RunReport::frame(const FrameResult& result)
+{
+    const std::lock_guard lock(mutex_);
+    run_.frames.push_back(statistics_of(result));
+    keep_worst(run_.stiff, result.figures.stiff);
+    progress_->frame(run_.frames.back(), now());
+}
+
+void RunReport::line(const std::string& text)
+{
+    const std::lock_guard lock(mutex_);
+    progress_->line(text);
+}
+
+void RunReport::warning(const std::string& text, std::optional<std::int64_t> frame)
+{
+    const std::lock_guard lock(mutex_);
+    if (!warned_.insert(text).second) return;
+    if (progress_) progress_->finish();
+    print_warning(frame ? fmt::format("frame {}: {}", *frame, text) : text);
+}
+
+void RunReport::finish()
+{
+    const std::lock_guard lock(mutex_);
+    if (progress_) progress_->finish();
+    write_statistics();
+    if (!options_.quiet) print(summary(run_));
+}
+
+int RunReport::fail(const Error& error)
+{
+    const std::lock_guard lock(mutex_);
+    if (progress_) progress_->finish();
+    print_error(error, options_.verbose);
+    try {
+        write_statistics();
+    } catch (const Error& second) {
+        print_error(second, options_.verbose);
+    }
+    return status_failed;
+}
+
+void RunReport::abandon(int status, const std::string& why)
+{
+    // The run's own thread holds the lock for moments only, unless its terminal is stopped; then go without.
+    if (mutex_.try_lock_for(std::chrono::seconds(1))) {
+        if (progress_) progress_->finish();
+        print_error(Error(why), false);
+        try {
+            write_statistics();
+        } catch (const Error& error) {
+            print_error(error, false);
+        }
+    }
+    remove_unfinished_files();
+    _exit(status);
+}
+
+void RunReport::write_statistics()
+{
+    run_.seconds = now();
+    run_.peak_bytes = peak_memory();
+    std::map<std::int64_t, FrameStatistics*> by_frame;
+    for (FrameStatistics& frame : run_.frames) {
+        frame.seconds.write = 0;
+        by_frame[frame.frame] = &frame;
+    }
+    for (const FrameWriter::Written& file : written_())
+        if (const auto found = by_frame.find(file.frame); found != by_frame.end())
+            found->second->seconds.write += file.seconds;
+    if (options_.stats_file.empty()) return;
+
+    try {
+        UnfinishedFile unfinished(options_.stats_file);
+        OutputFile file(unfinished.path());
+        const std::string text = to_json(run_);
+        file.append(text.data(), text.size());
+        file.close();
+        unfinished.finish();
+    } catch (Error& error) {
+        throw error.at({options_.stats_file, 0});
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,60 @@
+// What `rapid run` tells while it runs and when it ends, however it ends.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bindings/command/command.h"
+#include "runtime/io/frame_writer.h"
+#include "runtime/report/progress.h"
+#include "runtime/report/statistics.h"
+#include "runtime/stopwatch.h"
+
+namespace rapid {
+
+// Frames, progress and summary go to standard output, warnings and errors to standard error.
+class RunReport {
+public:
+    struct Options {
+        std::string graph;
+        int threads = 1;
+        std::string stats_file;  // empty: none
+        bool quiet = false, verbose = false;
+    };
+    // The run's time begins here. written: the files that are complete, asked from any thread.
+    RunReport(Options options, std::function<std::vector<FrameWriter::Written>()> written);
+
+    void begin(std::int64_t first, std::int64_t last);
+    void frame(const FrameResult& result);
+    void line(const std::string& text);
+    // Once, with the frame where it is of one: what is doubtful in one frame often is in the next ones.
+    void warning(const std::string& text, std::optional<std::int64_t> frame = {});
+
+    // The statistics file and the summary. Error: the file can't be written.
+    void finish();
+    // An error that ends the run: says it, and writes the statistics of the frames so far.
+    int fail(const Error& error);
+    // From another thread, at any moment: says why, writes the statistics, removes what is unfinished, ends the
+    // process.
+    [[noreturn]] void abandon(int status, const std::string& why);
+
+private:
+    void write_statistics();
+    double now() const;
+
+    const Options options_;
+    const std::function<std::vector<FrameWriter::Written>()> written_;
+    const Stopwatch stopwatch_;
+
+    std::timed_mutex mutex_;
+    RunStatistics run_;
+    std::optional<Progress> progress_;
+    std::set<std::string> warned_;
+};
+
+}  // namespace rapid

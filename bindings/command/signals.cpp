@@ -1,0 +1,41 @@
+#include "bindings/command/signals.h"
+
+#include <csignal>
+#include <utility>
+
+namespace rapid {
+namespace {
+
+bool is_ignored(int signal)
+{
+    struct sigaction action {};
+    sigaction(signal, nullptr, &action);
+    return action.sa_handler == SIG_IGN;
+}
+
+}  // namespace
+
+SignalThread::SignalThread(std::function<void(int signal)> end)
+{
+    sigset_t ours;
+    sigemptyset(&ours);
+    for (const int signal : {SIGINT, SIGTERM})
+        if (!is_ignored(signal)) sigaddset(&ours, signal);
+    sigaddset(&ours, SIGUSR1);  // the destructor's
+    pthread_sigmask(SIG_BLOCK, &ours, nullptr);
+    thread_ = std::thread([this, ours, end = std::move(end)] {
+        while (!stopping_) {
+            int signal = 0;
+            if (sigwait(&ours, &signal) == 0 && signal != SIGUSR1) end(signal);
+        }
+    });
+}
+
+SignalThread::~SignalThread()
+{
+    stopping_ = true;
+    pthread_kill(thread_.native_handle(), SIGUSR1);
+    thread_.join();
+}
+
+}  // namespace rapid

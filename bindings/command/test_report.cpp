@@ -1,0 +1,168 @@
+#include "bindings/command/test_report.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <vector>
+
+#include "bindings/command/command.h"
+
+namespace rapid {
+namespace {
+
+// Each line of a text behind a prefix.
+std::string prefixed(const std::string& prefix, std::string text)
+{
+    const std::string next = '\n' + prefix;
+    for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += next.size())
+        text.replace(at, 1, next);
+    return prefix + text + '\n';
+}
+
+class TextReport : public TestReport {
+public:
+    explicit TextReport(bool verbose) : verbose_(verbose) {}
+
+    void add(const TestResult& result) override
+    {
+        const std::string& name = result.name.empty() ? result.file : result.name;
+        if (result.kind == TestEvent::Failed || result.kind == TestEvent::Broken)
+            print(fmt::format("{} {}\n{}", result.kind == TestEvent::Failed ? "FAILED" : "BROKEN", name,
+                              prefixed("  ", result.message)));
+        else if (verbose_)
+            print(fmt::format("{} {}\n", result.kind == TestEvent::Passed ? "passed" : "skipped", name));
+    }
+
+    void end(const TestCounts& counts) override
+    {
+        print(fmt::format("{} passed, {} failed, {} skipped\n", counts.passed, counts.failed, counts.skipped));
+    }
+
+private:
+    bool verbose_;
+};
+
+// Test Anything Protocol, version 13: a line a test as it ends, messages as comments, the plan last.
+class TapReport : public TestReport {
+public:
+    TapReport() { print("TAP version 13\n"); }
+
+    void add(const TestResult& result) override
+    {
+        std::string name;
+        for (const char c : result.name.empty() ? result.file : result.name) {
+            if (c == '#' || c == '\\') name += '\\';
+            name += c == '\n' ? ' ' : c;
+        }
+        const bool ok = result.kind == TestEvent::Passed || result.kind == TestEvent::Skipped;
+        print(fmt::format("{} {} - {}{}\n{}", ok ? "ok" : "not ok", ++number_, name,
+                          result.kind == TestEvent::Skipped ? " # SKIP" : "",
+                          ok ? "" : prefixed("# ", result.message)));
+    }
+
+    void end(const TestCounts&) override { print(fmt::format("1..{}\n", number_)); }
+
+private:
+    int number_ = 0;
+};
+
+std::string xml(const std::string& text)
+{
+    std::string escaped;
+    for (const char c : text) {
+        switch (c) {
+            case '&':
+                escaped += "&amp;";
+                break;
+            case '<':
+                escaped += "&lt;";
+                break;
+            case '>':
+                escaped += "&gt;";
+                break;
+            case '"':
+                escaped += "&quot;";
+                break;
+            case '\n':
+                escaped += "&#10;";
+                break;
+            default:  // XML has no other control characters, not even escaped
+                escaped += static_cast<unsigned char>(c) < ' ' && c != '\t' ? '?' : c;
+        }
+    }
+    return escaped;
+}
+
+// A suite a file; its counts stand before its tests, so it is printed when all have ended.
+class JUnitReport : public TestReport {
+public:
+    void add(const TestResult& result) override
+    {
+        if (suites_.empty() || suites_.back().file != result.file) suites_.push_back({result.file, {}, 0, {}});
+        Suite& suite = suites_.back();
+        suite.counts.add(result.kind);
+        suite.seconds += result.seconds;
+        suite.cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3f}\"", xml(result.file),
+                                   xml(result.name), result.seconds);
+        if (result.kind == TestEvent::Passed) {
+            suite.cases += "/>\n";
+            return;
+        }
+        const std::string first_line = result.message.substr(0, result.message.find('\n'));
+        if (result.kind == TestEvent::Skipped)
+            suite.cases += ">\n      <skipped/>\n";
+        else
+            suite.cases += fmt::format(">\n      <{0} message=\"{1}\">{2}</{0}>\n",
+                                       result.kind == TestEvent::Failed ? "failure" : "error", xml(first_line),
+                                       xml(result.message));
+        suite.cases += "    </testcase>\n";
+    }
+
+    void end(const TestCounts& counts) override
+    {
+        double seconds = 0;
+        for (const Suite& suite : suites_) seconds += suite.seconds;
+        print(fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"rapid test\" {}>\n",
+                          attributes(counts, seconds)));
+        for (const Suite& suite : suites_)
+            print(fmt::format("  <testsuite name=\"{}\" {}>\n{}  </testsuite>\n", xml(suite.file),
+                              attributes(suite.counts, suite.seconds), suite.cases));
+        print("</testsuites>\n");
+    }
+
+private:
+    struct Suite {
+        std::string file;
+        TestCounts counts;
+        double seconds;
+        std::string cases;
+    };
+
+    static std::string attributes(const TestCounts& counts, double seconds)
+    {
+        return fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3f}\"",
+                           counts.passed + counts.failed + counts.skipped + counts.broken, counts.failed, counts.broken,
+                           counts.skipped, seconds);
+    }
+
+    std::vector<Suite> suites_;
+};
+
+}  // namespace
+
+void TestCounts::add(TestEvent::Kind kind)
+{
+    passed += kind == TestEvent::Passed;
+    failed += kind == TestEvent::Failed;
+    skipped += kind == TestEvent::Skipped;
+    broken += kind == TestEvent::Broken;
+}
+
+std::unique_ptr<TestReport> TestReport::make(const std::string& format, bool verbose)
+{
+    if (format == "tap") return std::make_unique<TapReport>();
+    if (format == "junit") return std::make_unique<JUnitReport>();
+    return std::make_unique<TextReport>(verbose);
+}
+
+}  // namespace rapid

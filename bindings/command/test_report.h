@@ -1,0 +1,36 @@
+// What `rapid test` prints: failures in words, TAP 13 for test harnesses, or JUnit's XML for build servers.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "bindings/host/test_host.h"
+
+namespace rapid {
+
+struct TestResult {
+    TestEvent::Kind kind;  // not Started
+    std::string file;
+    std::string name;     // of the test; empty for a file that is Broken
+    std::string message;  // of Failed and Broken
+    double seconds = 0;
+};
+
+struct TestCounts {
+    int passed = 0, failed = 0, skipped = 0, broken = 0;
+
+    void add(TestEvent::Kind kind);
+};
+
+class TestReport {
+public:
+    // verbose: tells of tests that pass, too.
+    static std::unique_ptr<TestReport> make(const std::string& format, bool verbose);
+    static constexpr const char* formats[] = {"text", "tap", "junit"};
+
+    virtual ~TestReport() = default;
+    virtual void add(const TestResult& result) = 0;
+    virtual void end(const TestCounts& counts) = 0;
+};
+
+}  // namespace rapid

@@ -1,0 +1,258 @@
+// rapid.levelset: narrow-band level sets.
+#include "runtime/shapes/level_set/level_set.h"
+
+#include <fmt/format.h>
+
+#include "bindings/host/maker.h"
+#include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set/level_set_tools.h"
+#include "runtime/shapes/motion/deforming.h"
+
+namespace rapid {
+namespace {
+
+// What every level set is made with.
+struct Grid {
+    double voxel, half_width;
+
+    LevelSetOptions options() const { return {voxel, half_width}; }
+
+    template <class T>
+    static void declare(MakerDeclaration<T>& declaration)
+    {
+        declaration.param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, above(0), "m", "edge of a voxel")
+            .param(static_cast<double T::*>(&T::half_width), "half_width", 3.0, at_least(1.5), "voxels",
+                   "of the band, on each side of the surface");
+    }
+};
+
+// A mesh, at rest, moving or deforming.
+struct AnyMesh {
+    static constexpr std::string_view param_type = "mesh";
+
+    MeshPtr still;
+    std::shared_ptr<const AnimatedMesh> moving;
+};
+
+void read_value(const Param& param, const Value& value, AnyMesh& mesh)
+{
+    mesh = {};
+    if (!(mesh.moving = value.object<AnimatedMesh>())) rapid::read_value(param, value, mesh.still);
+}
+
+struct FromMesh : Grid {
+    AnyMesh mesh;
+
+    static Maker declare()
+    {
+        auto declaration = maker<FromMesh>(
+            "levelset.from_mesh", "The distance to a closed mesh; where that moves or deforms, a collider that does.");
+        declaration.param(&FromMesh::mesh, "mesh", Value(), any_number(), "", "closed").required();
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        if (!mesh.moving) return level_set_from_mesh(mesh.still, options(), context.warnings);
+        if (mesh.moving->deforms())
+            return std::make_shared<DeformingLevelSet>(mesh.moving, options(), context.warnings);
+        return std::make_shared<AnimatedShape>(level_set_from_mesh(mesh.moving->rest(), options(), context.warnings),
+                                               mesh.moving->motion());
+    }
+};
+RAPID_MAKER(FromMesh);
+
+struct SphereLevelSet : Grid {
+    double radius;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        auto declaration = maker<SphereLevelSet>("levelset.sphere", "A sphere.");
+        declaration.param(&SphereLevelSet::radius, "radius", 1.0, above(0), "m", "of the sphere")
+            .param(&SphereLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const { return level_set_sphere(radius, center, options()); }
+};
+RAPID_MAKER(SphereLevelSet);
+
+struct BoxLevelSet : Grid {
+    Vec3d size, center;
+
+    static Maker declare()
+    {
+        auto declaration = maker<BoxLevelSet>("levelset.box", "A box.");
+        declaration.param(&BoxLevelSet::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
+            .param(&BoxLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        if (!(size.minCoeff() > 0))
+            throw Error(fmt::format("size = {}: each edge must be above 0", describe(Value(size))));
+        return level_set_box(size, center, options());
+    }
+};
+RAPID_MAKER(BoxLevelSet);
+
+struct TorusLevelSet : Grid {
+    double radius, tube;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        auto declaration = maker<TorusLevelSet>("levelset.torus", "A torus about the y axis.");
+        declaration
+            .param(&TorusLevelSet::radius, "radius", 1.0, above(0), "m", "from the axis to the middle of the tube")
+            .param(&TorusLevelSet::tube, "tube", 0.25, above(0), "m", "radius of the tube")
+            .param(&TorusLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const { return level_set_torus(radius, tube, center, options()); }
+};
+RAPID_MAKER(TorusLevelSet);
+
+struct FromPoints : Grid {
+    std::shared_ptr<const PointsObject> points;
+    std::optional<PerPoint<float>> radius;
+
+    static Maker declare()
+    {
+        auto declaration = maker<FromPoints>("levelset.from_points", "The balls around points.");
+        declaration.param(&FromPoints::points, "points", Value(), any_number(), "", "their middles").required();
+        declaration.param(&FromPoints::radius, "radius", Value(), above(0), "m",
+                          "of the balls; the attribute pscale where the points have it");
+        Grid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        const PointSet& set = points->points;
+        if (!radius && !set.has("pscale"))
+            throw Error("nothing says how large the balls are; give radius, or the points the attribute pscale");
+        const PerPoint<float> given = radius ? *radius : PerPoint<float>::of("pscale");
+        const Strided<Vec3f> P = set.P().read();
+        const Strided<float> r = given.read(set);
+        const std::size_t n = set.size();
+        std::vector<Vec3f> places;
+        for (std::size_t i = 0; i < n; ++i) places.push_back(P[i]);
+        return level_set_from_points(places, std::span(r.data, r.stride ? n : 1), options());
+    }
+};
+RAPID_MAKER(FromPoints);
+
+struct CombineLevelSets {
+    LevelSetPtr levelset, other;
+    std::string how;
+
+    static Maker declare()
+    {
+        return maker<CombineLevelSets>("levelset.combine", "The union, intersection or difference of two level sets.")
+            .param(&CombineLevelSets::levelset, "levelset", Value(), any_number(), "", "whose voxels the result has")
+            .required()
+            .param(&CombineLevelSets::other, "other", Value(), any_number(), "", "the second")
+            .required()
+            .param(&CombineLevelSets::how, "how", Value(), any_number(), "", "which")
+            .required();
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        return combine_level_sets(levelset, other,
+                                  how == "union"       ? Combine::Union
+                                  : how == "intersect" ? Combine::Intersect
+                                                       : Combine::Subtract,
+                                  context.warnings);
+    }
+};
+RAPID_MAKER(CombineLevelSets);
+
+struct OffsetLevelSet {
+    LevelSetPtr levelset;
+    double metres;
+
+    static Maker declare()
+    {
+        return maker<OffsetLevelSet>("levelset.offset", "The surface moved along its normal.")
+            .param(&OffsetLevelSet::levelset, "levelset", Value(), any_number(), "", "what to grow")
+            .required()
+            .param(&OffsetLevelSet::metres, "metres", Value(), any_number(), "m", "outwards; inwards where below 0")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return offset_level_set(levelset, metres); }
+};
+RAPID_MAKER(OffsetLevelSet);
+
+struct SmoothLevelSet {
+    LevelSetPtr levelset;
+    int width, iterations;
+
+    static Maker declare()
+    {
+        return maker<SmoothLevelSet>("levelset.smooth", "Rounds edges and fills creases.")
+            .param(&SmoothLevelSet::levelset, "levelset", Value(), any_number(), "", "what to smooth")
+            .required()
+            .param(&SmoothLevelSet::width, "width", 1.0, between(1, 64), "voxels", "of the filter")
+            .param(&SmoothLevelSet::iterations, "iterations", 1.0, between(1, 1000), "", "times that it is applied");
+    }
+    ObjectPtr make(MakeContext&) const { return smooth_level_set(levelset, width, iterations); }
+};
+RAPID_MAKER(SmoothLevelSet);
+
+struct ResampleLevelSet {
+    LevelSetPtr levelset;
+    double voxel;
+
+    static Maker declare()
+    {
+        return maker<ResampleLevelSet>("levelset.resample", "The same surface on voxels of another size.")
+            .param(&ResampleLevelSet::levelset, "levelset", Value(), any_number(), "", "what to resample")
+            .required()
+            .param(&ResampleLevelSet::voxel, "voxel", Value(), above(0), "m", "edge of a voxel")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return resample_level_set(levelset, voxel); }
+};
+RAPID_MAKER(ResampleLevelSet);
+
+struct ReadLevelSet {
+    std::string path, grid;
+
+    static Maker declare()
+    {
+        return maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file.")
+            .param(&ReadLevelSet::path, "path", Value(), any_number(), "", "relative to the graph file")
+            .required()
+            .param(&ReadLevelSet::grid, "grid", Value(), any_number(), "",
+                   "its name; the only level set, when not given");
+    }
+    ObjectPtr make(MakeContext& context) const { return read_level_set(context.resolve(path), grid); }
+};
+RAPID_MAKER(ReadLevelSet);
+
+struct WriteLevelSet {
+    LevelSetPtr levelset;
+    std::string path, grid;
+
+    static Maker declare()
+    {
+        return maker<WriteLevelSet>("levelset.write", "Writes a level set to a .vdb file, in a run.")
+            .param(&WriteLevelSet::levelset, "levelset", Value(), any_number(), "", "what to write")
+            .required()
+            .param(&WriteLevelSet::path, "path", Value(), any_number(), "", "relative to the current folder")
+            .required()
+            .param(&WriteLevelSet::grid, "grid", std::string("surface"), any_number(), "", "its name in the file");
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        if (context.may_write) levelset->write(path, grid);
+        return levelset;
+    }
+};
+RAPID_MAKER(WriteLevelSet);
+
+}  // namespace
+}  // namespace rapid

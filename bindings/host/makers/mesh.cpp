@@ -1,0 +1,143 @@
+// rapid.mesh: meshes that are read or made.
+#include "runtime/shapes/mesh/mesh.h"
+
+#include <fmt/format.h>
+
+#include "bindings/host/maker.h"
+#include "runtime/io/frame_pattern.h"
+#include "runtime/shapes/motion/animated.h"
+
+namespace rapid {
+namespace {
+
+struct ReadMesh {
+    std::string path;
+
+    static Maker declare()
+    {
+        return maker<ReadMesh>("mesh.read", "Reads OBJ, PLY, STL or glTF, or a sequence of such files.")
+            .param(&ReadMesh::path, "path", Value(), any_number(), "",
+                   "relative to the graph file; with #### or $F4 in it a deforming mesh, a file for each frame")
+            .required();
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        const FramePattern pattern((context.folder / path).string());  // an absolute path stays itself
+        if (!pattern.has_frame()) return read_mesh(context.resolve(path));
+        const auto files = pattern.existing();
+        if (context.on_read)
+            for (const auto& [frame, file] : files) context.on_read(file);
+        auto sequence = std::make_shared<MeshSequence>(files, pattern.text());
+        return std::make_shared<AnimatedMesh>(std::move(sequence), constant_motion({}));
+    }
+};
+RAPID_MAKER(ReadMesh);
+
+struct SphereMesh {
+    double radius;
+    int divisions;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        return maker<SphereMesh>("mesh.sphere", "A sphere.")
+            .param(&SphereMesh::radius, "radius", 1.0, above(0), "m", "of the sphere")
+            .param(&SphereMesh::divisions, "divisions", 24.0, between(3, 4096), "", "around the equator")
+            .param(&SphereMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+    }
+    ObjectPtr make(MakeContext&) const { return make_sphere(radius, divisions, center); }
+};
+RAPID_MAKER(SphereMesh);
+
+void check_size(const Vec3d& size)
+{
+    if (!(size.minCoeff() > 0)) throw Error(fmt::format("size = {}: each edge must be above 0", describe(Value(size))));
+}
+
+struct BoxMesh {
+    Vec3d size, center;
+
+    static Maker declare()
+    {
+        return maker<BoxMesh>("mesh.box", "A box.")
+            .param(&BoxMesh::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
+            .param(&BoxMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        check_size(size);
+        return make_box(size, center);
+    }
+};
+RAPID_MAKER(BoxMesh);
+
+struct GridMesh {
+    std::vector<double> size;
+    int divisions;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        return maker<GridMesh>("mesh.grid", "A flat grid, facing up.")
+            .param(&GridMesh::size, "size", Value(), any_number(), "m", "edge lengths {x, z} (1, 1)")
+            .param(&GridMesh::divisions, "divisions", 10.0, between(1, 4096), "", "cells along each edge")
+            .param(&GridMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        const double x = size.empty() ? 1 : size[0], z = size.empty() ? 1 : size.back();
+        if (size.size() > 2 || !(x > 0) || !(z > 0)) throw Error("size is two lengths above 0, {x, z}");
+        return make_grid(x, z, divisions, center);
+    }
+};
+RAPID_MAKER(GridMesh);
+
+struct TorusMesh {
+    double radius, tube;
+    int divisions;
+    Vec3d center;
+
+    static Maker declare()
+    {
+        return maker<TorusMesh>("mesh.torus", "A torus about the y axis.")
+            .param(&TorusMesh::radius, "radius", 1.0, above(0), "m", "from the axis to the middle of the tube")
+            .param(&TorusMesh::tube, "tube", 0.25, above(0), "m", "radius of the tube")
+            .param(&TorusMesh::divisions, "divisions", 24.0, between(3, 4096), "",
+                   "around the axis; around the tube as many as make edges of that length")
+            .param(&TorusMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+    }
+    ObjectPtr make(MakeContext&) const { return make_torus(radius, tube, divisions, center); }
+};
+RAPID_MAKER(TorusMesh);
+
+struct MeshFrom {
+    std::vector<Vec3f> points;
+    std::vector<std::vector<double>> faces;
+
+    static Maker declare()
+    {
+        return maker<MeshFrom>("mesh.from", "A mesh from a list of places and a list of faces.")
+            .param(&MeshFrom::points, "points", Value(), any_number(), "m", "{{x, y, z}, ...}")
+            .required()
+            .param(&MeshFrom::faces, "faces", Value(), any_number(), "", "{{1, 2, 3}, ...}: places in `points`, from 1")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        std::vector<std::vector<std::int32_t>> indices;
+        for (std::size_t f = 0; f < faces.size(); ++f) {
+            std::vector<std::int32_t>& face = indices.emplace_back();
+            for (const double corner : faces[f]) {
+                if (!(corner >= 1 && corner <= static_cast<double>(points.size())) || corner != std::floor(corner))
+                    throw Error(fmt::format("face {} has the corner {}; corners are whole, from 1 to {}", f + 1, corner,
+                                            points.size()));
+                face.push_back(static_cast<std::int32_t>(corner) - 1);
+            }
+        }
+        return make_mesh(points, indices);
+    }
+};
+RAPID_MAKER(MeshFrom);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,113 @@
+// rapid.translate, rapid.rotate, rapid.scale, their products, and what they move.
+#include "runtime/shapes/motion/motion.h"
+
+#include <fmt/format.h>
+
+#include "bindings/host/maker.h"
+#include "runtime/shapes/level_set/level_set_tools.h"
+#include "runtime/shapes/level_set/placed.h"
+#include "runtime/shapes/motion/deforming.h"
+
+namespace rapid {
+namespace {
+
+struct Translate {
+    Vec3d by;
+
+    static Maker declare()
+    {
+        return maker<Translate>("motion.translate", "Moves along a vector.")
+            .param(&Translate::by, "by", Value(), any_number(), "m", "the way")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return constant_motion({by}); }
+};
+RAPID_MAKER(Translate);
+
+struct Rotate {
+    Vec3d axis;
+    double angle;  // rad
+
+    static Maker declare()
+    {
+        return maker<Rotate>("motion.rotate", "Turns about an axis through the origin.")
+            .param(&Rotate::axis, "axis", Value(), any_number(), "", "any length but zero")
+            .required()
+            .param(&Rotate::angle, "degrees", Value(), any_number(), "deg", "the angle, by the right-hand rule")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        if (axis.norm() == 0) throw Error("the axis has length 0; it needs a direction");
+        return constant_motion({Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()))});
+    }
+};
+RAPID_MAKER(Rotate);
+
+struct Scale {
+    double by;
+
+    static Maker declare()
+    {
+        return maker<Scale>("motion.scale", "Scales about the origin.")
+            .param(&Scale::by, "factor", Value(), above(0), "", "of all lengths")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return constant_motion({Vec3d::Zero(), Eigen::Quaterniond::Identity(), by}); }
+};
+RAPID_MAKER(Scale);
+
+struct Product {
+    MotionPtr first, second;
+
+    static Maker declare()
+    {
+        return maker<Product>("motion.product", "The right motion, then the left one.")
+            .param(&Product::first, "first", Value(), any_number(), "", "done last")
+            .required()
+            .param(&Product::second, "second", Value(), any_number(), "", "done first")
+            .required();
+    }
+    ObjectPtr make(MakeContext&) const { return product(first, second); }
+};
+RAPID_MAKER(Product);
+
+struct Transform {
+    ObjectPtr object;
+    MotionPtr motion;
+
+    static Maker declare()
+    {
+        return maker<Transform>("transform", "A mesh or a shape, moved.")
+            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh or a shape")
+            .required()
+            .param(&Transform::motion, "motion", Value(), any_number(), "",
+                   "rapid.translate, .rotate, .scale, or a product; a function of the frame that returns one; keys")
+            .required();
+    }
+
+    ObjectPtr make(MakeContext&) const
+    {
+        if (const auto moving = std::dynamic_pointer_cast<const AnimatedMesh>(object))
+            return moving->transformed(motion);
+        if (const auto moving = std::dynamic_pointer_cast<const AnimatedShape>(object))
+            return std::make_shared<AnimatedShape>(moving->rest(), product(motion, moving->motion()));
+        if (const auto deforming = std::dynamic_pointer_cast<const DeformingLevelSet>(object))
+            return deforming->transformed(motion);
+        if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) {
+            if (motion->varies()) return std::make_shared<AnimatedMesh>(mesh, motion);
+            return transformed(mesh, motion->at({}).affine());
+        }
+        if (const auto shape = std::dynamic_pointer_cast<const Shape>(object)) {
+            if (motion->varies()) return std::make_shared<AnimatedShape>(shape, motion);
+            if (const auto level_set = std::dynamic_pointer_cast<const LevelSet>(shape))
+                return move_level_set(level_set, motion->at({}));
+            return placed(shape, motion->at({}));
+        }
+        throw Error(fmt::format("{} can't be moved; it must be a mesh or a shape", describe(object)));
+    }
+};
+RAPID_MAKER(Transform);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,139 @@
+// rapid.points: point sets that are read or made.
+#include <fmt/format.h>
+
+#include "bindings/host/maker.h"
+#include "runtime/graph/points_object.h"
+#include "runtime/io/format.h"
+
+namespace rapid {
+namespace {
+
+// Ids count from 0 in order.
+ObjectPtr numbered(PointSet points)
+{
+    auto object = std::make_shared<PointsObject>();
+    const std::span<std::int64_t> id = points.id().overwrite();
+    for (std::size_t i = 0; i < id.size(); ++i) id[i] = static_cast<std::int64_t>(i);
+    object->points = std::move(points);
+    return object;
+}
+
+struct ReadPoints {
+    std::string path;
+
+    static Maker declare()
+    {
+        return maker<ReadPoints>("points.read", "Reads points from a file that Rapid can write.")
+            .param(&ReadPoints::path, "path", Value(), any_number(), "", "relative to the graph file")
+            .required();
+    }
+    ObjectPtr make(MakeContext& context) const { return numbered(read_points(context.resolve(path))); }
+};
+RAPID_MAKER(ReadPoints);
+
+struct GridPoints {
+    Vec3d size, center;
+    double spacing;
+
+    static Maker declare()
+    {
+        return maker<GridPoints>("points.grid", "Points at the centres of the cells of a box.")
+            .param(&GridPoints::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
+            .param(&GridPoints::spacing, "spacing", 0.1, above(0), "m", "edge of a cell")
+            .param(&GridPoints::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+    }
+    ObjectPtr make(MakeContext&) const
+    {
+        // An edge shorter than the spacing is one layer; a ratio just below a whole number is that number.
+        const auto along = [this](int axis) { return std::max(1.0, std::floor(size[axis] / spacing * (1 + 1e-9))); };
+        const double nx = along(0), ny = along(1), nz = along(2);
+        if (!(size.minCoeff() >= 0) || !(nx * ny * nz <= 2147483648.0))
+            throw Error(fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
+                                    describe(Value(size)), spacing, nx * ny * nz));
+        PointSet points;
+        points.append(static_cast<std::size_t>(nx * ny * nz));
+        const std::span<Vec3f> P = points.P().overwrite();
+        const Vec3d corner = center - 0.5 * spacing * Vec3d(nx - 1, ny - 1, nz - 1);
+        std::size_t i = 0;
+        for (double x = 0; x < nx; ++x)
+            for (double y = 0; y < ny; ++y)
+                for (double z = 0; z < nz; ++z) P[i++] = (corner + spacing * Vec3d(x, y, z)).cast<float>();
+        return numbered(std::move(points));
+    }
+};
+RAPID_MAKER(GridPoints);
+
+struct PointsFrom {
+    std::map<std::string, Value> columns;
+
+    static Maker declare()
+    {
+        return maker<PointsFrom>("points.from", "Points from lists of values by attribute.")
+            .param(&PointsFrom::columns, "columns", Value(), any_number(), "", "{ P = {{x, y, z}, ...}, ANY = {...} }")
+            .required();
+    }
+
+    ObjectPtr make(MakeContext&) const
+    {
+        const auto place = columns.find("P");
+        if (place == columns.end()) throw Error("P is missing; give P = {{x, y, z}, ...}");
+        PointSet points;
+        const std::vector<Vec3f> P = vectors("P", place->second);
+        points.append(P.size());
+        points.P() = Column<Vec3f>(P);
+        for (const auto& [name, value] : columns) {
+            if (name == "P") continue;
+            if (name == "id") throw Error("id can't be given; ids count from 0 in order");
+            const Table* table = value.table();
+            if (!table || table->list.size() != P.size())
+                throw Error(fmt::format("{} has {}; it must be a list of {} values, as P is", name,
+                                        table ? fmt::format("{} values", table->list.size()) : describe(value),
+                                        P.size()));
+            if (name == "v")
+                points.v() = Column<Vec3f>(vectors("v", value));
+            else
+                add_column(points, name, table->list);
+        }
+        return numbered(std::move(points));
+    }
+
+    static std::vector<Vec3f> vectors(const std::string& name, const Value& list)
+    {
+        Param param;
+        param.name = name;
+        param.type = "list of {x, y, z}";
+        std::vector<Vec3f> result;
+        read_value(param, list, result);
+        return result;
+    }
+
+    // The first value decides the column's type.
+    static void add_column(PointSet& points, const std::string& name, const std::vector<Value>& list)
+    {
+        Param param;
+        param.name = name;
+        AttributeValue value = 0.0f;
+        if (!list.empty()) read_value(param, list.front(), value);
+        std::visit(
+            [&](const auto& first) {
+                using T = std::decay_t<decltype(first)>;
+                Column<T> column;
+                const std::span<T> values = column.append_for_writing(list.size());
+                for (std::size_t i = 0; i < list.size(); ++i) {
+                    AttributeValue given;
+                    read_value(param, list[i], given);
+                    const T* same = std::get_if<T>(&given);
+                    if (!same)
+                        throw Error(fmt::format("{}[{}] is {}; it must be a {}, as the first is", name, i + 1,
+                                                describe(list[i]), type_name(type_of(AttributeValue(first)))));
+                    values[i] = *same;
+                }
+                points.set(name, std::move(column));
+            },
+            AttributeValue(value));
+    }
+};
+RAPID_MAKER(PointsFrom);
+
+}  // namespace
+}  // namespace rapid

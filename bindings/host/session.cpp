@@ -1,0 +1,26 @@
+#include "bindings/host/session.h"
+
+#include "bindings/host/script_host.h"
+
+namespace rapid {
+
+Session::Session(const std::filesystem::path& file, SessionOptions options)
+    : host_(std::make_unique<ScriptHost>(file, std::move(options)))
+{
+}
+
+Session::~Session() = default;
+
+const Graph& Session::graph() const { return host_->graph; }
+const Registry& Session::registry() const { return host_->registry; }
+const std::vector<Session::Parameter>& Session::parameters() const { return host_->parameters; }
+const std::vector<std::string>& Session::warnings() const { return host_->warnings; }
+
+Registry Session::all_node_types()
+{
+    ScriptHost host{SessionOptions{}};
+    host.load_shipped_nodes();
+    return host.registry;
+}
+
+}  // namespace rapid

@@ -1,0 +1,138 @@
+// What a session tells of a study file: its description, its closed form and its own measure of error (lua/study.lua).
+#include <fmt/format.h>
+
+#include <lua.hpp>
+
+#include "bindings/host/maker.h"
+#include "bindings/host/script_host.h"
+#include "bindings/host/session.h"
+#include "runtime/graph/points_object.h"
+
+namespace rapid {
+namespace {
+
+// The numbers of one value, as lua/study.lua takes them.
+void append(lua_State* L, int& place, float value)
+{
+    lua_pushnumber(L, static_cast<double>(value));
+    lua_rawseti(L, -2, ++place);
+}
+template <class T>
+void append(lua_State* L, int& place, T value) requires std::is_integral_v<T>
+{
+    lua_pushnumber(L, static_cast<double>(value));
+    lua_rawseti(L, -2, ++place);
+}
+void append(lua_State* L, int& place, const Vec3f& v)
+{
+    for (int k = 0; k < 3; ++k) append(L, place, v[k]);
+}
+void append(lua_State* L, int& place, const Quatf& q)
+{
+    for (const float number : {q.x(), q.y(), q.z(), q.w()}) append(L, place, number);
+}
+
+// { { name, numbers a value, flat numbers }, ... }
+void push_columns(lua_State* L, const PointSet& points)
+{
+    lua_newtable(L);
+    int columns = 0;
+    for (const auto& [name, any] : points.columns()) {
+        lua_createtable(L, 3, 0);
+        lua_pushlstring(L, name.data(), name.size());
+        lua_rawseti(L, -2, 1);
+        std::visit(
+            [&](const auto& column) {
+                using T = std::decay_t<decltype(column[0])>;
+                lua_pushinteger(L, std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1);
+                lua_rawseti(L, -2, 2);
+                lua_newtable(L);
+                int place = 0;
+                for (std::size_t i = 0; i < column.size(); ++i) append(L, place, column[i]);
+            },
+            any);
+        lua_rawseti(L, -2, 3);
+        lua_rawseti(L, -2, ++columns);
+    }
+}
+
+Value knobs_value(const Knobs& knobs) { return Value(std::make_shared<const Table>(Table{{}, {}, knobs})); }
+
+// lua/study.lua has checked it: the fields are there, and of their types.
+Study study_of(const Table& asked)
+{
+    const auto table = [&](const char* name) { return asked.named.at(name).table(); };
+    const auto number = [](const Value& value) { return static_cast<std::int64_t>(*value.get<double>()); };
+    Study study;
+    study.name = *asked.named.at("name").get<std::string>();
+    for (const auto& [knob, values] : table("sweep")->named) study.sweep[knob] = values.table()->list;
+    for (const Value& line : table("lines")->list) study.lines.push_back(knob_text(line));
+    study.first = number(table("frames")->list[0]);
+    study.last = number(table("frames")->list[1]);
+    study.error = *asked.named.at("error").get<std::string>();
+    study.last_frame_only = *asked.named.at("error_frames").get<std::string>() == "last";
+    if (asked.named.count("reference")) study.reference = table("reference")->named;
+    study.repeat_runs = static_cast<int>(number(asked.named.at("repeat_runs")));
+    study.complete();
+    return study;
+}
+
+}  // namespace
+
+Study Session::study() const
+{
+    State& state = host_->main();
+    state.push_entry("study");
+    state.call(0, 1);
+    const Value asked = state.to_value(-1);
+    lua_pop(state.lua(), 1);
+    try {
+        Study study = study_of(*asked.table());
+        study.file = host_->graph.file;
+        return study;
+    } catch (Error& error) {
+        throw error.at({host_->graph.file, 0});
+    }
+}
+
+PointSet Session::study_reference(const Frame& frame, const Knobs& knobs) const
+{
+    State& state = host_->main();
+    lua_State* L = state.lua();
+    const ScriptHost::Section section(*host_, fmt::format("{}: the study's reference", host_->graph.file));
+    state.push_entry("reference");
+    lua_pushnumber(L, frame.number);
+    lua_pushnumber(L, frame.time);
+    lua_pushnumber(L, frame.dt);
+    state.push(knobs_value(knobs));
+    state.call(4, 1);
+    const Value found = state.to_value(-1);
+    lua_pop(L, 1);
+    try {
+        if (!found.table())
+            throw Error(fmt::format("it returns {}; it must return {{ P = {{{{x, y, z}}, ...}} }}", describe(found)));
+        const Maker& maker = find_maker("points.from");
+        MakeContext context{host_->folder(), host_->warnings, false, {}};
+        const Table arguments{{}, {}, {{"columns", found}}};
+        return std::dynamic_pointer_cast<const PointsObject>(maker.make(maker, arguments, context))->points;
+    } catch (const Error& error) {
+        throw Error(fmt::format("the study's reference, frame {:g}: {}", frame.number, error.what()))
+            .at({host_->graph.file, 0});
+    }
+}
+
+double Session::study_error(const PointSet& points, const PointSet& reference) const
+{
+    State& state = host_->main();
+    lua_State* L = state.lua();
+    const ScriptHost::Section section(*host_, fmt::format("{}: the study's error", host_->graph.file));
+    state.push_entry("study_error");
+    push_columns(L, points);
+    push_columns(L, reference);
+    state.call(2, 1);
+    const double error = lua_tonumber(L, -1);
+    lua_pop(L, 1);
+    return error;
+}
+
+}  // namespace rapid

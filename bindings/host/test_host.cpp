@@ -1,0 +1,205 @@
+#include "bindings/host/test_host.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <lua.hpp>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "bindings/host/script_host.h"
+#include "bindings/host/session.h"
+#include "bindings/host/test_points.h"
+#include "bindings/host/threads.h"
+#include "runtime/graph/evaluate.h"
+
+namespace rapid {
+namespace {
+
+// What the functions that Lua calls need of their file.
+struct Host {
+    const TestOptions& options;
+    const std::function<void(const TestEvent&)>& tell;
+};
+
+Host& host_of(lua_State* L) { return *static_cast<Host*>(lua_touserdata(L, lua_upvalueindex(1))); }
+
+std::string text_at(lua_State* L, int index)
+{
+    std::size_t size = 0;
+    const char* text = luaL_checklstring(L, index, &size);
+    return {text, size};
+}
+
+std::optional<double> number_field(lua_State* L, int table, const char* name)
+{
+    lua_getfield(L, table, name);
+    std::optional<double> number;
+    if (lua_isnumber(L, -1)) number = lua_tonumber(L, -1);
+    lua_pop(L, 1);
+    return number;
+}
+
+struct SceneRun {
+    std::string graph;
+    std::int64_t first = 0, last = 0;
+    std::optional<std::uint64_t> seed;
+    int threads = 0;
+    SessionOptions session;
+    bool watch_traces = false;  // the JIT's events are not safe in every run: a test asks for them
+};
+
+// The arguments that lua/testing/rapid.lua gives, checked there: (path, options).
+SceneRun read_run(lua_State* L)
+{
+    const Host& host = host_of(L);
+    SceneRun run;
+    run.graph = text_at(L, 1);
+    run.first = static_cast<std::int64_t>(number_field(L, 2, "first").value_or(0));
+    run.last = static_cast<std::int64_t>(number_field(L, 2, "last").value_or(0));
+    if (const auto seed = number_field(L, 2, "seed")) run.seed = static_cast<std::uint64_t>(*seed);
+    run.threads = static_cast<int>(number_field(L, 2, "threads").value_or(host.options.threads));
+    if (const auto seconds = number_field(L, 2, "script_timeout")) run.session.script_timeout = *seconds;
+    run.session.on_timeout = host.options.on_timeout;
+    run.session.may_write = false;
+    lua_getfield(L, 2, "watch_traces");
+    run.watch_traces = lua_toboolean(L, -1) != 0;
+    lua_pop(L, 1);
+    lua_getfield(L, 2, "set");
+    for (lua_pushnil(L); lua_next(L, -2); lua_pop(L, 1)) run.session.set[text_at(L, -2)] = text_at(L, -1);
+    lua_pop(L, 1);
+    return run;
+}
+
+// Runs the scene and returns its warnings, each once; each frame from the first asked for goes to `keep`.
+std::vector<std::string> run_scene(const SceneRun& run, const std::function<void(FrameResult&)>& keep)
+{
+    Threads threads(run.threads);
+    return threads.run([&] {
+        const Session session(run.graph, run.session);
+        const Plan plan(session.graph(), {run.seed, {}});
+        if (run.first < plan.first_frame())
+            throw Error(fmt::format("frames: {} is before the scene's first frame, {}", run.first, plan.first_frame()));
+        std::vector<std::string> warnings;
+        const auto add = [&](const std::vector<std::string>& found) {
+            for (const std::string& warning : found)
+                if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end()) warnings.push_back(warning);
+        };
+        add(session.warnings());
+        add(plan.warnings);
+        Evaluator evaluator(plan);
+        while (evaluator.next_frame() <= run.last) {
+            FrameResult result = evaluator.advance();
+            add(result.warnings);
+            if (result.frame >= run.first) keep(result);
+        }
+        return warnings;
+    });
+}
+
+void push_list(lua_State* L, const std::vector<std::string>& texts)
+{
+    lua_newtable(L);
+    for (std::size_t i = 0; i < texts.size(); ++i) {
+        lua_pushstring(L, texts[i].c_str());
+        lua_rawseti(L, -2, static_cast<int>(i) + 1);
+    }
+}
+
+// native.run(path, options): outputs by name, of them point sets by frame; the warnings, in order; and the traces that
+// were given up.
+int run(lua_State* L)
+{
+    std::string error;
+    try {
+        SceneRun scene = read_run(L);
+        std::mutex mutex;
+        std::vector<std::string> aborts;
+        if (scene.watch_traces)
+            scene.session.on_trace_abort = [&](const std::string& message) {
+                const std::lock_guard lock(mutex);
+                aborts.push_back(message);
+            };
+        lua_newtable(L);
+        const int outputs = lua_gettop(L);
+        const std::vector<std::string> warnings = run_scene(scene, [&](FrameResult& result) {
+            for (auto& [name, points] : result.outputs) {
+                lua_getfield(L, outputs, name.c_str());
+                if (lua_isnil(L, -1)) {
+                    lua_pop(L, 1);
+                    lua_newtable(L);
+                    lua_pushvalue(L, -1);
+                    lua_setfield(L, outputs, name.c_str());
+                }
+                push_points(L, points,
+                            result.outputs.size() == 1 ? fmt::format("frame {}", result.frame)
+                                                       : fmt::format("frame {}, output {}", result.frame, name));
+                lua_rawseti(L, -2, static_cast<int>(result.frame));
+                lua_pop(L, 1);
+            }
+        });
+        push_list(L, warnings);
+        push_list(L, aborts);
+        return 3;
+    } catch (const Error& raised) {
+        error = raised.what();
+    }
+    lua_pushlstring(L, error.data(), error.size());
+    error = {};  // lua_error() may not return through destructors
+    return lua_error(L);
+}
+
+// tell(kind, name, message)
+int tell(lua_State* L)
+{
+    constexpr const char* kinds[] = {"started", "passed", "failed", "skipped", "broken", nullptr};
+    host_of(L).tell({static_cast<TestEvent::Kind>(luaL_checkoption(L, 1, nullptr, kinds)), text_at(L, 2),
+                     luaL_optstring(L, 3, "")});
+    return 0;
+}
+
+void push_function(lua_State* L, Host& host, const char* name, lua_CFunction function)
+{
+    lua_pushlightuserdata(L, &host);
+    lua_pushcclosure(L, function, 1);
+    lua_setfield(L, -2, name);
+}
+
+// Rapid's own modules come first.
+void set_path(lua_State* L)
+{
+    lua_getglobal(L, "package");
+    lua_getfield(L, -1, "path");
+    const std::string path = fmt::format("{}/?.lua;{}", lua_folder().string(), lua_tostring(L, -1));
+    lua_pop(L, 1);
+    lua_pushlstring(L, path.data(), path.size());
+    lua_setfield(L, -2, "path");
+    lua_pop(L, 1);
+}
+
+}  // namespace
+
+void run_test_file(const std::filesystem::path& file, const TestOptions& options,
+                   const std::function<void(const TestEvent&)>& tell_event)
+{
+    Host host{options, tell_event};
+    const std::unique_ptr<lua_State, decltype(&lua_close)> state(luaL_newstate(), &lua_close);
+    lua_State* L = state.get();
+    luaL_openlibs(L);
+    set_path(L);
+
+    const std::string runner = (lua_folder() / "testing/runner.lua").string();
+    if (luaL_loadfile(L, runner.c_str()) != 0) throw Error(lua_tostring(L, -1));
+    lua_newtable(L);
+    push_function(L, host, "run", run);
+    push_function(L, host, "tell", tell);
+    register_points(L);
+    lua_pushstring(L, file.c_str());
+    lua_pushstring(L, options.filter.c_str());
+    lua_pushinteger(L, options.already_run);
+    if (lua_pcall(L, 4, 0, 0) != 0) throw Error(lua_tostring(L, -1));
+}
+
+}  // namespace rapid

@@ -1,0 +1,178 @@
+// The camera of a sequence.
+//
+// What will come is not known when the first frame is drawn, and a camera that jumps makes a sequence useless. So the
+// first frame with points is framed with room for where they go, and later the camera only glides back.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/picture/picture.h"
+
+namespace rapid {
+namespace {
+
+// m/s²: how fast points become that fall through the scene, for the scale of the speed colours.
+constexpr double gravity = 9.81;
+constexpr double look_ahead = 0.5;  // s: how far points are followed along their velocity in the first frame
+constexpr double glide = 0.35;      // s: how soon the camera has done most of its way back
+constexpr double margin = 1.06;     // of the bounds, left free around them
+const Vec3d view_from = Vec3d(0.55, 0.32, 1.0).normalized();  // from the scene to the camera
+
+// Bounds of the points but the outermost hundredth along each axis: a stray does not make the rest small. With where
+// they go in the time ahead, but not below `floor`.
+Box3d trimmed_bounds(const PointSet& points, double ahead, double floor)
+{
+    constexpr std::size_t sample_size = 20000;
+    const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
+    std::vector<double> along[3];
+    for (std::size_t i = 0; i < points.size(); i += step) {
+        const Vec3d P = points.P()[i].cast<double>();
+        Vec3d later = P + ahead * points.v()[i].cast<double>();
+        later.y() = std::max(later.y(), std::min(P.y(), floor));
+        if (!P.allFinite() || !later.allFinite()) continue;
+        for (int axis = 0; axis < 3; ++axis) {
+            along[axis].push_back(P[axis]);
+            if (ahead > 0) along[axis].push_back(later[axis]);
+        }
+    }
+    Box3d bounds;
+    if (along[0].empty()) return bounds;
+    const std::size_t left_out = along[0].size() / 200;
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<double>& values = along[axis];
+        const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);
+        const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
+        std::nth_element(values.begin(), low, values.end());
+        bounds.min()[axis] = *low;
+        std::nth_element(values.begin(), high, values.end());
+        bounds.max()[axis] = *high;
+    }
+    return bounds;
+}
+
+double fast_speed(const PointSet& points)
+{
+    constexpr std::size_t sample_size = 20000;
+    const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
+    std::vector<double> speeds;
+    for (std::size_t i = 0; i < points.size(); i += step) {
+        const double speed = points.v()[i].cast<double>().norm();
+        if (std::isfinite(speed)) speeds.push_back(speed);
+    }
+    if (speeds.empty()) return 0;
+    const auto high = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() - 1 - speeds.size() / 50);
+    std::nth_element(speeds.begin(), high, speeds.end());
+    return *high;
+}
+
+Box3d about(const Box3d& box, double factor)
+{
+    const Vec3d half = 0.5 * factor * Vec3d::Constant(box.diagonal().norm());
+    return Box3d(box.center() - half, box.center() + half);
+}
+
+// Of the scene's shapes: emitters as they are, colliders as far as they are near what moves. A floor of a hundred
+// metres is no reason to stand a hundred metres away.
+Box3d shape_bounds(const PictureScene& scene, const Box3d& moving)
+{
+    Box3d bounds = moving, colliders;
+    for (const PictureScene::Body& body : scene.bodies) {
+        const Box3f box = body.mesh->bounds();
+        if (box.isEmpty()) continue;
+        if (body.role == PictureScene::Body::Emitter)
+            bounds.extend(box.cast<double>());
+        else
+            colliders.extend(box.cast<double>());
+    }
+    if (colliders.isEmpty()) return bounds;
+    if (bounds.isEmpty() || bounds.diagonal().norm() == 0) return bounds.merged(colliders);
+    // Only a collider that dwarfs the rest is cut.
+    if (colliders.diagonal().norm() < 6 * bounds.diagonal().norm()) return bounds.merged(colliders);
+    const Box3d near = about(bounds, 0.8).intersection(colliders);
+    return near.isEmpty() ? bounds : bounds.merged(near);
+}
+
+// Below it nothing falls: the lowest shape.
+double floor_of(const PictureScene& scene)
+{
+    double floor = std::numeric_limits<double>::infinity();
+    for (const PictureScene::Body& body : scene.bodies)
+        floor = std::min(floor, static_cast<double>(body.mesh->bounds().min().y()));
+    for (const PictureScene::Plane& plane : scene.planes)
+        if (plane.normal.y() > 0.9 * plane.normal.norm()) floor = std::min(floor, plane.offset / plane.normal.y());
+    return floor;
+}
+
+// The position from which the box just fits, looking at its centre.
+Camera fitted(const Box3d& bounds, const PictureOptions& options)
+{
+    Camera camera;
+    camera.fov = options.fov;
+    camera.target = options.target.value_or(bounds.center());
+    if (options.position) {
+        camera.position = *options.position;
+        return camera;
+    }
+    const double vertical = std::tan(0.5 * options.fov);
+    const double horizontal = vertical * options.width / options.height;
+    camera.position = camera.target + view_from;
+    const Vec3d forward = -view_from, right = forward.cross(Vec3d::UnitY()).normalized(), up = right.cross(forward);
+    double distance = 0;
+    for (int c = 0; c < 8; ++c) {
+        const Vec3d corner = margin * (bounds.corner(static_cast<Box3d::CornerType>(c)) - bounds.center()) +
+                             (bounds.center() - camera.target);
+        // At the distance D the corner is at depth D + forward · corner; it must be inside both edges.
+        const double needed = std::max(std::abs(corner.dot(right)) / horizontal, std::abs(corner.dot(up)) / vertical);
+        distance = std::max(distance, needed - forward.dot(corner));
+    }
+    camera.position = camera.target + view_from * std::max(distance, 1e-3);
+    return camera;
+}
+
+}  // namespace
+
+PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
+{
+    static const PictureOptions usual;
+    static const PictureScene nothing;
+    const PictureOptions& options = frame.picture ? *frame.picture : usual;
+    const PictureScene& scene = frame.scene ? *frame.scene : nothing;
+
+    const bool first = !settled();
+    const Box3d moving = trimmed_bounds(points, first ? look_ahead : 0, floor_of(scene));
+    Box3d content = shape_bounds(scene, moving);
+    if (!content.isEmpty()) {
+        // A single point, a flat sheet: a metre or a tenth of the rest, so that there is something to look at.
+        const double least = content.diagonal().norm() > 0 ? 0.1 * content.diagonal().norm() : 1.0;
+        for (int axis = 0; axis < 3; ++axis)
+            if (content.sizes()[axis] < least) {
+                const double missing = 0.5 * (least - content.sizes()[axis]);
+                content.min()[axis] -= missing;
+                content.max()[axis] += missing;
+            }
+        seen_.extend(content);
+    }
+    const Box3d goal = seen_.isEmpty() ? Box3d(Vec3d::Constant(-1), Vec3d::Constant(1)) : seen_;
+
+    if (first) {
+        view_.emplace();
+        view_->bounds = goal;
+    } else {
+        const double part = 1 - std::exp(-std::max(0.0, frame.time - time_) / glide);
+        view_->bounds.min() += part * (goal.min() - view_->bounds.min());
+        view_->bounds.max() += part * (goal.max() - view_->bounds.max());
+    }
+    time_ = frame.time;
+    view_->camera = fitted(view_->bounds, options);
+
+    const double fall = std::sqrt(gravity * view_->bounds.diagonal().norm());
+    view_->full_speed = std::max({first ? 0.0 : view_->full_speed, fast_speed(points), 0.7 * fall, 1e-6});
+
+    // Few points are dots that one can see, many are fine grains.
+    most_points_ = std::max(most_points_, points.size());
+    const double dots = 2.6 * std::pow(std::max<double>(1000, static_cast<double>(most_points_)) / 1000, -0.16);
+    view_->least_radius = std::max(0.75, dots) * options.height / 720;
+    return *view_;
+}
+
+}  // namespace rapid

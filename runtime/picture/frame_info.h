@@ -1,0 +1,23 @@
+// The frame that is written or drawn, besides its points.
+#pragma once
+
+#include <memory>
+
+namespace rapid {
+
+struct PictureOptions;
+struct PictureScene;
+struct PictureView;
+
+struct FrameInfo {
+    int number = 1;
+    double time = 0;  // s since the start
+    double fps = 24;
+
+    // For pictures (picture.h). Null: the usual ones; the points alone; fitted to this one frame.
+    std::shared_ptr<const PictureOptions> picture = nullptr;
+    std::shared_ptr<const PictureScene> scene = nullptr;
+    std::shared_ptr<const PictureView> view = nullptr;  // FrameWriter keeps one over a sequence
+};
+
+}  // namespace rapid

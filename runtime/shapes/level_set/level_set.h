@@ -1,0 +1,58 @@
+// A narrow-band level set: the general shape that particles collide with (paper §4).
+//
+// The grid is OpenVDB's, for building and for files; queries run on a baked copy of its leaves behind a coarse index,
+// because a shared grid's tree costs several times more a sample (see level_set.cpp). OpenVDB stays out of this header.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/deferred.h"
+#include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/shape.h"
+
+namespace rapid {
+
+struct LevelSetOptions {
+    double voxel = 0.1;     // m
+    double half_width = 3;  // voxels on each side of the surface
+};
+
+class LevelSet : public Shape {
+public:
+    static constexpr std::string_view param_type = "level set";
+    std::string_view kind() const override { return "level set"; }
+
+    virtual double voxel() const = 0;  // m
+    virtual std::uint64_t active_voxels() const = 0;
+    MeshPtr surface() const override = 0;  // the zero crossing as a mesh
+    // The same surface with a band of at least `metres` on each side; this one where it is wide enough.
+    virtual std::shared_ptr<const LevelSet> with_band(double metres) const = 0;
+    virtual void write(const std::filesystem::path& path, const std::string& grid) const = 0;
+};
+
+using LevelSetPtr = std::shared_ptr<const LevelSet>;
+
+// Inside is where the mesh's faces wind around a place: pieces may overlap, and one that is turned inwards inside
+// another is a cavity. A mesh with holes keeps those smaller than a voxel closed (see level_set_grid.h).
+//
+// Warnings are collected in `warnings` where something is doubtful but usable (a mesh with holes, faces turned inside
+// out), with the numbers. Errors: a voxel that would make over 2^31 voxels, or that is larger than the mesh (nothing
+// would be left of it), an empty mesh.
+RAPID_DEFERRED(level_set_from_mesh,
+               LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings));
+// Another shape of a mesh of which that has been made before: its faces and what holds of them, `open`, are known.
+RAPID_DEFERRED(level_set_of_same_faces,
+               LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open));
+RAPID_DEFERRED(level_set_sphere, LevelSetPtr(double radius, const Vec3d& center, const LevelSetOptions& options));
+RAPID_DEFERRED(level_set_box, LevelSetPtr(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options));
+RAPID_DEFERRED(level_set_torus,
+               LevelSetPtr(double radius, double tube, const Vec3d& center, const LevelSetOptions& options));
+
+// `grid` empty: the only level set in the file. Error: no such file, not a .vdb, no such grid (with the names there
+// are), not a float level set, an empty grid, a map that is not uniform scale and translation.
+RAPID_DEFERRED(read_level_set, LevelSetPtr(const std::filesystem::path& path, const std::string& grid));
+
+}  // namespace rapid

@@ -1,0 +1,103 @@
+// Level sets in .vdb files, by the names of their grids.
+#include <fmt/format.h>
+#include <openvdb/io/File.h>
+
+#include <algorithm>
+
+#include "runtime/error.h"
+#include "runtime/shapes/level_set/grid_file.h"
+#include "runtime/shapes/level_set/level_set_grid.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::FloatGrid;
+
+bool is_level_set(const openvdb::GridBase& grid)
+{
+    return grid.isType<FloatGrid>() && grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+}
+
+openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
+{
+    if (!name.empty()) return grid_of_name(path, name, grids);
+    openvdb::GridPtrVec level_sets;
+    for (const auto& grid : grids)
+        if (is_level_set(*grid)) level_sets.push_back(grid);
+    if (level_sets.size() == 1) return level_sets[0];
+    if (level_sets.empty())
+        throw Error(fmt::format("there is no level set in \"{}\"; its grids are {}", path, grids_of(grids)));
+    throw Error(fmt::format("there are {} level sets in \"{}\": {}; name one by grid", level_sets.size(), path,
+                            grids_of(level_sets)));
+}
+
+// The metadata of all grids, and the values of the chosen one alone.
+FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
+{
+    try {
+        openvdb::io::File file(path);
+        file.open(/*delayLoad=*/false);
+        const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
+        const auto chosen = choose(path, name, *grids);
+        if (!is_level_set(*chosen))
+            throw Error(fmt::format("grid \"{}\" of \"{}\" is {} of class \"{}\"; it must be a float level set",
+                                    chosen->getName(), path, chosen->valueType(),
+                                    openvdb::GridBase::gridClassToString(chosen->getGridClass())));
+        return openvdb::gridPtrCast<FloatGrid>(file.readGrid(chosen->getName()));
+    } catch (const openvdb::Exception& e) {
+        throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path, e.what()));
+    }
+}
+
+LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
+{
+    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
+    initialize_openvdb();
+    FloatGrid::Ptr grid = read_grid(path.string(), name);
+    if (grid->activeVoxelCount() == 0)
+        throw Error(
+            fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));
+    // Exactly: a rotation, a shear or unequal scales would have to be resampled.
+    const openvdb::Mat4R map = grid->transform().baseMap()->getAffineMap()->getMat4();
+    const bool uniform = grid->transform().isLinear() && map(0, 0) > 0 && map(0, 0) == map(1, 1) &&
+                         map(1, 1) == map(2, 2) && map(0, 1) == 0 && map(0, 2) == 0 && map(1, 0) == 0 &&
+                         map(1, 2) == 0 && map(2, 0) == 0 && map(2, 1) == 0;
+    if (!uniform)
+        throw Error(
+            fmt::format("the map of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample it "
+                        "to cubic voxels along the axes",
+                        grid->getName(), path.string()));
+    if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles();
+
+    auto level_set =
+        std::make_shared<GridLevelSet>(grid, [grid](double half_width) { return widened(*grid, half_width); });
+    if (!level_set->has_surface())
+        throw Error(fmt::format("grid \"{}\" of \"{}\" has {} active voxels and no surface; a level set changes sign",
+                                grid->getName(), path.string(), grid->activeVoxelCount()));
+    return level_set;
+}
+
+const bool defined = read_level_set.define(read);
+
+}  // namespace
+
+void GridLevelSet::write(const std::filesystem::path& path, const std::string& name) const
+{
+    if (name.empty()) throw Error(fmt::format("cannot write \"{}\": the grid needs a name", path.string()));
+    // The tree is shared, only the name is another. The file gets its own name when it is complete.
+    openvdb::MetaMap metadata(*grid_);
+    metadata.removeMeta(openvdb::GridBase::META_GRID_NAME);
+    metadata.insertMeta(openvdb::GridBase::META_GRID_NAME, openvdb::StringMetadata(name));
+    const std::filesystem::path unfinished = path.string() + ".unfinished";
+    try {
+        if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
+        openvdb::io::File(unfinished.string()).write(openvdb::GridCPtrVec{grid_->copyGridReplacingMetadata(metadata)});
+        std::filesystem::rename(unfinished, path);
+    } catch (const std::exception& e) {
+        std::error_code ignored;
+        std::filesystem::remove(unfinished, ignored);
+        throw Error(fmt::format("cannot write \"{}\": {}", path.string(), e.what()));
+    }
+}
+
+}  // namespace rapid

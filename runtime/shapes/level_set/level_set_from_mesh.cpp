@@ -1,0 +1,108 @@
+// Level sets from meshes, and what is wrong with meshes as level sets.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "runtime/error.h"
+#include "runtime/shapes/level_set/level_set_grid.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::FloatGrid;
+
+FloatGrid::Ptr build(const Mesh& mesh, bool balanced, const LevelSetOptions& options)
+{
+    const Box3d bounds = mesh.bounds().cast<double>();
+    require_buildable(fmt::format("mesh \"{}\"", mesh.name), mesh.area(), bounds, options);
+    const auto transform = make_transform(options.voxel, bounds);
+    auto grid = signed_distance(mesh, balanced, *transform, options.half_width * options.voxel);
+    grid->setName("surface");
+    return grid;
+}
+
+// The bounds of the parts of a mesh that hang together.
+std::vector<Box3f> pieces_of(const Mesh& mesh)
+{
+    std::vector<std::int32_t> parent(mesh.positions.size());
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](std::int32_t i) {
+        while (parent[i] != i) i = parent[i] = parent[parent[i]];
+        return i;
+    };
+    for (const Mesh::Triangle& t : mesh.triangles) {
+        parent[root(t[1])] = root(t[0]);
+        parent[root(t[2])] = root(t[0]);
+    }
+    std::vector<Box3f> bounds(mesh.positions.size());
+    for (const Mesh::Triangle& t : mesh.triangles)
+        for (const std::int32_t i : t) bounds[root(i)].extend(mesh.positions[i]);
+    std::erase_if(bounds, [](const Box3f& box) { return box.isEmpty(); });
+    return bounds;
+}
+
+// What is doubtful but usable.
+void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& options,
+          std::vector<std::string>& warnings)
+{
+    if (open.unbalanced_edges > 0)
+        warnings.push_back(fmt::format(
+            "mesh \"{}\" is not closed: {} edges have one face, and {} have more than two or two that look "
+            "different ways; holes smaller than a voxel ({:g} m) are closed, through larger ones its inside "
+            "counts as outside",
+            mesh.name, open.boundary_edges, open.non_manifold_edges, options.voxel));
+    else if (const double volume = mesh.signed_volume(); volume < 0)
+        warnings.push_back(
+            fmt::format("mesh \"{}\" is turned inside out: its volume is {:.4g} m³; its faces are taken to "
+                        "look outwards",
+                        mesh.name, volume));
+    const std::vector<Box3f> pieces = pieces_of(mesh);
+    const auto thin = std::count_if(pieces.begin(), pieces.end(),
+                                    [&](const Box3f& bounds) { return bounds.sizes().minCoeff() < options.voxel; });
+    if (thin > 0)
+        warnings.push_back(
+            fmt::format("{} of the {} pieces of mesh \"{}\" are thinner than a voxel ({:g} m) and may be "
+                        "missing; a smaller voxel keeps them",
+                        thin, pieces.size(), mesh.name, options.voxel));
+}
+
+LevelSetPtr of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)
+{
+    const bool balanced = open.unbalanced_edges == 0;
+    const auto rebuild = [mesh, balanced, voxel = options.voxel](double half_width) {
+        return build(*mesh, balanced, {voxel, half_width / voxel});
+    };
+    auto level_set = std::make_shared<GridLevelSet>(build(*mesh, balanced, options), rebuild);
+    if (!level_set->has_surface()) {
+        if (!balanced)
+            throw Error(
+                fmt::format("mesh \"{}\" encloses nothing with voxel = {:g} m: {} of its edges have one face, and "
+                            "outside reaches its inside through them; close it",
+                            mesh->name, options.voxel, open.boundary_edges));
+        const Vec3f size = mesh->bounds().sizes();
+        throw Error(
+            fmt::format("mesh \"{}\" vanishes with voxel = {:g} m: its size is {:g} x {:g} x {:g} m; use a voxel "
+                        "of at most {:.3g} m",
+                        mesh->name, options.voxel, size.x(), size.y(), size.z(), size.minCoeff() / 3));
+    }
+    return level_set;
+}
+
+LevelSetPtr from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
+{
+    require_legal(options);
+    if (mesh->triangles.empty())
+        throw Error(fmt::format("mesh \"{}\" has no faces; a level set needs a closed surface", mesh->name));
+    initialize_openvdb();
+
+    const Mesh::Openness open = mesh->openness();
+    LevelSetPtr level_set = of_same_faces(mesh, options, open);
+    warn(*mesh, open, options, warnings);
+    return level_set;
+}
+
+const bool defined = level_set_from_mesh.define(from_mesh) && level_set_of_same_faces.define(of_same_faces);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,78 @@
+// Level sets around points: the union of their balls, exact outside of them.
+#include <fmt/format.h>
+#include <openvdb/tools/ParticlesToLevelSet.h>
+
+#include <numbers>
+
+#include "runtime/error.h"
+#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/level_set_tools.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::FloatGrid;
+
+// What OpenVDB asks points for.
+struct Balls {
+    using PosType = openvdb::Vec3R;
+
+    std::vector<Vec3f> P;
+    std::vector<float> radius;  // one for all, or shape [P]
+
+    float radius_of(std::size_t i) const { return radius[radius.size() == 1 ? 0 : i]; }
+    std::size_t size() const { return P.size(); }
+    void getPos(std::size_t i, PosType& place) const { place = PosType(P[i].x(), P[i].y(), P[i].z()); }
+    void getPosRad(std::size_t i, PosType& place, openvdb::Real& r) const
+    {
+        getPos(i, place);
+        r = radius_of(i);
+    }
+};
+
+LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius, const LevelSetOptions& options)
+{
+    constexpr double least = 1.5;  // voxels: a smaller ball can fall between the voxels
+    require_legal(options);
+    if (P.empty()) throw Error("there are no points to make a level set of");
+    initialize_openvdb();
+    auto balls = std::make_shared<Balls>();
+    balls->P.assign(P.begin(), P.end());
+    balls->radius.assign(radius.begin(), radius.end());
+
+    Box3d bounds;
+    double area = 0;
+    for (std::size_t i = 0; i < balls->size(); ++i) {
+        const double r = balls->radius_of(i);
+        if (!(r >= least * options.voxel) || !std::isfinite(r))
+            throw Error(
+                fmt::format("point {} has the radius {:g} m, and with voxel = {:g} m it must be at least {:g} "
+                            "voxels; use a voxel of at most {:.3g} m",
+                            i, r, options.voxel, least, std::max(r, 0.0) / least));
+        if (!P[i].allFinite())
+            throw Error(
+                fmt::format("point {} is at ({}, {}, {}); places must be finite", i, P[i].x(), P[i].y(), P[i].z()));
+        bounds.extend(Vec3d(P[i].cast<double>() - Vec3d::Constant(r)));
+        bounds.extend(Vec3d(P[i].cast<double>() + Vec3d::Constant(r)));
+        area += 4 * std::numbers::pi * r * r;
+    }
+    const double voxel = options.voxel;
+    const auto build = [=](double half_width) {
+        require_buildable(fmt::format("a level set of {} points", balls->size()), area, bounds,
+                          {voxel, half_width / voxel});
+        auto grid = FloatGrid::create(static_cast<float>(half_width));
+        grid->setTransform(make_transform(voxel, bounds));
+        grid->setGridClass(openvdb::GRID_LEVEL_SET);
+        grid->setName("surface");
+        openvdb::tools::ParticlesToLevelSet<FloatGrid> rasterizer(*grid);
+        rasterizer.rasterizeSpheres(*balls);
+        rasterizer.finalize(/*prune=*/true);
+        return grid;
+    };
+    return std::make_shared<GridLevelSet>(build(options.half_width * voxel), build);
+}
+
+const bool defined = level_set_from_points.define(from_points);
+
+}  // namespace
+}  // namespace rapid

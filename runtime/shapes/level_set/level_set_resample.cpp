@@ -1,0 +1,87 @@
+// Level sets on other voxels: from their surface as a mesh, so that distances are distances again.
+#include <fmt/format.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/tools/LevelSetRebuild.h>
+
+#include <cmath>
+
+#include "runtime/error.h"
+#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/level_set_tools.h"
+#include "runtime/shapes/level_set/placed.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::FloatGrid;
+
+// m²: the band has voxels on both sides of the surface.
+double area_of(const FloatGrid& grid)
+{
+    return double(grid.activeVoxelCount()) * std::pow(grid.voxelSize()[0], 3) / (2 * grid.background());
+}
+
+// The level set's grid, turned with it where it is.
+FloatGrid::ConstPtr grid_in_world(const LevelSetPtr& shape)
+{
+    if (const auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid->shared_grid();
+    const auto& turned = dynamic_cast<const PlacedLevelSet&>(*shape);
+    const FloatGrid::ConstPtr rest = grid_in_world(turned.rest());
+    const Eigen::Matrix4d pose = turned.pose().affine().matrix();
+    openvdb::Mat4R map;  // OpenVDB's vectors are rows
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) map(j, i) = pose(i, j);
+    const openvdb::Mat4R to_world = rest->transform().baseMap()->getAffineMap()->getMat4() * map;
+    return openvdb::gridConstPtrCast<FloatGrid>(
+        rest->copyGridReplacingTransform(openvdb::math::Transform::createLinearTransform(to_world)));
+}
+
+}  // namespace
+
+FloatGrid::Ptr widened(const FloatGrid& grid, double half_width)
+{
+    const double voxel = grid.voxelSize()[0];
+    const auto index = grid.evalActiveVoxelBoundingBox();
+    const auto low = grid.indexToWorld(index.min()), high = grid.indexToWorld(index.max());
+    require_buildable(fmt::format("grid \"{}\"", grid.getName()), area_of(grid),
+                      Box3d(Vec3d(low[0], low[1], low[2]), Vec3d(high[0], high[1], high[2])),
+                      {voxel, half_width / voxel});
+    auto wide = openvdb::tools::levelSetRebuild(grid, 0.0f, static_cast<float>(half_width / voxel));
+    openvdb::tools::compReplace(*wide, grid);
+    wide->setName(grid.getName());
+    return wide;
+}
+
+FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Transform& transform, double half_width)
+{
+    const double voxel = transform.voxelSize()[0];
+    const FloatGrid::ConstPtr source = grid_in_world(shape);
+    require_buildable("the resampled level set", area_of(*source), shape->bounds(), {voxel, half_width / voxel});
+    auto grid = openvdb::tools::levelSetRebuild(*source, 0.0f, static_cast<float>(half_width / voxel), &transform);
+    grid->setName("surface");
+    return grid;
+}
+
+namespace {
+
+LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
+{
+    const double half_width = shape->band() / shape->voxel();
+    require_legal({voxel, half_width});
+    const Vec3f size = shape->surface()->bounds().sizes();
+    if (size.minCoeff() < voxel)
+        throw Error(fmt::format(
+            "the level set vanishes with voxel = {:g} m: its size is {:.3g} x {:.3g} x {:.3g} m; use a voxel "
+            "of at most {:.3g} m",
+            voxel, size.x(), size.y(), size.z(), size.minCoeff() / 3));
+    // Before OpenVDB refuses a voxel that it can't hold.
+    require_buildable("the resampled level set", area_of(*grid_in_world(shape)), shape->bounds(), {voxel, half_width});
+    const auto transform = make_transform(voxel, shape->bounds());
+    const auto build = [=](double metres) { return resampled_to(shape, *transform, metres); };
+    return std::make_shared<GridLevelSet>(build(half_width * voxel), build);
+}
+
+const bool defined = resample_level_set.define(resampled);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,181 @@
+#include "runtime/shapes/level_set/level_set_tools.h"
+
+#include <fmt/format.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/tools/LevelSetFilter.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/error.h"
+#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/placed.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+using GridPtr = std::shared_ptr<const GridLevelSet>;
+
+// Voxel sizes that differ by less are the same but for rounding.
+constexpr double same_size = 1e-6;
+// Voxels that lie within this part of a voxel of each other's places lie there.
+constexpr double same_place = 1e-4;
+
+// On voxels along the axes: what is turned is resampled.
+GridPtr on_axes(const LevelSetPtr& shape)
+{
+    if (auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid;
+    return std::dynamic_pointer_cast<const GridLevelSet>(resample_level_set(shape, shape->voxel()));
+}
+
+LevelSetPtr finished(FloatGrid::Ptr grid, GridLevelSet::Rebuild rebuild, const std::string& what)
+{
+    grid->setName("surface");
+    auto result = std::make_shared<GridLevelSet>(std::move(grid), std::move(rebuild));
+    if (!result->has_surface()) throw Error(fmt::format("nothing is left of {}", what));
+    return result;
+}
+
+// A copy whose values are `scale` (phi - shift), within a band of `half_width` metres of the new ones, and whose voxels
+// lie by `by` farther along the axes. The band of `grid` must reach as far.
+FloatGrid::Ptr rebanded(const FloatGrid& grid, const openvdb::math::Transform& transform, double scale, double shift,
+                        double half_width, const Coord& by = Coord(0))
+{
+    std::vector<const Leaf*> leaves;
+    grid.tree().getNodes(leaves);
+    const auto width = static_cast<float>(half_width);
+    // Leaves of the copy begin at multiples of 8, so one of `grid` falls apart where the way is no such multiple.
+    auto result = FloatGrid::create(width);
+    result->setTransform(transform.copy());
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    const auto moved = [&](float phi) { return static_cast<float>(scale * (double(phi) - shift)); };
+    if (by.x() % Leaf::DIM != 0 || by.y() % Leaf::DIM != 0 || by.z() % Leaf::DIM != 0) {
+        auto accessor = result->getAccessor();
+        for (const Leaf* leaf : leaves)
+            for (auto value = leaf->cbeginValueOn(); value; ++value)
+                if (const float phi = moved(*value); std::abs(phi) < width)
+                    accessor.setValueOn(value.getCoord() + by, phi);
+    } else {
+        std::vector<std::unique_ptr<Leaf>> made(leaves.size());
+        tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+            auto leaf = std::make_unique<Leaf>(leaves[i]->origin() + by, width);
+            for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+                const float phi = moved(leaves[i]->getValue(n));
+                if (std::abs(phi) < width && leaves[i]->isValueOn(n))
+                    leaf->setValueOn(n, phi);
+                else
+                    leaf->setValueOff(n, std::copysign(width, phi));
+            }
+            if (!leaf->isEmpty()) made[i] = std::move(leaf);
+        });
+        for (auto& leaf : made)
+            if (leaf) result->tree().addLeaf(leaf.release());
+    }
+    openvdb::tools::signedFloodFill(result->tree());
+    return result;
+}
+
+FloatGrid::Ptr rebanded(const FloatGrid& grid, double shift, double half_width)
+{
+    return rebanded(grid, grid.transform(), 1, shift, half_width);
+}
+
+// The level set on the voxels of `like`, with a band of exactly `half_width` metres.
+FloatGrid::Ptr aligned(const LevelSetPtr& shape, const FloatGrid& like, double half_width)
+{
+    const GridPtr grid = std::dynamic_pointer_cast<const GridLevelSet>(shape);
+    const double voxel = like.voxelSize()[0];
+    if (!grid || std::abs(grid->voxel() - voxel) > same_size * voxel)
+        return resampled_to(shape, like.transform(), half_width);
+    const openvdb::Vec3d place = like.worldToIndex(grid->grid().indexToWorld(Coord(0)));
+    const Coord whole = Coord::round(place);
+    const openvdb::Vec3d off = place - whole.asVec3d();
+    if (std::max({std::abs(off[0]), std::abs(off[1]), std::abs(off[2])}) > same_place)
+        return resampled_to(shape, like.transform(), half_width);
+    const auto wide = std::static_pointer_cast<const GridLevelSet>(grid->with_band(half_width));
+    return rebanded(wide->grid(), like.transform(), 1, 0, half_width, whole);
+}
+
+FloatGrid::Ptr combine(const GridPtr& a, const LevelSetPtr& b, Combine how, double half_width)
+{
+    const auto wide = std::static_pointer_cast<const GridLevelSet>(a->with_band(half_width));
+    const FloatGrid::Ptr first = rebanded(wide->grid(), 0, half_width), second = aligned(b, *first, half_width);
+    switch (how) {
+        case Combine::Union:
+            return openvdb::tools::csgUnionCopy(*first, *second);
+        case Combine::Intersect:
+            return openvdb::tools::csgIntersectionCopy(*first, *second);
+        case Combine::Subtract:
+            break;
+    }
+    return openvdb::tools::csgDifferenceCopy(*first, *second);
+}
+
+LevelSetPtr combined(const LevelSetPtr& a, const LevelSetPtr& b, Combine how, std::vector<std::string>& warnings)
+{
+    if (std::abs(a->voxel() - b->voxel()) > same_size * a->voxel())
+        warnings.push_back(
+            fmt::format("the second level set has a voxel of {:g} m and the first of {:g} m; it is "
+                        "resampled to that (:resample says which is wanted)",
+                        b->voxel(), a->voxel()));
+    const GridPtr first = on_axes(a);
+    const auto build = [=](double half_width) { return combine(first, b, how, half_width); };
+    const char* what = how == Combine::Union       ? "the union"
+                       : how == Combine::Intersect ? "the intersection; the two do not overlap"
+                                                   : "the difference; the second covers the first";
+    return finished(build(first->band()), build, what);
+}
+
+LevelSetPtr offset(const LevelSetPtr& shape, double metres)
+{
+    if (!std::isfinite(metres)) throw Error(fmt::format("an offset of {} m; it must be finite", metres));
+    const std::string what =
+        fmt::format("the level set {:g} m inwards; its size is {:.3g} x {:.3g} x {:.3g} m", -metres,
+                    shape->bounds().sizes().x(), shape->bounds().sizes().y(), shape->bounds().sizes().z());
+    if (-metres > shape->bounds().sizes().minCoeff() / 2) throw Error(fmt::format("nothing is left of {}", what));
+    const GridPtr grid = on_axes(shape);
+    const auto build = [=](double half_width) {
+        const double reach = half_width + std::abs(metres) + grid->voxel();
+        return rebanded(std::static_pointer_cast<const GridLevelSet>(grid->with_band(reach))->grid(), metres,
+                        half_width);
+    };
+    return finished(build(grid->band()), build, what);
+}
+
+LevelSetPtr smoothed(const LevelSetPtr& shape, int width, int iterations)
+{
+    const GridPtr source = on_axes(shape);
+    const FloatGrid::Ptr grid = source->grid().deepCopy();
+    openvdb::tools::LevelSetFilter<FloatGrid> filter(*grid);
+    for (int i = 0; i < iterations; ++i) filter.gaussian(width);
+    return finished(
+        grid, [grid](double half_width) { return widened(*grid, half_width); },
+        fmt::format("the level set smoothed {} times by {} voxels", iterations, width));
+}
+
+LevelSetPtr moved(const LevelSetPtr& shape, const Pose& pose)
+{
+    if (const auto turned = std::dynamic_pointer_cast<const PlacedLevelSet>(shape))
+        return std::make_shared<PlacedLevelSet>(turned->rest(), pose * turned->pose());
+    if (!pose.rotation.vec().isZero(0)) return std::make_shared<PlacedLevelSet>(shape, pose);
+    const GridPtr grid = std::dynamic_pointer_cast<const GridLevelSet>(shape);
+    auto transform = grid->grid().transform().copy();
+    transform->postScale(pose.scale);
+    transform->postTranslate({pose.translation.x(), pose.translation.y(), pose.translation.z()});
+    const auto build = [=](double half_width) {
+        const auto wide = std::static_pointer_cast<const GridLevelSet>(grid->with_band(half_width / pose.scale));
+        return rebanded(wide->grid(), *transform, pose.scale, 0, half_width);
+    };
+    return finished(build(pose.scale * grid->band()), build, "the moved level set");
+}
+
+const bool defined = combine_level_sets.define(combined) && offset_level_set.define(offset) &&
+                     smooth_level_set.define(smoothed) && move_level_set.define(moved);
+
+}  // namespace
+}  // namespace rapid

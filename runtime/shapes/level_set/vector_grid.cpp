@@ -1,0 +1,100 @@
+#include "runtime/shapes/level_set/vector_grid.h"
+
+#include <fmt/format.h>
+#include <openvdb/io/File.h>
+#include <openvdb/tools/Interpolation.h>
+
+#include "runtime/error.h"
+#include "runtime/shapes/level_set/grid_file.h"
+#include "runtime/shapes/level_set/level_set_grid.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::Vec3SGrid;
+
+class OpenVectorGrid final : public VectorGrid {
+public:
+    explicit OpenVectorGrid(Vec3SGrid::ConstPtr grid) : grid_(std::move(grid)) {}
+
+    void sample(std::span<const Vec3d> P, std::span<Vec3d> values) const override
+    {
+        if (grid_->getGridClass() == openvdb::GRID_STAGGERED)
+            sample_by<openvdb::tools::StaggeredBoxSampler>(P, values);
+        else
+            sample_by<openvdb::tools::BoxSampler>(P, values);
+    }
+
+private:
+    template <class Sampler>
+    void sample_by(std::span<const Vec3d> P, std::span<Vec3d> values) const
+    {
+        // Not registered with the tree, which would lock it for each batch.
+        openvdb::tree::ValueAccessor<const openvdb::Vec3STree, /*IsSafe=*/false> accessor(grid_->tree());
+        for (std::size_t i = 0; i < P.size(); ++i) {
+            const openvdb::Vec3d at = grid_->transform().worldToIndex({P[i].x(), P[i].y(), P[i].z()});
+            // Voxels have numbers of 32 bits; farther out than those there is nothing.
+            constexpr double farthest = 1 << 30;
+            openvdb::Vec3s value = grid_->background();
+            if (std::abs(at.x()) < farthest && std::abs(at.y()) < farthest && std::abs(at.z()) < farthest)
+                value = Sampler::sample(accessor, at);
+            values[i] = Vec3d(value.x(), value.y(), value.z());
+        }
+    }
+
+    Vec3SGrid::ConstPtr grid_;
+};
+
+openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
+{
+    if (!name.empty()) return grid_of_name(path, name, grids);
+    openvdb::GridPtrVec vectors;
+    for (const auto& grid : grids)
+        if (grid->isType<Vec3SGrid>()) vectors.push_back(grid);
+    if (vectors.size() == 1) return vectors[0];
+    if (vectors.empty())
+        throw Error(
+            fmt::format("there is no grid of vectors (vec3s) in \"{}\"; its grids are {}", path, grids_of(grids)));
+    throw Error(fmt::format("there are {} grids of vectors in \"{}\": {}; name one by grid", vectors.size(), path,
+                            grids_of(vectors)));
+}
+
+VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
+{
+    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
+    initialize_openvdb();
+    try {
+        openvdb::io::File file(path.string());
+        file.open(/*delayLoad=*/false);
+        const auto chosen = choose(path.string(), name, *file.readAllGridMetadata());
+        if (!chosen->isType<Vec3SGrid>())
+            throw Error(
+                fmt::format("grid \"{}\" of \"{}\" is {}; it must be of vectors (vec3s): three grids of floats are "
+                            "merged into one where they are made",
+                            chosen->getName(), path.string(), chosen->valueType()));
+        return std::make_shared<OpenVectorGrid>(openvdb::gridPtrCast<Vec3SGrid>(file.readGrid(chosen->getName())));
+    } catch (const openvdb::Exception& e) {
+        throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path.string(), e.what()));
+    }
+}
+
+VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes, std::span<const Vec3f> values)
+{
+    initialize_openvdb();
+    auto grid = Vec3SGrid::create();
+    auto accessor = grid->getAccessor();
+    std::size_t at = 0;
+    for (int x = 0; x < nodes.x(); ++x)
+        for (int y = 0; y < nodes.y(); ++y)
+            for (int z = 0; z < nodes.z(); ++z, ++at)
+                accessor.setValue({x, y, z}, {values[at].x(), values[at].y(), values[at].z()});
+    auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+    transform->postTranslate({origin.x(), origin.y(), origin.z()});
+    grid->setTransform(transform);
+    return std::make_shared<OpenVectorGrid>(grid);
+}
+
+const bool defined = read_vector_grid.define(read) && make_vector_grid.define(make);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,81 @@
+#include "runtime/shapes/mesh/mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rapid {
+
+Box3f Mesh::bounds() const
+{
+    Box3f box;
+    for (const Vec3f& P : positions) box.extend(P);
+    return box;
+}
+
+double Mesh::area() const
+{
+    double twice = 0;
+    for (const Triangle& t : triangles) {
+        const Vec3d a = positions[t[0]].cast<double>();
+        twice += (positions[t[1]].cast<double>() - a).cross(positions[t[2]].cast<double>() - a).norm();
+    }
+    return twice / 2;
+}
+
+// The sum over the faces of the tetrahedra (origin, a, b, c), by the divergence theorem. For a closed mesh any origin
+// gives the same; the middle of the bounds loses the fewest digits far from the world's origin, and makes the figure of
+// an open mesh independent of where it stands.
+double Mesh::signed_volume() const
+{
+    if (positions.empty()) return 0;
+    const Vec3d origin = bounds().cast<double>().center();
+    double six_times = 0;
+    for (const Triangle& t : triangles) {
+        const Vec3d a = positions[t[0]].cast<double>() - origin;
+        const Vec3d b = positions[t[1]].cast<double>() - origin;
+        const Vec3d c = positions[t[2]].cast<double>() - origin;
+        six_times += a.dot(b.cross(c));
+    }
+    return six_times / 6;
+}
+
+Mesh::Openness Mesh::openness() const
+{
+    // An edge is its two vertices, lower first; the lowest bit tells which way its face goes along it.
+    struct Side {
+        std::uint64_t edge;
+        bool forward;
+    };
+    std::vector<Side> sides;
+    sides.reserve(3 * triangles.size());
+    for (const Triangle& t : triangles)
+        for (int k = 0; k < 3; ++k) {
+            const auto from = static_cast<std::uint64_t>(t[k]), to = static_cast<std::uint64_t>(t[(k + 1) % 3]);
+            sides.push_back({std::min(from, to) << 32 | std::max(from, to), from < to});
+        }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.edge < b.edge; });
+
+    Openness openness;
+    for (std::size_t begin = 0, end; begin < sides.size(); begin = end) {
+        std::size_t forward = 0;
+        for (end = begin; end < sides.size() && sides[end].edge == sides[begin].edge; ++end)
+            forward += sides[end].forward;
+        const std::size_t faces = end - begin;
+        openness.boundary_edges += faces == 1;
+        openness.non_manifold_edges += faces > 2 || (faces == 2 && forward != 1);
+        openness.odd_edges += faces % 2;
+        openness.unbalanced_edges += 2 * forward != faces;
+    }
+    return openness;
+}
+
+MeshPtr transformed(const MeshPtr& mesh, const Eigen::Affine3d& map)
+{
+    auto moved = std::make_shared<Mesh>(*mesh);
+    for (Vec3f& P : moved->positions) P = (map * P.cast<double>()).cast<float>();
+    if (map.linear().determinant() < 0)
+        for (Mesh::Triangle& t : moved->triangles) std::swap(t[1], t[2]);
+    return moved;
+}
+
+}  // namespace rapid

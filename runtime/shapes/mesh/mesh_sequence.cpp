@@ -1,0 +1,87 @@
+#include "runtime/shapes/mesh/mesh_sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runtime/error.h"
+#include "runtime/shapes/mesh/mesh_file.h"
+
+namespace rapid {
+namespace {
+
+// A frame's spline and the jumps around it need six; two more go on to the next frame.
+constexpr std::size_t most_kept = 8;
+
+// Corners of one vertex may differ by this much of the mesh's size: what an exporter's rounding makes of them.
+constexpr double same_place = 1e-6;
+
+}  // namespace
+
+MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::string name)
+    : files_(std::move(files)), name_(std::move(name))
+{
+    if (files_.empty()) throw Error(fmt::format("there is no mesh file \"{}\", at any frame", name_));
+    for (int frame = first(); frame < last(); ++frame)
+        if (!files_.count(frame))
+            throw Error(fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
+                                    frame, name_, first(), last()));
+    const MeshFile file = read_mesh_file(files_.begin()->second);
+    corners_ = file.positions.size();
+    faces_ = file.triangles.size();
+    vertex_of_ = join_by_place(file.positions);
+    rest_ = joined(file, vertex_of_, files_.begin()->second.string());
+    kept_.emplace_front(first(), rest_);
+}
+
+MeshPtr MeshSequence::at(std::int64_t frame) const
+{
+    const int held = static_cast<int>(std::clamp<std::int64_t>(frame, first(), last()));
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& kept) { return kept.first == held; });
+    MeshPtr mesh;
+    if (found != kept_.end()) {
+        mesh = found->second;
+        kept_.erase(found);
+    } else {
+        mesh = read(held);
+    }
+    kept_.emplace_front(held, mesh);
+    if (kept_.size() > most_kept) kept_.pop_back();
+    return mesh;
+}
+
+MeshPtr MeshSequence::read(int frame) const
+{
+    const std::filesystem::path& path = files_.at(frame);
+    const MeshFile file = read_mesh_file(path);
+    const auto counts = [](std::size_t corners, std::size_t faces) {
+        return fmt::format("{} corners and {} faces", corners, faces);
+    };
+    if (file.positions.size() != corners_ || file.triangles.size() != faces_)
+        throw Error(fmt::format(
+            "\"{}\" changes at frame {}: it has {} there, and {} at frame {}; a sequence deforms one "
+            "mesh, whose vertices and faces stay the same",
+            name_, frame, counts(file.positions.size(), file.triangles.size()), counts(corners_, faces_), first()));
+    MeshPtr mesh = joined(file, vertex_of_, path.string());
+    const auto other =
+        std::mismatch(mesh->triangles.begin(), mesh->triangles.end(), rest_->triangles.begin(), rest_->triangles.end());
+    if (other.first != mesh->triangles.end())
+        throw Error(
+            fmt::format("\"{}\" changes at frame {}: it has as many faces as at frame {} ({}), but face {} joins "
+                        "other vertices; a sequence deforms one mesh, whose faces stay the same",
+                        name_, frame, first(), faces_, other.first - mesh->triangles.begin()));
+
+    const double near = same_place * mesh->bounds().sizes().maxCoeff();
+    for (std::size_t corner = 0; corner < corners_; ++corner) {
+        const double apart = (file.positions[corner] - mesh->positions[vertex_of_[corner]]).norm();
+        if (!(apart <= near))
+            throw Error(
+                fmt::format("corner {} of \"{}\" leaves the vertex that it shares at frame {} by {:.3g} m at frame "
+                            "{}; begin the sequence at a frame where what can part does not touch",
+                            corner, name_, first(), apart, frame));
+    }
+    return mesh;
+}
+
+}  // namespace rapid

@@ -1,0 +1,72 @@
+// Meshes of what files hold: vertices by place, faces that have a surface.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <unordered_map>
+
+#include "runtime/error.h"
+#include "runtime/shapes/mesh/mesh_file.h"
+
+namespace rapid {
+
+std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
+{
+    struct Hash {
+        std::size_t operator()(const std::array<std::uint32_t, 3>& bits) const
+        {
+            std::uint64_t hash = 0;
+            for (const std::uint32_t word : bits) hash = (hash ^ word) * 0x9E3779B97F4A7C15ull, hash ^= hash >> 29;
+            return hash;
+        }
+    };
+    std::unordered_map<std::array<std::uint32_t, 3>, std::int32_t, Hash> vertices;
+    vertices.reserve(positions.size());
+    std::vector<std::int32_t> vertex_of(positions.size());
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        std::array<std::uint32_t, 3> place;
+        for (int axis = 0; axis < 3; ++axis)
+            place[axis] = std::bit_cast<std::uint32_t>(positions[i][axis] + 0.0f);  // -0 is 0
+        vertex_of[i] = vertices.try_emplace(place, static_cast<std::int32_t>(vertices.size())).first->second;
+    }
+    return vertex_of;
+}
+
+MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of, std::string name)
+{
+    auto mesh = std::make_shared<Mesh>();
+    mesh->name = std::move(name);
+    std::vector<Vec3f> colours;
+    std::vector<float> alphas;
+    for (std::size_t i = 0; i < file.positions.size(); ++i) {
+        if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its place
+        mesh->positions.push_back(file.positions[i]);
+        if (!file.colours.empty()) {
+            colours.push_back(file.colours[i]);
+            alphas.push_back(file.alphas[i]);
+        }
+    }
+    for (const Mesh::Triangle& t : file.triangles) {
+        const Mesh::Triangle joined(vertex_of[t[0]], vertex_of[t[1]], vertex_of[t[2]]);
+        // A face whose corners fell together is a line, and its edges cancel: what it bounded is closed without it.
+        if (joined[0] != joined[1] && joined[1] != joined[2] && joined[2] != joined[0])
+            mesh->triangles.push_back(joined);
+    }
+    if (mesh->triangles.empty())
+        throw Error(fmt::format("the mesh \"{}\" has {} vertices and no faces; a mesh needs at least one triangle",
+                                mesh->name, mesh->positions.size()));
+
+    if (std::any_of(alphas.begin(), alphas.end(), [](float alpha) { return alpha != 1.0f; }))
+        mesh->values.emplace("Alpha", std::move(alphas));
+    if (!colours.empty()) mesh->values.emplace("Cd", std::move(colours));
+    return mesh;
+}
+
+MeshPtr read_mesh(const std::filesystem::path& path)
+{
+    const MeshFile file = read_mesh_file(path);
+    return joined(file, join_by_place(file.positions), path.string());
+}
+
+}  // namespace rapid

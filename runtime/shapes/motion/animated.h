@@ -1,0 +1,58 @@
+// Meshes and shapes that are another at each time: what `:transform` with a motion, and a sequence of files, give. They
+// have no place of their own; who uses one asks where it is at the frames that it needs.
+#pragma once
+
+#include "runtime/shapes/mesh/mesh_sequence.h"
+#include "runtime/shapes/motion/motion.h"
+#include "runtime/shapes/shape.h"
+
+namespace rapid {
+
+// A mesh that moves as a whole, or deforms, or both. Its faces stay the same.
+class AnimatedMesh : public Object {
+public:
+    static constexpr std::string_view param_type = "moving mesh";
+
+    AnimatedMesh(MeshPtr mesh, MotionPtr motion) : rest_(std::move(mesh)), motion_(std::move(motion)) {}
+    AnimatedMesh(MeshSequencePtr sequence, MotionPtr motion)
+        : rest_(sequence->rest()), sequence_(std::move(sequence)), motion_(std::move(motion))
+    {
+    }
+
+    std::string_view kind() const override { return "moving mesh"; }
+    bool varies() const override { return true; }
+
+    bool deforms() const { return sequence_ != nullptr; }
+    const MeshPtr& rest() const { return rest_; }  // of a sequence its first file, without the motion
+    const MotionPtr& motion() const { return motion_; }
+    FrameRange range() const;
+
+    // Moved further.
+    std::shared_ptr<const AnimatedMesh> transformed(const MotionPtr& motion) const;
+
+    // Where it is at a whole frame. On one thread: the motion may be a script's.
+    MeshPtr at(const FrameClock& clock, std::int64_t frame) const;
+
+private:
+    MeshPtr rest_;
+    MeshSequencePtr sequence_;  // null where the mesh does not deform
+    MotionPtr motion_;
+};
+
+class AnimatedShape : public Object {
+public:
+    static constexpr std::string_view param_type = "moving shape";
+
+    AnimatedShape(ShapePtr shape, MotionPtr motion) : rest_(std::move(shape)), motion_(std::move(motion)) {}
+    std::string_view kind() const override { return "moving shape"; }
+    bool varies() const override { return true; }
+
+    const ShapePtr& rest() const { return rest_; }
+    const MotionPtr& motion() const { return motion_; }
+
+private:
+    ShapePtr rest_;
+    MotionPtr motion_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,301 @@
+#include "runtime/shapes/motion/body_path.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/shapes/mesh/ray_crossings.h"
+
+namespace rapid {
+namespace {
+
+// A jump: this many times the way of the frames around, and this part of the body's size.
+constexpr double jump_factor = 8, jump_size = 0.5;
+
+using Map = Eigen::Matrix<double, 3, 4>;
+
+Map map_at(const Motion& motion, const FrameClock& clock, std::int64_t frame)
+{
+    return motion.at(clock.at_step(frame)).affine().matrix().topRows<3>();
+}
+
+// The normal of a surface after a linear map: by its cofactors, as a normal turns otherwise than the surface.
+Vec3f mapped_normal(const Eigen::Matrix3d& map, const Vec3f& normal)
+{
+    const Vec3d n = normal.cast<double>();
+    const Vec3d x = map.col(0), y = map.col(1), z = map.col(2);
+    return (n.x() * y.cross(z) + n.y() * z.cross(x) + n.z() * x.cross(y)).normalized().cast<float>();
+}
+
+class RigidPath final : public BodyPath {
+public:
+    explicit RigidPath(const Cubic<Map>& map) : map_(map) {}
+
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+               std::span<Vec3d> velocity) const override
+    {
+        for (std::size_t i = 0; i < places.size(); ++i) {
+            const Eigen::Vector4d X = places[i].P.cast<double>().homogeneous();
+            const Cubic<Vec3d> way{map_.c0 * X, map_.c1 * X, map_.c2 * X, map_.c3 * X};
+            places[i].P = way.at(t[i]).cast<float>();
+            velocity[i] = way.derivative(t[i]);
+            if (normals && !places[i].N.isZero(0))
+                places[i].N = mapped_normal(map_.at(t[i]).leftCols<3>(), places[i].N);
+        }
+    }
+
+private:
+    Cubic<Map> map_;
+};
+
+// The ways of all vertices of a mesh.
+class DeformingPath final : public BodyPath {
+public:
+    DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> ways, PlacesOn on)
+        : mesh_(std::move(mesh)), on_(on), ways_(std::move(ways))
+    {
+        if (on == PlacesOn::Volume) crossings_.emplace(mesh_);
+    }
+
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+               std::span<Vec3d> velocity) const override
+    {
+        std::vector<RayCrossings::Crossing> crossings;
+        for (std::size_t i = 0; i < places.size(); ++i) {
+            Birthplace& place = places[i];
+            if (on_ == PlacesOn::Volume) {
+                const Cubic<Vec3d> way = way_inside(place.P, crossings);
+                place.P = way.at(t[i]).cast<float>();
+                velocity[i] = way.derivative(t[i]);
+            } else if (on_ == PlacesOn::Vertices) {
+                const Cubic<Vec3d>& way = ways_[static_cast<std::size_t>(place.element)];
+                place.P = way.at(t[i]).cast<float>();
+                velocity[i] = way.derivative(t[i]);
+            } else {
+                carry_on_face(t[i], normals, place, velocity[i]);
+            }
+        }
+    }
+
+private:
+    const Cubic<Vec3d>& corner(const Mesh::Triangle& triangle, int k) const
+    {
+        return ways_[static_cast<std::size_t>(triangle[k])];
+    }
+
+    void carry_on_face(double t, bool normals, Birthplace& place, Vec3d& velocity) const
+    {
+        const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(place.element)];
+        const Cubic<Vec3d>&a = corner(triangle, 0), &b = corner(triangle, 1), &c = corner(triangle, 2);
+        const Vec3d A = a.at(t), B = b.at(t), C = c.at(t);
+        const double u = place.b1, w = place.b2;
+        const Vec3d va = a.derivative(t);
+        place.P = (A + u * (B - A) + w * (C - A)).cast<float>();
+        velocity = va + u * (b.derivative(t) - va) + w * (c.derivative(t) - va);
+        if (normals) place.N = (B - A).cross(C - A).normalized().cast<float>();
+    }
+
+    // Of the point of a triangle at (y, z), in the mesh at the frame.
+    Cubic<Vec3d> way_on(std::int32_t t, const Vec3d& P) const
+    {
+        const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(t)];
+        const auto yz = [&](int k) -> Eigen::Vector2d {
+            return mesh_->positions[static_cast<std::size_t>(triangle[k])].cast<double>().tail<2>();
+        };
+        const Eigen::Vector2d ab = yz(1) - yz(0), ac = yz(2) - yz(0), ap = P.tail<2>() - yz(0);
+        const double twice_area = ab.x() * ac.y() - ab.y() * ac.x();
+        const double u = (ap.x() * ac.y() - ap.y() * ac.x()) / twice_area;
+        const double w = (ab.x() * ap.y() - ab.y() * ap.x()) / twice_area;
+        return mix(mix(corner(triangle, 0), corner(triangle, 1), u / std::max(1e-300, 1 - w)), corner(triangle, 2), w);
+    }
+
+    static Cubic<Vec3d> mix(const Cubic<Vec3d>& a, const Cubic<Vec3d>& b, double t)
+    {
+        const auto part = [t](const Vec3d& p, const Vec3d& q) -> Vec3d { return p + t * (q - p); };
+        return {part(a.c0, b.c0), part(a.c1, b.c1), part(a.c2, b.c2), part(a.c3, b.c3)};
+    }
+
+    Cubic<Vec3d> way_inside(const Vec3f& place, std::vector<RayCrossings::Crossing>& crossings) const
+    {
+        const Vec3d P = place.cast<double>();
+        crossings_->along_x(P.y(), P.z(), crossings);
+        const auto behind = std::find_if(crossings.begin(), crossings.end(),
+                                         [&](const RayCrossings::Crossing& crossing) { return crossing.x > P.x(); });
+        // Rounding of the place to single precision may have put it on the last face of its line, or a little out of
+        // it.
+        if (crossings.empty()) return mesh_still(P);
+        const auto& high = behind == crossings.end() ? crossings.back() : *behind;
+        const auto& low = behind == crossings.begin() ? crossings.front() : *std::prev(behind);
+        const double across = high.x - low.x;
+        const double t = across > 0 ? std::clamp((P.x() - low.x) / across, 0.0, 1.0) : 0;
+        Cubic<Vec3d> way = mix(way_on(low.triangle, P), way_on(high.triangle, P), t);
+        return way;
+    }
+
+    // The way of the vertex that is nearest, from P.
+    Cubic<Vec3d> mesh_still(const Vec3d& P) const
+    {
+        const auto nearest =
+            std::min_element(mesh_->positions.begin(), mesh_->positions.end(), [&](const Vec3f& a, const Vec3f& b) {
+                return (a.cast<double>() - P).squaredNorm() < (b.cast<double>() - P).squaredNorm();
+            });
+        Cubic<Vec3d> way = ways_[static_cast<std::size_t>(nearest - mesh_->positions.begin())];
+        way.c0 += P - nearest->cast<double>();
+        return way;
+    }
+
+    MeshPtr mesh_;  // at the frame
+    PlacesOn on_;
+    std::vector<Cubic<Vec3d>> ways_;  // by vertex
+    std::optional<RayCrossings> crossings_;
+};
+
+class PartOfPath final : public BodyPath {
+public:
+    PartOfPath(BodyPathPtr path, double begin, double length) : path_(std::move(path)), begin_(begin), length_(length)
+    {
+    }
+
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+               std::span<Vec3d> velocity) const override
+    {
+        std::vector<double> of_whole(t.size());
+        for (std::size_t i = 0; i < t.size(); ++i) of_whole[i] = begin_ + length_ * t[i];
+        path_->carry(of_whole, normals, places, velocity);
+        for (Vec3d& v : velocity.first(places.size())) v *= length_;
+    }
+
+private:
+    BodyPathPtr path_;
+    double begin_, length_;
+};
+
+// The same in steps. A script's motion has none before the first.
+FrameRange in_steps(FrameRange range, const FrameClock& clock)
+{
+    const auto start = static_cast<double>(clock.start);
+    if (std::isinf(range.first) && range.first < 0) range.first = start;
+    for (double* frame : {&range.first, &range.last}) *frame = start + (*frame - start) * clock.subframes;
+    return range;
+}
+
+// Cuts are those of frames: what jumps to a frame does so in its last step.
+PathOptions in_steps(PathOptions options, const FrameClock& clock)
+{
+    if (!options.cuts) return options;
+    std::set<std::int64_t> steps;
+    for (const std::int64_t frame : *options.cuts) steps.insert(clock.step_of(frame));
+    options.cuts = std::move(steps);
+    return options;
+}
+
+FramePath path_of_rigid(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
+                        const PathOptions& options)
+{
+    const auto way = [&](std::int64_t i) {
+        const Map step = map_at(motion, clock, i) - map_at(motion, clock, i - 1);
+        double sum = 0;
+        for (int k = 0; k < 8; ++k)
+            sum += (step * Vec3d(rest.corner(static_cast<Box3d::CornerType>(k))).homogeneous()).squaredNorm();
+        return std::sqrt(sum / 8);
+    };
+    const double scale = motion.at(clock.at_step(frame)).scale;
+    return FramePath::find(frame, in_steps(motion.range(), clock), in_steps(options, clock),
+                           scale * rest.diagonal().norm(), way);
+}
+
+double root_mean_square(const Mesh& a, const Mesh& b)
+{
+    double sum = 0;
+    for (std::size_t i = 0; i < a.positions.size(); ++i)
+        sum += (b.positions[i].cast<double>() - a.positions[i].cast<double>()).squaredNorm();
+    return std::sqrt(sum / double(a.positions.size()));
+}
+
+}  // namespace
+
+std::string describe(const Jump& jump, std::int64_t frame)
+{
+    return fmt::format("jumps by {:.3g} m to frame {}, {}", jump.way, frame,
+                       jump.usual > 0
+                           ? fmt::format("{:.3g} times as far as in the frames around", jump.way / jump.usual)
+                           : std::string("and is at rest in the frames around"));
+}
+
+FramePath FramePath::find(std::int64_t frame, const FrameRange& range, const PathOptions& options, double size,
+                          const std::function<double(std::int64_t)>& way)
+{
+    FramePath path;
+    path.alpha = options.kind == PathOptions::Spline ? options.alpha : 0.5;
+    const auto moves = [&](std::int64_t i) { return range.first <= double(i - 1) && double(i) <= range.last; };
+    if (options.kind == PathOptions::None || !moves(frame)) return path;
+
+    const auto jump_at = [&](std::int64_t i) -> std::optional<Jump> {
+        if (!moves(i) || !(moves(i - 1) || moves(i + 1))) return std::nullopt;
+        const double here = way(i);
+        if (!(here > jump_size * size)) return std::nullopt;
+        const double usual = std::max(moves(i - 1) ? way(i - 1) : 0, moves(i + 1) ? way(i + 1) : 0);
+        return here > jump_factor * usual ? std::optional(Jump{here, usual}) : std::nullopt;
+    };
+    const auto is_cut = [&](std::int64_t i) {
+        return options.cuts ? options.cuts->count(i) > 0 : jump_at(i).has_value();
+    };
+    path.after = moves(frame + 1) && !is_cut(frame + 1);
+    path.before = moves(frame - 1) && !is_cut(frame - 1);
+    if (options.cuts ? options.cuts->count(frame) > 0 : (path.jump = jump_at(frame)).has_value())
+        path.kind = AfterCut;
+    else
+        path.kind = options.kind == PathOptions::Linear ? Straight : Curved;
+    return path;
+}
+
+BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64_t frame, const FramePath& path)
+{
+    return std::make_shared<RigidPath>(path.through<Map>(map_at(motion, clock, path.before ? frame - 2 : frame),
+                                                         map_at(motion, clock, frame - 1), map_at(motion, clock, frame),
+                                                         map_at(motion, clock, path.after ? frame + 1 : frame)));
+}
+
+BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
+                           PlacesOn on)
+{
+    return std::make_shared<DeformingPath>(mesh.at(clock, frame), vertex_ways(mesh, clock, frame, path), on);
+}
+
+std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
+                                      const FramePath& path)
+{
+    const MeshPtr now = mesh.at(clock, frame);
+    const MeshPtr at[] = {path.before ? mesh.at(clock, frame - 2) : now,
+                          path.kind == FramePath::Still ? now : mesh.at(clock, frame - 1), now,
+                          path.after ? mesh.at(clock, frame + 1) : now};
+    const auto place = [&](int k, std::size_t i) -> Vec3d { return at[k]->positions[i].cast<double>(); };
+    std::vector<Cubic<Vec3d>> ways;
+    ways.reserve(now->positions.size());
+    for (std::size_t i = 0; i < now->positions.size(); ++i)
+        ways.push_back(path.through<Vec3d>(place(0, i), place(1, i), place(2, i), place(3, i)));
+    return ways;
+}
+
+BodyPathPtr part_of(BodyPathPtr path, double begin, double length)
+{
+    return std::make_shared<PartOfPath>(std::move(path), begin, length);
+}
+
+FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options)
+{
+    const Box3d rest = mesh.rest()->bounds().cast<double>();
+    if (!mesh.deforms()) return path_of_rigid(*mesh.motion(), rest, clock, frame, options);
+    const auto way = [&](std::int64_t i) { return root_mean_square(*mesh.at(clock, i - 1), *mesh.at(clock, i)); };
+    return FramePath::find(frame, in_steps(mesh.range(), clock), in_steps(options, clock),
+                           mesh.at(clock, frame)->bounds().diagonal().norm(), way);
+}
+
+FramePath path_of(const AnimatedShape& shape, const FrameClock& clock, std::int64_t frame, const PathOptions& options)
+{
+    return path_of_rigid(*shape.motion(), shape.rest()->bounds(), clock, frame, options);
+}
+
+}  // namespace rapid

@@ -1,0 +1,81 @@
+#include "runtime/shapes/motion/deforming.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/shapes/motion/deforming_shape.h"
+
+namespace rapid {
+namespace {
+
+// A cubic between two of its times, as one from 0 to 1.
+Cubic<Vec3d> part(const Cubic<Vec3d>& way, double from, double to)
+{
+    const double d = to - from;
+    return {way.at(from), d * way.derivative(from), d * d * (way.c2 + 3 * from * way.c3), d * d * d * way.c3};
+}
+
+MeshPtr mesh_of(const Mesh& rest, std::span<const Cubic<Vec3d>> ways, double t)
+{
+    auto mesh = std::make_shared<Mesh>();
+    mesh->name = rest.name;
+    mesh->triangles = rest.triangles;
+    mesh->positions.reserve(ways.size());
+    for (const Cubic<Vec3d>& way : ways) mesh->positions.push_back(way.at(t).cast<float>());
+    return mesh;
+}
+
+}  // namespace
+
+DeformingLevelSet::DeformingLevelSet(std::shared_ptr<const AnimatedMesh> mesh, const LevelSetOptions& options,
+                                     std::vector<std::string>& warnings)
+    : mesh_(std::move(mesh)), options_(options), open_(mesh_->rest()->openness()), tree_(triangle_tree(mesh_->rest()))
+{
+    bounds_ = level_set_from_mesh(mesh_->rest(), options, warnings)->bounds();
+}
+
+DeformingLevelSetPtr DeformingLevelSet::transformed(const MotionPtr& motion) const
+{
+    auto moved = std::make_shared<DeformingLevelSet>(*this);
+    moved->mesh_ = mesh_->transformed(motion);
+    return moved;
+}
+
+LevelSetPtr DeformingLevelSet::build(const MeshPtr& mesh, double band) const
+{
+    LevelSetOptions options = options_;
+    options.half_width = std::max(options.half_width, band / options.voxel * (1 + 1e-6));
+    return level_set_of_same_faces(mesh, options, open_);
+}
+
+Deformation::Interval Deformation::over(const FrameClock& clock, double from, double to, const MotionPtr& motion,
+                                        const PathOptions& options, double band)
+{
+    const std::shared_ptr<const AnimatedMesh> moved = motion ? body_->mesh().transformed(motion) : nullptr;
+    const AnimatedMesh& mesh = moved ? *moved : body_->mesh();
+    const auto frame = static_cast<std::int64_t>(std::ceil(to));
+    const FramePath path = path_of(mesh, clock, frame, options);
+    if (path.kind == FramePath::Still) {
+        if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = body_->build(mesh.at(clock, frame), band);
+        end_ = to;
+        return {at_end_, path.jump};
+    }
+
+    std::vector<Cubic<Vec3d>> ways = vertex_ways(mesh, clock, frame, path);
+    const double whole = static_cast<double>(frame) - 1;
+    for (Cubic<Vec3d>& way : ways) way = part(way, from - whole, to - whole);
+    const bool jumped = path.kind == FramePath::AfterCut && from == whole;
+    LevelSetPtr begin;
+    if (!jumped) {
+        if (at_end_ && end_ == from && at_end_->band() >= band)
+            begin = at_end_;
+        else
+            begin = body_->build(mesh_of(*mesh.rest(), ways, 0), band);
+    }
+    at_end_ =
+        body_->build(to == static_cast<double>(frame) ? mesh.at(clock, frame) : mesh_of(*mesh.rest(), ways, 1), band);
+    end_ = to;
+    return {deforming_shape(begin, at_end_, body_->tree(), std::move(ways), (to - from) / clock.fps), path.jump};
+}
+
+}  // namespace rapid

@@ -1,0 +1,217 @@
+#include "runtime/shapes/motion/motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+// Of the way that the body goes in the interval, and of a whole turn.
+constexpr double track_error = 1e-5;
+constexpr double least_piece = 1.0 / 64;  // of the interval
+
+class ConstantMotion final : public Motion {
+public:
+    explicit ConstantMotion(const Pose& pose) : pose_(pose) {}
+    Pose at(const Frame&) const override { return pose_; }
+    FrameRange range() const override { return {}; }
+
+private:
+    Pose pose_;
+};
+
+class ProductMotion final : public Motion {
+public:
+    ProductMotion(MotionPtr first, MotionPtr second) : first_(std::move(first)), second_(std::move(second)) {}
+    Pose at(const Frame& frame) const override { return first_->at(frame) * second_->at(frame); }
+    FrameRange range() const override
+    {
+        FrameRange range = first_->range();
+        range.extend(second_->range());
+        return range;
+    }
+
+private:
+    MotionPtr first_, second_;
+};
+
+class BackwardMotion final : public Motion {
+public:
+    BackwardMotion(MotionPtr motion, const FrameClock& clock, double frame)
+        : motion_(std::move(motion)), clock_(clock), frame_(frame)
+    {
+    }
+
+    Pose at(const Frame& frame) const override
+    {
+        const Pose there = motion_->at(clock_.at(frame_));
+        const Pose ahead = motion_->at(clock_.at(2 * frame_ - frame.number));
+        return there * ahead.inverse() * there;
+    }
+    FrameRange range() const override { return motion_->range(); }
+
+private:
+    MotionPtr motion_;
+    FrameClock clock_;
+    double frame_;
+};
+
+class KeyedMotion final : public Motion {
+public:
+    explicit KeyedMotion(std::map<std::int64_t, Pose> keys) : keys_(std::move(keys)) {}
+
+    Pose at(const Frame& frame) const override
+    {
+        const auto after = std::find_if(keys_.begin(), keys_.end(),
+                                        [&](const auto& key) { return static_cast<double>(key.first) > frame.number; });
+        if (after == keys_.begin()) return after->second;
+        const auto before = std::prev(after);
+        if (after == keys_.end()) return before->second;
+        const auto from = static_cast<double>(before->first), to = static_cast<double>(after->first);
+        return interpolate(before->second, after->second, (frame.number - from) / (to - from));
+    }
+    FrameRange range() const override
+    {
+        return {static_cast<double>(keys_.begin()->first), static_cast<double>(keys_.rbegin()->first)};
+    }
+
+private:
+    std::map<std::int64_t, Pose> keys_;
+};
+
+// The rotation vector of the shorter way from a to b, rad.
+Vec3d turn(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
+{
+    Eigen::Quaterniond way = b * a.conjugate();
+    if (way.w() < 0) way.coeffs() = -way.coeffs();
+    const double sine = way.vec().norm();
+    return sine > 0 ? Vec3d(2 * std::atan2(sine, way.w()) / sine * way.vec()) : Vec3d(Vec3d::Zero());
+}
+
+Eigen::Quaterniond turned_by(const Vec3d& rotation)
+{
+    const double angle = rotation.norm();
+    if (!(angle > 0)) return Eigen::Quaterniond::Identity();
+    return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation / angle));
+}
+
+// The piece through three poses, the second in the middle of the time.
+MotionTrack::Piece through(double begin, double end, const Pose& from, const Pose& middle, const Pose& to)
+{
+    const double T = end - begin;
+    MotionTrack::Piece piece{begin, end, from, Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), 0};
+    if (!(T > 0)) return piece;
+    const Vec3d way = to.translation - from.translation;
+    Vec3d sag = from.translation + to.translation - 2 * middle.translation;
+    // What rounding leaves of a straight way is no acceleration.
+    if (sag.cwiseAbs().maxCoeff() <=
+        0x1p-49 * from.translation.cwiseAbs().cwiseMax(to.translation.cwiseAbs()).maxCoeff())
+        sag.setZero();
+    piece.a = 4 / (T * T) * sag;
+    piece.v = way / T - 0.5 * T * piece.a;
+    piece.spin = turn(from.rotation, to.rotation) / T;
+    piece.growth = (to.scale - from.scale) / T;
+    return piece;
+}
+
+// Asks a motion, and halves an interval until its pieces are near enough.
+class TrackBuilder {
+public:
+    TrackBuilder(const Motion& motion, const FrameClock& clock, double from, double to)
+        : motion_(motion), clock_(clock), from_(from), to_(to)
+    {
+    }
+
+    std::vector<MotionTrack::Piece> build()
+    {
+        const Pose first = at(0);
+        if (!motion_.varies()) return {through(0, (to_ - from_) / clock_.fps, first, first, first)};
+        const Pose middle = at(0.5), last = at(1);
+        way_ = (middle.translation - first.translation).norm() + (last.translation - middle.translation).norm();
+        halve(0, 1, first, middle, last);
+        return std::move(pieces_);
+    }
+
+private:
+    Pose at(double u) const { return motion_.at(clock_.at(u == 1 ? to_ : from_ + u * (to_ - from_))); }
+
+    void halve(double begin, double end, const Pose& first, const Pose& middle, const Pose& last)
+    {
+        const double seconds = (to_ - from_) / clock_.fps, half = 0.5 * (begin + end);
+        const MotionTrack::Piece piece = through(begin * seconds, end * seconds, first, middle, last);
+        // Two places that no number of whole turns makes look alike.
+        const double off = begin + 0.381966 * (end - begin);
+        if (end - begin <= least_piece || (near(piece.at(half * seconds), middle, last.scale) &&
+                                           near(piece.at(off * seconds), at(off), last.scale))) {
+            pieces_.push_back(piece);
+            return;
+        }
+        halve(begin, half, first, at(0.5 * (begin + half)), middle);
+        halve(half, end, middle, at(0.5 * (half + end)), last);
+    }
+
+    bool near(const Pose& guess, const Pose& asked, double scale) const
+    {
+        const double rounding = 0x1p-45 * asked.translation.cwiseAbs().maxCoeff();
+        return (guess.translation - asked.translation).norm() <= track_error * way_ + rounding &&
+               turn(guess.rotation, asked.rotation).norm() <= track_error &&
+               std::abs(guess.scale - asked.scale) <= track_error * scale;
+    }
+
+    const Motion& motion_;
+    FrameClock clock_;
+    double from_, to_;
+    double way_ = 0;  // m
+    std::vector<MotionTrack::Piece> pieces_;
+};
+
+}  // namespace
+
+MotionPtr constant_motion(const Pose& pose) { return std::make_shared<ConstantMotion>(pose); }
+
+MotionPtr product(const MotionPtr& first, const MotionPtr& second)
+{
+    if (!first->varies() && !second->varies()) return constant_motion(first->at({}) * second->at({}));
+    return std::make_shared<ProductMotion>(first, second);
+}
+
+MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on)
+{
+    if (!goes_on) return constant_motion(motion->at(clock.at(frame)));
+    return std::make_shared<BackwardMotion>(motion, clock, frame);
+}
+
+MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys)
+{
+    if (keys.empty()) throw Error("a motion by keys has none; give a motion at one frame at least, {[1] = ...}");
+    if (keys.size() == 1) return constant_motion(keys.begin()->second);
+    return std::make_shared<KeyedMotion>(std::move(keys));
+}
+
+Pose MotionTrack::Piece::at(double s) const
+{
+    const double t = s - begin;
+    return {pose.translation + t * (v + 0.5 * t * a), (turned_by(t * spin) * pose.rotation).normalized(),
+            pose.scale + t * growth};
+}
+
+VelocityField MotionTrack::Piece::velocity_at(double s) const
+{
+    const double t = s - begin;
+    return {v + t * a, spin, growth / (pose.scale + t * growth), pose.translation + t * (v + 0.5 * t * a)};
+}
+
+MotionTrack::MotionTrack(const Motion& motion, const FrameClock& clock, double from, double to)
+    : pieces_(TrackBuilder(motion, clock, from, to).build())
+{
+}
+
+const MotionTrack::Piece& MotionTrack::piece_at(double s) const
+{
+    const auto after = std::find_if(pieces_.begin(), pieces_.end(), [s](const Piece& piece) { return s < piece.end; });
+    return after == pieces_.end() ? pieces_.back() : *after;
+}
+
+}  // namespace rapid

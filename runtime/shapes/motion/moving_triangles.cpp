@@ -1,0 +1,185 @@
+#include "runtime/shapes/motion/moving_triangles.h"
+
+#include <openvdb/math/Proximity.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+namespace rapid {
+namespace {
+
+constexpr std::int32_t most_in_leaf = 4;
+
+openvdb::Vec3d vdb(const Vec3d& P) { return {P.x(), P.y(), P.z()}; }
+
+struct Ordering {
+    TriangleTree& tree;
+    std::vector<Vec3f> middles;
+
+    void split(std::int32_t first, std::int32_t last)
+    {
+        const auto own = tree.nodes.size();
+        tree.nodes.push_back({first, last - first, 0});
+        if (last - first <= most_in_leaf) return;
+        Box3f box;
+        for (std::int32_t i = first; i < last; ++i) box.extend(middles[static_cast<std::size_t>(tree.order[i])]);
+        int axis;
+        box.sizes().maxCoeff(&axis);
+        const std::int32_t middle = first + (last - first) / 2;
+        const auto at = [&](std::int32_t i) { return tree.order.begin() + i; };
+        // Places that are the same are ordered too, so that the tree depends on the mesh alone.
+        std::nth_element(at(first), at(middle), at(last), [&](std::int32_t a, std::int32_t b) {
+            const float x = middles[static_cast<std::size_t>(a)][axis], y = middles[static_cast<std::size_t>(b)][axis];
+            return x < y || (x == y && a < b);
+        });
+        tree.nodes[own].count = 0;
+        split(first, middle);
+        tree.nodes[own].second = static_cast<std::int32_t>(tree.nodes.size());
+        split(middle, last);
+    }
+};
+
+}  // namespace
+
+TriangleTree::TriangleTree(const MeshPtr& mesh) : triangles(mesh->triangles)
+{
+    order.resize(triangles.size());
+    std::iota(order.begin(), order.end(), 0);
+    Ordering ordering{*this, {}};
+    for (const Mesh::Triangle& t : triangles)
+        ordering.middles.push_back((mesh->positions[t[0]] + mesh->positions[t[1]] + mesh->positions[t[2]]) / 3);
+    ordering.split(0, static_cast<std::int32_t>(order.size()));
+}
+
+MovingTriangles::MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> ways)
+    : tree_(std::move(tree)), ways_(std::move(ways)), boxes_(tree_->nodes.size())
+{
+    std::vector<Box> of_vertex;
+    of_vertex.reserve(ways_.size());
+    for (const Cubic<Vec3d>& way : ways_) {
+        // Less its chord a cubic is -t(1-t) (c2 + c3 (1+t)).
+        const Vec3d off = 0.25 * (way.c2 + way.c3).cwiseAbs().cwiseMax((way.c2 + 2 * way.c3).cwiseAbs());
+        of_vertex.push_back({way.c0, way.c0, way.at(1), way.at(1), off});
+        // The derivative is between its Bézier points.
+        for (const Vec3d& v : {way.c1, Vec3d(way.c1 + way.c2), way.derivative(1)})
+            fastest_ = std::max(fastest_, v.norm());
+        curved_ = std::max({curved_, 2 * way.c2.norm(), (2 * way.c2 + 6 * way.c3).norm()});
+    }
+    const auto join = [](Box& box, const Box& other) {
+        box.low0 = box.low0.cwiseMin(other.low0), box.high0 = box.high0.cwiseMax(other.high0);
+        box.low1 = box.low1.cwiseMin(other.low1), box.high1 = box.high1.cwiseMax(other.high1);
+        box.off = box.off.cwiseMax(other.off);
+    };
+    for (std::size_t n = boxes_.size(); n-- > 0;) {
+        const TriangleTree::Node& node = tree_->nodes[n];
+        if (node.count == 0) {
+            boxes_[n] = boxes_[n + 1];
+            join(boxes_[n], boxes_[static_cast<std::size_t>(node.second)]);
+            continue;
+        }
+        boxes_[n] = of_vertex[static_cast<std::size_t>(tree_->triangles[tree_->order[node.first]][0])];
+        for (std::int32_t i = node.first; i < node.first + node.count; ++i)
+            for (const std::int32_t vertex : tree_->triangles[tree_->order[i]])
+                join(boxes_[n], of_vertex[static_cast<std::size_t>(vertex)]);
+    }
+}
+
+double MovingTriangles::Box::squared_distance(const Vec3d& P, double t) const
+{
+    const double bent = 4 * t * (1 - t);
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        const double low = low0[k] + t * (low1[k] - low0[k]) - bent * off[k];
+        const double high = high0[k] + t * (high1[k] - high0[k]) + bent * off[k];
+        const double gap = std::max({low - P[k], P[k] - high, 0.0});
+        sum += gap * gap;
+    }
+    return sum;
+}
+
+std::array<Vec3d, 3> MovingTriangles::corners(std::int32_t triangle, double t) const
+{
+    const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(triangle)];
+    return {ways_[face[0]].at(t), ways_[face[1]].at(t), ways_[face[2]].at(t)};
+}
+
+void MovingTriangles::look(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const
+{
+    const std::array<Vec3d, 3> corner = corners(triangle, t);
+    openvdb::Vec3d weights;
+    const openvdb::Vec3d on =
+        openvdb::math::closestPointOnTriangleToPoint(vdb(corner[0]), vdb(corner[1]), vdb(corner[2]), vdb(P), weights);
+    const Vec3d there(on.x(), on.y(), on.z());
+    const double squared = (there - P).squaredNorm();
+    if (!(squared < best)) return;
+    best = squared;
+    place = {triangle, weights[1], weights[2], there, 0};
+}
+
+MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::int32_t hint) const
+{
+    Place place;
+    double best = std::numeric_limits<double>::infinity();
+    if (hint >= 0) look(hint, P, t, best, place);
+
+    struct Open {
+        std::int32_t node;
+        double squared;
+    };
+    Open open[64];  // the tree is balanced: as deep as the number of faces has bits
+    int depth = 0;
+    open[depth++] = {0, boxes_[0].squared_distance(P, t)};
+    while (depth > 0) {
+        const Open now = open[--depth];
+        if (!(now.squared < best)) continue;
+        const TriangleTree::Node& node = tree_->nodes[static_cast<std::size_t>(now.node)];
+        if (node.count > 0) {
+            for (std::int32_t i = node.first; i < node.first + node.count; ++i)
+                look(tree_->order[static_cast<std::size_t>(i)], P, t, best, place);
+            continue;
+        }
+        Open near{now.node + 1, boxes_[static_cast<std::size_t>(now.node) + 1].squared_distance(P, t)};
+        Open far{node.second, boxes_[static_cast<std::size_t>(node.second)].squared_distance(P, t)};
+        if (far.squared < near.squared) std::swap(near, far);
+        open[depth++] = far;
+        open[depth++] = near;
+    }
+    place.distance = std::sqrt(best);
+    return place;
+}
+
+Vec3d MovingTriangles::at(const Place& place, double t) const
+{
+    const std::array<Vec3d, 3> corner = corners(place.triangle, t);
+    return corner[0] + place.b1 * (corner[1] - corner[0]) + place.b2 * (corner[2] - corner[0]);
+}
+
+Vec3d MovingTriangles::velocity(const Place& place, double t) const
+{
+    const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(place.triangle)];
+    const Vec3d a = ways_[face[0]].derivative(t);
+    return a + place.b1 * (ways_[face[1]].derivative(t) - a) + place.b2 * (ways_[face[2]].derivative(t) - a);
+}
+
+Eigen::Matrix3d MovingTriangles::frame(std::int32_t triangle, double t) const
+{
+    const std::array<Vec3d, 3> corner = corners(triangle, t);
+    const Vec3d edge = corner[1] - corner[0], normal = edge.cross(corner[2] - corner[0]);
+    const double size = normal.norm();
+    Eigen::Matrix3d frame = Eigen::Matrix3d::Zero();
+    if (!(size > 0)) return frame;
+    frame.col(0) = edge.normalized();
+    frame.col(2) = normal / size;
+    frame.col(1) = frame.col(2).cross(frame.col(0));
+    return frame;
+}
+
+Box3d MovingTriangles::bounds() const
+{
+    const Box& root = boxes_.front();
+    return {root.low0.cwiseMin(root.low1) - root.off, root.high0.cwiseMax(root.high1) + root.off};
+}
+
+}  // namespace rapid

@@ -1,0 +1,71 @@
+// The faces of a mesh that deforms in an interval of time, each vertex along a cubic: where the surface is nearest to a
+// place at any time of it, and how it moves there.
+//
+// The boxes around faces are ordered once for a mesh, as its faces stay the same, and fitted to each interval. A box
+// goes straight from where its faces begin to where they end, and is wider by what their ways are off straight lines.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/motion/body_path.h"
+
+namespace rapid {
+
+// The order of faces: a binary tree, of the parts of the mesh that lie together in its rest position.
+struct TriangleTree {
+    explicit TriangleTree(const MeshPtr& mesh);
+
+    // In preorder: the first child of an inner node comes right after it.
+    struct Node {
+        std::int32_t first, count;  // of a leaf, in `order`; count is 0 for an inner node
+        std::int32_t second;        // child of an inner node
+    };
+    std::vector<Node> nodes;
+    std::vector<std::int32_t> order;  // of triangles
+    std::vector<Mesh::Triangle> triangles;
+};
+
+class MovingTriangles {
+public:
+    // ways: of each vertex, with t from 0 to 1.
+    MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> ways);
+
+    struct Place {
+        std::int32_t triangle = -1;
+        double b1 = 0, b2 = 0;    // barycentric weights of the second and third corner
+        Vec3d P = Vec3d::Zero();  // m
+        double distance = 0;      // m, from what was asked
+    };
+    // hint: a triangle that is near, where one is known; the search is shorter for it.
+    Place nearest(const Vec3d& P, double t, std::int32_t hint = -1) const;
+
+    Vec3d at(const Place& place, double t) const;
+    Vec3d velocity(const Place& place, double t) const;  // m an interval
+    // Unit tangents and the outward normal, as columns; zero where the triangle has no area.
+    Eigen::Matrix3d frame(std::int32_t triangle, double t) const;
+
+    Box3d bounds() const;                           // of the whole interval
+    double fastest() const { return fastest_; }     // a bound, m an interval
+    double most_curved() const { return curved_; }  // of the second derivatives
+
+private:
+    struct Box {
+        Vec3d low0, high0, low1, high1, off;
+
+        double squared_distance(const Vec3d& P, double t) const;
+    };
+    std::array<Vec3d, 3> corners(std::int32_t triangle, double t) const;
+    void look(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const;
+
+    std::shared_ptr<const TriangleTree> tree_;
+    std::vector<Cubic<Vec3d>> ways_;
+    std::vector<Box> boxes_;  // by node
+    double fastest_ = 0, curved_ = 0;
+};
+
+}  // namespace rapid

@@ -1,0 +1,38 @@
+// Where a body is and how it moves there, at one time.
+#pragma once
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// Where a body is: its place X, in its rest frame, is at translation + scale rotation X.
+struct Pose {
+    Vec3d translation = Vec3d::Zero();  // m
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+    double scale = 1;  // above 0
+
+    Vec3d operator*(const Vec3d& X) const { return translation + scale * (rotation * X); }
+    // First `other`, then this.
+    Pose operator*(const Pose& other) const
+    {
+        return {*this * other.translation, (rotation * other.rotation).normalized(), scale * other.scale};
+    }
+    Pose inverse() const;
+    Eigen::Affine3d affine() const { return Eigen::Translation3d(translation) * rotation * Eigen::Scaling(scale); }
+};
+
+// Translation linear, rotation on the sphere (the shorter way round), scale linear; t from 0 (a) to 1 (b).
+Pose interpolate(const Pose& a, const Pose& b, double t);
+
+// The velocity of each place of a body that moves, turns and grows: v(x) = linear + angular × r + growth r with
+// r = x - about, m/s.
+struct VelocityField {
+    Vec3d linear = Vec3d::Zero();   // m/s
+    Vec3d angular = Vec3d::Zero();  // rad/s
+    double growth = 0;              // 1/s
+    Vec3d about = Vec3d::Zero();    // m
+
+    Vec3d at(const Vec3d& x) const { return linear + angular.cross(x - about) + growth * (x - about); }
+};
+
+}  // namespace rapid

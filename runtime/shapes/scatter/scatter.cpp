@@ -1,0 +1,24 @@
+#include "runtime/shapes/scatter/scatter.h"
+
+#include <fmt/format.h>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+ScatterPtr Shape::surface_scatter() const
+{
+    throw Error(
+        fmt::format("a {} has no finite surface to be born on; use a mesh, a level set, a sphere or a box", kind()));
+}
+
+ScatterPtr Shape::volume_scatter() const
+{
+    throw Error(fmt::format(
+        "a {} has no finite volume to be born in; use a closed mesh, a level set, a sphere or a box", kind()));
+}
+
+ScatterPtr scatter_on_surface(const ShapePtr& shape) { return shape->surface_scatter(); }
+ScatterPtr scatter_in_volume(const ShapePtr& shape) { return shape->volume_scatter(); }
+
+}  // namespace rapid

@@ -1,0 +1,77 @@
+// Births in a region that can only be asked "is this place inside?", uniform by volume.
+//
+// Equal cells cover the region; a birth takes a cell, a place in it, and another of each until the place is inside.
+// Cells that are wholly inside are never asked, so the cost follows the region's surface, not its box.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/error.h"
+#include "runtime/shapes/scatter/scatter.h"
+
+namespace rapid {
+
+struct ScatterCells {
+    Vec3d origin = Vec3d::Zero(), edge = Vec3d::Ones();  // m
+    Eigen::Vector3i counts = Eigen::Vector3i::Zero();    // cells along each axis; z fastest in a cell's number
+    std::vector<std::uint32_t> cells;                    // those wholly inside, then those partly inside
+    std::size_t whole = 0;                               // how many are wholly inside
+
+    Vec3d low(std::uint32_t cell) const
+    {
+        const auto z = cell % std::uint32_t(counts.z()),
+                   y = cell / std::uint32_t(counts.z()) % std::uint32_t(counts.y());
+        const auto x = cell / std::uint32_t(counts.z()) / std::uint32_t(counts.y());
+        return origin + Vec3d(x, y, z).cwiseProduct(edge);
+    }
+    double volume() const { return double(cells.size()) * edge.prod(); }
+};
+
+// Inside: bool operator()(const Vec3f& P) const.
+template <class Inside>
+class ScatterInCells final : public Scatter {
+public:
+    // `volume` is the region's, m³. Error: it is so small a part of its cells that births would take for ever.
+    ScatterInCells(ScatterCells cells, Inside inside, double volume, const std::string& what)
+        : cells_(std::move(cells)), inside_(std::move(inside))
+    {
+        if (!(volume > least_part * cells_.volume()))
+            throw Error(
+                fmt::format("the volume of {}, {:.3g} m³, is too thin to be born in: it is less than {:g} of the "
+                            "cells around it; use its surface",
+                            what, volume, least_part));
+    }
+
+    void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const override
+    {
+        for (std::size_t i = 0; i < out.size(); ++i) {
+            out[i] = Birthplace{};
+            out[i].P = draw(key, first + i);
+        }
+    }
+
+private:
+    static constexpr double least_part = 1e-5;
+    // The chance to need more is exp(-100) at the least part.
+    static constexpr std::uint64_t most_trials = 10'000'000;
+
+    Vec3f draw(RandomKey key, std::uint64_t birth) const
+    {
+        for (std::uint64_t trial = 0; trial < most_trials; ++trial) {
+            const auto u = uniform4(key, birth, trial << 32);
+            const auto n = static_cast<std::size_t>(u[0] * double(cells_.cells.size()));
+            const Vec3d in_cell = Vec3d(u[1], u[2], u[3]).cwiseProduct(cells_.edge);
+            const Vec3f P = (cells_.low(cells_.cells[n]) + in_cell).template cast<float>();
+            if (n < cells_.whole || inside_(P)) return P;
+        }
+        throw Error("no place was found in a volume that is too thin to be born in; use its surface");
+    }
+
+    ScatterCells cells_;
+    Inside inside_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,120 @@
+// Births on a mesh's surface, uniform by area.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/error.h"
+#include "runtime/shapes/scatter/scatter.h"
+
+namespace rapid {
+namespace {
+
+// Draws an item with a probability in proportion to its weight, in constant time: each of n equal columns holds the
+// weight of its own item up to `keep`, and of one other above (Walker 1977, built as by Vose 1991).
+class AliasTable {
+public:
+    AliasTable(const std::vector<double>& weights, double sum) : columns_(weights.size())
+    {
+        std::vector<std::int32_t> small, large;
+        for (std::size_t i = 0; i < weights.size(); ++i) {
+            columns_[i] = {weights[i] / sum * double(weights.size()), static_cast<std::int32_t>(i)};
+            (columns_[i].keep < 1 ? small : large).push_back(static_cast<std::int32_t>(i));
+        }
+        while (!small.empty() && !large.empty()) {
+            Column& filled = columns_[small.back()];
+            small.pop_back();
+            filled.other = large.back();
+            Column& giver = columns_[large.back()];
+            giver.keep -= 1 - filled.keep;
+            if (giver.keep < 1) {
+                small.push_back(large.back());
+                large.pop_back();
+            }
+        }
+        // What is left is full but for rounding. An item of weight 0 is never left: a giver would be, too.
+        for (const std::int32_t i : large) columns_[i].keep = 1;
+        for (const std::int32_t i : small)
+            if (columns_[i].keep > 0) columns_[i].keep = 1;
+    }
+
+    // From two numbers in [0, 1).
+    std::int32_t draw(double u, double w) const
+    {
+        const auto i = static_cast<std::int32_t>(u * double(columns_.size()));
+        return w < columns_[i].keep ? i : columns_[i].other;
+    }
+
+private:
+    struct Column {
+        double keep;
+        std::int32_t other;
+    };
+    std::vector<Column> columns_;
+};
+
+// A triangle as a birth needs it.
+struct Face {
+    Vec3d corner, to_second, to_third;
+    Vec3f N;
+};
+
+class ScatterOnMesh final : public Scatter {
+public:
+    ScatterOnMesh(std::vector<Face> faces, AliasTable chances) : faces_(std::move(faces)), chances_(std::move(chances))
+    {
+    }
+
+    void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const override
+    {
+        constexpr std::size_t block_size = 256;
+        std::array<std::array<double, 4>, block_size> numbers;
+        for (std::size_t begin = 0; begin < out.size(); begin += block_size) {
+            const std::size_t n = std::min(block_size, out.size() - begin);
+            uniform4(key, first + begin, 0, std::span(numbers).first(n));
+            for (std::size_t i = 0; i < n; ++i) {
+                const auto& u = numbers[i];
+                Birthplace& birth = out[begin + i];
+                birth.element = chances_.draw(u[0], u[1]);
+                // Uniform in a triangle (Turk 1990).
+                const double s = std::sqrt(u[2]);
+                birth.b1 = static_cast<float>(s * (1 - u[3]));
+                birth.b2 = static_cast<float>(s * u[3]);
+                const Face& face = faces_[static_cast<std::size_t>(birth.element)];
+                birth.P =
+                    (face.corner + double(birth.b1) * face.to_second + double(birth.b2) * face.to_third).cast<float>();
+                birth.N = face.N;
+            }
+        }
+    }
+
+private:
+    std::vector<Face> faces_;
+    AliasTable chances_;
+};
+
+}  // namespace
+
+ScatterPtr scatter_on_surface(const MeshPtr& mesh)
+{
+    std::vector<Face> faces;
+    std::vector<double> areas;
+    faces.reserve(mesh->triangles.size());
+    areas.reserve(mesh->triangles.size());
+    double sum = 0;
+    for (const Mesh::Triangle& t : mesh->triangles) {
+        const Vec3d a = mesh->positions[t[0]].cast<double>();
+        const Vec3d ab = mesh->positions[t[1]].cast<double>() - a, ac = mesh->positions[t[2]].cast<double>() - a;
+        const Vec3d twice_area = ab.cross(ac);
+        faces.push_back({a, ab, ac, twice_area.normalized().cast<float>()});
+        areas.push_back(twice_area.norm() / 2);
+        sum += areas.back();
+    }
+    if (!(sum > 0))
+        throw Error(fmt::format("mesh \"{}\" has {} faces and no area; nothing can be born on it", mesh->name,
+                                mesh->triangles.size()));
+    return std::make_shared<ScatterOnMesh>(std::move(faces), AliasTable(areas, sum));
+}
+
+}  // namespace rapid

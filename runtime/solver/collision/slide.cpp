@@ -1,0 +1,115 @@
+#include "runtime/solver/collision/slide.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rapid {
+namespace {
+
+constexpr double never = std::numeric_limits<double>::infinity();
+
+// How far the direction of friction may turn within a piece, in radians. The error of a piece is of the third order in
+// it; a point that slides straight down, or along, is exact at any.
+constexpr double most_turn = 0.05;
+
+// Two surfaces within 0.06 degrees of each other are one: along their edge the forces would be ill determined.
+constexpr double parallel = 1e-3;  // sine of the angle between the normals
+
+// Of an acceleration, what rounding leaves of a part along the surface that is exactly 0.
+constexpr double rounding = 0x1p-48;
+
+}  // namespace
+
+// With a the acceleration in the surface's frame, N = g - κ |vt|² the surface's force a mass, g = -a·n, at = a + g n:
+//
+//   at rest    the point stays while |at| <= μ N, else a' = at (1 - μ N / |at|)
+//   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece
+Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double left, double least)
+{
+    const Vec3d& n = support.n;
+    const Vec3d a = pull - support.ac;
+    const Vec3d relative = v - support.vc;
+    const Vec3d vt = relative - relative.dot(n) * n;
+    const double g = -a.dot(n), speed2 = vt.squaredNorm();
+    const double N = g - support.curvature * speed2;
+    if (N < 0) return {Slide::Leaves};
+
+    const Vec3d at = a + g * n;
+    const double holds = support.friction * N;
+    if (!(speed2 > 0)) {
+        const double drives = at.norm();
+        if (drives <= holds + rounding * a.norm()) return {Slide::Sticks};
+        return {Slide::Moves, at * (1 - holds / drives), left};
+    }
+    if (holds == 0) return {Slide::Moves, at, left};
+
+    const double speed = std::sqrt(speed2);
+    const Vec3d direction = vt / speed;
+    Slide slide{Slide::Moves, at - holds * direction, left};
+    const bool straight = at.isZero(0);  // as on a level floor: friction alone does not turn
+    const double along = straight ? -holds : slide.a.dot(direction);
+    if (!straight) {
+        const double aside2 = (slide.a - along * direction).squaredNorm();
+        if (slide.duration * slide.duration * aside2 > most_turn * most_turn * speed2)
+            slide.duration = std::min(left, std::max(most_turn * speed / std::sqrt(aside2), least));
+    }
+    if (const double stop = along < 0 ? -speed / along : never; stop <= slide.duration) {
+        slide.duration = stop;
+        slide.stops = true;
+    }
+    if (!straight) {
+        const Vec3d middle = vt + 0.5 * slide.duration * slide.a;
+        if (const double size = middle.norm(); size > 0) slide.a = at - holds / size * middle;
+    }
+    return slide;
+}
+
+// x - (n + n1) (n1·x) / (1 + n·n1), for n·x = 0.
+Vec3d carried(const Vec3d& x, const Vec3d& n, const Vec3d& n1)
+{
+    const double cosine = n.dot(n1);
+    if (1 + cosine < parallel) return x - n1.dot(x) * n1;
+    return x - n1.dot(x) / (1 + cosine) * (n + n1);
+}
+
+Vec3d edge_of(const Support& A, const Support& B)
+{
+    const Vec3d along = A.n.cross(B.n);
+    const double sine = along.norm();
+    return sine > parallel ? Vec3d(along / sine) : Vec3d(Vec3d::Zero());
+}
+
+// a = -NA nA - NB nB + (a·e) e, so with c = nA·nB, gA = -a·nA, gB = -a·nB:
+//
+//   NA = (gA - c gB) / (1 - c²),   NB = (gB - c gA) / (1 - c²)
+//
+// and friction takes up to μA NA + μB NB along e.
+Slide slide_along(const Support& A, const Support& B, const Vec3d& v, const Vec3d& pull, double left, int& lifted)
+{
+    const Vec3d e = edge_of(A, B), a = pull - A.ac;
+    const double c = A.n.dot(B.n), gA = -a.dot(A.n), gB = -(pull - B.ac).dot(B.n);
+    const double sine2 = (1 - c) * (1 + c);
+    const double NA = (gA - c * gB) / sine2, NB = (gB - c * gA) / sine2;
+    lifted = -1;
+    if (NA < 0 || NB < 0) {
+        lifted = NA < NB ? 0 : 1;
+        return {Slide::Leaves};
+    }
+
+    const double drive = a.dot(e), holds = A.friction * NA + B.friction * NB;
+    const double speed = (v - A.vc).dot(e);
+    if (speed == 0) {
+        if (std::abs(drive) <= holds + rounding * a.norm()) return {Slide::Sticks};
+        return {Slide::Moves, (drive - std::copysign(holds, drive)) * e, left};
+    }
+    const double along = drive - std::copysign(holds, speed);
+    Slide slide{Slide::Moves, along * e, left};
+    if (const double stop = along * speed < 0 ? -speed / along : never; holds > 0 && stop <= left) {
+        slide.duration = stop;
+        slide.stops = true;
+    }
+    return slide;
+}
+
+}  // namespace rapid

@@ -1,0 +1,36 @@
+#include "runtime/solver/constraints/rows.h"
+
+namespace rapid {
+
+PlacesById::PlacesById(const Column<std::int64_t>& ids) : ids_(ids.read()), size_(ids.size())
+{
+    bool ascend = true;
+    for (std::size_t i = 1; i < size_; ++i) ascend &= ids_[i - 1] < ids_[i];
+    if (ascend) return;
+    sorted_.resize(size_);
+    for (std::size_t i = 0; i < size_; ++i) sorted_[i] = {ids_[i], static_cast<std::uint32_t>(i)};
+    std::sort(sorted_.begin(), sorted_.end());
+}
+
+std::uint32_t PlacesById::operator[](std::int64_t id) const
+{
+    if (!sorted_.empty()) {
+        const auto found = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair(id, std::uint32_t{0}));
+        return found != sorted_.end() && found->first == id ? found->second : none;
+    }
+    if (size_ > 0) {  // where none has died yet
+        const auto nth = static_cast<std::uint64_t>(id) - static_cast<std::uint64_t>(ids_[0]);
+        if (nth < size_ && ids_[nth] == id) return static_cast<std::uint32_t>(nth);
+    }
+    std::size_t low = 0, high = size_;
+    while (low < high) {
+        const std::size_t middle = (low + high) / 2;
+        if (ids_[middle] < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < size_ && ids_[low] == id ? static_cast<std::uint32_t>(low) : none;
+}
+
+}  // namespace rapid

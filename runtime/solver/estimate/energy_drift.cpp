@@ -1,0 +1,107 @@
+#include "runtime/solver/estimate/energy_drift.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/points/members.h"
+#include "runtime/solver/interaction.h"
+
+namespace rapid {
+namespace {
+
+// J/kg; nothing where there is no such energy.
+std::optional<std::vector<double>> energies_of(const PointSet& points, std::span<const DynamicPtr> dynamics)
+{
+    std::vector<Vec3d> P(points.size()), v(points.size());
+    const Strided<Vec3f> P_of_points = points.P().read(), v_of_points = points.v().read();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        P[i] = P_of_points[i].cast<double>();
+        v[i] = v_of_points[i].cast<double>();
+    }
+    const std::vector<double> none(points.size());
+    const Chunk chunk{points, 0, P, v, none, none, 0};
+    std::vector<double> energies(points.size()), potential;
+    for (std::size_t i = 0; i < points.size(); ++i) energies[i] = 0.5 * v[i].squaredNorm();
+    for (const DynamicPtr& dynamic : dynamics) {
+        const auto* force = dynamic_cast<const Force*>(dynamic.get());
+        if (!force) continue;
+        potential.assign(points.size(), 0);
+        if (!force->add_potential(chunk, potential)) return std::nullopt;
+        const Strided<std::uint8_t> members = members_of(points, force->group);
+        for (std::size_t i = 0; i < points.size(); ++i)
+            if (members[i]) energies[i] += potential[i];
+    }
+    return energies;
+}
+
+// Those that change velocities by more than the slope of a potential.
+bool spends_energy(const DynamicPtr& dynamic)
+{
+    return dynamic_cast<const Action*>(dynamic.get()) || dynamic_cast<const Constraint*>(dynamic.get()) ||
+           dynamic_cast<const Interaction*>(dynamic.get());
+}
+
+}  // namespace
+
+void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, std::span<const DynamicPtr> dynamics,
+                        SolveOptions& options)
+{
+    before_.clear();
+    places_.clear();
+    meets_ = false;
+    const auto* force = points.find<Vec3f>("force");
+    const bool forced = force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero());
+    defined_ = !forced && std::none_of(dynamics.begin(), dynamics.end(), spends_energy);
+    if (!defined_) return;
+    if (!shadows.idle()) places_.assign(shadows.places().begin(), shadows.places().end());
+    auto energies = energies_of(shadows.idle() ? points.select({}) : shadows.before(), dynamics);
+    defined_ = energies.has_value();
+    if (!defined_ || shadows.idle()) return;
+
+    before_ = std::move(*energies);
+    std::vector<double> drift(before_.size(), 0);
+    for (std::size_t k = 0, old = 0; k < drift.size() && old < ids_.size();) {
+        if (ids_[old] == shadows.ids()[k]) drift[k] = drift_[old];
+        if (ids_[old] <= shadows.ids()[k])
+            ++old;
+        else
+            ++k;
+    }
+    drift_ = std::move(drift);
+    ids_.assign(shadows.ids().begin(), shadows.ids().end());
+    const auto is_collider = [](const DynamicPtr& dynamic) { return dynamic_cast<const Collider*>(dynamic.get()); };
+    if (std::none_of(dynamics.begin(), dynamics.end(), is_collider)) return;
+    // Nobody looks at the others'.
+    met_.resize(points.size());
+    for (const std::uint32_t place : places_) met_[place] = 0;
+    options.met = met_.data();
+    meets_ = true;
+}
+
+std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, const Shadows& shadows,
+                                                    std::span<const DynamicPtr> dynamics)
+{
+    if (!defined_) {
+        drift_.assign(drift_.size(), 0);
+        return std::nullopt;
+    }
+    if (shadows.idle()) return std::vector<double>(solved.empty() ? 0 : 1, 0.0);  // in closed form
+    // They are far apart in memory: all of them at once, before they are looked at.
+    if (meets_)
+        for (const std::uint32_t place : places_) __builtin_prefetch(&met_[place]);
+    const auto after = energies_of(solved.select(shadows.places()), dynamics);
+    if (!after) return std::nullopt;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < ids_.size() && kept < shadows.ids().size(); ++k) {
+        if (ids_[k] != shadows.ids()[kept]) continue;  // it has died
+        const double change = (*after)[kept] - before_[k];
+        const bool counts = std::isfinite(change) && !(meets_ && met_[places_[k]]);
+        ids_[kept] = ids_[k];
+        drift_[kept++] = drift_[k] + (counts ? change : 0);
+    }
+    ids_.resize(kept);
+    drift_.resize(kept);
+    return drift_;
+}
+
+}  // namespace rapid

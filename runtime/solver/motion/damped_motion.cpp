@@ -1,0 +1,174 @@
+#include "runtime/solver/motion/damped_motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace rapid {
+namespace {
+
+constexpr int terms = 22;  // of the series, whose last is then below rounding
+constexpr auto one_over = [] {
+    std::array<double, terms + 2> all{};
+    for (int n = 1; n < terms + 2; ++n) all[n] = 1.0 / n;
+    return all;
+}();
+
+// Taylor series of the impulse response h(t), h'' + k h' + w2 h = 0, h(0) = 0, h'(0) = 1; of its integral and its
+// derivative. For k t and w2 t² up to 1 the terms fall as 1/n!.
+Propagator by_series(double k, double w2, double t)
+{
+    const double kt = k * t, w2t2 = w2 * t * t;
+    double before = 0, term = 1;  // c_n t^(n-1), from n = 0 and 1
+    double h = 1, slope = 1, integral = 0.5;
+    for (int n = 2; n <= terms; ++n) {
+        const double next = -(kt * term + w2t2 * one_over[n - 1] * before) * one_over[n];
+        before = term;
+        term = next;
+        h += term;
+        slope += n * term;
+        integral += term * one_over[n + 1];
+    }
+    return {t * h, t * t * integral, slope, t * h};
+}
+
+// Without a spring, by x = k t: e^-x, (1 - e^-x)/x and (e^-x - 1 + x)/x². Up to 1 by the series of the last, from which
+// the others follow without cancellation.
+struct Decay {
+    double slope, h, integral;
+};
+
+inline Decay small_decay(double x)
+{
+    double integral = one_over[terms];
+#pragma GCC unroll 32
+    for (int n = terms - 1; n >= 2; --n) integral = (1 - x * integral) * one_over[n];
+    const double h = 1 - x * integral;
+    return {1 - x * h, h, integral};
+}
+
+Decay large_decay(double x)
+{
+    const double slope = std::exp(-x), h = (1 - slope) / x;
+    return {slope, h, (1 - h) / x};
+}
+
+Propagator respond_to_drag(double k, double t)
+{
+    const double x = k * t;
+    const Decay decay = x <= 1 ? small_decay(x) : large_decay(x);
+    return {t * decay.h, t * t * decay.integral, decay.slope, t * decay.h};
+}
+
+// (e^x - 1)/x
+double e1(double x) { return x == 0 ? 1 : std::expm1(x) / x; }
+
+}  // namespace
+
+Propagator respond(double k, double w2, double t)
+{
+    if (w2 == 0) return respond_to_drag(k, t);
+    if (k * t <= 1 && w2 * t * t <= 1) return by_series(k, w2, t);
+    const double half = 0.5 * k, discriminant = (half - std::sqrt(w2)) * (half + std::sqrt(w2));
+    const double root = std::sqrt(std::abs(discriminant));
+    if (discriminant > 0 && root * t > 0.125) {  // two decays; their rates without cancellation
+        const double fast = -(half + root), slow = -w2 / (half + root);
+        const double e_fast = std::exp(fast * t), e_slow = std::exp(slow * t);
+        const double h = (e_slow - e_fast) / (2 * root);
+        return {h, t * (e1(slow * t) - e1(fast * t)) / (2 * root), (slow * e_slow - fast * e_fast) / (2 * root), h};
+    }
+    // An oscillation, or nearly critical damping.
+    const double angle = root * t, decay = std::exp(-half * t);
+    double c, s;  // cos and sin(angle)/angle, or cosh and sinh(angle)/angle
+    if (discriminant > 0) {
+        c = std::cosh(angle);
+        s = angle > 0 ? std::sinh(angle) / angle : 1;
+    } else {
+        c = std::cos(angle);
+        s = angle > 0 ? std::sin(angle) / angle : 1;
+    }
+    const double h = decay * t * s;
+    return {h, (1 - decay * (c + half * t * s)) / w2, decay * (c - half * t * s), h};
+}
+
+void DragPropagators::respond(std::span<const double> k, std::span<const double> t)
+{
+    const std::size_t size = k.size();
+    for (auto* column : {&x_of_v, &x_of_G, &v_of_v}) column->resize(size);
+    double *xv = x_of_v.data(), *xG = x_of_G.data(), *vv = v_of_v.data();
+    const auto set = [=](std::size_t i, const Decay& decay) {
+        xv[i] = t[i] * decay.h;
+        xG[i] = t[i] * t[i] * decay.integral;
+        vv[i] = decay.slope;
+    };
+    std::size_t small = 0;
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < size; ++i) {
+        const double x = k[i] * t[i];
+        small += x <= 1;
+        set(i, small_decay(x));
+    }
+    for (std::size_t i = 0; small < size && i < size; ++i)
+        if (!(k[i] * t[i] <= 1)) set(i, large_decay(k[i] * t[i]));
+}
+
+double mean_speed(double speed, double a, double c, double t)
+{
+    if (!(t > 0)) return speed;
+    const double rate2 = std::abs(a) * c;
+    const double x = std::sqrt(rate2) * t, push = c * speed * t;
+    // ∫ c speed dt = ln of what the speed is divided by, which is 1 + push where nothing accelerates.
+    double log_ratio;
+    if (x < 1e-4) {
+        log_ratio = std::log1p(push + (a > 0 ? 0.5 : -0.5) * x * x);
+    } else if (a > 0) {
+        // ln(cosh x + (push/x) sinh x), for any size of x
+        log_ratio = x + std::log(0.5 * ((1 + push / x) + (1 - push / x) * std::exp(-2 * x)));
+    } else {
+        // Slowed to rest at the time where the angle is atan(push/x); then it stays: what turns it round is no drag.
+        const double stop = std::atan2(push, x);
+        const double angle = std::min(x, stop);
+        log_ratio = std::log(std::cos(angle) + push / x * std::sin(angle));
+    }
+    return std::max(log_ratio, 0.0) / (c * t);
+}
+
+double drag_rate_along(const Vec3d& direction, const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
+{
+    if (!(linear.c > 0)) return linear.k;
+    const double size = direction.norm();
+    const double along = size > 0 ? G.dot(direction) / size : 0;
+    return linear.k + linear.c * mean_speed(v.norm(), along, linear.c, t);
+}
+
+double drag_rate(const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
+{
+    if (!(linear.c > 0)) return linear.k;
+    // The direction of the way is not known before the rate is: a second time with that of the first.
+    const double first = drag_rate_along(v.squaredNorm() > 0 ? v : G, v, G, linear, t);
+    const Propagator r = respond(first, linear.w2, t);
+    return drag_rate_along(v + (v * r.v_of_v + G * r.v_of_G), v, G, linear, t);
+}
+
+Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t, Responder& respond)
+{
+    Damped damped;
+    damped.w2 = linear.w2;
+    damped.G = acceleration_at_rest(P, a, linear);
+    damped.k = drag_rate(v, damped.G, linear, t);
+    const Propagator& r = respond(damped.k, damped.w2, t);
+    damped.travel = v * r.x_of_v + damped.G * r.x_of_G;
+    damped.v = v * r.v_of_v + damped.G * r.v_of_G;
+    damped.path_v = t > 0 ? Vec3d(v * (r.x_of_v / t)) : v;
+    damped.path_a = t > 0 ? Vec3d(damped.G * (2 * r.x_of_G / (t * t))) : damped.G;
+    return damped;
+}
+
+Vec3d Damped::mean_acceleration(const Vec3d& from, double t) const
+{
+    if (!(t > 0)) return G - k * from;
+    const Propagator r = respond(k, w2, t);
+    return (from * (r.v_of_v - 1) + G * r.v_of_G) / t;
+}
+
+}  // namespace rapid

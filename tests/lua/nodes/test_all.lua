@@ -1,0 +1,40 @@
+-- Every node in lua/nodes, by its scene in graphs/nodes: compiled without a failed trace, finite, and the same bits on
+-- any number of threads.
+local command = require "testing.command"
+
+local function exists(path)
+  local file = io.open(path)
+  if file then file:close() end
+  return file ~= nil
+end
+
+local function read(path)
+  local file = assert(io.open(path))
+  local text = file:read "*a"
+  file:close()
+  return text
+end
+
+describe("every node in lua/nodes", function()
+  for name in command.shell("ls lua/nodes").stdout:gmatch "([%w_]+)%.lua" do
+    local scene = "graphs/nodes/" .. name .. ".lua"
+
+    it(name .. " has a test, a scene that uses it, and a picture", function()
+      assert.is_true(exists("tests/lua/nodes/test_" .. name .. ".lua"))
+      assert.truthy(read(scene):find(":" .. name .. "%s*{"), scene)
+      local picture = "graphs/nodes/pictures/" .. name .. ".png"
+      assert.is_true(exists(picture))
+      assert.is_true(#read(picture) < 75000, picture)
+    end)
+
+    it(name .. " is compiled, stays finite, and is the same on 1, 2 and 7 threads", function()
+      local one = rapid.run(scene, { frames = {1, 24}, threads = 1, watch_traces = true })
+      assert.same({}, one.trace_aborts)
+      for _, points in one:frames() do assert.points(points).finite() end
+      assert.is_true(#one[24] > 4096) -- more than one chunk
+      for _, threads in ipairs { 2, 7 } do
+        assert.same_points(one[24], rapid.run(scene, { frames = {24, 24}, threads = threads })[24])
+      end
+    end)
+  end
+end)

@@ -1,0 +1,112 @@
+#include "runtime/shapes/mesh/mesh_sequence.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "runtime/error.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using Catch::Matchers::Contains;
+using rapid::test::close_to;
+
+namespace {
+
+// A folder of its own, removed at the end.
+struct Folder {
+    std::filesystem::path path;
+
+    Folder()
+    {
+        path = std::filesystem::temp_directory_path() / ("rapid_sequence_" + std::to_string(std::random_device()()));
+        std::filesystem::create_directories(path);
+    }
+    ~Folder() { std::filesystem::remove_all(path); }
+
+    // A tetrahedron with its apex at this height.
+    void tetrahedron(int frame, double apex) const
+    {
+        file(frame, fmt::format("v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 {} 0\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n", apex));
+    }
+    void file(int frame, const std::string& text) const
+    {
+        std::ofstream(path / fmt::format("body.{:04}.obj", frame)) << text;
+    }
+    MeshSequence sequence(int first, int last) const
+    {
+        std::map<int, std::filesystem::path> files;
+        for (int frame = first; frame <= last; ++frame)
+            if (const auto name = path / fmt::format("body.{:04}.obj", frame); std::filesystem::exists(name))
+                files[frame] = name;
+        return {files, "body.####.obj"};
+    }
+};
+
+template <class F>
+std::string message_of(const F& f)
+{
+    try {
+        f();
+    } catch (const Error& e) {
+        return e.what();
+    }
+    return "nothing was thrown";
+}
+
+double apex(const Mesh& mesh) { return mesh.bounds().max().y(); }
+
+}  // namespace
+
+TEST_CASE("a sequence has each frame's vertices, and holds its first and last file outside", "[mesh]")
+{
+    const Folder folder;
+    for (int frame = 3; frame <= 6; ++frame) folder.tetrahedron(frame, frame);
+    const MeshSequence sequence = folder.sequence(1, 9);
+    CHECK(sequence.first() == 3);
+    CHECK(sequence.last() == 6);
+    for (const int frame : {5, 3, 6, 4, 5}) CHECK(apex(*sequence.at(frame)) == frame);
+    CHECK(apex(*sequence.at(-100)) == 3);
+    CHECK(apex(*sequence.at(100)) == 6);
+    CHECK(sequence.at(4)->positions.size() == 4);
+    CHECK(sequence.at(4)->triangles == sequence.rest()->triangles);
+}
+
+TEST_CASE("only the files that are asked for are read, and the last few are kept", "[mesh]")
+{
+    const Folder folder;
+    for (int frame = 1; frame <= 20; ++frame) folder.tetrahedron(frame, frame);
+    folder.file(15, "nothing that is a mesh");
+    const MeshSequence sequence = folder.sequence(1, 20);
+    const MeshPtr first = sequence.at(2);
+    for (int frame = 3; frame <= 8; ++frame) sequence.at(frame);
+    std::filesystem::remove(folder.path / "body.0002.obj");
+    CHECK(sequence.at(2) == first);
+    CHECK_THAT(message_of([&] { sequence.at(15); }), Contains("frame 15"));
+}
+
+TEST_CASE("a sequence whose topology changes is refused, with the frame and both counts", "[mesh]")
+{
+    const Folder folder;
+    for (int frame = 1; frame <= 3; ++frame) folder.tetrahedron(frame, 1);
+    folder.file(2, "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 1 0\nf 1 2 3\nf 1 3 4\n");
+    folder.file(3, "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 1 0\nf 1 3 2\nf 1 3 4\nf 1 4 2\nf 2 4 3\n");
+    const MeshSequence sequence = folder.sequence(1, 3);
+    CHECK_THAT(
+        message_of([&] { sequence.at(2); }),
+        Contains("changes at frame 2: it has 6 corners and 2 faces there, and 12 corners and 4 faces at frame 1"));
+    // Corners that are written in another order leave the vertices that they had.
+    CHECK_THAT(message_of([&] { sequence.at(3); }), Contains("at frame 3"));
+}
+
+TEST_CASE("a sequence without a file, or with a gap, says which frame is missing", "[mesh]")
+{
+    const Folder folder;
+    CHECK_THAT(message_of([&] { folder.sequence(1, 3); }), Contains("there is no mesh file \"body.####.obj\""));
+    folder.tetrahedron(1, 1);
+    folder.tetrahedron(3, 1);
+    CHECK_THAT(message_of([&] { folder.sequence(1, 3); }),
+               Contains("frame 2 of \"body.####.obj\" is missing; there must be a file for each frame from 1 to 3"));
+}

@@ -1,0 +1,65 @@
+// Rods and springs between points, by rows.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "runtime/solver/constraints/rows.h"
+
+namespace rapid::test {
+
+constexpr float immovable = std::numeric_limits<float>::infinity();
+
+// A rod or spring between two points.
+struct Rod {
+    static constexpr int points = 2;
+    static constexpr bool rests = true;
+    double rest;
+
+    double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
+    {
+        const Vec3d d = P[0] - P[1];
+        gradient[0] = d.normalized();
+        gradient[1] = -gradient[0];
+        return d.norm() - rest;
+    }
+    Eigen::Matrix3d curvature(const std::array<Vec3d, 2>& P) const
+    {
+        const Vec3d d = P[0] - P[1];
+        const double length = d.norm();
+        if (!(length > 0)) return Eigen::Matrix3d::Zero();
+        return (Eigen::Matrix3d::Identity() - d * d.transpose() / (length * length)) / length;
+    }
+};
+
+template <class Kind>
+class RowsConstraint : public Constraint {
+public:
+    std::shared_ptr<Rows<Kind>> rows = std::make_shared<Rows<Kind>>();
+
+    std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
+    {
+        rows->follow(points, group);
+        return rows;
+    }
+};
+
+template <class Kind = Rod>
+std::shared_ptr<RowsConstraint<Kind>> rods(const std::vector<std::array<std::int64_t, 2>>& pairs, double length,
+                                           double compliance = 0)
+{
+    auto made = std::make_shared<RowsConstraint<Kind>>();
+    made->node = "rods1";
+    for (const auto& pair : pairs) made->rows->add(pair, {length}, compliance);
+    return made;
+}
+
+inline std::vector<std::array<std::int64_t, 2>> links_of_chain(std::int64_t n)
+{
+    std::vector<std::array<std::int64_t, 2>> pairs;
+    for (std::int64_t k = 0; k < n; ++k) pairs.push_back({k, k + 1});
+    return pairs;
+}
+
+}  // namespace rapid::test

@@ -1,0 +1,121 @@
+#include "runtime/solver/estimate/shadow.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "tests/test.h"
+
+using namespace rapid;
+
+namespace {
+
+PointSet points_with_ids(std::int64_t first, std::int64_t last)
+{
+    PointSet points;
+    points.append(static_cast<std::size_t>(last - first));
+    const auto ids = points.id().write();
+    std::iota(ids.begin(), ids.end(), first);
+    return points;
+}
+
+// A solver that takes every point `way` metres on.
+auto by(float way)
+{
+    return [way](PointSet& points) {
+        for (Vec3f& P : points.P().write()) P.x() += way;
+    };
+}
+
+std::vector<double> frame(Shadows& shadows, PointSet& points, float way, float finer_way)
+{
+    shadows.begin(points, false);
+    by(way)(points);
+    return shadows.advance(points, by(finer_way));
+}
+
+// The same of a frame that is exact: the finer solver would find what the other has found.
+std::vector<double> exact_frame(Shadows& shadows, PointSet& points, float way, int& solved)
+{
+    shadows.begin(points, true);
+    by(way)(points);
+    return shadows.advance(points, [&](PointSet& set) {
+        ++solved;
+        by(way)(set);
+    });
+}
+
+}  // namespace
+
+TEST_CASE("what each frame is off by adds up from a point's birth on", "[shadow]")
+{
+    Shadows shadows;
+    PointSet points = points_with_ids(0, 10);
+    for (int f = 1; f <= 4; ++f) {
+        const std::vector<double> errors = frame(shadows, points, 1, 1.25f);
+        CHECK(errors == std::vector<double>(10, 2 * 0.25 * f));
+    }
+    // Those born now have been off for one frame.
+    PointSet both = points_with_ids(0, 13);
+    std::copy_n(points.P().read().data, 10, both.P().write().begin());
+    std::vector<double> errors = frame(shadows, both, 1, 1.25f);
+    std::sort(errors.begin(), errors.end());
+    CHECK(errors.front() == 0.5);
+    CHECK(errors[2] == 0.5);
+    CHECK(errors[3] == 2.5);
+}
+
+TEST_CASE("what nodes do to a point between two frames is done to its shadow", "[shadow]")
+{
+    Shadows shadows;
+    PointSet points = points_with_ids(0, 3);
+    frame(shadows, points, 1, 1.25f);
+    for (Vec3f& P : points.P().write()) P += Vec3f(0, 7, -3);
+    CHECK(frame(shadows, points, 1, 1).front() == 0.5);
+}
+
+TEST_CASE("of many points 1,000 to 1,250 have a shadow, the same ones however they come", "[shadow]")
+{
+    Shadows shadows;
+    PointSet points = points_with_ids(0, 900);
+    CHECK(frame(shadows, points, 0, 0).size() == 900);
+    points = points_with_ids(0, 50000);
+    CHECK(frame(shadows, points, 0, 0).size() == 1000);
+    for (std::int64_t n = 51000; n < 90000; n += 1000) {
+        points = points_with_ids(0, n);
+        const std::size_t size = frame(shadows, points, 0, 0).size();
+        CHECK(size >= 1000);
+        CHECK(size <= 1250);
+    }
+}
+
+TEST_CASE("a point that dies takes its shadow along, and one that is moved in the set keeps it", "[shadow]")
+{
+    Shadows shadows;
+    PointSet points = points_with_ids(0, 100);
+    for (std::size_t i = 0; i < 100; ++i) points.P().write()[i].y() = static_cast<float>(i);
+    frame(shadows, points, 1, 1.5f);
+    std::vector<std::uint8_t> keep(100, 1);
+    keep[3] = keep[50] = keep[99] = 0;
+    points.keep(keep);
+    const std::size_t left = 97;
+    std::vector<std::uint32_t> reversed(left);
+    for (std::size_t i = 0; i < left; ++i) reversed[i] = static_cast<std::uint32_t>(left - 1 - i);
+    points = points.select(reversed);
+    CHECK(frame(shadows, points, 1, 1.5f) == std::vector<double>(left, 2.0));
+}
+
+TEST_CASE("frames that are exact are not solved again while no shadow is off its point", "[shadow]")
+{
+    Shadows shadows;
+    PointSet points = points_with_ids(0, 20);
+    int solved = 0;
+    CHECK(exact_frame(shadows, points, 1, solved) == std::vector<double>{0});
+    CHECK(solved == 0);
+    // From here on the errors that there are go on being told, of those too that were born in between.
+    CHECK(frame(shadows, points, 1, 1.25f) == std::vector<double>(20, 0.5));
+    CHECK(exact_frame(shadows, points, 1, solved) == std::vector<double>(20, 0.5));
+    CHECK(solved == 1);
+    PointSet nobody;
+    Shadows of_nobody;
+    CHECK(exact_frame(of_nobody, nobody, 1, solved).empty());
+}

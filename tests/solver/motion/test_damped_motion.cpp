@@ -1,0 +1,98 @@
+// The damped oscillator, against its closed forms in long double.
+#include "runtime/solver/motion/damped_motion.h"
+
+#include <cmath>
+
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+// Of drag alone; where k t is small by series, for there the closed forms cancel.
+struct Exact {
+    long double x_of_v, x_of_G, v_of_v;
+
+    Exact(long double k, long double t)
+    {
+        const long double x = k * t;
+        long double phi1 = 0, phi2 = 0, term = 1;
+        if (x < 1) {
+            for (int n = 1; n < 40; ++n) {
+                phi1 += term / n;  // (1 - e^-x)/x
+                phi2 += term / (static_cast<long double>(n) * (n + 1));
+                term *= -x / n;
+            }
+        } else {
+            phi1 = -std::expm1(-x) / x;
+            phi2 = (1 - phi1) / x;
+        }
+        v_of_v = std::exp(-x);
+        x_of_v = t * phi1;
+        x_of_G = t * t * phi2;
+    }
+};
+
+TEST_CASE("drag without a spring is exact to rounding for k t from 1e-9 to 1e9", "[damped]")
+{
+    const double t = GENERATE(1e-9, 1.0 / 24, 10.0);
+    for (double x = 1e-9; x < 2e9; x *= 1.37) {
+        CAPTURE(x, t);
+        const Propagator found = respond(x / t, 0, t);
+        const Exact right(x / t, t);
+        CHECK(found.x_of_v == Approx(double(right.x_of_v)).epsilon(1e-15));
+        CHECK(found.v_of_G == found.x_of_v);
+        CHECK(found.x_of_G == Approx(double(right.x_of_G)).epsilon(1e-15));
+        CHECK(found.v_of_v == Approx(double(right.v_of_v)).epsilon(1e-15).margin(1e-16));
+    }
+}
+
+TEST_CASE("many drags at once have the bits of each alone", "[damped]")
+{
+    std::vector<double> k, t;
+    for (double x = 1e-9; x < 2e9; x *= 3.1) {
+        k.push_back(x);
+        t.push_back(k.size() % 3 == 0 ? 0 : k.size() % 3 == 1 ? 1.0 : 1.0 / 24);
+    }
+    DragPropagators many;
+    many.respond(k, t);
+    for (std::size_t i = 0; i < k.size(); ++i) {
+        const Propagator alone = respond(k[i], 0, t[i]);
+        CHECK(many.x_of_v[i] == alone.x_of_v);
+        CHECK(many.x_of_G[i] == alone.x_of_G);
+        CHECK(many.v_of_v[i] == alone.v_of_v);
+    }
+}
+
+TEST_CASE("one response leads on from the other: two halves of a time are the whole", "[damped]")
+{
+    const double k = GENERATE(0.0, 0.3, 20.0, 1e4), w2 = GENERATE(1e-6, 1.0, 90.0, 100.0, 110.0, 1e6);
+    const double t = GENERATE(1e-3, 1.0 / 24, 1.0);
+    CAPTURE(k, w2, t);
+    const Propagator half = respond(k, w2, t / 2), whole = respond(k, w2, t);
+    // G acts at rest where the point is: it is w2 x less there.
+    const auto twice = [&](double v, double G) {
+        const double x1 = v * half.x_of_v + G * half.x_of_G, v1 = v * half.v_of_v + G * half.v_of_G;
+        const double G1 = G - w2 * x1;
+        return std::pair(x1 + v1 * half.x_of_v + G1 * half.x_of_G, v1 * half.v_of_v + G1 * half.v_of_G);
+    };
+    const double scale = 1e-13 * std::max(1.0, std::sqrt(w2) * t);
+    CHECK(whole.x_of_v == Approx(twice(1, 0).first).margin(scale * t));
+    CHECK(whole.v_of_v == Approx(twice(1, 0).second).margin(scale));
+    CHECK(whole.x_of_G == Approx(twice(0, 1).first).margin(scale * t * t));
+    CHECK(whole.v_of_G == Approx(twice(0, 1).second).margin(scale * t));
+}
+
+TEST_CASE("who is asked the same again knows it", "[damped]")
+{
+    Responder responder;
+    for (const double k : {0.0, 2.0, 2.0, 0.0, 30.0})
+        for (const double t : {0.0, 0.1, 0.1}) {
+            const Propagator known = responder(k, 4, t), found = respond(k, 4, t);
+            CHECK(known.x_of_v == found.x_of_v);
+            CHECK(known.x_of_G == found.x_of_G);
+            CHECK(known.v_of_v == found.v_of_v);
+        }
+}
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,135 @@
+// What the documents say of the code is still so: files, folders, names and sections that they mention exist.
+#include "tests/docs/document.h"
+
+namespace rapid {
+namespace {
+
+using namespace test;
+namespace fs = std::filesystem;
+
+const std::vector<std::string> documents = {"docs/architecture.md", "docs/numerics.md", "docs/extending.md",
+                                            "CONTRIBUTING.md"};
+
+// Files that a document's examples are, which a reader would write.
+std::set<std::string> example_files(const std::string& text)
+{
+    std::set<std::string> files;
+    for (const auto& match : matches(text, std::regex(R"re(\n```\w+ (\S+)\n)re"))) files.insert(match[1]);
+    return files;
+}
+
+const std::regex path_in_code(R"re(`((?:runtime|bindings|lua|graphs|tests|cmake|setup|docs)/[\w./-]*)`)re");
+
+std::vector<fs::path> sources()
+{
+    std::vector<fs::path> files;
+    for (const char* folder : {"runtime", "bindings", "lua", "graphs", "tests"})
+        for (const auto& entry : fs::recursive_directory_iterator(project / folder)) {
+            const fs::path extension = entry.path().extension();
+            if (extension == ".h" || extension == ".cpp" || extension == ".lua") files.push_back(entry.path());
+        }
+    return files;
+}
+
+}  // namespace
+
+TEST_CASE("a file or folder that a document names is there", "[docs]")
+{
+    for (const std::string& document : documents) {
+        const std::string text = read_text(project / document);
+        const std::set<std::string> examples = example_files(text);
+        for (const auto& match : matches(without_fenced_code(text), path_in_code)) {
+            const std::string& path = match[1];
+            CAPTURE(document, path);
+            CHECK((examples.count(path) > 0 || fs::exists(project / path)));
+        }
+    }
+}
+
+TEST_CASE("a name that a document gives with its file is in that file", "[docs]")
+{
+    const std::regex named(R"re(`([\w/]+\.\w+)` \((`[^)]*`)\))re"), name(R"re(`(\w+)`)re");
+    for (const std::string& document : documents) {
+        const std::string text = without_fenced_code(read_text(project / document));
+        for (const auto& match : matches(text, named)) {
+            const std::string &file = match[1], &names = match[2];
+            const std::string source = read_text(project / file);
+            for (const auto& each : matches(names, name)) {
+                CAPTURE(document, file, each[1]);
+                CHECK(std::regex_search(source, std::regex("\\b" + each[1] + "\\b")));
+            }
+        }
+    }
+}
+
+TEST_CASE("a link of a document leads somewhere", "[docs]")
+{
+    const std::regex link(R"re(\]\(([^)#:]*)(?:#([^)]*))?\))re");
+    for (const std::string& document : documents) {
+        const fs::path here = project / document;
+        for (const auto& match : matches(without_fenced_code(read_text(here)), link)) {
+            const std::string &file = match[1], &anchor = match[2];
+            CAPTURE(document, file, anchor);
+            const fs::path there = file.empty() ? here : here.parent_path() / file;
+            REQUIRE(fs::exists(there));
+            if (anchor.empty()) continue;
+            std::set<std::string> anchors;
+            for (const Section& each : sections(read_text(there))) anchors.insert(anchor_of(each.title));
+            CHECK(anchors.count(anchor) == 1);
+        }
+    }
+}
+
+TEST_CASE("the folders of the architecture are those that there are", "[docs]")
+{
+    std::set<std::string> described, found;
+    const std::string layers = section(read_text(project / "docs/architecture.md"), "Layers");
+    for (const auto& match : matches(layers, std::regex(R"re(\n\| `((?:runtime|bindings)/[\w/]*)`)re")))
+        described.insert(match[1]);
+    for (const char* top : {"runtime", "bindings"}) {
+        if (top == std::string("runtime")) found.insert("runtime/");
+        for (const auto& entry : fs::recursive_directory_iterator(project / top))
+            if (entry.is_directory()) found.insert(fs::relative(entry.path(), project).string() + '/');
+    }
+    CHECK(described == found);
+}
+
+TEST_CASE("a name of the glossary is in the file that it is said to be in", "[docs]")
+{
+    const std::string glossary = section(read_text(project / "docs/architecture.md"), "Glossary");
+    const auto entries = matches(glossary, std::regex(R"re(\n\| `(\w+)` \|[^\n]*\| `([\w/.]+)` \|)re"));
+    REQUIRE(entries.size() > 40);
+    for (const auto& entry : entries) {
+        const std::string &name = entry[1], &file = entry[2];
+        CAPTURE(name, file);
+        CHECK(std::regex_search(read_text(project / file), std::regex("(class|struct|using|enum) " + name + "\\b")));
+    }
+}
+
+TEST_CASE("a section of numerics that a comment cites is there", "[docs]")
+{
+    std::set<std::string> titles;
+    for (const Section& each : sections(read_text(project / "docs/numerics.md"))) titles.insert(each.title);
+    const std::regex across_lines(R"re(\n\s*(//|--)\s*)re"), cited(R"re(numerics(?:\.md)?, ([A-Z][\w' -]*\w)[).;:])re");
+    std::size_t citations = 0;
+    for (const fs::path& file : sources()) {
+        const std::string text = std::regex_replace(read_text(file), across_lines, " ");
+        for (const auto& match : matches(text, cited)) {
+            ++citations;
+            CAPTURE(file, match[1]);
+            CHECK(titles.count(match[1]) == 1);
+        }
+    }
+    CHECK(citations >= 7);
+}
+
+TEST_CASE("each formula of numerics names the file that computes it", "[docs]")
+{
+    for (const Section& each : sections(read_text(project / "docs/numerics.md"))) {
+        if (each.level < 3) continue;
+        CAPTURE(each.title);
+        CHECK(std::regex_search(each.text, std::regex(R"re(`(runtime|tests)/[\w/]+\.\w+`)re")));
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,152 @@
+// The examples of docs/extending.md, compiled into this program, do what their comments say.
+#include <unistd.h>
+
+#include <cmath>
+
+#include "bindings/command/command.h"
+#include "bindings/host/session.h"
+#include "runtime/graph/evaluate.h"
+#include "runtime/graph/plugin.h"
+#include "runtime/io/format.h"
+#include "tests/docs/document.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path examples = RAPID_EXAMPLES;  // where the build has written them
+
+class Folder {
+public:
+    Folder()
+    {
+        std::string name = (fs::temp_directory_path() / "rapid-XXXXXX").string();
+        REQUIRE(mkdtemp(name.data()));
+        path_ = name;
+    }
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+    ~Folder() { fs::remove_all(path_); }
+    const fs::path& path() const { return path_; }
+
+private:
+    fs::path path_;
+};
+
+// The points of a chain of nodes after so many frames of 1/24 s. The example in Lua lies beside the scene.
+PointSet run(const std::string& chain, int frames)
+{
+    const Folder folder;
+    fs::copy_file(examples / "lua/nodes/breathe.lua", folder.path() / "breathe.lua");
+    std::ofstream(folder.path() / "scene.lua") << "local rapid = require \"rapid\"\nreturn " << chain << '\n';
+    const Session session(folder.path() / "scene.lua", {});
+    const Plan plan(session.graph(), {});
+    Evaluator evaluator(plan);
+    PointSet points = evaluator.advance().outputs.at("main");
+    for (int frame = 0; frame < frames; ++frame) points = evaluator.advance().outputs.at("main");
+    return points;
+}
+
+// What is written to standard output meanwhile.
+template <class F>
+std::string printed_by(const F& f)
+{
+    const Folder folder;
+    const fs::path file = folder.path() / "out";
+    std::fflush(stdout);
+    const int kept = dup(STDOUT_FILENO);
+    REQUIRE(std::freopen(file.c_str(), "w", stdout));
+    f();
+    std::fflush(stdout);
+    dup2(kept, STDOUT_FILENO);
+    close(kept);
+    return test::read_text(file);
+}
+
+}  // namespace
+
+TEST_CASE("the example of a node makes radii smaller by its rate", "[docs]")
+{
+    const PointSet points =
+        run("rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, pscale = {0.1} } }"
+            ":shrink { rate = 2 } :solve {}",
+            24);
+    CHECK(points.column<float>("pscale")[0] == Approx(0.1 * std::exp(-2.0)).epsilon(1e-5));
+}
+
+TEST_CASE("the example of a force is exact, at any number of sub-steps", "[docs]")
+{
+    const std::string substeps = GENERATE("1", "7");
+    const PointSet points =
+        run("rapid.create { points = rapid.points.from { P = {{0, 2, 0}} } }"
+            ":shear { rate = 3, drag = 4 } :solve { substeps = " +
+                substeps + " }",
+            24);
+    const double u = 6, k = 4, t = 1, v = u * (1 - std::exp(-k * t));
+    CHECK_THAT(points.v()[0], test::close_to(Vec3f(static_cast<float>(v), 0, 0), 1e-5));
+    CHECK_THAT(points.P()[0], test::close_to(Vec3f(static_cast<float>(u * t - v / k), 2, 0), 1e-5));
+}
+
+TEST_CASE("the example of a constraint holds what hangs from it, and leaves alone what is within its reach", "[docs]")
+{
+    const PointSet points = run(
+        "rapid.create { points = rapid.points.from { P = {{0, -1, 0}, {0.5, 0, 0}}, v = {{0, 0, 0}, {-0.5, 0, 0}} } }"
+        ":group { name = \"heavy\", where = function(p) return p.P.y < 0 end }"
+        ":gravity { group = \"heavy\" } :tether { length = 1 } :solve { substeps = 8 }",
+        24);
+    CHECK_THAT(points.P()[0], test::close_to(Vec3f(0, -1, 0), 1e-5));
+    CHECK_THAT(points.P()[1], test::close_to(Vec3f(0, 0, 0), 1e-5));
+}
+
+TEST_CASE("the example of a format is read as it was written", "[docs]")
+{
+    const Folder folder;
+    const PointSet points = test::points({{1, 2, 3}, {-4, 5e-7f, 6e8f}});
+    write_points(folder.path() / "some.raw", points);
+    const PointSet read = read_points(folder.path() / "some.raw");
+    REQUIRE(read.size() == 2);
+    CHECK(read.P()[0] == points.P()[0]);
+    CHECK(read.P()[1] == points.P()[1]);
+    CHECK(read.id()[1] == 1);
+}
+
+TEST_CASE("the example of a node in Lua follows its sine", "[docs]")
+{
+    const PointSet points =
+        run("rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, pscale = {0} } }"
+            ":breathe { size = 0.1, amount = 0.5, rate = 1 } :solve {}",
+            6);
+    CHECK(points.column<float>("pscale")[0] == Approx(0.15).epsilon(1e-6));  // a quarter of a second
+}
+
+TEST_CASE("the example of a plugin is loaded, and stops points", "[docs]")
+{
+    load_plugin(RAPID_EXAMPLE_PLUGIN);
+    const PointSet points =
+        run("rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, v = {{3, 0, 0}} } }"
+            ":gate { x = 1 } :solve { substeps = 4 }",
+            24);
+    CHECK(points.P()[0] == Vec3f(1, 0, 0));
+    CHECK(points.v()[0] == Vec3f(0, 0, 0));
+}
+
+TEST_CASE("the example of a command counts points", "[docs]")
+{
+    const Folder folder;
+    const fs::path file = folder.path() / "some.csv";
+    write_points(file, test::points({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));
+    for (const std::unique_ptr<Command>& command : make_commands()) {
+        if (command->name() != "count") continue;
+        CLI::App app;
+        command->declare(app);
+        app.parse("\"" + file.string() + "\"");
+        int status = status_failed;
+        CHECK(printed_by([&] { status = command->run({}); }) == "3\n");
+        CHECK(status == status_done);
+        return;
+    }
+    FAIL("there is no such command");
+}
+
+}  // namespace rapid

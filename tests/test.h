@@ -1,14 +1,16 @@
-// What every test includes: Catch2, RapidCheck's rc::prop, vectors compared within a tolerance, and point sets in a
-// line.
+// What every test includes: Catch2, RapidCheck's rc::prop, vectors compared within a tolerance, point sets in a line,
+// and columns compared to the bit.
 #pragma once
 
 #include <rapidcheck/catch.h>
 
 #include <catch2/catch.hpp>
+#include <cstring>
 #include <initializer_list>
 #include <limits>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "runtime/points/point_set.h"
@@ -57,10 +59,23 @@ private:
 inline CloseTo<Vec3f> close_to(const Vec3f& expected, double tolerance) { return {expected, tolerance}; }
 inline CloseTo<Vec3d> close_to(const Vec3d& expected, double tolerance) { return {expected, tolerance}; }
 
+// A vector of which {} is zero: Eigen leaves one that is made of nothing uninitialised.
+struct InitialisedVec3f : Vec3f {
+    InitialisedVec3f() : Vec3f(Vec3f::Zero()) {}
+    InitialisedVec3f(float x, float y, float z) : Vec3f(x, y, z) {}
+    InitialisedVec3f(const Vec3f& value) : Vec3f(value) {}
+};
+template <class T>
+using Initialised = std::conditional_t<std::is_same_v<T, Vec3f>, InitialisedVec3f, T>;
+
 // points({{0, 1, 0}, {0, 2, 0}}).v({{0, -3, 0}, {}}).set<float>("heat", {1, 2}).group("hot", {1}): a set with ids from
 // 0.
 class Points : public PointSet {
 public:
+    explicit Points(std::initializer_list<InitialisedVec3f> positions)
+        : Points(std::vector<Vec3f>(positions.begin(), positions.end()))
+    {
+    }
     explicit Points(const std::vector<Vec3f>& positions)
     {
         append(positions.size());
@@ -70,9 +85,15 @@ public:
     }
 
     using PointSet::v;
+    Points& v(std::initializer_list<InitialisedVec3f> velocities) { return set<Vec3f>("v", velocities); }
     Points& v(const std::vector<Vec3f>& velocities) { return set<Vec3f>("v", velocities); }
 
     using PointSet::set;
+    template <class T>
+    Points& set(std::string_view name, std::initializer_list<Initialised<T>> values)
+    {
+        return set<T>(name, std::vector<T>(values.begin(), values.end()));
+    }
     template <class T>
     Points& set(std::string_view name, const std::vector<T>& values)
     {
@@ -90,6 +111,17 @@ public:
     }
 };
 
+inline Points points(std::initializer_list<InitialisedVec3f> positions) { return Points(positions); }
 inline Points points(const std::vector<Vec3f>& positions) { return Points(positions); }
+
+// Whether two columns hold the same values, to the bit (NaN and -0 included).
+template <class T>
+bool same_bits(const Column<T>& a, const Column<T>& b)
+{
+    if (a.size() != b.size()) return false;
+    for (std::size_t i = 0; i < a.size(); ++i)
+        if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0) return false;
+    return true;
+}
 
 }  // namespace rapid::test

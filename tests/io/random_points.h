@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <bit>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,6 +11,7 @@
 #include <string>
 
 #include "runtime/points/point_set.h"
+#include "tests/test.h"
 
 namespace rapid::test {
 
@@ -94,16 +94,6 @@ inline std::vector<std::string> file_names(const std::filesystem::path& folder)
         names.push_back(entry.path().filename().string());
     std::sort(names.begin(), names.end());
     return names;
-}
-
-// Whether two columns hold the same bits (NaN and -0 included).
-template <class T>
-bool same_bits(const Column<T>& a, const Column<T>& b)
-{
-    if (a.size() != b.size()) return false;
-    for (std::size_t i = 0; i < a.size(); ++i)
-        if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0) return false;
-    return true;
 }
 
 // The names of what two sets do not have in common to the bit; empty when they are the same.

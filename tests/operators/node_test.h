@@ -61,16 +61,8 @@ inline std::shared_ptr<Simulation> simulation(double fps = 24, std::int64_t star
 }
 
 // Points at these places, with ids from 0.
-inline PointSet points_at(const std::vector<Vec3f>& places)
-{
-    PointSet points;
-    points.append(places.size());
-    points.P() = Column<Vec3f>(std::span<const Vec3f>(places));
-    if (places.empty()) return points;
-    const auto ids = points.id().write();
-    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int64_t>(i);
-    return points;
-}
+inline PointSet points_at(std::initializer_list<InitialisedVec3f> places) { return points(places); }
+inline PointSet points_at(const std::vector<Vec3f>& places) { return points(places); }
 
 inline std::shared_ptr<PointsObject> source_of(PointSet points)
 {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -104,11 +103,10 @@ public:
     Vec3d v(std::size_t i = 0) const { return std::as_const(points).v()[i].cast<double>(); }
 };
 
-// Whether places and velocities are.
+// Whether places and velocities are the same, to the bit.
 inline bool same_bits(const PointSet& a, const PointSet& b)
 {
-    return std::memcmp(a.P().read().data, b.P().read().data, a.size() * sizeof(Vec3f)) == 0 &&
-           std::memcmp(a.v().read().data, b.v().read().data, a.size() * sizeof(Vec3f)) == 0;
+    return same_bits(a.P(), b.P()) && same_bits(a.v(), b.v());
 }
 
 }  // namespace rapid::test

@@ -26,12 +26,7 @@ DynamicPtr among(double radius, float separation, float cohesion, float alignmen
 
 PointSet points_at(std::span<const Vec3f> P, std::span<const Vec3f> v)
 {
-    PointSet points;
-    points.append(P.size());
-    std::copy(P.begin(), P.end(), points.P().write().begin());
-    std::copy(v.begin(), v.end(), points.v().write().begin());
-    for (std::size_t i = 0; i < P.size(); ++i) points.id().write()[i] = static_cast<std::int64_t>(i);
-    return points;
+    return test::points(std::vector<Vec3f>(P.begin(), P.end())).v(std::vector<Vec3f>(v.begin(), v.end()));
 }
 
 // A frame as Solve takes it: a kick, the way, a kick.

@@ -63,6 +63,35 @@ TEST_CASE("many drags at once have the bits of each alone", "[damped]")
     }
 }
 
+// y'' = -k y' - w2 y + G from y = 0 with y' = v: y = v S + G (1 - S' - k S)/w2 with the response S to an impulse.
+TEST_CASE("a damped spring has its closed form below, at and above critical damping", "[damped]")
+{
+    const double k = GENERATE(0.0, 0.3, 20.0, 1e4), w2 = GENERATE(1.0, 90.0, 100.0, 110.0, 1e6);
+    const double t = GENERATE(1.0 / 24, 0.3, 2.0);
+    CAPTURE(k, w2, t);
+    const long double a = k / 2.0L, discriminant = a * a - w2;
+    long double S = 0, slope = 0;
+    if (discriminant < 0) {
+        const long double w = std::sqrt(-discriminant);
+        S = std::exp(-a * t) * std::sin(w * t) / w;
+        slope = std::exp(-a * t) * std::cos(w * t) - a * S;
+    } else if (discriminant > 0) {
+        const long double root = std::sqrt(discriminant), fast = -(a + root), slow = -w2 / (a + root);
+        S = (std::exp(slow * t) - std::exp(fast * t)) / (2 * root);
+        slope = (slow * std::exp(slow * t) - fast * std::exp(fast * t)) / (2 * root);
+    } else {
+        S = t * std::exp(-a * t);
+        slope = (1 - a * t) * std::exp(-a * t);
+    }
+
+    const Propagator found = respond(k, w2, t);
+    const double phase = 1e-15 * std::max(1.0, std::sqrt(w2) * t);  // of a rounded angle
+    CHECK(found.x_of_v == Approx(double(S)).epsilon(1e-13).margin(phase / std::sqrt(w2)));
+    CHECK(found.v_of_v == Approx(double(slope)).epsilon(1e-13).margin(4 * phase));
+    CHECK(found.v_of_G == Approx(double(S)).epsilon(1e-13).margin(phase / std::sqrt(w2)));
+    CHECK(found.x_of_G == Approx(double((1 - slope - k * S) / w2)).epsilon(1e-13).margin(4 * phase / w2));
+}
+
 TEST_CASE("one response leads on from the other: two halves of a time are the whole", "[damped]")
 {
     const double k = GENERATE(0.0, 0.3, 20.0, 1e4), w2 = GENERATE(1e-6, 1.0, 90.0, 100.0, 110.0, 1e6);

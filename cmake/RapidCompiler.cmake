@@ -7,7 +7,7 @@ endif()
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 # Sanitizers double what there is to optimise: at -O1 OpenVDB's templates compile in two thirds of the time.
-if(RAPID_SANITIZE)
+if(RAPID_SANITIZE OR RAPID_POISON)
   set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1 -DNDEBUG")
 endif()
 
@@ -35,6 +35,13 @@ target_compile_options(rapid_private INTERFACE
 # uninitialised values in its own AVX-512 functions (105593) and in vectors that Eigen leaves for the caller to set.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(rapid_private INTERFACE -Wno-restrict -Wno-stringop-overflow -Wno-maybe-uninitialized)
+endif()
+# clang does not know g++'s optimisation pragmas, and advises && where a branch would cost more.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  target_compile_options(rapid_private INTERFACE -Wno-unknown-pragmas -Wno-bitwise-instead-of-logical -Wno-psabi)
+endif()
+if(RAPID_POISON)
+  target_compile_options(rapid_private INTERFACE -ftrivial-auto-var-init=pattern)
 endif()
 if(RAPID_SANITIZE)
   target_compile_options(rapid_private INTERFACE

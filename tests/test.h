@@ -5,6 +5,7 @@
 #include <rapidcheck/catch.h>
 
 #include <catch2/catch.hpp>
+#include <cstdlib>
 #include <cstring>
 #include <initializer_list>
 #include <limits>
@@ -33,6 +34,9 @@ struct StringMaker<Eigen::Matrix<Scalar, 3, 1>> {
 }  // namespace Catch
 
 namespace rapid::test {
+
+// RapidCheck's scenes are the same in each run, unless RC_PARAMS asks for others.
+inline const bool has_fixed_seed = setenv("RC_PARAMS", "seed=1", /*overwrite=*/0) == 0;
 
 // Compares vectors by the largest difference of a component; `tolerance` is absolute, in the vector's unit. NaN is
 // close to nothing.

@@ -188,8 +188,8 @@ void PointSet::keep(std::span<const std::uint8_t> mask)
 
     std::vector<std::function<void()>> tasks;
     for (auto& [name, column] : columns_)
-        tasks.emplace_back([&] { std::visit([&](auto& c) { c.keep(compaction); }, column); });
-    for (auto& [name, members] : groups_) tasks.emplace_back([&] { members.keep(compaction); });
+        tasks.emplace_back([&compaction, &any = column] { std::visit([&](auto& c) { c.keep(compaction); }, any); });
+    for (auto& [name, members] : groups_) tasks.emplace_back([&compaction, &m = members] { m.keep(compaction); });
     tbb::parallel_for_each(tasks, [](const std::function<void()>& task) { task(); });
     size_ = compaction.kept;
 }

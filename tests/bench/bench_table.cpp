@@ -1,7 +1,7 @@
 // The table of how near Rapid is to its limits: each figure beside one of the same run on the same machine, so that the
 // ratios can be read anywhere. Runs the other benchmarks that stand beside it, and whole scenes with the command.
 //
-//   tests/bench/run [--json FILE] [--repeat N] [--only TEXT]
+//   tests/bench/run [--json FILE] [--repeat N] [--only TEXT | --readme]
 //
 // Quoted are ratios of medians. What is compared runs in turn, so that a machine that is busy for a while is busy for
 // both sides.
@@ -17,6 +17,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -103,6 +104,15 @@ public:
         main_job();
         output();
         examples();
+    }
+
+    std::string as_markdown() const
+    {
+        std::string text = "| | measured | wanted |\n|---|---|---|\n";
+        for (const Row& row : rows_)
+            text += fmt::format("| {} | {:.3g}{} | at {} {:.4g} |\n", row.name, row.value,
+                                row.unit.empty() ? "" : " " + row.unit, row.at_least ? "least" : "most", row.limit);
+        return text;
     }
 
     json as_json() const
@@ -361,6 +371,18 @@ private:
     std::vector<Row> rows_;
 };
 
+// Puts the table between the two lines of the README that name the benchmark. Error: it has no such lines.
+void write_readme(const fs::path& path, const std::string& table)
+{
+    const std::string begin = "<!-- table of tests/bench/run -->\n", end = "<!-- end of the table -->\n";
+    std::ifstream file(path);
+    std::string text(std::istreambuf_iterator<char>(file), {});
+    const std::size_t from = text.find(begin), to = text.find(end);
+    if (from == text.npos || to == text.npos || to < from)
+        throw std::runtime_error(fmt::format("{} has no place for the table", path.string()));
+    std::ofstream(path) << text.substr(0, from) << begin << table << text.substr(to);
+}
+
 }  // namespace
 
 int main(int count, char** words)
@@ -370,13 +392,16 @@ int main(int count, char** words)
     int repeat = 5;
     app.add_option("--json", out, "writes the table as JSON too")->type_name("FILE");
     app.add_option("--repeat", repeat, "runs of each figure, of which the median is taken")->check(CLI::PositiveNumber);
-    app.add_option("--only", only, "rows whose name has this text")->type_name("TEXT");
+    CLI::Option* some = app.add_option("--only", only, "rows whose name has this text")->type_name("TEXT");
+    bool readme = false;
+    app.add_flag("--readme", readme, "writes the table into README.md")->excludes(some);
     CLI11_PARSE(app, count, words);
     try {
         const fs::path bin = fs::read_symlink("/proc/self/exe").parent_path();
         Table table(bin, fs::path(RAPID_SOURCE_DIR) / "graphs", repeat, only);
         table.fill();
         if (!out.empty()) std::ofstream(out) << table.as_json().dump(2) << '\n';
+        if (readme) write_readme(fs::path(RAPID_SOURCE_DIR) / "README.md", table.as_markdown());
     } catch (const std::exception& error) {
         fmt::print(stderr, "bench: {}\n", error.what());
         return 1;

@@ -1,0 +1,115 @@
+-- docs/lua-api.md against the program: nodes, parameters, fields, methods and constructors, both ways; its scenes run.
+local command = require "testing.command"
+local document = require "testing.document"
+local json = require "dkjson"
+
+local page = document.read "docs/lua-api.md"
+local annotations = command.rapid "nodes --annotations".stdout
+local nodes = json.decode(command.rapid "nodes --json".stdout)
+
+-- The rows of "## Nodes": a node's name and what stands in backticks behind it.
+local documented = {}
+for cells in document.rows(document.section(page, "## Nodes")) do
+  local name = cells[1]:match "^`:([%w_]+)`$" or cells[1]:match "^`rapid%.(create)`$"
+  if name then documented[name] = document.code(cells[2]) end
+end
+
+describe("docs/lua-api.md", function()
+  it("has a row for each native node, with its parameters, and no others", function()
+    local written_in_lua = document.code(document.section(page, "## Nodes"):match "\nSeventeen .-\n\n")
+    local count = 0
+    for _, node in ipairs(nodes) do
+      local known = documented[node.name]
+      if not written_in_lua[node.name] then
+        assert.truthy(known, node.name)
+        count = count + 1
+        local params = { name = true }
+        for _, param in ipairs(node.params) do
+          params[param.name] = true
+          assert.truthy(known[param.name] or param.name == "group", node.name .. "." .. param.name)
+        end
+        for word in pairs(known) do
+          assert.truthy(params[word] or not word:find "^%l[%l_]*$", node.name .. "." .. word)
+        end
+        documented[node.name] = nil
+      end
+    end
+    assert.is_true(count > 20)
+    assert.same({}, documented)
+  end)
+
+  it("lists the nodes that are written in Lua", function()
+    local listed = document.code(document.section(page, "## Nodes"):match "\nSeventeen .-\n\n")
+    listed["lua/nodes"] = nil
+    local there = {}
+    for name in command.shell("ls lua/nodes").stdout:gmatch "([%w_]+)%.lua" do there[name] = true end
+    assert.same(there, listed)
+  end)
+
+  it("has the fields and methods of a point, and no others", function()
+    local section = document.section(page, "## Kernels")
+    local fields, methods = {}, {}
+    local class = annotations:match "%-%-%-@class rapid%.Point\n(.-)\n\n"
+    for name in class:gmatch "%-%-%-@field ([%w_]+) " do fields[name] = true end
+    for name in annotations:gmatch "function Point:([%w_]+)%(" do methods[name] = true end
+    assert.truthy(fields.P and fields.hitpath and methods.rand)
+    local named, called = {}, {}
+    for cells in document.rows(section) do
+      for word in pairs(document.code(cells[1])) do
+        if word:match "^p%.(%w+)$" then named[word:match "^p%.(%w+)$"] = true end
+        if word:match "^p:(%w+)%(" then called[word:match "^p:(%w+)%("] = true end
+      end
+    end
+    assert.same(fields, named)
+    assert.same(methods, called)
+  end)
+
+  it("has the fields of frame and step", function()
+    local section = document.section(page, "## Kernels")
+    for class, value in pairs { Frame = "frame", Step = "step" } do
+      local fields = annotations:match("%-%-%-@class rapid%." .. class .. "[^\n]*\n(.-)\n\n")
+      for name in fields:gmatch "%-%-%-@field ([%w_]+) " do
+        assert.truthy(section:find(("`%s.%s`"):format(value, name), 1, true), value .. "." .. name)
+      end
+    end
+  end)
+
+  it("names every constructor and method of the library, and no others", function()
+    local there = {}
+    for name in annotations:gmatch "\nfunction (rapid%.[%w_.]+)%(" do
+      there[name] = true
+      local short = name:match "^rapid%.math%.(.*)"
+      assert.truthy(page:find(name, 1, true) or (short and page:find("`" .. short, 1, true)), name)
+    end
+    assert.truthy(there["rapid.mesh.torus"] and there["rapid.levelset.from_points"])
+    for word in pairs(document.code(page)) do
+      local name = word:match "^(rapid%.[%l_]+%.[%l_]+)"
+      if name then assert.truthy(there[name], name) end
+    end
+    for class in ("Vec3 Quat Mesh Shape LevelSet Grid"):gmatch "%a+" do
+      for name in annotations:gmatch("\nfunction " .. class .. ":([%w_]+)%(") do
+        assert.truthy(page:find(":" .. name, 1, true), class .. ":" .. name)
+      end
+    end
+  end)
+
+  it("shows scenes that run", function()
+    local folder = command.folder()
+    local scene, node = document.blocks(page, "lua")[1], document.blocks(page, "lua")[2]
+    folder:write("scene.lua", scene)
+    folder:write("swirl.lua", node)
+    folder:write("turned.lua", [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :solve {}]])
+    for _, name in ipairs { "scene", "turned" } do
+      local result = command.rapid(("run %s.lua -f 1-3 --quiet"):format(name), { cwd = folder.path })
+      assert.equal(0, result.status, result.stderr)
+    end
+  end)
+
+  it("shows a test that passes", function()
+    local folder = command.folder()
+    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[3])
+    assert.equal(0, command.rapid("test " .. command.quoted(file)).status)
+  end)
+end)

@@ -94,6 +94,16 @@ TEST_CASE("the folders of the architecture are those that there are", "[docs]")
     CHECK(described == found);
 }
 
+TEST_CASE("the presets that contributing tells of are those that there are", "[docs]")
+{
+    std::set<std::string> described, found;
+    const std::string building = section(read_text(project / "CONTRIBUTING.md"), "Building");
+    for (const auto& match : matches(building, std::regex(R"re(\n\| `(\w+)` \|)re"))) described.insert(match[1]);
+    const std::regex shown(R"re("name": "(\w+)",\s*"displayName")re");
+    for (const auto& match : matches(read_text(project / "CMakePresets.json"), shown)) found.insert(match[1]);
+    CHECK(described == found);
+}
+
 TEST_CASE("a name of the glossary is in the file that it is said to be in", "[docs]")
 {
     const std::string glossary = section(read_text(project / "docs/architecture.md"), "Glossary");

@@ -611,7 +611,8 @@ private:
     const KernelArguments arguments_;
 };
 
-DynamicPtr Kernel::action(const std::string& group, const Evaluation& now, const KernelArguments& arguments) const
+std::shared_ptr<const Action> Kernel::action(const std::string& group, const Evaluation& now,
+                                             const KernelArguments& arguments) const
 {
     auto action = std::make_shared<KernelAction>(*this, now, arguments);
     action->group = group;

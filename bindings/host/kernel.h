@@ -45,7 +45,8 @@ public:
     bool kills() const { return kills_; }
 
     // What it does inside Solve, at every sub-step, on the points of `group`.
-    DynamicPtr action(const std::string& group, const Evaluation& now, const KernelArguments& arguments) const;
+    std::shared_ptr<const Action> action(const std::string& group, const Evaluation& now,
+                                         const KernelArguments& arguments) const;
 
     ScriptHost& host() const { return host_; }
 

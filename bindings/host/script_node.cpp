@@ -87,7 +87,10 @@ struct ScriptAction {
     }
     void check() const { check_writable(writes); }
     void uses(Uses& uses) const { kernel->uses_in_action(uses, declared(reads, writes)); }
-    DynamicPtr dynamic(const Evaluation& now) const { return kernel->action(group, now, declared(reads, writes)); }
+    std::shared_ptr<const Action> dynamic(const Evaluation& now) const
+    {
+        return kernel->action(group, now, declared(reads, writes));
+    }
 };
 RAPID_NODE(ScriptAction);
 
@@ -150,7 +153,7 @@ public:
         if (fields_.kernel->of_the_set)
             run_detail(*fields_.kernel, inputs[0], now, fields_.arguments);
         else
-            inputs[0].dynamics.push_back(fields_.kernel->action(fields_.group, now, fields_.arguments));
+            inputs[0].dynamics.add(fields_.kernel->action(fields_.group, now, fields_.arguments));
         return std::move(inputs[0]);
     }
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }

@@ -28,7 +28,7 @@ struct Rail {
             .param(&Rail::radius, "radius", 1.0, above(0), "m", "the distance")
             .param(&Rail::compliance, "compliance", 0.0, at_least(0), "m/N", "give by force; 0: rigid");
     }
-    DynamicPtr dynamic(const Evaluation& now) const
+    auto dynamic(const Evaluation& now) const
     {
         return constrain(now, group, [rows = rows, kind = OnCylinder{radius}, c = compliance](const PointSet& points) {
             for (std::size_t i = 0; i < points.size(); ++i)
@@ -46,7 +46,7 @@ struct Brake {
         return node<Brake>("brake", "Holds the speed of points below a bound, at every sub-step.")
             .param(&Brake::most, "most", 1.0, at_least(0), "m/s", "the bound");
     }
-    DynamicPtr dynamic(const Evaluation& now) const
+    auto dynamic(const Evaluation& now) const
     {
         return act(now, [most = most](Vec3d&, Vec3d& v) { if (v.norm() > most) v *= most / v.norm(); });
     }

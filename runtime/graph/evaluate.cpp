@@ -190,10 +190,10 @@ void Evaluator::edit_together(std::size_t first, std::size_t last, int left, Poi
 {
     std::deque<Told> told;
     std::vector<const Evaluation*> now;
-    std::vector<PointEdit*> edits;
+    std::vector<const PointEdit*> edits;
     for (std::size_t i = first; i <= last; ++i) {
         now.push_back(&*told.emplace_back(*this, plan_.nodes[i], left, frame).evaluation);
-        edits.push_back(&dynamic_cast<PointEdit&>(*plan_.nodes[i].op));
+        edits.push_back(plan_.nodes[i].op->as_point_edit());
     }
     rapid::edit_together(edits, now, points);
 }

@@ -18,7 +18,7 @@
 //   void contribute(const Chunk&, Forces&) const             a force: Solve calls it (solver/dynamics.h)
 //   std::optional<Uniform> uniform() const                   a force that is uniform; also besides contribute()
 //   bool add_potential(const Chunk&, std::span<double>) const    besides these: the energy of which it is the slope
-//   DynamicPtr dynamic(const Evaluation&) const              a collider, a constraint, a force with a state of its own
+//   auto dynamic(const Evaluation&) const                    a shared pointer to a Collider, Constraint, Action, Force
 //   Flow evaluate(std::span<Flow>, const Evaluation&)        anything else (Create, Merge, Solve)
 //
 // and, where it needs them,
@@ -71,7 +71,7 @@ struct Simulation {
 // What travels along an edge of the graph.
 struct Flow {
     PointSet points;
-    std::vector<DynamicPtr> dynamics;  // in the order of the chain
+    Dynamics dynamics;  // of the nodes upstream
     std::shared_ptr<Simulation> simulation;
 };
 
@@ -162,6 +162,8 @@ struct Uses {
     std::set<std::string> functions;
 };
 
+class PointEdit;
+
 // What a node does; one object a node and run.
 class Operator {
 public:
@@ -171,6 +173,9 @@ public:
     virtual Flow start(std::span<Flow> inputs, const Evaluation& now) = 0;
     virtual void uses(Uses& uses) const = 0;
     virtual void check() const = 0;
+
+    // This, where it edits points one by one (point_edit.h), and so can go together with its neighbours.
+    virtual const PointEdit* as_point_edit() const { return nullptr; }
 };
 
 // The parts of a frame's work that a scene may have or lack.
@@ -283,7 +288,7 @@ public:
             fields_.edit(inputs[0].points, now);
             return std::move(inputs[0]);
         } else if constexpr (is_force<T> || has_dynamic<T>) {
-            if (DynamicPtr made = dynamic(now)) inputs[0].dynamics.push_back(std::move(made));
+            if (auto made = dynamic(now)) inputs[0].dynamics.add(std::move(made));
             return std::move(inputs[0]);
         } else {
             return fields_.evaluate(inputs, now);
@@ -311,7 +316,7 @@ public:
     }
 
 private:
-    DynamicPtr dynamic(const Evaluation& now) const
+    auto dynamic(const Evaluation& now) const
     {
         if constexpr (has_dynamic<T>) {
             return fields_.dynamic(now);

@@ -429,13 +429,13 @@ std::set<std::string> Plan::names_of_scene() const
 
 std::size_t Plan::last_together(std::size_t first) const
 {
-    const auto* edit = dynamic_cast<const PointEdit*>(nodes[first].op.get());
+    const PointEdit* edit = nodes[first].op->as_point_edit();
     bool removed = false;
     for (std::size_t last = first; edit; ++last) {
         removed |= edit->removes_points();
         if (last + 1 == nodes.size() || nodes[last + 1].inputs != std::vector{last}) return last;
         const PlannedNode &before = nodes[last], &after = nodes[last + 1];
-        edit = dynamic_cast<const PointEdit*>(after.op.get());
+        edit = after.op->as_point_edit();
         if (!edit || (removed && edit->asks_places())) return last;
         if (before.consumers > 1 || before.in_loop != after.in_loop || before.once || after.once) return last;
     }

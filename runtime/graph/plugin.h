@@ -33,7 +33,7 @@ void load_plugins(const std::string& path);
 
 // A constraint from a function of the points, asked before each frame, that gives its rows (solver/rows.h).
 template <class F>
-DynamicPtr constrain(const Evaluation& now, const std::string& group, F rows_of)
+std::shared_ptr<const Constraint> constrain(const Evaluation& now, const std::string& group, F rows_of)
 {
     struct Made : Constraint {
         F rows_of;
@@ -45,13 +45,12 @@ DynamicPtr constrain(const Evaluation& now, const std::string& group, F rows_of)
             return rows;
         }
     };
-    auto made = dynamic_of<Made>(now, group, std::move(rows_of));
-    return made;
+    return dynamic_of<Made>(now, group, std::move(rows_of));
 }
 
 // An action from a function of a point's P (m) and v (m/s), called at every sub-step from any thread.
 template <class F>
-DynamicPtr act(const Evaluation& now, F edit)
+std::shared_ptr<const Action> act(const Evaluation& now, F edit)
 {
     struct Pass : ActionPass {
         F edit;
@@ -66,8 +65,7 @@ DynamicPtr act(const Evaluation& now, F edit)
         explicit Made(F f) : edit(std::move(f)) {}
         std::unique_ptr<ActionPass> begin(PointSet&) const override { return std::make_unique<Pass>(edit); }
     };
-    auto made = dynamic_of<Made>(now, {}, std::move(edit));
-    return made;
+    return dynamic_of<Made>(now, {}, std::move(edit));
 }
 
 }  // namespace rapid

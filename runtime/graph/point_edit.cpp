@@ -54,13 +54,13 @@ void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points
 
 Flow PointEdit::evaluate(std::span<Flow> inputs, const Evaluation& now)
 {
-    PointEdit* const self = this;
+    const PointEdit* const self = this;
     const Evaluation* const told = &now;
     edit_together({&self, 1}, {&told, 1}, inputs[0].points);
     return std::move(inputs[0]);
 }
 
-void edit_together(std::span<PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points)
+void edit_together(std::span<const PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points)
 {
     const Stopwatch stopwatch;
     std::vector<std::unique_ptr<EditPass>> passes;

@@ -64,6 +64,7 @@ public:
     // Whether it may ask for places in the set (p.index). It does not go with one before it that removes points.
     virtual bool asks_places() const = 0;
 
+    const PointEdit* as_point_edit() const override { return this; }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override;
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
 };
@@ -106,6 +107,6 @@ private:
 
 // All edits of the points, in their order; now: what each is told. The same as one after the other, to the bit. Error:
 // as go_over().
-void edit_together(std::span<PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
+void edit_together(std::span<const PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
 
 }  // namespace rapid

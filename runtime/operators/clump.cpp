@@ -141,7 +141,7 @@ struct Clump {
             .param(&Clump::strength, "strength", 1.0, at_least(0), "N", "the pull that a bond bears");
     }
 
-    DynamicPtr dynamic(const Evaluation& now) const
+    std::shared_ptr<const Constraint> dynamic(const Evaluation& now) const
     {
         auto constraint = dynamic_of<ClumpConstraint>(now, group);
         constraint->bonds = bonds_;

@@ -99,7 +99,7 @@ struct Collide {
         uses.writes.insert(uses.writes.end(), std::begin(Hits::names), std::end(Hits::names));
     }
 
-    DynamicPtr dynamic(const Evaluation& now) const
+    std::shared_ptr<const Collider> dynamic(const Evaluation& now) const
     {
         if (!shape.rest && !shape.deforming) return nullptr;
         auto collider = dynamic_of<Collider>(now, group);

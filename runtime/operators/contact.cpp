@@ -53,7 +53,7 @@ struct ContactNode {
                 "hold with few sub-steps, and flow less");
     }
 
-    DynamicPtr dynamic(const Evaluation& now) const
+    std::shared_ptr<const Constraint> dynamic(const Evaluation& now) const
     {
         auto constraint = dynamic_of<ContactConstraint>(now, group);
         constraint->contacts = contacts_;

@@ -109,7 +109,7 @@ struct Distance {
         if (!rows_ && !flow.points.empty()) rows_ = tie(flow.points);
         if (!rows_) return flow;
         auto constraint = dynamic_of<TieConstraint>(now, group, rows_);
-        flow.dynamics.push_back(std::move(constraint));
+        flow.dynamics.add(std::move(constraint));
         return flow;
     }
 

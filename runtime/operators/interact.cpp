@@ -27,7 +27,7 @@ struct Interact {
                    "rate at which they stop approaching and parting; what turns about them goes on");
     }
 
-    DynamicPtr dynamic(const Evaluation& now) const
+    std::shared_ptr<const Interaction> dynamic(const Evaluation& now) const
     {
         auto interaction = dynamic_of<Interaction>(now, group);
         interaction->radius = radius;

@@ -115,9 +115,7 @@ private:
         points.keep(fresh);
         append_points(result.points, std::move(points), now);
 
-        for (DynamicPtr& dynamic : input.dynamics)
-            if (std::find(result.dynamics.begin(), result.dynamics.end(), dynamic) == result.dynamics.end())
-                result.dynamics.push_back(std::move(dynamic));
+        result.dynamics.merge(input.dynamics);
     }
 };
 RAPID_NODE(Merge);

@@ -211,7 +211,7 @@ struct PinNode {
             pin->track =
                 std::make_shared<MotionTrack>(*motion, flow.simulation->clock(),
                                               now.frame.number - 1.0 / flow.simulation->subframes, now.frame.number);
-        flow.dynamics.push_back(std::move(pin));
+        flow.dynamics.add(std::move(pin));
         return flow;
     }
 

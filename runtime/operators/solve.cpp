@@ -84,7 +84,7 @@ struct Solve {
         options.loads = &loads_;
         options.sleep = sleep;
         options.beds = &beds_;
-        const bool coupled = couples(flow.dynamics);
+        const bool coupled = !flow.dynamics.constraints().empty();
         if (coupled && !points.has("still")) points.add({"still", 0.0f});
         if (tolerance && coupled)
             throw Error(
@@ -174,7 +174,7 @@ struct Solve {
 private:
     // After 1, 2, 4, 8, ... steps: what is stiff changes as points go on, and is looked for at little cost. With a
     // tolerance the sub-steps are chosen, and there is nothing to advise.
-    void note_stiffness(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
+    void note_stiffness(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options,
                         const Evaluation& now) const
     {
         if (!std::has_single_bit(static_cast<std::uint64_t>(std::llround(options.time / options.h)))) return;
@@ -249,12 +249,12 @@ private:
     }
 
     // Level sets are widened once for each shape, and only as far as it takes.
-    void widen(const PointSet& points, std::vector<DynamicPtr>& dynamics, const Evaluation& now)
+    void widen(const PointSet& points, Dynamics& dynamics, const Evaluation& now)
     {
         std::map<ShapePtr, LevelSetPtr> wide;
-        for (DynamicPtr& dynamic : dynamics) {
-            const auto collider = std::dynamic_pointer_cast<const Collider>(dynamic);
-            const auto level_set = collider ? std::dynamic_pointer_cast<const LevelSet>(collider->shape) : nullptr;
+        for (std::size_t i = 0; i < dynamics.colliders().size(); ++i) {
+            const std::shared_ptr<const Collider> collider = dynamics.colliders()[i];
+            const auto level_set = std::dynamic_pointer_cast<const LevelSet>(collider->shape);
             if (!level_set) continue;
             const double needed = needed_band(*collider, points, level_set->voxel(), level_set->bounds(), now.frame.dt);
             const auto known = wide_.find(collider->shape);
@@ -270,7 +270,7 @@ private:
             if (shape == level_set) continue;
             auto widened = std::make_shared<Collider>(*collider);
             widened->shape = shape;
-            dynamic = std::move(widened);
+            dynamics.replace_collider(i, std::move(widened));
         }
         wide_ = std::move(wide);
     }
@@ -293,13 +293,12 @@ private:
     }
 
     // Shapes that move, in their way through this frame.
-    void set_in_motion(const PointSet& points, std::vector<DynamicPtr>& dynamics, const FrameClock& clock,
-                       const Evaluation& now)
+    void set_in_motion(const PointSet& points, Dynamics& dynamics, const FrameClock& clock, const Evaluation& now)
     {
         std::map<std::string, Deformation> deforming;
-        for (DynamicPtr& dynamic : dynamics) {
-            const auto collider = std::dynamic_pointer_cast<const Collider>(dynamic);
-            if (!collider || !(collider->motion || collider->deforming)) continue;
+        for (std::size_t i = 0; i < dynamics.colliders().size(); ++i) {
+            const std::shared_ptr<const Collider> collider = dynamics.colliders()[i];
+            if (!collider->motion && !collider->deforming) continue;
             auto going = std::make_shared<Collider>(*collider);
             PathOptions options;
             options.cuts = collider->cuts;
@@ -345,7 +344,7 @@ private:
                     static_cast<std::int64_t>(std::ceil(to))));
             going->motion = nullptr;
             going->deforming = nullptr;
-            dynamic = std::move(going);
+            dynamics.replace_collider(i, std::move(going));
         }
         deforming_ = std::move(deforming);
     }

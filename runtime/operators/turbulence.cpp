@@ -53,7 +53,7 @@ struct Turbulence {
             .varies();
     }
 
-    DynamicPtr dynamic(const Evaluation& now) const
+    std::shared_ptr<const Force> dynamic(const Evaluation& now) const
     {
         auto force = dynamic_of<TurbulentForce>(now, group);
         force->amplitude = amplitude;

@@ -142,12 +142,11 @@ private:
 
 }  // namespace
 
-void interact(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
-    for (const DynamicPtr& dynamic : dynamics) {
-        const auto* interaction = dynamic_cast<const Interaction*>(dynamic.get());
-        if (!interaction || points.empty()) continue;
-        try {
+    if (points.empty()) return;
+    for (const std::shared_ptr<const Interaction>& interaction : dynamics.interactions())
+        at_node(*interaction, [&] {
             Neighbourhood neighbourhood(*interaction, points, options);
             const std::vector<Vec3d> kicks = neighbourhood.kicks();
             const Strided<std::uint8_t> advanced = members_of(points, options.group);
@@ -157,11 +156,7 @@ void interact(PointSet& points, std::span<const DynamicPtr> dynamics, const Solv
                 if (!advanced[i]) continue;
                 v[i] = (v[i].cast<double>() + kicks[m]).cast<float>();
             }
-        } catch (Error& error) {
-            error.in_node(interaction->node).at(interaction->location);
-            throw;
-        }
-    }
+        });
 }
 
 }  // namespace rapid

@@ -32,6 +32,6 @@ public:
 
 // Half the frame's kicks of all interactions among `dynamics`, on the velocities; each of half the point's own time.
 // Points that the solve does not advance act, and are not moved. Same bits for any number of threads.
-void interact(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
+void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 }  // namespace rapid

@@ -66,17 +66,6 @@ struct Scene {
     bool falls() const { return is_uniform() && actions.empty() && is_closed_form(uniform.linear); }
 };
 
-template <class F>
-void at_node(const Dynamic& dynamic, const F& f)
-{
-    try {
-        f();
-    } catch (Error& error) {
-        error.in_node(dynamic.node).at(dynamic.location);
-        throw;
-    }
-}
-
 // Adds the values, if all of them are finite; shapes [n].
 bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
 {
@@ -90,41 +79,62 @@ bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
     return true;
 }
 
-Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
+// Finds its place in the scene for each dynamic, in the order of the chain: of several errors the first is thrown.
+class SceneBuilder {
+public:
+    SceneBuilder(Scene& scene, const PointSet& points, double h) : scene_(scene), points_(points), h_(h) {}
+
+    void operator()(const std::shared_ptr<const Force>& force) const
+    {
+        at_node(*force, [&] { add(*force); });
+    }
+    void operator()(const std::shared_ptr<const Collider>& collider) const
+    {
+        at_node(*collider, [&] { scene_.obstacles.emplace_back(*collider, points_); });
+        scene_.kills |= collider->response == Response::Die;
+        scene_.records |= collider->record.has_value();
+    }
+    void operator()(const std::shared_ptr<const Constraint>& constraint) const
+    {
+        at_node(*constraint, [&] {
+            if (auto coupling = constraint->begin(points_, h_))
+                scene_.constraints.push_back({constraint.get(), std::move(coupling)});
+        });
+    }
+    void operator()(const std::shared_ptr<const Action>&) const {}       // prepared before
+    void operator()(const std::shared_ptr<const Interaction>&) const {}  // interact()
+
+private:
+    void add(const Force& force) const
+    {
+        const std::optional<Uniform> uniform = force.uniform();
+        if (uniform && !uniform->a.allFinite())
+            throw Error(fmt::format("its acceleration is {{{:g}, {:g}, {:g}}}; it must be finite", uniform->a.x(),
+                                    uniform->a.y(), uniform->a.z()));
+        if (uniform && force.group.empty()) {
+            scene_.uniform.a += uniform->a;
+            scene_.uniform.linear.add(uniform->linear);
+            return;
+        }
+        scene_.forces.push_back({&force, uniform, members_of(points_, force.group), force.group.empty()});
+    }
+
+    Scene& scene_;
+    const PointSet& points_;
+    double h_;
+};
+
+Scene scene_of(PointSet& set, const Dynamics& dynamics, double h)
 {
     Scene scene;
-    // First those that make columns writable: what is read below is then at its place.
-    std::vector<const Action*> actions;
-    for (const DynamicPtr& dynamic : dynamics)
-        if (const auto* action = dynamic_cast<const Action*>(dynamic.get())) actions.push_back(action);
-    for (const Action* action : actions) at_node(*action, [&] { action->prepare(set); });
-    for (const Action* action : actions)
+    // First the actions, which make columns writable: what is read below then stays where it is in memory.
+    for (const auto& action : dynamics.actions()) at_node(*action, [&] { action->prepare(set); });
+    for (const auto& action : dynamics.actions())
         at_node(*action, [&] {
-            if (auto pass = action->begin(set)) scene.actions.push_back({action, std::move(pass)});
+            if (auto pass = action->begin(set)) scene.actions.push_back({action.get(), std::move(pass)});
         });
     const PointSet& points = set;
-    for (const DynamicPtr& dynamic : dynamics)
-        at_node(*dynamic, [&] {
-            if (const auto* collider = dynamic_cast<const Collider*>(dynamic.get())) {
-                scene.obstacles.emplace_back(*collider, points);
-                scene.kills |= collider->response == Response::Die;
-                scene.records |= collider->record.has_value();
-            } else if (const auto* constraint = dynamic_cast<const Constraint*>(dynamic.get())) {
-                if (auto coupling = constraint->begin(points, h))
-                    scene.constraints.push_back({constraint, std::move(coupling)});
-            } else if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
-                const std::optional<Uniform> uniform = force->uniform();
-                if (uniform && !uniform->a.allFinite())
-                    throw Error(fmt::format("its acceleration is {{{:g}, {:g}, {:g}}}; it must be finite",
-                                            uniform->a.x(), uniform->a.y(), uniform->a.z()));
-                if (uniform && force->group.empty()) {
-                    scene.uniform.a += uniform->a;
-                    scene.uniform.linear.add(uniform->linear);
-                    return;
-                }
-                scene.forces.push_back({force, uniform, members_of(points, force->group), force->group.empty()});
-            }
-        });
+    dynamics.visit_in_order(SceneBuilder(scene, points, h));
     scene.force = forces_of(points);
     if (points.has("mass")) scene.mass = points.column<float>("mass").read();
     return scene;
@@ -132,7 +142,7 @@ Scene scene_of(PointSet& set, std::span<const DynamicPtr> dynamics, double h)
 
 class Step {
 public:
-    Step(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Runs* runs)
+    Step(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Runs* runs)
         : points_(points),
           options_(options),
           runs_(runs),
@@ -832,28 +842,17 @@ private:
 
 }  // namespace
 
-bool couples(std::span<const DynamicPtr> dynamics)
-{
-    return std::any_of(dynamics.begin(), dynamics.end(), [](const DynamicPtr& dynamic) {
-        return dynamic_cast<const Constraint*>(dynamic.get()) != nullptr;
-    });
-}
-
-bool is_closed_form(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+bool is_closed_form(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
     if (!options.group.empty() || forces_of(points)) return false;
-    return std::all_of(dynamics.begin(), dynamics.end(), [](const DynamicPtr& dynamic) {
-        if (const auto* force = dynamic_cast<const Force*>(dynamic.get())) {
-            const std::optional<Uniform> uniform = force->uniform();
-            return uniform && force->group.empty() && is_closed_form(uniform->linear);
-        }
-        // What else Solve takes to its points.
-        return !dynamic_cast<const Action*>(dynamic.get()) && !dynamic_cast<const Collider*>(dynamic.get()) &&
-               !dynamic_cast<const Constraint*>(dynamic.get());
+    if (!dynamics.actions().empty() || !dynamics.colliders().empty() || !dynamics.constraints().empty()) return false;
+    return std::all_of(dynamics.forces().begin(), dynamics.forces().end(), [](const auto& force) {
+        const std::optional<Uniform> uniform = force->uniform();
+        return uniform && force->group.empty() && is_closed_form(uniform->linear);
     });
 }
 
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options)
+SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
     if (points.empty()) return {};
@@ -862,9 +861,9 @@ SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const 
     return result;
 }
 
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Runs& runs)
+SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Runs& runs)
 {
-    RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0 && !couples(dynamics));
+    RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0 && dynamics.constraints().empty());
     return points.empty() ? SolveResult() : Step(points, dynamics, options, &runs).run();
 }
 

@@ -98,16 +98,13 @@ public:
 // Error: a velocity or position that is not finite before or after, with the point's id, or a force that is not, with
 // its node; a collider or force whose attribute is missing. Of several points the one nearest to the beginning of the
 // set is named.
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
+SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 // The same of points that nothing couples, where the ends of all blocks are handed to `runs`, and nothing else is done
 // to P, v, `force` and the dead. What is counted is of the first run of each; the deepest is of all.
-SolveResult solve(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, Runs& runs);
+SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Runs& runs);
 
 // Whether the ways of all points have a closed form for the whole frame, which sub-steps would only repeat.
-bool is_closed_form(const PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options);
-
-// Whether one of them makes the way of a point depend on others.
-bool couples(std::span<const DynamicPtr> dynamics);
+bool is_closed_form(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 }  // namespace rapid

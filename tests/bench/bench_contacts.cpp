@@ -296,11 +296,11 @@ constexpr int frames = 48;
 
 // Two seconds of the column under these contacts; after_frame is not timed.
 template <class F>
-PointSet collapse(benchmark::State& state, const Column& start, DynamicPtr contacts, int substeps, int iterations,
-                  const F& after_frame)
+PointSet collapse(benchmark::State& state, const Column& start, std::shared_ptr<const Constraint> contacts,
+                  int substeps, int iterations, const F& after_frame)
 {
     PointSet points = start.points;
-    std::vector<DynamicPtr> dynamics = {std::make_shared<test::UniformForce>(), std::move(contacts)};
+    Dynamics dynamics = test::chain(std::make_shared<test::UniformForce>(), contacts);
     const double w = start.width;
     for (const auto& [normal, offset] :
          {std::pair(Vec3d(0, 1, 0), 0.0), std::pair(Vec3d(1, 0, 0), 0.0), std::pair(Vec3d(-1, 0, 0), -3 * w),
@@ -309,7 +309,7 @@ PointSet collapse(benchmark::State& state, const Column& start, DynamicPtr conta
         wall->shape = make_plane(normal, offset);
         wall->bounce = 0.0f;
         wall->friction = 0.3f;
-        dynamics.push_back(wall);
+        dynamics.add(wall);
     }
     ShapeLoads loads;
     SolveOptions options;
@@ -360,7 +360,7 @@ void contacts_by(benchmark::State& state)
     const Column start(10000, false);
     double p99 = 0, worst = 0;
     for (auto _ : state) {
-        std::shared_ptr<Dynamic> contacts;
+        std::shared_ptr<const Constraint> contacts;
         if constexpr (jacobi) {
             const auto spheres = std::make_shared<JacobiSpheres>();
             spheres->options.friction = 0.3f;

@@ -18,7 +18,7 @@ namespace {
 using Arguments = std::map<std::string, Value>;
 
 // What the node adds to the points that travel down the chain.
-DynamicPtr force(const std::string& type, Arguments arguments)
+Dynamics force(const std::string& type, Arguments arguments)
 {
     static const Registry registry;
     const Node node{&registry.at(type), type + "1", {}, 0, {}, std::move(arguments)};
@@ -31,20 +31,20 @@ DynamicPtr force(const std::string& type, Arguments arguments)
     const Evaluation now{simulation->frame(2),    false,   node.name, node.location,
                          RandomKey(0, node.name), figures, warnings,  no_write};
     Flow input{PointSet(), {}, simulation};
-    return op->evaluate({&input, 1}, now).dynamics.at(0);
+    return op->evaluate({&input, 1}, now).dynamics;
 }
 
-using Scene = std::vector<DynamicPtr>;
-
-Scene air(Value linear, double quadratic)
+Dynamics air(Value linear, double quadratic)
 {
-    return {force("gravity", {}), force("drag", {{"linear", std::move(linear)}, {"quadratic", quadratic}}),
-            force("wind", {{"velocity", Vec3d(3, 0, 1)}, {"drag", 0.5}})};
+    Dynamics forces = force("gravity", {});
+    forces.merge(force("drag", {{"linear", std::move(linear)}, {"quadratic", quadratic}}));
+    forces.merge(force("wind", {{"velocity", Vec3d(3, 0, 1)}, {"drag", 0.5}}));
+    return forces;
 }
 
-Scene turbulence(double speed)
+Dynamics turbulence(double speed)
 {
-    return {force("turbulence", {{"amplitude", 5.0}, {"octaves", 3.0}, {"speed", speed}})};
+    return force("turbulence", {{"amplitude", 5.0}, {"octaves", 3.0}, {"speed", speed}});
 }
 
 // Points all over a cube, each with a rate of its own.
@@ -63,7 +63,7 @@ PointSet crowd(std::size_t count)
     return set;
 }
 
-void frames(benchmark::State& state, const Scene& forces)
+void frames(benchmark::State& state, const Dynamics& forces)
 {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     constexpr std::size_t count = 250'000;
@@ -80,7 +80,7 @@ void frames(benchmark::State& state, const Scene& forces)
 }
 
 // What telling the error costs: the shadows' part of the time of Solve, in percent.
-void error_estimate(benchmark::State& state, const Scene& forces)
+void error_estimate(benchmark::State& state, const Dynamics& forces)
 {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     PointSet set = crowd(static_cast<std::size_t>(state.range(0)));
@@ -108,7 +108,7 @@ void error_estimate(benchmark::State& state, const Scene& forces)
 }
 void error_in_turbulence(benchmark::State& state) { error_estimate(state, turbulence(0)); }
 
-void gravity_alone(benchmark::State& state) { frames(state, {force("gravity", {})}); }
+void gravity_alone(benchmark::State& state) { frames(state, force("gravity", {})); }
 void air_alike(benchmark::State& state) { frames(state, air(2.0, 0)); }
 void air_by_attribute(benchmark::State& state) { frames(state, air(AttributeRef{"rate"}, 0)); }
 void air_with_quadratic_drag(benchmark::State& state) { frames(state, air(2.0, 0.1)); }
@@ -116,8 +116,8 @@ void still_turbulence(benchmark::State& state) { frames(state, turbulence(0)); }
 void moving_turbulence(benchmark::State& state) { frames(state, turbulence(1)); }
 void turbulence_in_air(benchmark::State& state)
 {
-    Scene forces = air(2.0, 0);
-    forces.push_back(turbulence(0)[0]);
+    Dynamics forces = air(2.0, 0);
+    forces.merge(turbulence(0));
     frames(state, forces);
 }
 

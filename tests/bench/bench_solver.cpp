@@ -17,9 +17,7 @@
 namespace rapid {
 namespace {
 
-;
-
-DynamicPtr collider(const ShapePtr& shape, float bounce, float friction)
+std::shared_ptr<const Collider> collider(const ShapePtr& shape, float bounce, float friction)
 {
     auto made = std::make_shared<Collider>();
     made->shape = shape;
@@ -28,7 +26,10 @@ DynamicPtr collider(const ShapePtr& shape, float bounce, float friction)
     return made;
 }
 
-DynamicPtr ground(float friction = 0) { return collider(make_plane({0, 1, 0}, 0), 0.3f, friction); }
+std::shared_ptr<const Collider> ground(float friction = 0)
+{
+    return collider(make_plane({0, 1, 0}, 0), 0.3f, friction);
+}
 
 // 188,000 active voxels, one metre above the ground.
 const ShapePtr& ball()
@@ -52,10 +53,10 @@ PointSet points(std::size_t n, float height, float spread, float speed)
 
 // One frame of 1/24 s from the same state, again and again: on the number of threads that the benchmark's argument
 // says. What must be restored between frames is not counted.
-void advance(benchmark::State& state, PointSet start, std::vector<DynamicPtr> dynamics, int substeps = 1, int warm = 0)
+void advance(benchmark::State& state, PointSet start, Dynamics dynamics, int substeps = 1, int warm = 0)
 {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
-    dynamics.push_back(std::make_shared<test::UniformForce>());
+    dynamics.add(std::make_shared<test::UniformForce>());
     SolveOptions options;
     options.h = 1.0 / 24;
     options.substeps = substeps;
@@ -99,7 +100,7 @@ void fall_for(benchmark::State& state, int substeps, bool newborn)
         set.add({"dt", 1.0f / 24});
         set.column<float>("dt").write()[0] = 0.01f;
     }
-    const std::vector<DynamicPtr> dynamics = {std::make_shared<test::UniformForce>()};
+    const Dynamics dynamics = test::chain(std::make_shared<test::UniformForce>());
     SolveOptions options;
     options.h = 1.0 / 24;
     options.substeps = substeps;
@@ -113,30 +114,39 @@ void free_fall_rapid_with_newborn(benchmark::State& state) { fall_for(state, 1, 
 void nothing_to_hit(benchmark::State& state) { advance(state, points(million, 50, 10, 1), {}); }
 void far_from_level_set(benchmark::State& state)
 {
-    advance(state, points(million, 50, 10, 1), {collider(ball(), 0.4f, 0.2f)});
+    advance(state, points(million, 50, 10, 1), test::chain(collider(ball(), 0.4f, 0.2f)));
 }
 void far_from_level_set_and_ground(benchmark::State& state)
 {
-    advance(state, points(million, 50, 10, 1), {collider(ball(), 0.4f, 0.2f), ground()});
+    advance(state, points(million, 50, 10, 1), test::chain(collider(ball(), 0.4f, 0.2f), ground()));
 }
 void in_the_box_of_level_set(benchmark::State& state)
 {
-    advance(state, points(million, 2, 1.2f, 1), {collider(ball(), 0.4f, 0.2f)});
+    advance(state, points(million, 2, 1.2f, 1), test::chain(collider(ball(), 0.4f, 0.2f)));
 }
-void resting_on_ground(benchmark::State& state) { advance(state, points(million, 0, 10, 0), {ground()}, 1, 1); }
-void sliding_on_ground(benchmark::State& state) { advance(state, points(million, 0, 10, 1), {ground()}, 1, 1); }
+void resting_on_ground(benchmark::State& state)
+{
+    advance(state, points(million, 0, 10, 0), test::chain(ground()), 1, 1);
+}
+void sliding_on_ground(benchmark::State& state)
+{
+    advance(state, points(million, 0, 10, 1), test::chain(ground()), 1, 1);
+}
 void sliding_on_ground_with_friction(benchmark::State& state)
 {
-    advance(state, points(million, 0, 10, 10), {ground(0.1f)}, 1, 1);
+    advance(state, points(million, 0, 10, 10), test::chain(ground(0.1f)), 1, 1);
 }
 void sliding_on_ground_near_level_set(benchmark::State& state)
 {
-    advance(state, points(million, 0, 3, 1), {collider(ball(), 0.4f, 0.2f), ground()}, 1, 1);
+    advance(state, points(million, 0, 3, 1), test::chain(collider(ball(), 0.4f, 0.2f), ground()), 1, 1);
 }
-void falling_on_ground(benchmark::State& state) { advance(state, points(million, 0.2f, 0.2f, 1), {ground()}, 1, 4); }
+void falling_on_ground(benchmark::State& state)
+{
+    advance(state, points(million, 0.2f, 0.2f, 1), test::chain(ground()), 1, 4);
+}
 void falling_on_level_set(benchmark::State& state)
 {
-    advance(state, points(million, 4, 0.8f, 1), {collider(ball(), 0.4f, 0.2f), ground()}, 1, 8);
+    advance(state, points(million, 4, 0.8f, 1), test::chain(collider(ball(), 0.4f, 0.2f), ground()), 1, 8);
 }
 
 #define ON_1_AND_2_THREADS Arg(1)->Arg(2)->ArgName("threads")->UseRealTime()->Unit(benchmark::kMillisecond)

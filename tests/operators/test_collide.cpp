@@ -19,9 +19,8 @@ Flow collided(const Arguments& arguments)
 const Collider& collider_of(const Flow& flow)
 {
     REQUIRE(flow.dynamics.size() == 1);
-    const auto* collider = dynamic_cast<const Collider*>(flow.dynamics[0].get());
-    REQUIRE(collider);
-    return *collider;
+    REQUIRE(flow.dynamics.colliders().size() == 1);
+    return *flow.dynamics.colliders()[0];
 }
 
 TEST_CASE("collide changes no point, and adds its shape to what Solve applies", "[collide]")

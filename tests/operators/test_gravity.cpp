@@ -8,9 +8,8 @@ using test::NodeTest;
 const Force& force_of(const Flow& flow)
 {
     REQUIRE(flow.dynamics.size() == 1);
-    const auto* force = dynamic_cast<const Force*>(flow.dynamics[0].get());
-    REQUIRE(force);
-    return *force;
+    REQUIRE(flow.dynamics.forces().size() == 1);
+    return *flow.dynamics.forces()[0];
 }
 
 TEST_CASE("gravity changes no point, and adds one acceleration for all", "[gravity]")

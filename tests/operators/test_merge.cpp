@@ -1,5 +1,6 @@
 #include "runtime/graph/adopted_ids.h"
 #include "tests/operators/graph_test.h"
+#include "tests/solver/motion/uniform_force.h"
 
 namespace rapid {
 
@@ -110,10 +111,11 @@ TEST_CASE("uniform columns of one value stay uniform", "[merge]")
 TEST_CASE("forces of both inputs travel on, those that came by both once", "[merge]")
 {
     const auto one = simulation();
-    const auto make = [] { return std::make_shared<Dynamic>(); };
-    const DynamicPtr shared = make(), left = make(), right = make();
-    const Flow merged = NodeTest("merge", {}).evaluate(2, {{{}, {shared, left}, one}, {{}, {shared, right}, one}});
-    CHECK(merged.dynamics == std::vector<DynamicPtr>{shared, left, right});
+    const auto make = [] { return std::make_shared<Collider>(); };
+    const auto shared = make(), left = make(), right = make();
+    const auto merged = NodeTest("merge", {})
+                            .evaluate(2, {{{}, test::chain(shared, left), one}, {{}, test::chain(shared, right), one}});
+    CHECK(merged.dynamics.colliders() == Dynamics::List<Collider>{shared, left, right});
 }
 
 TEST_CASE("the initial points of all inputs are there at the first frame", "[merge]")

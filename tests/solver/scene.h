@@ -29,7 +29,7 @@ private:
 class Scene {
 public:
     PointSet points;
-    std::vector<DynamicPtr> dynamics;
+    Dynamics dynamics;
     SolveOptions options;
     SleepMemory beds;
     SolveResult last;              // of the last frame
@@ -40,7 +40,7 @@ public:
 
     Scene& gravity(const Vec3d& g = {0, -9.81, 0})
     {
-        dynamics.push_back(std::make_shared<UniformForce>(g));
+        dynamics.add(std::make_shared<UniformForce>(g));
         return *this;
     }
     template <class F>
@@ -48,7 +48,7 @@ public:
     {
         auto made = std::make_shared<LocalForce<F>>(std::move(f));
         made->node = "push1";
-        dynamics.push_back(std::move(made));
+        dynamics.add(std::move(made));
         return *this;
     }
     Scene& collide(ShapePtr shape, PerPoint<float> bounce = 0.5f, PerPoint<float> friction = 0.0f,
@@ -60,7 +60,7 @@ public:
         collider->bounce = std::move(bounce);
         collider->friction = std::move(friction);
         collider->group = group;
-        dynamics.push_back(std::move(collider));
+        dynamics.add(std::move(collider));
         return *this;
     }
     Scene& floor(float bounce = 0.5f, float friction = 0.0f)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/solver/motion/uniform_force.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -13,7 +14,7 @@ namespace {
 
 constexpr double h = 1.0 / 24;
 
-DynamicPtr among(double radius, float separation, float cohesion, float alignment, float drag)
+Dynamics among(double radius, float separation, float cohesion, float alignment, float drag)
 {
     auto interaction = std::make_shared<Interaction>();
     interaction->radius = radius;
@@ -21,7 +22,7 @@ DynamicPtr among(double radius, float separation, float cohesion, float alignmen
     interaction->cohesion = cohesion;
     interaction->alignment = alignment;
     interaction->drag = drag;
-    return interaction;
+    return test::chain(interaction);
 }
 
 PointSet points_at(std::span<const Vec3f> P, std::span<const Vec3f> v)
@@ -30,13 +31,13 @@ PointSet points_at(std::span<const Vec3f> P, std::span<const Vec3f> v)
 }
 
 // A frame as Solve takes it: a kick, the way, a kick.
-void advance(PointSet& points, const DynamicPtr& interaction, double frame = h)
+void advance(PointSet& points, const Dynamics& interaction, double frame = h)
 {
     SolveOptions options;
     options.h = frame;
-    interact(points, {&interaction, 1}, options);
+    interact(points, interaction, options);
     solve(points, {}, options);
-    interact(points, {&interaction, 1}, options);
+    interact(points, interaction, options);
 }
 
 PointSet cloud(std::size_t n, float size, float speed)
@@ -79,10 +80,10 @@ TEST_CASE("two points that move past each other come to their mean velocity at t
     const float rate = GENERATE(0.5f, 5.0f, 1e6f);
     // In one place, so that each weighs 1 on the other.
     PointSet points = points_at(std::vector<Vec3f>{{0, 0, 0}, {0, 0, 0}}, std::vector<Vec3f>{{3, 1, 0}, {1, 1, 0}});
-    const DynamicPtr interaction = among(1, 0, 0, rate, 0);
+    const Dynamics interaction = among(1, 0, 0, rate, 0);
     SolveOptions options;
     options.h = h;
-    interact(points, {&interaction, 1}, options);
+    interact(points, interaction, options);
     CHECK(points.v()[0].x() == Approx(2 + std::exp(-rate * h)));  // half the frame
     CHECK(points.v()[1].x() == Approx(2 - std::exp(-rate * h)));
     CHECK(points.v()[0].y() == 1);
@@ -91,10 +92,10 @@ TEST_CASE("two points that move past each other come to their mean velocity at t
 TEST_CASE("drag takes what two points approach by, and leaves what turns them about each other", "[interaction]")
 {
     PointSet points = points_at(std::vector<Vec3f>{{0, 0, 0}, {0.5, 0, 0}}, std::vector<Vec3f>{{1, 2, 0}, {-1, -2, 0}});
-    const DynamicPtr interaction = among(1, 0, 0, 0, 1e6f);
+    const Dynamics interaction = among(1, 0, 0, 0, 1e6f);
     SolveOptions options;
     options.h = h;
-    interact(points, {&interaction, 1}, options);
+    interact(points, interaction, options);
     // Half a weight takes half of it, however strong; their way is along x.
     CHECK(points.v()[0].x() == Approx(0.5));
     CHECK(points.v()[1].x() == Approx(-0.5));
@@ -128,7 +129,7 @@ TEST_CASE("two points that attract each other swing through their middle, of sec
     const auto half_gap_after = [](int frames) {
         PointSet points =
             points_at(std::vector<Vec3f>{{-0.3f, 0, 0}, {0.3f, 0, 0}}, std::vector<Vec3f>{{0, 0.3f, 0}, {0, -0.3f, 0}});
-        const DynamicPtr interaction = among(2, 0, 1, 0, 0);
+        const Dynamics interaction = among(2, 0, 1, 0, 0);
         for (int f = 0; f < frames; ++f) advance(points, interaction, 1.0 / frames);
         return Vec3d(points.P()[1].cast<double>());
     };
@@ -144,10 +145,10 @@ TEST_CASE("momentum is kept by any interaction of unequal masses and ages", "[in
     const auto dt = points.column<float>("dt").write();
     for (std::size_t i = 0; i < points.size(); i += 3) dt[i] = static_cast<float>(h * 0.001 * double(i));
     const Vec3d before = momentum(points);
-    const DynamicPtr interaction = among(0.4, 30, 20, 7, 5);
+    const Dynamics interaction = among(0.4, 30, 20, 7, 5);
     SolveOptions options;
     options.h = h;
-    interact(points, {&interaction, 1}, options);
+    interact(points, interaction, options);
     // Each velocity is rounded to single precision once.
     CHECK((momentum(points) - before).norm() < 500 * 3 * 4 * 0x1p-24);
 }
@@ -156,12 +157,12 @@ TEST_CASE("alignment and drag only ever take energy, at any rate", "[interaction
 {
     const float rate = GENERATE(1e-3f, 1.0f, 100.0f, 1e9f);
     PointSet points = cloud(300, 0.5f, 2);
-    const DynamicPtr interaction = among(0.6, 0, 0, rate, rate);
+    const Dynamics interaction = among(0.6, 0, 0, rate, rate);
     SolveOptions options;
     options.h = h;
     for (int kick = 0; kick < 20; ++kick) {
         const double before = energy(points);
-        interact(points, {&interaction, 1}, options);
+        interact(points, interaction, options);
         CHECK(energy(points) <= before * (1 + 1e-6));
     }
 }
@@ -171,7 +172,7 @@ TEST_CASE("no strength flings points about: a crowd that is driven apart leaves 
 {
     const float strength = GENERATE(1.0f, 1e4f, 1e12f);
     PointSet points = cloud(200, 0.2f, 0);
-    const DynamicPtr interaction = among(0.5, strength, strength, 0, 0);
+    const Dynamics interaction = among(0.5, strength, strength, 0, 0);
     for (int frame = 0; frame < 200; ++frame) advance(points, interaction);
     for (std::size_t i = 0; i < points.size(); ++i) {
         REQUIRE(points.v()[i].allFinite());

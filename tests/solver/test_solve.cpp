@@ -82,7 +82,7 @@ TEST_CASE("a force acts on its group, and on nobody where the group is unknown",
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).group("heavy", {1}));
     auto force = std::make_shared<test::UniformForce>(Vec3d(0, -g, 0));
     force->group = GENERATE("heavy", "missing");
-    scene.dynamics.push_back(force);
+    scene.dynamics.add(force);
     scene.frame_length(1).run(1);
 
     CHECK(scene.P(0) == Vec3d(0, 0, 0));

@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "runtime/points/members.h"
-#include "runtime/solver/interaction.h"
 
 namespace rapid {
 namespace {
 
 // J/kg; nothing where there is no such energy.
-std::optional<std::vector<double>> energies_of(const PointSet& points, std::span<const DynamicPtr> dynamics)
+std::optional<std::vector<double>> energies_of(const PointSet& points, const Dynamics& dynamics)
 {
     std::vector<Vec3d> P(points.size()), v(points.size());
     const Strided<Vec3f> P_of_points = points.P().read(), v_of_points = points.v().read();
@@ -22,9 +21,7 @@ std::optional<std::vector<double>> energies_of(const PointSet& points, std::span
     const Chunk chunk{points, 0, P, v, none, none, 0};
     std::vector<double> energies(points.size()), potential;
     for (std::size_t i = 0; i < points.size(); ++i) energies[i] = 0.5 * v[i].squaredNorm();
-    for (const DynamicPtr& dynamic : dynamics) {
-        const auto* force = dynamic_cast<const Force*>(dynamic.get());
-        if (!force) continue;
+    for (const std::shared_ptr<const Force>& force : dynamics.forces()) {
         potential.assign(points.size(), 0);
         if (!force->add_potential(chunk, potential)) return std::nullopt;
         const Strided<std::uint8_t> members = members_of(points, force->group);
@@ -34,24 +31,22 @@ std::optional<std::vector<double>> energies_of(const PointSet& points, std::span
     return energies;
 }
 
-// Those that change velocities by more than the slope of a potential.
-bool spends_energy(const DynamicPtr& dynamic)
+// Whether velocities change by more than the slope of a potential.
+bool spend_energy(const Dynamics& dynamics)
 {
-    return dynamic_cast<const Action*>(dynamic.get()) || dynamic_cast<const Constraint*>(dynamic.get()) ||
-           dynamic_cast<const Interaction*>(dynamic.get());
+    return !dynamics.actions().empty() || !dynamics.constraints().empty() || !dynamics.interactions().empty();
 }
 
 }  // namespace
 
-void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, std::span<const DynamicPtr> dynamics,
-                        SolveOptions& options)
+void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, const Dynamics& dynamics, SolveOptions& options)
 {
     before_.clear();
     places_.clear();
     meets_ = false;
     const auto* force = points.find<Vec3f>("force");
     const bool forced = force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero());
-    defined_ = !forced && std::none_of(dynamics.begin(), dynamics.end(), spends_energy);
+    defined_ = !forced && !spend_energy(dynamics);
     if (!defined_) return;
     if (!shadows.idle()) places_.assign(shadows.places().begin(), shadows.places().end());
     auto energies = energies_of(shadows.idle() ? points.select({}) : shadows.before(), dynamics);
@@ -69,8 +64,7 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, std::spa
     }
     drift_ = std::move(drift);
     ids_.assign(shadows.ids().begin(), shadows.ids().end());
-    const auto is_collider = [](const DynamicPtr& dynamic) { return dynamic_cast<const Collider*>(dynamic.get()); };
-    if (std::none_of(dynamics.begin(), dynamics.end(), is_collider)) return;
+    if (dynamics.colliders().empty()) return;
     // Nobody looks at the others'.
     met_.resize(points.size());
     for (const std::uint32_t place : places_) met_[place] = 0;
@@ -79,7 +73,7 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, std::spa
 }
 
 std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, const Shadows& shadows,
-                                                    std::span<const DynamicPtr> dynamics)
+                                                    const Dynamics& dynamics)
 {
     if (!defined_) {
         drift_.assign(drift_.size(), 0);

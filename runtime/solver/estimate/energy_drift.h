@@ -20,13 +20,11 @@ class EnergyDrift {
 public:
     // Before Solve, when the shadows have begun. Where there is something to measure, `options` are told to note who
     // meets a shape.
-    void begin(const PointSet& points, const Shadows& shadows, std::span<const DynamicPtr> dynamics,
-               SolveOptions& options);
+    void begin(const PointSet& points, const Shadows& shadows, const Dynamics& dynamics, SolveOptions& options);
 
     // After Solve and the shadows' advance: of each point that has a shadow, in order of id, J/kg. Nothing where it is
     // not defined.
-    std::optional<std::vector<double>> end(const PointSet& solved, const Shadows& shadows,
-                                           std::span<const DynamicPtr> dynamics);
+    std::optional<std::vector<double>> end(const PointSet& solved, const Shadows& shadows, const Dynamics& dynamics);
 
 private:
     std::vector<std::int64_t> ids_;  // ascending

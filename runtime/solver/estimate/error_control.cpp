@@ -319,13 +319,11 @@ std::unique_ptr<BlockRuns> Pass::begin() { return std::make_unique<Block>(*this)
 // What solve_within() does, in one call of it.
 class SolveWithin {
 public:
-    SolveWithin(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options, double tolerance,
+    SolveWithin(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
                 int max_substeps)
-        : points_(points),
-          dynamics_(dynamics),
-          options_(options),
-          asked_{tolerance, options.substeps, max_substeps,
-                 options.h, options.met,      std::none_of(dynamics.begin(), dynamics.end(), writes_more)}
+        : points_(points), dynamics_(dynamics), options_(options), asked_{tolerance,    options.substeps,
+                                                                          max_substeps, options.h,
+                                                                          options.met,  !writes_more(dynamics)}
     {
         done_.substeps = options.substeps;
     }
@@ -347,11 +345,12 @@ public:
     }
 
 private:
-    // Whether it writes more of points than their P and v.
-    static bool writes_more(const DynamicPtr& dynamic)
+    // Whether they write more of the points than P and v.
+    static bool writes_more(const Dynamics& dynamics)
     {
-        const auto* collider = dynamic_cast<const Collider*>(dynamic.get());
-        return dynamic_cast<const Action*>(dynamic.get()) || (collider && collider->record);
+        return !dynamics.actions().empty() ||
+               std::any_of(dynamics.colliders().begin(), dynamics.colliders().end(),
+                           [](const auto& collider) { return collider->record.has_value(); });
     }
 
     // All of the set at once, then all that is left of it, and so on.
@@ -441,7 +440,7 @@ private:
     }
 
     PointSet& points_;
-    const std::span<const DynamicPtr> dynamics_;
+    const Dynamics& dynamics_;
     const SolveOptions& options_;
     const Asked asked_;
 
@@ -451,8 +450,8 @@ private:
 
 }  // namespace
 
-Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
-                       double tolerance, int max_substeps)
+Tolerated solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
+                       int max_substeps)
 {
     return SolveWithin(points, dynamics, options, tolerance, max_substeps).run();
 }

@@ -30,7 +30,7 @@ struct Tolerated {
 
 // Solves with the sub-steps that each point needs by itself for an error of at most `tolerance` (m): a multiple of
 // options.substeps by a power of 2, up to max_substeps.
-Tolerated solve_within(PointSet& points, std::span<const DynamicPtr> dynamics, const SolveOptions& options,
-                       double tolerance, int max_substeps);
+Tolerated solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
+                       int max_substeps);
 
 }  // namespace rapid

@@ -235,7 +235,7 @@ double apart(const PointSet& a, const PointSet& b)
     return worst;
 }
 
-Stiffness::Cure cure_of(const PointSet& points, std::span<const DynamicPtr> pulls, SolveOptions options, int substeps)
+Stiffness::Cure cure_of(const PointSet& points, const Dynamics& pulls, SolveOptions options, int substeps)
 {
     options.loads = nullptr;
     const auto solved = [&](int steps) {
@@ -248,45 +248,52 @@ Stiffness::Cure cure_of(const PointSet& points, std::span<const DynamicPtr> pull
     return {apart(as_it_is, right), substeps, apart(then, right)};
 }
 
-bool pulls(const DynamicPtr& dynamic)
+Dynamics forces_and_actions_of(const Dynamics& dynamics)
 {
-    return dynamic_cast<const Force*>(dynamic.get()) || dynamic_cast<const Action*>(dynamic.get());
+    Dynamics pulls;
+    dynamics.visit_in_order([&]<class T>(const std::shared_ptr<const T>& dynamic) {
+        if constexpr (std::is_same_v<T, Force> || std::is_same_v<T, Action>) pulls.add(dynamic);
+    });
+    return pulls;
 }
 
 }  // namespace
 
-std::vector<Stiffness> find_stiff(const PointSet& points, std::span<const DynamicPtr> dynamics,
-                                  const SolveOptions& options)
+std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
-    std::vector<DynamicPtr> forces;
-    std::copy_if(dynamics.begin(), dynamics.end(), std::back_inserter(forces), pulls);
+    const Dynamics pulls = forces_and_actions_of(dynamics);
     std::vector<std::uint32_t> places = sample_of(points, options.group);
     if (const auto* own = points.find<float>("dt"))  // those born at the frame's end take no step
         std::erase_if(places, [&](std::uint32_t place) { return !((*own)[place] > 0); });
-    if (forces.empty() || places.empty()) return {};
+    if (pulls.empty() || places.empty()) return {};
 
     const Sample sample(points, places, options);
     std::vector<Stiffness> all;
     std::vector<double> inexact(sample.size(), 0);
     double worst = 0;
-    for (const DynamicPtr& dynamic : forces) {
-        const auto* action = dynamic_cast<const Action*>(dynamic.get());
+    const auto look_at = [&](const auto& pull, const std::string& name) {
         std::optional<Found> found;
         try {
-            found = action ? ask(*action, sample) : ask(static_cast<const Force&>(*dynamic), sample);
+            found = ask(pull, sample);
         } catch (const Error&) {
-            continue;  // what is wrong with it the step itself tells, of a point that is there
+            return;  // the step itself reports it
         }
         for (Stiffness& stiffness : found->told()) {
-            stiffness.node = action ? fmt::format("action \"{}\"", dynamic->node) : dynamic->node;
+            stiffness.node = name;
             stiffness.substeps = options.substeps;
             stiffness.frame = options.frame;
             if (!stiffness.is_exact()) worst = std::max(worst, stiffness.step);
             all.push_back(std::move(stiffness));
         }
         for (std::size_t i = 0; i < sample.size(); ++i) inexact[i] = std::max(inexact[i], found->inexact(i));
-    }
-    if (worst == 0 || couples(dynamics)) return all;
+    };
+    pulls.visit_in_order([&]<class T>(const std::shared_ptr<const T>& pull) {
+        if constexpr (std::is_same_v<T, Force>)
+            look_at(*pull, pull->node);
+        else if constexpr (std::is_same_v<T, Action>)
+            look_at(*pull, fmt::format("action \"{}\"", pull->node));
+    });
+    if (worst == 0 || !dynamics.constraints().empty()) return all;
 
     std::vector<std::uint32_t> stiffest(sample.size());
     for (std::size_t i = 0; i < stiffest.size(); ++i) stiffest[i] = static_cast<std::uint32_t>(i);
@@ -294,7 +301,7 @@ std::vector<Stiffness> find_stiff(const PointSet& points, std::span<const Dynami
                      [&](std::uint32_t a, std::uint32_t b) { return inexact[a] > inexact[b]; });
     stiffest.resize(std::min(stiffest.size(), most_solved));
     try {
-        const Stiffness::Cure cure = cure_of(sample.set.select(stiffest), forces, options, proposed(options, worst));
+        const Stiffness::Cure cure = cure_of(sample.set.select(stiffest), pulls, options, proposed(options, worst));
         for (Stiffness& stiffness : all)
             if (!stiffness.is_exact()) stiffness.cure = cure;
     } catch (const Error&) {  // it blows up: then the run says so

@@ -46,8 +46,7 @@ struct Stiffness {
 };
 
 // Of the points as they are before Solve, in the order of the chain; what is not stiff is left out. Changes nothing.
-std::vector<Stiffness> find_stiff(const PointSet& points, std::span<const DynamicPtr> dynamics,
-                                  const SolveOptions& options);
+std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 // Of all that was found of a node the worst.
 void keep_worst(std::vector<Stiffness>& worst, const std::vector<Stiffness>& found);

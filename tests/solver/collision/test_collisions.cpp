@@ -371,9 +371,9 @@ TEST_CASE("a collider's radius is pscale unless it is given", "[collide]")
     scene.gravity().floor(0);
     const bool given = GENERATE(false, true);
     if (given) {
-        auto collider = std::make_shared<Collider>(static_cast<const Collider&>(*scene.dynamics.back()));
+        auto collider = std::make_shared<Collider>(*scene.dynamics.colliders().back());
         collider->radius = PerPoint<float>::of("size");
-        scene.dynamics.back() = collider;
+        scene.dynamics.replace_collider(0, collider);
     }
     scene.run(48);
     CHECK(scene.P(0).y() == (given ? 0.125 : 0.25));

@@ -32,7 +32,7 @@ public:
         spheres->node = "contact1";
         spheres->options.bounce = bounce;
         spheres->options.friction = friction;
-        dynamics.push_back(spheres);
+        dynamics.add(spheres);
     }
 
     Vec3d momentum() const

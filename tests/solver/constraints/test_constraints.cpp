@@ -32,7 +32,7 @@ Scene chain(std::size_t n, double link, double compliance, float mass = 1)
         at.emplace_back(0.0f, static_cast<float>(-link * static_cast<double>(k)), 0.0f);
     Scene scene(points(at).set<float>("mass", masses));
     scene.gravity();
-    scene.dynamics.push_back(rods(links_of_chain(static_cast<std::int64_t>(n)), link, compliance));
+    scene.dynamics.add(rods(links_of_chain(static_cast<std::int64_t>(n)), link, compliance));
     return scene;
 }
 
@@ -79,7 +79,7 @@ TEST_CASE("a pendulum has the period of the closed form, to second order, and ke
         Scene scene(points({{0, 0, 0}, {static_cast<float>(std::sin(angle)), static_cast<float>(-std::cos(angle)), 0}})
                         .set<float>("mass", {immovable, 1}));
         scene.gravity().substeps(substeps).frame_length(1.0 / 96);
-        scene.dynamics.push_back(rods({{0, 1}}, length));
+        scene.dynamics.add(rods({{0, 1}}, length));
         const double time = time_of_passage(scene, 9);  // a quarter, and four periods
         CHECK(scene.P(1).norm() == Approx(length).margin(1e-4));
         return std::abs(time - 4.25 * period);
@@ -99,7 +99,7 @@ TEST_CASE("a spring is stretched by its load, whatever the steps and iterations"
     Scene scene(points({{0, 0, 0}, {0, static_cast<float>(-1 - stretch), 0}}).set<float>("mass", {immovable, 2}));
     scene.gravity().substeps(substeps);
     scene.options.iterations = iterations;
-    scene.dynamics.push_back(rods({{0, 1}}, 1, compliance));
+    scene.dynamics.add(rods({{0, 1}}, 1, compliance));
     come_to_rest(scene, 240);
     // By rounding of P and v once a frame.
     CHECK(-scene.P(1).y() == Approx(1 + stretch).margin(2e-6));
@@ -145,7 +145,7 @@ TEST_CASE("rods keep the momentum, and a dumbbell its angular momentum to second
     const auto lost_with = [&](int substeps) {
         Scene scene(points({{-0.5f, 0, 0}, {0.5f, 0, 0}}).v({{0, -3, 1}, {0, 1, 1}}).set<float>("mass", {1, 3}));
         scene.substeps(substeps).frame_length(1.0 / 24);
-        scene.dynamics.push_back(rods({{0, 1}}, 1));
+        scene.dynamics.add(rods({{0, 1}}, 1));
         const auto momentum = [&] { return Vec3d(scene.v(0) + 3 * scene.v(1)); };
         const auto spin = [&] { return Vec3d(scene.P(0).cross(scene.v(0)) + 3 * scene.P(1).cross(scene.v(1))); };
         const Vec3d p = momentum(), L = spin();
@@ -177,7 +177,7 @@ TEST_CASE("a net, which no tree is, comes to the same bits on any number of thre
             }
         Scene scene(points(at).set<float>("mass", masses));
         scene.gravity().substeps(4).floor();
-        scene.dynamics.push_back(rods(pairs, 0.1));
+        scene.dynamics.add(rods(pairs, 0.1));
         scene.run(6);
         CHECK(scene.last.residual.rows == pairs.size());
         return scene.points;
@@ -198,8 +198,8 @@ TEST_CASE("a spring under drag is stretched by its load all the same", "[constra
     const double compliance = 1e-2;
     Scene scene(points({{0, 0, 0}, {0, -1, 0}}).set<float>("mass", {immovable, 2}));
     scene.gravity();
-    scene.dynamics.push_back(std::make_shared<Drag>());
-    scene.dynamics.push_back(rods({{0, 1}}, 1, compliance));
+    scene.dynamics.add(std::make_shared<Drag>());
+    scene.dynamics.add(rods({{0, 1}}, 1, compliance));
     scene.run(480);
     CHECK(-scene.P(1).y() == Approx(1 + compliance * 2 * g).margin(2e-6));
 }
@@ -210,7 +210,7 @@ TEST_CASE("what a rod pushes into the ground lies on it", "[constraints]")
     Scene scene(points({{0, 0.1f, 0}, {0, 1.1f, 0}}).set<float>("mass", {1, 2}).set<float>("pscale", {0.1f, 0.1f}));
     scene.gravity().floor(0).substeps(4);
     scene.options.iterations = 20;
-    scene.dynamics.push_back(rods({{0, 1}}, 1));
+    scene.dynamics.add(rods({{0, 1}}, 1));
     scene.run(48);
     CHECK(scene.P(0).y() >= 0.1f);
     CHECK_THAT(scene.P(0), close_to(Vec3d(0, 0.1, 0), 1e-6));
@@ -222,7 +222,7 @@ TEST_CASE("what a rod pushes into the ground lies on it", "[constraints]")
 TEST_CASE("a mass of 0 is refused, with the point", "[constraints]")
 {
     Scene scene(points({{0, 0, 0}, {0, -1, 0}}).set<float>("mass", {0, 1}));
-    scene.dynamics.push_back(rods({{0, 1}}, 1));
+    scene.dynamics.add(rods({{0, 1}}, 1));
     std::string text;
     try {
         scene.run(1);

@@ -141,7 +141,7 @@ TEST_CASE("up is against what pulls all points, for mass scaling: not those of a
     beside.points.group("balloon") = Column<std::uint8_t>(std::span<const std::uint8_t>(members));
     const auto lift = std::make_shared<test::UniformForce>(Vec3d(0, 20, 0));
     lift->group = "balloon";
-    beside.dynamics.push_back(lift);
+    beside.dynamics.add(lift);
     alone.run(12);
     beside.run(12);
     for (std::size_t i = 0; i < n; ++i) CHECK_THAT(beside.P(i), close_to(alone.P(i), 1e-6));

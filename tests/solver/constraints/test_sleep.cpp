@@ -172,7 +172,11 @@ TEST_CASE("a sleeper whose support is gone falls", "[sleep]")
         Granular scene = asleep_on_floor({{0, r, 0}});
         scene.sleep().run(12);
         REQUIRE(scene.last.asleep == 1);
-        std::erase_if(scene.dynamics, [](const DynamicPtr& d) { return dynamic_cast<const Collider*>(d.get()); });
+        Dynamics without;
+        scene.dynamics.visit_in_order([&]<class T>(const std::shared_ptr<const T>& dynamic) {
+            if constexpr (!std::is_same_v<T, Collider>) without.add(dynamic);
+        });
+        scene.dynamics = without;
         scene.run(1);
         CHECK(scene.v().y() == Approx(-g / 24).epsilon(1e-4));
     }
@@ -222,9 +226,9 @@ TEST_CASE("a sleeper on a slope slides when the slope's friction is taken away",
     scene.gravity().collide(make_plane(n, 0), 0.0f, 0.5f).substeps(8);
     scene.sleep().run(12);
     REQUIRE(scene.last.asleep == 1);
-    auto smooth = std::make_shared<Collider>(dynamic_cast<const Collider&>(*scene.dynamics.back()));
+    auto smooth = std::make_shared<Collider>(*scene.dynamics.colliders().back());
     smooth->friction = 0.0f;
-    scene.dynamics.back() = smooth;
+    scene.dynamics.replace_collider(0, smooth);
     scene.run(1);
     CHECK(scene.v().norm() == Approx(g * std::sin(angle) / 24).epsilon(1e-4));
 }

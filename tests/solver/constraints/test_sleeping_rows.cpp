@@ -54,8 +54,8 @@ Scene rope(std::size_t links, double compliance = 0)
         at.emplace_back(0.06f * static_cast<float>(k), -0.08f * static_cast<float>(k), 0.0f);
     Scene scene(points(at).set<float>("mass", masses));
     scene.gravity().substeps(8);
-    scene.dynamics.push_back(std::make_shared<Drag>(5));
-    scene.dynamics.push_back(rods(links_of_chain(static_cast<std::int64_t>(links)), 0.1, compliance));
+    scene.dynamics.add(std::make_shared<Drag>(5));
+    scene.dynamics.add(rods(links_of_chain(static_cast<std::int64_t>(links)), 0.1, compliance));
     return scene;
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("a pendulum of a long period never falls asleep, and keeps its phase",
                      0);
     Scene scene(points({{0, static_cast<float>(length), 0}, from}).set<float>("mass", {immovable, 1}));
     scene.gravity().substeps(substeps).sleep();
-    scene.dynamics.push_back(rods({{0, 1}}, (scene.P(0) - scene.P(1)).norm()));
+    scene.dynamics.add(rods({{0, 1}}, (scene.P(0) - scene.P(1)).norm()));
     double off = 0;
     std::uint64_t asleep = 0;
     for (int frame = 0; frame < 2400; ++frame) {  // 100 s: five periods
@@ -189,8 +189,8 @@ TEST_CASE("two ropes that hang from one immovable point sleep each by itself", "
 {
     Scene scene(points({{0, 0, 0}, {0.1f, 0, 0}, {-0.1f, 0, 0}}).set<float>("mass", {immovable, 1, 1}));
     scene.gravity().substeps(8);
-    scene.dynamics.push_back(std::make_shared<Drag>(5));
-    scene.dynamics.push_back(rods({{0, 1}, {0, 2}}, 0.1));
+    scene.dynamics.add(std::make_shared<Drag>(5));
+    scene.dynamics.add(rods({{0, 1}, {0, 2}}, 0.1));
     fall_asleep(scene, 2);
     scene.points.v().write()[1] = Vec3f(0.1f, 0, 0);
     scene.run(1);
@@ -202,7 +202,7 @@ TEST_CASE("points of rows whose kind does not say that it rests stay awake", "[s
 {
     Scene scene(points({{0, 0, 0}, {0, -0.1f, 0}}).set<float>("mass", {immovable, 1}));
     scene.gravity().substeps(8).sleep();
-    scene.dynamics.push_back(rods<Restless>({{0, 1}}, 0.1));
+    scene.dynamics.add(rods<Restless>({{0, 1}}, 0.1));
     scene.run(48);
     CHECK(scene.last.asleep == 0);
     CHECK(scene.v(1).norm() < 1e-6);
@@ -227,8 +227,8 @@ Granular net(std::int64_t n, const Vec3f& ball)
     radius.push_back(0.1f);
     Granular scene(points(at).set<float>("mass", masses).set<float>("pscale", radius));
     scene.gravity().substeps(12);
-    scene.dynamics.push_back(std::make_shared<Drag>(3));
-    scene.dynamics.push_back(rods(pairs, 0.1));
+    scene.dynamics.add(std::make_shared<Drag>(3));
+    scene.dynamics.add(rods(pairs, 0.1));
     return scene;
 }
 
@@ -273,7 +273,7 @@ Granular dumbbells(std::int64_t n, std::int64_t side)
     const double w = 4.6 * r * static_cast<double>(side);
     scene.collide(make_plane({1, 0, 0}, 0), 0.0f, 0.4f).collide(make_plane({-1, 0, 0}, -w), 0.0f, 0.4f);
     scene.collide(make_plane({0, 0, 1}, 0), 0.0f, 0.4f).collide(make_plane({0, 0, -1}, -w), 0.0f, 0.4f);
-    scene.dynamics.push_back(rods(pairs, 2 * r));
+    scene.dynamics.add(rods(pairs, 2 * r));
     scene.sleep();
     return scene;
 }

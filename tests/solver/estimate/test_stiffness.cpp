@@ -34,7 +34,7 @@ std::vector<Stiffness> found_in(const Scene& scene) { return find_stiff(scene.po
 Scene with(double k, double w2, double c = 0)
 {
     Scene scene(points({{1, 2, 0}}).v({{0, 3, 4}}));
-    scene.dynamics.push_back(std::make_shared<LinearForce>(k, w2, c));
+    scene.dynamics.add(std::make_shared<LinearForce>(k, w2, c));
     return scene;
 }
 
@@ -138,7 +138,7 @@ TEST_CASE("only the points that a force acts on are asked, each for its own time
                        .group("held", {0, 1});
     Scene scene(set);
     auto force = std::make_shared<LinearForce>(500, 0);
-    scene.dynamics.push_back(force);
+    scene.dynamics.add(force);
     CHECK(found_in(scene).at(0).step == Approx(20));
     force->group = "held";
     CHECK(found_in(scene).at(0).step == Approx(5));

@@ -179,7 +179,7 @@ TEST_CASE("points in air and points among shapes there go the same way", "[fall]
         PointSet set = test::points(crowd.P);
         std::copy(crowd.v.begin(), crowd.v.end(), set.v().write().begin());
         Scene scene(std::move(set));
-        scene.dynamics.push_back(std::make_shared<Air>());
+        scene.dynamics.add(std::make_shared<Air>());
         scene.collide(make_plane(normal, -100)).substeps(substeps);
         return scene.run(4).points;
     };

@@ -1,4 +1,4 @@
-// Gravity for tests and benchmarks of the solver alone.
+// Gravity, and chains of dynamics, for tests and benchmarks of the solver alone.
 #pragma once
 
 #include "runtime/solver/dynamics.h"
@@ -14,5 +14,14 @@ public:
 private:
     Vec3d a_;
 };
+
+// The dynamics of a chain that adds these, in this order.
+template <class... D>
+Dynamics chain(const D&... added)
+{
+    Dynamics dynamics;
+    (dynamics.add(added), ...);
+    return dynamics;
+}
 
 }  // namespace rapid::test

@@ -7,6 +7,7 @@
 
 #include "runtime/graph/at_node.h"
 #include "runtime/graph/point_edit.h"
+#include "runtime/graph/undeclared_columns.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -115,7 +116,7 @@ void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
         // Whoever is told of each result is told of each node by itself.
-        if (!result_) last = plan_.last_together(first);
+        if (!result_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);
     }
     before.go_on(std::move(frame.figures));
@@ -170,6 +171,10 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
     const Evaluation& evaluation = *told.evaluation;
     return at_node(node.name, node.location, [&] {
         const Stopwatch stopwatch;
+        std::optional<UndeclaredColumns> undeclared;
+        const NodeKind kind = node.type->kind;
+        if (checks_declarations_ && (kind == NodeKind::Points || kind == NodeKind::Solve))
+            undeclared.emplace(inputs[0].points, declared_for(first));
         Flow result;
         if (planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source) {
             result = planned.op->start(inputs, evaluation);
@@ -179,11 +184,26 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
             result = std::move(inputs[0]);
             edit_together(first, last, left, result.points, frame);
         }
-        if (node.type->kind == NodeKind::Solve) frame.figures.solve_seconds += stopwatch.seconds();
+        if (undeclared) {
+            undeclared->restore(result.points);
+            if (kind == NodeKind::Solve) undeclared->restore(simulations_[planned.simulation]->state);
+        }
+        if (kind == NodeKind::Solve) frame.figures.solve_seconds += stopwatch.seconds();
         if (planned.once) kept_[first] = result;
         if (result_) result_(node, next_, result.points);
         return result;
     });
+}
+
+std::vector<Uses> Evaluator::declared_for(std::size_t node) const
+{
+    std::vector<Uses> declared = {uses_of(plan_.nodes[node])};
+    if (plan_.nodes[node].node->type->kind != NodeKind::Solve) return declared;
+    for (const std::vector<std::size_t>& pass : plan_.passes()) {
+        if (std::find(pass.begin(), pass.end(), node) == pass.end()) continue;
+        for (const std::size_t other : pass) declared.push_back(uses_of(plan_.nodes[other]));
+    }
+    return declared;
 }
 
 void Evaluator::edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame)

@@ -37,6 +37,10 @@ public:
 
     explicit Evaluator(const Plan& plan, WriteHook write = {}, ResultHook result = {});
 
+    // From now on each node finds poison in what it has not declared, and goes over the points by itself: slower, and
+    // for tests (undeclared_columns.h). Error of advance(): a node whose declaration is too short.
+    void check_declarations() { checks_declarations_ = true; }
+
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
 
@@ -54,6 +58,8 @@ private:
     // The nodes from first to last: several where they go together (Plan::last_together). The result of the last.
     Flow evaluate(std::size_t first, std::size_t last, int left, std::vector<Flow>& results,
                   std::vector<std::size_t>& readers, FrameResult& frame);
+    // What a node may use: for a Solve, also what the dynamics upstream of it do.
+    std::vector<Uses> declared_for(std::size_t node) const;
     void edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame);
     class Told;
 
@@ -62,6 +68,7 @@ private:
     ResultHook result_;
     std::int64_t next_;
     int subframes_ = 1;  // of all simulations
+    bool checks_declarations_ = false;
     std::vector<std::shared_ptr<Simulation>> simulations_;
     std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once
 };

@@ -111,6 +111,24 @@ struct Read {
 };
 RAPID_NODE(Read);
 
+// Uses an attribute that it does not declare: reads "heat" into P, writes it, or leaves it alone.
+struct Undeclared {
+    std::string what;
+
+    static NodeType declare()
+    {
+        return node<Undeclared>("undeclared", "Declares nothing.")
+            .param(&Undeclared::what, "what", Value(), any_number(), "", "reads, writes or nothing");
+    }
+    void edit(PointSet& points, const Evaluation& now) const
+    {
+        ++evaluations[now.node];
+        if (what == "reads") points.P().write()[0].x() += points.column<float>("heat")[0];
+        if (what == "writes") points.column<float>("heat").write()[0] = 7;
+    }
+};
+RAPID_NODE(Undeclared);
+
 // Bears nothing, but would write lives and birth times; and puts points into a group one by one.
 struct Bear {
     double life = 1;

@@ -207,7 +207,7 @@ private:
     std::span<const Damped> damped_;
     std::vector<Vec3d> path_v_, path_a_, mean_a_;
 
-    Flight flight_;
+    FreePaths flight_;
 
     // By point of the block.
     std::span<const double> after_;    // s, to the end of the frame

@@ -10,6 +10,7 @@
 
 #include "runtime/parallel.h"
 #include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/refinement.h"
 
 namespace rapid {
 namespace {
@@ -73,12 +74,12 @@ public:
     };
 
     // What the run adds for point i; P and v: the best that is known of it now.
-    Difference add(std::size_t i, const RunEnd& end, Vec3d& P, Vec3d& v)
+    Difference add(std::size_t i, const BlockResult& end, Vec3d& P, Vec3d& v)
     {
         P = end.P[i];
         v = end.v[i];
         const bool dies = !end.dead.empty() && end.dead[i];
-        const bool lives = !dies && !died_[i], is_series = !dies && end.way[i] != Way::Broken;
+        const bool lives = !dies && !died_[i], is_series = !dies && end.path[i] != PathKind::Broken;
         Difference off{infinity, infinity};
         if (lives && runs_ > 1)
             // Runs that find a contact at the same end of a sub-step agree on what is wrong with it.
@@ -88,7 +89,7 @@ public:
         const std::size_t known = lives && is_series ? std::min<std::size_t>(length_[i], most_columns - 1) : 0;
         double power = 1;
         for (std::size_t c = 0; c < known; ++c) {
-            power *= end.way[i] == Way::Acted ? 2 : 4;
+            power *= end.path[i] == PathKind::Acted ? 2 : 4;
             const Vec3d dP = P - P_[c][i], dv = v - v_[c][i];
             P_[c][i] = P;
             v_[c][i] = v;
@@ -156,7 +157,7 @@ struct Rest {
 };
 
 // One pass over a set, or over the rest of one.
-class Pass final : public Runs {
+class Pass final : public Refinement {
 public:
     // substeps: of the next run. P and v: of all points, to write results to. rest: those that are solved, as a set of
     // their own, and their runs so far; null: all, from the first run on.
@@ -166,7 +167,7 @@ public:
     }
 
     bool takes_exact() const override { return asked_.is_first(substeps_); }
-    std::unique_ptr<BlockRuns> begin() override;
+    std::unique_ptr<BlockRefinement> begin() override;
 
     // Afterwards: those that need more, by the sub-steps of their next run; those that have died.
     std::map<int, Rest> left()
@@ -199,7 +200,7 @@ private:
     std::uint64_t beyond_ = 0;
 };
 
-class Pass::Block final : public BlockRuns {
+class Pass::Block final : public BlockRefinement {
 public:
     explicit Block(Pass& pass) : pass_(pass), asked_(pass.asked_) {}
 
@@ -222,7 +223,7 @@ public:
         v_.resize(size);
     }
 
-    int take(const RunEnd& end) override
+    int take(const BlockResult& end) override
     {
         judge(end);
         settle(end);
@@ -242,7 +243,7 @@ private:
     enum class Fate : std::uint8_t { Open, Known, Dead };
 
     // How wrong the points that are open are.
-    void judge(const RunEnd& end)
+    void judge(const BlockResult& end)
     {
         const bool first = asked_.is_first(substeps_), counts = asked_.counts(substeps_);
         const double allowed = squared(asked_.tolerance);
@@ -250,8 +251,8 @@ private:
         verdict_.assign(places_.size(), Verdict::Within);
         improved_.assign(places_.size(), 0);
         for (const std::uint32_t i : open_) {
-            if (end.way[i] == Way::Exact) continue;
-            if (asked_.met && end.way[i] == Way::Broken) asked_.met[places_[i]] = 1;
+            if (end.path[i] == PathKind::Exact) continue;
+            if (asked_.met && end.path[i] == PathKind::Broken) asked_.met[places_[i]] = 1;
             const Series::Difference off = series_.add(i, end, best_P_[i], best_v_[i]);
             const bool within = !first && (counts ? off.best : off.run) <= allowed;
             verdict_[i] = !within ? Verdict::Again : off.run <= allowed ? Verdict::Within : Verdict::WithinIfImproved;
@@ -261,7 +262,7 @@ private:
     }
 
     // What of that is their result. Leaves open those that need another run.
-    void settle(const RunEnd& end)
+    void settle(const BlockResult& end)
     {
         const bool counts = asked_.counts(substeps_), takes_all = asked_.takes_all(substeps_);
         std::size_t open = 0;
@@ -314,7 +315,7 @@ private:
     std::vector<Vec3f> P_, v_;  // where it is known
 };
 
-std::unique_ptr<BlockRuns> Pass::begin() { return std::make_unique<Block>(*this); }
+std::unique_ptr<BlockRefinement> Pass::begin() { return std::make_unique<Block>(*this); }
 
 // What solve_within() does, in one call of it.
 class SolveWithin {
@@ -426,7 +427,7 @@ private:
     {
         SolveOptions options = options_;
         options.substeps = substeps;
-        options.met = nullptr;  // the ways tell
+        options.met = nullptr;  // the kinds of path tell
         const SolveResult result = solve(set, dynamics_, options, pass);
         SolveResult& all = done_.result;
         all.penetration_max = std::max(all.penetration_max, result.penetration_max);

@@ -24,16 +24,16 @@ constexpr auto nobody = [](std::uint32_t, bool) {};
 
 }  // namespace
 
-Fall::Period Fall::by_axis(const Vec3d& x)
+BallisticBatch::Period BallisticBatch::by_axis(const Vec3d& x)
 {
     Period all;
     for (int l = 0; l < period; ++l) all[l] = x[l % 3];
     return all;
 }
 
-Fall::Fall(const Vec3d& g, double k) : g_(by_axis(g)), k_(k) {}
+BallisticBatch::BallisticBatch(const Vec3d& g, double k) : g_(by_axis(g)), k_(k) {}
 
-void Fall::set_times(Times& times, int point, double t) const
+void BallisticBatch::set_times(Times& times, int point, double t) const
 {
     const Propagator by = k_ == 0 ? Propagator() : respond(k_, 0, t);
     for (int l = 3 * point; l < 3 * point + 3; ++l) {
@@ -45,13 +45,13 @@ void Fall::set_times(Times& times, int point, double t) const
     }
 }
 
-Fall::Clock::Clock(const Fall& fall, const OwnTime& time, std::size_t begin)
+BallisticBatch::Clock::Clock(const BallisticBatch& fall, const OwnTime& time, std::size_t begin)
     : fall_(fall), time_(time), own_(time.own.data && time.own.stride != 0 ? time.own.data : nullptr), of_h_(own_)
 {
     for (int p = 0; p < points_a_period; ++p) fall_.set_times(times_, p, own_ ? time.h : time(begin));
 }
 
-void Fall::Clock::set(std::size_t first, std::size_t n)
+void BallisticBatch::Clock::set(std::size_t first, std::size_t n)
 {
     bool whole = true;
     for (std::size_t p = 0; p < n; ++p) whole &= own_[first + p] == static_cast<float>(time_.h);
@@ -60,7 +60,7 @@ void Fall::Clock::set(std::size_t first, std::size_t n)
     of_h_ = whole;
 }
 
-void Fall::avoid(const Box3d& box, double radius)
+void BallisticBatch::avoid(const Box3d& box, double radius)
 {
     const Vec3d margin = Vec3d::Constant(radius * (1 + 0x1p-21));
     boxes_.emplace_back(box.min() - margin, box.max() + margin);
@@ -70,7 +70,8 @@ void Fall::avoid(const Box3d& box, double radius)
 // One period. near(p) is told, for each of its points, whether it stays; `largest`, by coordinate, keeps the size of
 // what is written, unless that is known to be finite.
 template <bool Dragged, bool Avoids, bool Checks, class Near>
-void Fall::advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const
+void BallisticBatch::advance_period(float* P, float* v, const Times& times, std::uint32_t* largest,
+                                    const Near& near) const
 {
     float P1[period], v1[period];
     [[maybe_unused]] double lowest[period], highest[period];
@@ -122,7 +123,7 @@ void Fall::advance_period(float* P, float* v, const Times& times, std::uint32_t*
     for (int p = 0; p < points_a_period; ++p) near(p, !(clear[p] > 0));
 }
 
-Fall::Extent Fall::extent_of(std::span<const Vec3f> values)
+BallisticBatch::Extent BallisticBatch::extent_of(std::span<const Vec3f> values)
 {
     // Three vectors of eight are a period. They stay in registers.
     typedef float Lanes __attribute__((vector_size(32)));
@@ -169,7 +170,7 @@ Fall::Extent Fall::extent_of(std::span<const Vec3f> values)
 }
 
 // Whether no point of these places and velocities comes near a box in t seconds, and all stay finite.
-bool Fall::are_far(const Box3d& places, const Box3d& speeds, double t) const
+bool BallisticBatch::are_far(const Box3d& places, const Box3d& speeds, double t) const
 {
     const Vec3d g = Eigen::Map<const Vec3d>(g_.data()), pulled = t * g;
     // Drag makes less of the velocity and of what the acceleration adds, each by itself.
@@ -187,24 +188,27 @@ bool Fall::are_far(const Box3d& places, const Box3d& speeds, double t) const
            std::none_of(boxes_.begin(), boxes_.end(), [&](const Box3d& box) { return box.intersects(reach); });
 }
 
-Fall::Way Fall::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                        std::vector<std::uint32_t>& near) const
+BallisticBatch::Progress BallisticBatch::advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time,
+                                                 std::size_t begin, std::size_t end,
+                                                 std::vector<std::uint32_t>& near) const
 {
     if (limits_.empty()) return advance_any<false>(P, v, time, begin, end, near);
     return advance_any<true>(P, v, time, begin, end, near);
 }
 
 template <bool Avoids>
-Fall::Way Fall::advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
-                            std::size_t end, std::vector<std::uint32_t>& near) const
+BallisticBatch::Progress BallisticBatch::advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time,
+                                                     std::size_t begin, std::size_t end,
+                                                     std::vector<std::uint32_t>& near) const
 {
     return k_ == 0 ? advance_all<false, Avoids>(P, v, time, begin, end, near)
                    : advance_all<true, Avoids>(P, v, time, begin, end, near);
 }
 
 template <bool Dragged, bool Avoids>
-Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
-                            std::size_t end, std::vector<std::uint32_t>& near) const
+BallisticBatch::Progress BallisticBatch::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time,
+                                                     std::size_t begin, std::size_t end,
+                                                     std::vector<std::uint32_t>& near) const
 {
     const double longest = std::max(time.h, double(static_cast<float>(time.h)));
     Clock clock(*this, time, begin);
@@ -212,11 +216,11 @@ Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTim
     for (std::size_t at = begin; at < end; at += block) {
         const std::size_t size = std::min(block, end - at);
         if constexpr (!Avoids) {
-            if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) return way(at, largest);
+            if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) return progress(at, largest);
             advance_block<Dragged, false, true>(P, v, clock, at, at + size, largest, nobody);
         } else {
             const Extent places = extent_of(P.subspan(at, size)), speeds = extent_of(v.subspan(at, size));
-            if (!places.finite || !speeds.finite) return way(at, largest);
+            if (!places.finite || !speeds.finite) return progress(at, largest);
             if (are_far(places.box, speeds.box, longest)) {
                 advance_block<Dragged, false, false>(P, v, clock, at, at + size, largest, nobody);
                 continue;
@@ -230,17 +234,17 @@ Fall::Way Fall::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTim
             near.resize(count);
         }
     }
-    return way(end, largest);
+    return progress(end, largest);
 }
 
-Fall::Way Fall::way(std::size_t end, const std::uint32_t* largest)
+BallisticBatch::Progress BallisticBatch::progress(std::size_t end, const std::uint32_t* largest)
 {
     return {end, *std::max_element(largest, largest + period) < infinity_bits};
 }
 
 template <bool Dragged, bool Avoids, bool Checks, class Near>
-void Fall::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
-                         std::uint32_t* largest, const Near& near) const
+void BallisticBatch::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin,
+                                   std::size_t end, std::uint32_t* largest, const Near& near) const
 {
     std::uint32_t own_largest[period];
     std::copy_n(largest, period, own_largest);

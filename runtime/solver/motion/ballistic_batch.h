@@ -26,24 +26,24 @@ struct OwnTime {
     }
 };
 
-class Fall {
+class BallisticBatch {
 public:
     // v' = g - k v: m/s², 1/s.
-    Fall(const Vec3d& g, double k);
+    BallisticBatch(const Vec3d& g, double k);
 
     // No point is advanced that may come within `radius` of the box on its way, or has begun there: by the box around
     // its path, and with what rounding a position to single precision can do.
     void avoid(const Box3d& box, double radius);
 
-    struct Way {
+    struct Progress {
         std::size_t end;  // how far it came
         bool finite;      // whether all states up to there are
     };
 
     // Advances the points [begin, end), up to the first few of which one is not finite. Those that are left as they
     // are, are appended to `near`, in order.
-    Way advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                std::vector<std::uint32_t>& near) const;
+    Progress advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
+                     std::vector<std::uint32_t>& near) const;
 
 private:
     // What belongs to the axes recurs along the packed coordinates: in whole vectors of 8, and whole points.
@@ -63,7 +63,7 @@ private:
     // The times of one period after another: most points move for the whole frame, and share them.
     class Clock {
     public:
-        Clock(const Fall& fall, const OwnTime& time, std::size_t begin);
+        Clock(const BallisticBatch& fall, const OwnTime& time, std::size_t begin);
         // Of n points.
         const Times& of(std::size_t first, std::size_t n)
         {
@@ -74,7 +74,7 @@ private:
     private:
         void set(std::size_t first, std::size_t n);
 
-        const Fall& fall_;
+        const BallisticBatch& fall_;
         const OwnTime& time_;
         const float* own_;  // null where all move for the same time
         bool of_h_;         // whether times_ are of the whole frame
@@ -89,7 +89,7 @@ private:
 
     static Period by_axis(const Vec3d& x);
     static Extent extent_of(std::span<const Vec3f> values);
-    static Way way(std::size_t end, const std::uint32_t* largest);
+    static Progress progress(std::size_t end, const std::uint32_t* largest);
     void set_times(Times& times, int point, double t) const;
     bool are_far(const Box3d& places, const Box3d& speeds, double t) const;
     template <bool Dragged, bool Avoids, bool Checks, class Near>
@@ -98,11 +98,11 @@ private:
     void advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
                        std::uint32_t* largest, const Near& near) const;
     template <bool Dragged, bool Avoids>
-    Way advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                    std::vector<std::uint32_t>& near) const;
+    Progress advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
+                         std::size_t end, std::vector<std::uint32_t>& near) const;
     template <bool Avoids>
-    Way advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
-                    std::vector<std::uint32_t>& near) const;
+    Progress advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
+                         std::size_t end, std::vector<std::uint32_t>& near) const;
 
     Period g_;
     double k_;

@@ -19,7 +19,7 @@ Eigen::Map<const Period> period_at(const Eigen::ArrayXd& x, Eigen::Index at)
 
 }  // namespace
 
-void Flight::begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<Vec3d> a, std::span<const double> dt)
+void FreePaths::begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<Vec3d> a, std::span<const double> dt)
 {
     size_ = P.size();
     const auto n = static_cast<Eigen::Index>(3 * size_);
@@ -64,13 +64,13 @@ void Flight::begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<V
     }
 }
 
-void Flight::exchange(std::span<Vec3d> P, std::span<Vec3d> v)
+void FreePaths::exchange(std::span<Vec3d> P, std::span<Vec3d> v)
 {
     std::swap_ranges(P_.begin(), P_.end(), coordinates(P));
     std::swap_ranges(v_.begin(), v_.end(), coordinates(v));
 }
 
-void Flight::find_near(const Box3d& box, double radius, std::vector<std::uint32_t>& near) const
+void FreePaths::find_near(const Box3d& box, double radius, std::vector<std::uint32_t>& near) const
 {
     near.clear();
     const Vec3d margin = Vec3d::Constant(radius * (1 + 0x1p-21));

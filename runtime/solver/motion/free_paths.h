@@ -12,7 +12,7 @@
 
 namespace rapid {
 
-class Flight {
+class FreePaths {
 public:
     // Shapes [n]; m, m/s, m/s², s. The accelerations are constant within the sub-step.
     void begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<Vec3d> a, std::span<const double> dt);

@@ -43,7 +43,7 @@ bool comes_near(const Vec3d& P, const Vec3d& v, double t, const Box3d& box, doub
     return false;
 }
 
-TEST_CASE("points fall along their parabolas, each for its own time", "[fall]")
+TEST_CASE("points fall along their parabolas, each for its own time", "[ballistic]")
 {
     const std::size_t n = GENERATE(1, 2, 7, 8, 9, 64, 1001);
     const std::size_t begin = GENERATE(0, 5);
@@ -53,7 +53,7 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[fall]")
     const Crowd crowd(n);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
-    Fall(g, 0).advance(P, v, crowd.time(own), begin, n, near);
+    BallisticBatch(g, 0).advance(P, v, crowd.time(own), begin, n, near);
     CHECK(near.empty());
     for (std::size_t i = 0; i < n; ++i) {
         const double t = i < begin ? 0 : crowd.time(own)(i);
@@ -63,7 +63,7 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[fall]")
     }
 }
 
-TEST_CASE("points that come near a box stay as they are, and are listed in order", "[fall]")
+TEST_CASE("points that come near a box stay as they are, and are listed in order", "[ballistic]")
 {
     const double radius = GENERATE(0.0, 0.1);
     const double away = GENERATE(0.0, 1.0, 1.2, 1.3, 1.34, 1.5, 4.0);  // the fastest come by a third of a metre
@@ -74,11 +74,11 @@ TEST_CASE("points that come near a box stay as they are, and are listed in order
         {Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2)},
         {Vec3d::Constant(-std::numeric_limits<double>::infinity()),
          Vec3d(std::numeric_limits<double>::infinity(), -0.9 - away, std::numeric_limits<double>::infinity())}};
-    Fall fall(g, 0);
-    for (const Box3d& box : boxes) fall.avoid(box, radius);
+    BallisticBatch batch(g, 0);
+    for (const Box3d& box : boxes) batch.avoid(box, radius);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near{42};  // what is there stays
-    fall.advance(P, v, crowd.time(true), 0, n, near);
+    batch.advance(P, v, crowd.time(true), 0, n, near);
 
     REQUIRE(near.front() == 42);
     REQUIRE(std::is_sorted(near.begin() + 1, near.end()));
@@ -112,7 +112,7 @@ struct Dragged {
     }
 };
 
-TEST_CASE("points in air go by the closed form, each for its own time", "[fall]")
+TEST_CASE("points in air go by the closed form, each for its own time", "[ballistic]")
 {
     const double k = GENERATE(0.5, 24.0, 1e5);
     const bool own = GENERATE(false, true);
@@ -121,7 +121,7 @@ TEST_CASE("points in air go by the closed form, each for its own time", "[fall]"
     const Crowd crowd(n);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
-    Fall(g, k).advance(P, v, crowd.time(own), 0, n, near);
+    BallisticBatch(g, k).advance(P, v, crowd.time(own), 0, n, near);
     for (std::size_t i = 0; i < n; ++i) {
         const Dragged right(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, crowd.time(own)(i));
         REQUIRE_THAT(P[i], close_to(Vec3f(right.P.cast<float>()), 1e-7));
@@ -129,7 +129,7 @@ TEST_CASE("points in air go by the closed form, each for its own time", "[fall]"
     }
 }
 
-TEST_CASE("points in air that come near a box stay as they are", "[fall]")
+TEST_CASE("points in air that come near a box stay as they are", "[ballistic]")
 {
     const double k = GENERATE(1.0, 50.0, 1000.0);
     const double away = GENERATE(0.0, 1.0, 1.1, 1.2);
@@ -137,11 +137,11 @@ TEST_CASE("points in air that come near a box stay as they are", "[fall]")
     const std::size_t n = 1003;
     const Crowd crowd(n);
     const Box3d box(Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2));
-    Fall fall(g, k);
-    fall.avoid(box, 0.05);
+    BallisticBatch batch(g, k);
+    batch.avoid(box, 0.05);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
-    fall.advance(P, v, crowd.time(true), 0, n, near);
+    batch.advance(P, v, crowd.time(true), 0, n, near);
     std::vector<bool> stays(n);
     for (const std::uint32_t i : near) stays[i] = true;
     std::size_t met = 0;
@@ -161,7 +161,7 @@ TEST_CASE("points in air that come near a box stay as they are", "[fall]")
     CHECK(near.size() <= 3 * met + 30);
 }
 
-TEST_CASE("points in air and points among shapes there go the same way", "[fall]")
+TEST_CASE("points in air and points among shapes there go the same way", "[ballistic]")
 {
     struct Air : Force {
         void contribute(const Chunk&, Forces&) const override {}
@@ -191,7 +191,7 @@ TEST_CASE("points in air and points among shapes there go the same way", "[fall]
     }
 }
 
-TEST_CASE("what sub-steps are asked for does not change a fall by a bit", "[fall]")
+TEST_CASE("what sub-steps are asked for does not change a fall by a bit", "[ballistic]")
 {
     const Crowd crowd(500);
     const auto run = [&](int substeps) {

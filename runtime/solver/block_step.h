@@ -1,0 +1,56 @@
+// The sub-steps of one block of points: forces, motion among the colliders, actions.
+//
+//   no actions     x(t + dt) by the forces at the middle of the sub-step
+//   with actions   half a drift, all actions, half a drift: second order (numerics.md, Motion)
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "runtime/solver/point_block.h"
+#include "runtime/solver/step_context.h"
+
+namespace rapid {
+
+// One object serves many blocks, one after the other, and keeps their arrays.
+class BlockStep {
+public:
+    explicit BlockStep(StepContext& context) : context_(context) {}
+
+    PointBlock block;
+
+    // The points at these places of the set, in order; a run of neighbours where forces or actions act.
+    void begin(std::span<const std::uint32_t> places, int substeps)
+    {
+        block.begin(places, context_.P, context_.v, context_.time, substeps);
+    }
+
+    // One sub-step, from 0. The collisions have begun this block.
+    void advance(Collisions& collisions, int substep);
+
+    // At the end of the frame, with block.rounded. Checked before it is stored: the message tells what the point had.
+    void require_finite() const;
+    void store() const;
+
+private:
+    void add_forces(int substep);
+    void add_force_attribute();
+    void add_accelerations(const StepForce& local);
+    void add_linear(const StepForce& local);
+    void drift(Collisions& collisions, std::span<const double> dt, double halves_after);
+    void drift_among_others(Collisions& collisions, std::span<const double> dt, double halves_after);
+    void act(int substep);
+    void stop_dead();
+    void set_time(int substep);
+    Vec3d acceleration_by(const Vec3d& force, std::size_t point) const
+    {
+        return context_.errors.acceleration(point, force, context_.scene.mass[point]);
+    }
+
+    StepContext& context_;
+    std::vector<double> half_, after_, time_;  // s
+    std::vector<Vec3d> middle_, kick_;         // m, N
+    Forces one_;                               // of one Force
+};
+
+}  // namespace rapid

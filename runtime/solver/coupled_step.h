@@ -1,0 +1,51 @@
+// A step of points that constraints couple: the sub-step is the barrier. In each, all points move freely, block by
+// block; then the constraints are projected (constraints/constraint.h).
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "runtime/solver/block_step.h"
+#include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/constraints/projection.h"
+#include "runtime/solver/constraints/sleep.h"
+#include "runtime/solver/step_context.h"
+
+namespace rapid {
+
+class CoupledStep {
+public:
+    explicit CoupledStep(StepContext& context);
+
+    void run();
+
+private:
+    void read_points(std::size_t begin, std::size_t end);
+    void begin_substeps();
+    void begin_sleep();
+    void advance_freely(std::size_t begin, std::size_t end);
+    void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
+    void take_point(const PointBlock& block, std::size_t k);
+    bool leaves_out(std::size_t i);
+    void store(std::size_t begin, std::size_t end);
+    Vec3d pull_on(const PointBlock& block, std::size_t k, bool asleep) const;
+    double inverse_mass(std::size_t i) const;
+
+    StepContext& context_;
+    // By point.
+    std::vector<Place> at_;
+    std::vector<Vec3d> v_, begin_;
+    std::vector<double> weight_;  // inverse masses, 1/kg
+    std::vector<Yield> yields_;
+
+    Substep now_;
+    Projection projection_;
+    std::optional<Islands> islands_;
+    std::optional<Sleepers> sleepers_;
+    bool skips_sleepers_ = false;  // only uniform forces act: sleeping points are left out of the blocks
+    std::mutex mutex_;
+};
+
+}  // namespace rapid

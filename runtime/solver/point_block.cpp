@@ -1,0 +1,86 @@
+#include "runtime/solver/point_block.h"
+
+namespace rapid {
+
+void PointBlock::begin(std::span<const std::uint32_t> block_places, std::span<const Vec3f> P0,
+                       std::span<const Vec3f> v0, const OwnTime& time, int count)
+{
+    places = block_places;
+    substeps = count;
+    const std::size_t n = places.size();
+    P.resize(n);
+    v.resize(n);
+    dt.resize(n);
+    rounded.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        rounded[i] = P0[places[i]];
+        P[i] = rounded[i].cast<double>();
+        v[i] = v0[places[i]].cast<double>();
+        dt[i] = time(places[i]) / substeps;
+    }
+    moved_dt = dt;
+}
+
+void PointBlock::drift(std::span<const double> t)
+{
+    for (std::size_t i = 0; i < P.size(); ++i) {
+        P[i] += t[i] * (v[i] + 0.5 * t[i] * a[i]);
+        v[i] += t[i] * a[i];
+    }
+}
+
+void PointBlock::find_damped_paths(std::span<const double> t)
+{
+    damped.resize(P.size());
+    Responder responder;
+    for (std::size_t i = 0; i < P.size(); ++i) damped[i] = Damped::from(P[i], v[i], a[i], linear[i], t[i], responder);
+}
+
+void PointBlock::drift_damped(std::span<const double> t)
+{
+    if (!has_springs() && (linear.stride || linear[0].c > 0)) return drift_dragged(t);
+    Responder responder;
+    for (std::size_t i = 0; i < P.size(); ++i) {
+        const Vec3d G = acceleration_at_rest(P[i], a[i], linear[i]);
+        const Propagator& r = responder(drag_rate(v[i], G, linear[i], t[i]), linear[i].w2, t[i]);
+        P[i] += v[i] * r.x_of_v + G * r.x_of_G;
+        v[i] = v[i] * r.v_of_v + G * r.v_of_G;
+    }
+}
+
+// The same without springs: the exponentials of all points at once. Quadratic drag as in drag_rate().
+void PointBlock::drift_dragged(std::span<const double> t)
+{
+    const std::size_t n = P.size();
+    const auto G = [&](std::size_t i) { return acceleration_at_rest(P[i], a[i], linear[i]); };
+    rates_.resize(n);
+    bool quadratic = false;
+    for (std::size_t i = 0; i < n; ++i) {
+        rates_[i] = linear[i].k;
+        quadratic |= linear[i].c > 0;
+    }
+    if (quadratic) {
+        for (std::size_t i = 0; i < n; ++i)
+            rates_[i] = drag_rate_along(v[i].squaredNorm() > 0 ? v[i] : G(i), v[i], G(i), linear[i], t[i]);
+        dragged_.respond(rates_, t);
+        for (std::size_t i = 0; i < n; ++i) {
+            const Vec3d after_first = v[i] + (v[i] * dragged_.v_of_v[i] + G(i) * dragged_.x_of_v[i]);
+            rates_[i] = drag_rate_along(after_first, v[i], G(i), linear[i], t[i]);
+        }
+    }
+    dragged_.respond(rates_, t);
+    for (std::size_t i = 0; i < n; ++i) {
+        const Vec3d g = G(i);
+        P[i] += v[i] * dragged_.x_of_v[i] + g * dragged_.x_of_G[i];
+        v[i] = v[i] * dragged_.v_of_v[i] + g * dragged_.x_of_v[i];
+    }
+}
+
+bool PointBlock::has_springs() const
+{
+    for (std::size_t i = 0; i < (linear.stride ? P.size() : 1); ++i)
+        if (linear[i].w2 > 0) return true;
+    return false;
+}
+
+}  // namespace rapid

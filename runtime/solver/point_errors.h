@@ -1,0 +1,54 @@
+// Errors about single points: which point, in which frame, what is wrong with it, and what it had.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+class PointErrors {
+public:
+    PointErrors(const PointSet& points, std::int64_t frame) : points_(points), frame_(frame) {}
+
+    // When a value was found, as the message puts it.
+    struct Occasion {
+        const char *verb, *when, *had;
+    };
+    static constexpr Occasion before_step{"is", "before the step; a node before this one made it so", "it has"};
+    static constexpr Occasion in_step{"became", "in the step; the frame was not written", "it had"};
+    // The point has been overwritten by the result.
+    static constexpr Occasion in_step_overwritten{"became", "in the step; the frame was not written", "it has"};
+
+    // Error: P or v of one of the points from `begin` on is not finite; shapes [n].
+    void require_finite(std::size_t begin, std::span<const Vec3f> P, std::span<const Vec3f> v,
+                        const Occasion& occasion) const;
+    // The same of a point whose state would be P and v.
+    void require_finite(std::size_t i, const Vec3f& P, const Vec3f& v, const Occasion& occasion) const
+    {
+        if (!P.allFinite() || !v.allFinite()) not_finite(i, P, v, occasion);
+    }
+
+    [[noreturn]] void bad_acceleration(std::size_t i, const Vec3d& a) const;
+    // The acceleration by a force (N). Error: the mass (kg) is not above 0, or the force not finite.
+    Vec3d acceleration(std::size_t i, const Vec3d& force, float mass) const
+    {
+        if (force.isZero(0)) return force;
+        if (!(mass > 0) || !force.allFinite()) bad_force(i, force, mass);
+        return force / mass;
+    }
+    // 1/kg. Error: the mass is not above 0.
+    double inverse_mass(std::size_t i, float mass) const;
+
+private:
+    [[noreturn]] void not_finite(std::size_t i, const Vec3f& P, const Vec3f& v, const Occasion& occasion) const;
+    [[noreturn]] void bad_force(std::size_t i, const Vec3d& force, float mass) const;
+    std::string name_of(std::size_t i) const;
+
+    const PointSet& points_;
+    std::int64_t frame_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,62 @@
+#include "runtime/solver/step_context.h"
+
+#include <algorithm>
+
+#include "runtime/points/members.h"
+
+namespace rapid {
+
+StepContext::StepContext(PointSet& set, const Dynamics& dynamics, const SolveOptions& solve_options)
+    : points(set),
+      options(solve_options),
+      scene(set, dynamics, options.h),
+      P(set.P().write()),
+      v(set.v().write()),
+      dead(scene.actions.empty() && !scene.kills ? 0 : set.size()),
+      errors(set, options.frame)
+{
+    if (scene.records) hits_.emplace(points, options.begins_frame);
+    if (!options.group.empty()) members_ = members_of(points, options.group);
+    time.h = options.h;
+    if (points.has("dt")) time.own = points.column<float>("dt").read();
+}
+
+Consequences StepContext::consequences()
+{
+    return {hits_ ? &*hits_ : nullptr, dead, options.met, scene.mass, options.time, options.h};
+}
+
+void StepContext::count(const Collisions& collisions, double deepest, std::size_t first)
+{
+    const std::scoped_lock lock(mutex_);
+    result_.collisions += collisions.contacts;
+    result_.contact_limit += collisions.limited;
+    result_.trapped += collisions.trapped;
+    result_.penetration_max = std::max(result_.penetration_max, deepest);
+    if (collisions.energy != ContactEnergy()) energies_.emplace_back(first, collisions.energy);
+}
+
+void StepContext::count_penetration(double deepest)
+{
+    const std::scoped_lock lock(mutex_);
+    result_.penetration_max = std::max(result_.penetration_max, deepest);
+}
+
+void StepContext::remove_dead()
+{
+    if (std::find(dead.begin(), dead.end(), 1) == dead.end()) return;
+    for (std::uint8_t& killed : dead) killed = !killed;
+    const std::size_t before = points.size();
+    points.keep(dead);
+    result_.died = before - points.size();
+}
+
+void StepContext::sum_contact_energy()
+{
+    // In the order of the points: a sum of doubles depends on it.
+    std::stable_sort(energies_.begin(), energies_.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [first, energy] : energies_) result_.contact_energy += energy;
+}
+
+}  // namespace rapid

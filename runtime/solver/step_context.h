@@ -1,0 +1,81 @@
+// What the blocks of a step share: the columns of the points, the scene, and the counts.
+#pragma once
+
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "runtime/parallel.h"
+#include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/motion/ballistic_batch.h"
+#include "runtime/solver/point_errors.h"
+#include "runtime/solver/solve.h"
+#include "runtime/solver/step_scene.h"
+
+namespace rapid {
+
+// Points that go through their sub-steps together: their state, paths and contacts stay in the first and second-level
+// caches. A chunk, the unit of work of a thread, is several blocks.
+constexpr std::size_t block_size = 256;
+
+class StepContext {
+public:
+    StepContext(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
+
+    PointSet& points;
+    const SolveOptions& options;
+    const StepScene scene;
+    const std::span<Vec3f> P, v;     // at the beginning of the frame, until the result is stored
+    OwnTime time;                    // s, of each point in the frame
+    std::vector<std::uint8_t> dead;  // 1: killed by an action or a collider; empty where none does
+    const PointErrors errors;
+
+    // Whether the step advances a point: those outside options.group stay where they are.
+    bool advances_all() const { return !members_.data; }
+    bool advances(std::size_t i) const { return !members_.data || members_[i]; }
+    Consequences consequences();
+
+    // Calls f(begin, end) for each chunk, in parallel. Of several errors that of the first chunk is thrown.
+    template <class F>
+    void for_each_chunk(const F& f);
+
+    // Counts of a chunk; first: one of its points. From any thread.
+    void count(const Collisions& collisions, double deepest, std::size_t first);
+    void count_penetration(double deepest);
+
+    void remove_dead();
+    SolveResult& result() { return result_; }
+    void sum_contact_energy();
+
+private:
+    Strided<std::uint8_t> members_{nullptr, 0};  // of options.group; null for all
+    std::optional<Hits> hits_;
+
+    std::mutex mutex_;
+    SolveResult result_;
+    std::vector<std::pair<std::size_t, ContactEnergy>> energies_;  // by a point of the chunk
+    std::exception_ptr error_;
+    std::size_t failed_ = 0;  // the beginning of the chunk in which error_ was thrown
+};
+
+template <class F>
+void StepContext::for_each_chunk(const F& f)
+{
+    const auto guarded = [&](std::size_t begin, std::size_t end) {
+        try {
+            f(begin, end);
+        } catch (...) {
+            const std::scoped_lock lock(mutex_);
+            if (!error_ || begin < failed_) error_ = std::current_exception(), failed_ = begin;
+        }
+    };
+    // Even a few points, such as shadows, are work for all threads.
+    const std::size_t n = points.size(), part = block_size * (n / (16 * block_size) + 1);
+    rapid::for_each_chunk(n, guarded, std::min(part, chunk_size));
+    if (error_) std::rethrow_exception(error_);
+}
+
+}  // namespace rapid

@@ -1,5 +1,9 @@
-// Eight numbers that are reckoned with together, lane by lane in one instruction: left to loops, the compiler takes
-// them apart. What a processor's registers do not hold it does in parts, to the same bits.
+// Packs of eight numbers, on which arithmetic is lane by lane; wider than a register they are computed in parts, with
+// the same bits on any processor.
+//
+// These are the compiler's vector types. Of Debian's libraries, Highway and xsimd size their vectors by the processor,
+// and a pack is part of the layout of records (contact packs) and of loops over whole points (24 coordinates); Vc has
+// packs of a given size, but is no longer developed. None promises more about bits than IEEE arithmetic by lane.
 #pragma once
 
 #include <array>
@@ -11,7 +15,7 @@
 
 #include "runtime/vec.h"
 
-// g++ says that vectors wider than the processor's are passed otherwise by other compilers: what takes them is inlined.
+// g++ warns that the calling convention of wide vectors differs between compilers: all functions here are inlined.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace rapid {
@@ -25,19 +29,55 @@ using Indices = std::array<std::uint32_t, lanes>;
 [[gnu::always_inline]] inline Doubles widen(const Floats& x) { return __builtin_convertvector(x, Doubles); }
 [[gnu::always_inline]] inline Floats narrow(const Doubles& x) { return __builtin_convertvector(x, Floats); }
 
-// Comparisons of Doubles give Flags: all bits of a lane, or none.
+// Comparisons of Doubles give Flags, of Floats FloatFlags: all bits of a lane, or none.
 typedef std::int64_t Flags __attribute__((vector_size(8 * lanes)));
+typedef std::int32_t FloatFlags __attribute__((vector_size(4 * lanes)));
 
-// A byte a lane, so that lane l is the bits from 8 l on.
+// One byte per lane: lane l is the bits from 8 l on.
 [[gnu::always_inline]] inline std::uint64_t bytes(const Flags& flags)
 {
     typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
     return std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, Bytes));
 }
 [[gnu::always_inline]] inline bool any(const Flags& flags) { return bytes(flags) != 0; }
+// One bit per lane: lane l is bit l.
+[[gnu::always_inline]] inline std::uint32_t bits(const Flags& flags)
+{
+    return static_cast<std::uint32_t>((bytes(flags) & 0x8040201008040201) * 0x0101010101010101 >> 56);
+}
+// The lanes of these bits.
+[[gnu::always_inline]] inline FloatFlags float_flags(std::uint32_t bits)
+{
+    const FloatFlags lane_bit = {1, 2, 4, 8, 16, 32, 64, 128};
+    return (lane_bit & static_cast<std::int32_t>(bits)) != 0;
+}
+
+// From and to memory, without alignment.
+[[gnu::always_inline]] inline Floats load_pack(const float* from)
+{
+    Floats pack;
+    std::memcpy(&pack, from, sizeof pack);
+    return pack;
+}
+[[gnu::always_inline]] inline Doubles load_pack(const double* from)
+{
+    Doubles pack;
+    std::memcpy(&pack, from, sizeof pack);
+    return pack;
+}
+template <class Pack, class T>
+[[gnu::always_inline]] inline void store_pack(const Pack& pack, T* to)
+{
+    static_assert(sizeof pack == lanes * sizeof *to);
+    std::memcpy(to, &pack, sizeof pack);
+}
 
 [[gnu::always_inline]] inline Doubles least(const Doubles& a, const Doubles& b) { return a < b ? a : b; }
 [[gnu::always_inline]] inline Doubles most(const Doubles& a, const Doubles& b) { return a > b ? a : b; }
+[[gnu::always_inline]] inline Doubles magnitude(const Doubles& x)
+{
+    return std::bit_cast<Doubles>(std::bit_cast<Flags>(x) & INT64_MAX);
+}
 [[gnu::always_inline]] inline Doubles sqrt(const Doubles& x)
 {
     Doubles root;
@@ -85,7 +125,7 @@ typedef double Four __attribute__((vector_size(32)));
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-// Each of four times two rows of four, in columns of eight.
+// The transpose of eight rows of four numbers, given two by two.
 struct Columns {
     Doubles x, y, z, w;
 };
@@ -102,7 +142,7 @@ struct Columns {
             __builtin_shufflevector(zw0, zw4, 4, 5, 6, 7, 12, 13, 14, 15)};
 }
 
-// Their rows, two and two.
+// The transpose back: the rows, two by two.
 struct Rows {
     Doubles of01, of23, of45, of67;
 };
@@ -127,7 +167,7 @@ struct Rows {
     return __builtin_shufflevector(rows, rows, 4, 5, 6, 7);
 }
 
-// Stores the first `count` rows, each of them by store(lane, row).
+// Stores the first `count` rows, each by store(lane, row).
 template <class F>
 [[gnu::always_inline]] inline void store_rows(const Columns& columns, std::uint32_t count, const F& store)
 {
@@ -171,7 +211,7 @@ template <class F>
     return {c.x, c.y, c.z};
 }
 
-// Of the first `count` lanes.
+// Writes the first `count` lanes.
 [[gnu::always_inline]] inline void scatter(const Vectors<Doubles>& values, std::span<Vec3d> to, const Indices& i,
                                            std::uint32_t count)
 {

@@ -16,8 +16,8 @@ namespace {
 
 const float unit_mass = 1;
 
-// (1 - e^(-2 k t)) / 2: of the difference of two velocities that decays at the rate k on both sides, what each gets of
-// the other's in the time t. At most a half, which makes them equal.
+// (1 - e^(-2 k t)) / 2: the part of the velocity difference of two points that each gets in the time t, where it decays
+// at the rate k on both sides. At most a half, which makes them equal.
 double exchanged(double k, double t) { return -0.5 * std::expm1(-2 * k * t); }
 
 class Neighbourhood {
@@ -40,7 +40,7 @@ public:
         std::vector<Vec3f> places;
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!members[i]) continue;
-            if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve says so, with the point's name
+            if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve reports it, with the point's name
                 members_.clear();
                 return;
             }
@@ -53,7 +53,7 @@ public:
         if (!members_.empty()) grid_ = index_neighbours(places, interaction.radius);
     }
 
-    // The change of each member's velocity, m/s.
+    // The change of velocity of each member, m/s.
     std::vector<Vec3d> kicks()
     {
         weights_.assign(members_.size(), 0);
@@ -66,7 +66,7 @@ public:
     std::span<const std::uint32_t> members() const { return members_; }
 
 private:
-    // Each member with each of its neighbours, in order of their places in the set.
+    // Calls f for each member with each of its neighbours, in order of their places in the set.
     template <class F>
     void for_all(const F& f) const
     {
@@ -102,9 +102,9 @@ private:
         const double length = d.norm(), w = weight_at(length);
         const Vec3d n = length > 0 ? Vec3d(d / length) : direction(id_[i], id_[j]);
 
-        // An acceleration whose slope is `slope` at the most moves the two towards where it ends, in a frame, by no
-        // more than the way there: as one step of Newton's method for its implicit solution does. The 4: a
-        // neighbourhood's weights average to a quarter of its number, by which the slopes are not shared.
+        // An acceleration of at most this slope moves the two towards its zero, in a frame, and never past it: one
+        // Newton step of the implicit solution. The 4: the weights of a neighbourhood average to a quarter of its
+        // number, by which the slopes are not shared.
         const auto held = [&](double a, double slope) { return a / (1 + 4 * slope * t * frame); };
         const double push = held(mean(separation_) * w, mean(separation_) / interaction_.radius);
         const double draw = held(mean(cohesion_) * 4 * w * (1 - w), 4 * mean(cohesion_) / interaction_.radius);
@@ -119,7 +119,7 @@ private:
         return part * share * (t * (draw - push) * n + w * (align * u + (along - align) * along_n));
     }
 
-    // Of points in one place: any, but the opposite one for the other.
+    // Of coincident points: any direction, and the opposite one for the other point.
     static Vec3d direction(std::int64_t a, std::int64_t b)
     {
         const auto u = uniform4(RandomKey(0, "interact"), static_cast<std::uint64_t>(std::min(a, b)),

@@ -1,19 +1,18 @@
-// What neighbours do to each other: separation, cohesion, alignment and drag, after Yuksel et al. 2014.
+// Forces among neighbours: separation, cohesion, alignment and drag, after Yuksel et al. 2014.
 //
-// Points i and j that are d < radius apart, with n the direction from i to j, weigh w = 1 - d / radius on each other.
-// Of points of equal mass each gets the acceleration
+// For points i and j at a distance d < radius, with n the direction from i to j, the weight is w = 1 - d / radius.
+// Points of equal mass each get the acceleration
 //
 //   a_i = share (-separation w n + cohesion 4 w (1 - w) n + alignment w (v_j - v_i) + drag w n (v_j - v_i)·n)
 //   share = 1 / max(1, Σ w of i, Σ w of j)
 //
-// so that it is an average over the neighbours, as flocks have it, and the same for both: momentum is kept, and by all
-// but alignment angular momentum too. Of unequal masses 2 m_j / (m_i + m_j) of it, with half the sum of their
-// strengths.
+// which is an average over the neighbours, as for flocks, and the same for both: it conserves momentum, and except for
+// alignment also angular momentum. Unequal masses get 2 m_j / (m_i + m_j) of it, with the mean of their strengths.
 //
-// It is applied as a kick of half the frame before the points move and one of half the frame after: of second order in
-// the frame's length by place, of first in alignment and drag. The neighbours are those of the frame's ends, whatever
-// the sub-steps: a frame is made finer by create's subframes. However strong, a kick brings velocities together at the
-// most, never past each other, and moves neighbours in a frame at the most out to the radius, or together.
+// It is applied as a kick of half the frame before the points move and one of half the frame after: second order in the
+// frame's length by position, first order in alignment and drag. Neighbours are found at the ends of the frame,
+// whatever the sub-steps: only create's subframes refine it. However strong, a kick makes velocities equal at the most,
+// and moves neighbours in a frame no farther than out to the radius, or together.
 #pragma once
 
 #include <span>
@@ -30,8 +29,8 @@ public:
     PerPoint<float> alignment{0.0f}, drag{0.0f};       // 1/s
 };
 
-// Half the frame's kicks of all interactions among `dynamics`, on the velocities; each of half the point's own time.
-// Points that the solve does not advance act, and are not moved. Same bits for any number of threads.
+// Applies the kicks of half the frame of all interactions to the velocities, for half of each point's own time. Points
+// that the solve does not advance act on others, and are not changed. Same bits for any number of threads.
 void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 }  // namespace rapid

@@ -30,7 +30,7 @@ PointSet points_at(std::span<const Vec3f> P, std::span<const Vec3f> v)
     return test::points(std::vector<Vec3f>(P.begin(), P.end())).v(std::vector<Vec3f>(v.begin(), v.end()));
 }
 
-// A frame as Solve takes it: a kick, the way, a kick.
+// A frame as Solve takes it: kick, drift, kick.
 void advance(PointSet& points, const Dynamics& interaction, double frame = h)
 {
     SolveOptions options;
@@ -74,11 +74,10 @@ double energy(const PointSet& points)
 
 }  // namespace
 
-TEST_CASE("two points that move past each other come to their mean velocity at twice the rate of alignment",
-          "[interaction]")
+TEST_CASE("two passing points approach their mean velocity at twice the rate of alignment", "[interaction]")
 {
     const float rate = GENERATE(0.5f, 5.0f, 1e6f);
-    // In one place, so that each weighs 1 on the other.
+    // Coincident, so that each has the weight 1.
     PointSet points = points_at(std::vector<Vec3f>{{0, 0, 0}, {0, 0, 0}}, std::vector<Vec3f>{{3, 1, 0}, {1, 1, 0}});
     const Dynamics interaction = among(1, 0, 0, rate, 0);
     SolveOptions options;
@@ -89,21 +88,20 @@ TEST_CASE("two points that move past each other come to their mean velocity at t
     CHECK(points.v()[0].y() == 1);
 }
 
-TEST_CASE("drag takes what two points approach by, and leaves what turns them about each other", "[interaction]")
+TEST_CASE("drag damps the approach of two points, and not their rotation about each other", "[interaction]")
 {
     PointSet points = points_at(std::vector<Vec3f>{{0, 0, 0}, {0.5, 0, 0}}, std::vector<Vec3f>{{1, 2, 0}, {-1, -2, 0}});
     const Dynamics interaction = among(1, 0, 0, 0, 1e6f);
     SolveOptions options;
     options.h = h;
     interact(points, interaction, options);
-    // Half a weight takes half of it, however strong; their way is along x.
+    // At half a weight, half of it, at any strength; they move along x.
     CHECK(points.v()[0].x() == Approx(0.5));
     CHECK(points.v()[1].x() == Approx(-0.5));
     CHECK(points.v()[0].y() == 2);
 }
 
-TEST_CASE("separation is w of its strength, shared by the masses, and as strong as the radius allows at the most",
-          "[interaction]")
+TEST_CASE("separation is its strength times w, shared by the masses, and limited by the radius", "[interaction]")
 {
     const auto apart = [](float strength, double frame) {
         PointSet points = points_at(std::vector<Vec3f>{{0, 0, 0}, {0.25, 0, 0}}, std::vector<Vec3f>(2, Vec3f::Zero()));
@@ -122,10 +120,9 @@ TEST_CASE("separation is w of its strength, shared by the masses, and as strong 
     CHECK(gap < 1);
 }
 
-TEST_CASE("two points that attract each other swing through their middle, of second order in the frame",
-          "[interaction]")
+TEST_CASE("two points that attract each other oscillate about their centre, second order in the frame", "[interaction]")
 {
-    // Without a closed form: against itself at a thousandth of the step.
+    // There is no closed form: the reference is a run at a thousandth of the step.
     const auto half_gap_after = [](int frames) {
         PointSet points =
             points_at(std::vector<Vec3f>{{-0.3f, 0, 0}, {0.3f, 0, 0}}, std::vector<Vec3f>{{0, 0.3f, 0}, {0, -0.3f, 0}});
@@ -138,7 +135,7 @@ TEST_CASE("two points that attract each other swing through their middle, of sec
     CHECK(coarse / fine == Approx(4).epsilon(0.1));
 }
 
-TEST_CASE("momentum is kept by any interaction of unequal masses and ages", "[interaction]")
+TEST_CASE("interactions of unequal masses and ages conserve momentum", "[interaction]")
 {
     PointSet points = cloud(500, 1, 2);
     points.set("dt", Column<float>(points.size(), float(h)));
@@ -153,7 +150,7 @@ TEST_CASE("momentum is kept by any interaction of unequal masses and ages", "[in
     CHECK((momentum(points) - before).norm() < 500 * 3 * 4 * 0x1p-24);
 }
 
-TEST_CASE("alignment and drag only ever take energy, at any rate", "[interaction]")
+TEST_CASE("alignment and drag never add energy, at any rate", "[interaction]")
 {
     const float rate = GENERATE(1e-3f, 1.0f, 100.0f, 1e9f);
     PointSet points = cloud(300, 0.5f, 2);
@@ -167,7 +164,7 @@ TEST_CASE("alignment and drag only ever take energy, at any rate", "[interaction
     }
 }
 
-TEST_CASE("no strength flings points about: a crowd that is driven apart leaves at what the radius allows",
+TEST_CASE("no strength blows up: a crowd that separates moves no faster than the radius allows",
           "[interaction][extreme]")
 {
     const float strength = GENERATE(1.0f, 1e4f, 1e12f);
@@ -180,7 +177,7 @@ TEST_CASE("no strength flings points about: a crowd that is driven apart leaves 
     }
 }
 
-TEST_CASE("points in one place part, each its own way", "[interaction][extreme]")
+TEST_CASE("coincident points separate, each in its own direction", "[interaction][extreme]")
 {
     PointSet points = points_at(std::vector<Vec3f>(10, Vec3f(1, 2, 3)), std::vector<Vec3f>(10, Vec3f::Zero()));
     advance(points, among(0.1, 1, 0, 0, 0));

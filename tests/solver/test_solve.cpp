@@ -1,4 +1,5 @@
-// Motion: what is exact in closed form, at any number of sub-steps; determinism; wrong input.
+// The step without constraints: closed forms at any number of sub-steps; determinism; wrong input. Covers step_scene,
+// step_context, point_errors, point_block, block_step and uncoupled_step; coupled_step is covered by constraints/.
 #include "runtime/solver/solve.h"
 
 #include <tbb/global_control.h>
@@ -36,7 +37,7 @@ std::string error_of(Scene& scene)
 TEST_CASE("free fall is exact to rounding, whatever the number of sub-steps", "[solve]")
 {
     const int substeps = GENERATE(1, 7, 1000);
-    const bool with_collider = GENERATE(false, true);  // stops sub-steps from being left out
+    const bool with_collider = GENERATE(false, true);  // so that sub-steps are taken
     CAPTURE(substeps, with_collider);
     const int frames = 24;
 
@@ -45,8 +46,8 @@ TEST_CASE("free fall is exact to rounding, whatever the number of sub-steps", "[
     if (with_collider) scene.collide(make_plane({0, 1, 0}, -1000));
     scene.run(frames);
 
-    // Once a frame the state is rounded to single precision: by half an ulp of P, and of v, which counts for the time
-    // that is left: at most 1 s.
+    // Once per frame the state is rounded to single precision: by half an ulp of P, and of v, which acts for the rest
+    // of the time, at most 1 s.
     const double ulp_P = 0x1p-20, ulp_v = 0x1p-20;
     CHECK_THAT(scene.P(), close_to(Vec3d(1.5, 10 + 3 - g / 2, -2), frames * (ulp_P + ulp_v) / 2));
     CHECK_THAT(scene.v(), close_to(Vec3d(0.5, 3 - g, 0), frames * ulp_v / 2));
@@ -77,7 +78,7 @@ TEST_CASE("a point moves by the same bits whether or not others are newborn", "[
     CHECK(alone.v(0) == among.v(0));
 }
 
-TEST_CASE("a force acts on its group, and on nobody where the group is unknown", "[solve]")
+TEST_CASE("a force acts on its group, and on no point where the group is unknown", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).group("heavy", {1}));
     auto force = std::make_shared<test::UniformForce>(Vec3d(0, -g, 0));
@@ -119,9 +120,9 @@ TEST_CASE("a force attribute accelerates by force / mass over the point's time, 
     CHECK_THAT(scene.v(0), close_to(Vec3d(0, 3, 0), 1e-15));
 }
 
-TEST_CASE("forces of position are of second order: the place in a circular orbit", "[solve]")
+TEST_CASE("forces of position are second order: the position in a circular orbit", "[solve]")
 {
-    const double omega = 2 * std::numbers::pi;  // one turn a second
+    const double omega = 2 * std::numbers::pi;  // one revolution per second
     const auto error_after_a_turn = [&](int substeps) {
         Scene scene(points({{1, 0, 0}}).v({{0, float(omega), 0}}));
         scene.force([=](const Chunk& chunk, std::size_t i) { return Vec3d(-omega * omega * chunk.P[i]); });
@@ -144,12 +145,12 @@ TEST_CASE("the energy of an orbit stays bounded", "[solve]")
         least = std::min(least, scene.P().norm());
         most = std::max(most, scene.P().norm());
     }
-    // At 24 steps a turn the orbit is an ellipse that is off by (ω h)²/8, here 0.9 %, and stays so.
+    // At 24 steps per revolution the orbit is an ellipse that is off by (ω h)²/8, here 0.9 %, and stays so.
     CHECK(least > 0.98);
     CHECK(most < 1.02);
 }
 
-TEST_CASE("forces are told the middle of each point's own sub-step", "[solve]")
+TEST_CASE("forces are evaluated at the middle of each point's own sub-step", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).v({{1, 0, 0}, {1, 0, 0}}).set<float>("dt", {1, 0.5f}));
     std::vector<std::array<double, 3>> heard[2];  // time, dt, x of each sub-step
@@ -164,7 +165,7 @@ TEST_CASE("forces are told the middle of each point's own sub-step", "[solve]")
     CHECK(heard[1] == Told{{0.625, 0.25, 0.125}, {0.875, 0.25, 0.375}});
 }
 
-TEST_CASE("no points, one and two are advanced", "[solve][extreme]")
+TEST_CASE("sets of no, one and two points are advanced", "[solve][extreme]")
 {
     const std::size_t n = GENERATE(0, 1, 2);
     Scene scene{PointSet(points(std::vector<Vec3f>(n, Vec3f(0, 1, 0))))};
@@ -173,7 +174,7 @@ TEST_CASE("no points, one and two are advanced", "[solve][extreme]")
     for (std::size_t i = 0; i < n; ++i) CHECK(scene.P(i) == Vec3d(0, 0, 0));
 }
 
-TEST_CASE("a point that is not finite stops the step by name", "[solve]")
+TEST_CASE("a point that is not finite stops the step, and is named", "[solve]")
 {
     const bool with_collider = GENERATE(false, true);
     const auto [bad, text] = GENERATE(table<float, std::string>({{nan, "nan"}, {infinity, "inf"}}));
@@ -190,7 +191,7 @@ TEST_CASE("a point that is not finite stops the step by name", "[solve]")
               ", 1}");
 }
 
-TEST_CASE("a velocity that the step makes infinite stops it by name", "[solve]")
+TEST_CASE("a velocity that becomes infinite in the step stops it, and is named", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).v({{0, 0, 0}, {3e38f, 0, 0}}));
     scene.gravity({3e38, 0, 0}).frame_length(1);
@@ -199,7 +200,7 @@ TEST_CASE("a velocity that the step makes infinite stops it by name", "[solve]")
           "{inf, 0, 0}");
 }
 
-TEST_CASE("a point that the step makes infinite is named with all that it had before", "[solve]")
+TEST_CASE("a point that becomes infinite in the step is named with the values it had before", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {5, 0, 0}}).v({{0, 0, 0}, {0, 2, 0}}).set<float>("heat", {1, 7}).group("hot", {1}));
     scene.force(
@@ -283,7 +284,7 @@ TEST_CASE("results are the same bits on any number of threads", "[solve]")
     CHECK(reference.penetration_max == scene.penetration_max);
 }
 
-TEST_CASE("results are the same bits wherever a point is, and whichever others there are", "[solve]")
+TEST_CASE("results are the same bits at any place in the set, and whichever other points there are", "[solve]")
 {
     const std::size_t before = GENERATE(1, 100, 4096, 5000);
     Scene alone = crowd(3000, 0), among = crowd(3000, before);

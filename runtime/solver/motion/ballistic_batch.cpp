@@ -2,184 +2,165 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <cstring>
 #include <limits>
 
+#include "runtime/path_extent.h"
 #include "runtime/solver/motion/damped_motion.h"
 
 namespace rapid {
 namespace {
 
-// a where all bits are set, b where none is.
-float chosen(std::uint32_t bits, float a, float b)
+// Points that are looked at and then advanced while they are in the first-level cache.
+constexpr std::size_t points_per_block = 512;
+
+[[gnu::always_inline]] inline FloatFlags magnitude_bits(const Floats& x)
 {
-    return std::bit_cast<float>((std::bit_cast<std::uint32_t>(a) & bits) | (std::bit_cast<std::uint32_t>(b) & ~bits));
+    return std::bit_cast<FloatFlags>(x) & 0x7fffffff;
 }
 
-// Points that are looked at, and then advanced, while they are in the first-level cache.
-constexpr std::size_t block = 512;
-
-constexpr auto nobody = [](std::uint32_t, bool) {};
+[[gnu::always_inline]] inline FloatFlags largest_of(const FloatFlags& a, const FloatFlags& b) { return a > b ? a : b; }
 
 }  // namespace
 
-BallisticBatch::Period BallisticBatch::by_axis(const Vec3d& x)
+BallisticBatch::BallisticBatch(const Vec3d& g, double k) : g_(g), k_(k), packed_g_(repeated(g)) {}
+
+void BallisticBatch::avoid(const Box3d& box, double radius)
 {
-    Period all;
-    for (int l = 0; l < period; ++l) all[l] = x[l % 3];
-    return all;
+    boxes_.push_back(widened(box, radius));
+    limits_.push_back({repeated(boxes_.back().min()), repeated(boxes_.back().max())});
 }
 
-BallisticBatch::BallisticBatch(const Vec3d& g, double k) : g_(by_axis(g)), k_(k) {}
-
-void BallisticBatch::set_times(Times& times, int point, double t) const
+void BallisticBatch::set_propagator(Propagators& all, std::uint32_t point, double t) const
 {
     const Propagator by = k_ == 0 ? Propagator() : respond(k_, 0, t);
-    for (int l = 3 * point; l < 3 * point + 3; ++l) {
-        times.t[l] = t;
-        times.x_of_v[l] = by.x_of_v;
-        times.v_of_v[l] = by.v_of_v;
-        times.fallen[l] = by.x_of_G * g_[l];
-        times.gained[l] = by.v_of_G * g_[l];
+    all.t.set_point(point, t);
+    all.x_of_v.set_point(point, by.x_of_v);
+    all.v_of_v.set_point(point, by.v_of_v);
+    for (std::uint32_t l = 3 * point; l < 3 * point + 3; ++l) {
+        all.fallen.set(l, by.x_of_G * g_[l % 3]);
+        all.gained.set(l, by.v_of_G * g_[l % 3]);
     }
 }
 
-BallisticBatch::Clock::Clock(const BallisticBatch& fall, const OwnTime& time, std::size_t begin)
-    : fall_(fall), time_(time), own_(time.own.data && time.own.stride != 0 ? time.own.data : nullptr), of_h_(own_)
+BallisticBatch::Clock::Clock(const BallisticBatch& batch, const OwnTime& time, std::size_t begin)
+    : batch_(batch),
+      time_(time),
+      own_(time.own.data && time.own.stride != 0 ? time.own.data : nullptr),
+      is_of_whole_frame_(own_)
 {
-    for (int p = 0; p < points_a_period; ++p) fall_.set_times(times_, p, own_ ? time.h : time(begin));
+    for (std::uint32_t p = 0; p < lanes; ++p) batch_.set_propagator(propagators_, p, own_ ? time.h : time(begin));
 }
 
 void BallisticBatch::Clock::set(std::size_t first, std::size_t n)
 {
     bool whole = true;
     for (std::size_t p = 0; p < n; ++p) whole &= own_[first + p] == static_cast<float>(time_.h);
-    if (whole && of_h_) return;
-    for (std::size_t p = 0; p < points_a_period; ++p) fall_.set_times(times_, p, time_(first + std::min(p, n - 1)));
-    of_h_ = whole;
+    if (whole && is_of_whole_frame_) return;
+    for (std::uint32_t p = 0; p < lanes; ++p)
+        batch_.set_propagator(propagators_, p, time_(first + std::min<std::size_t>(p, n - 1)));
+    is_of_whole_frame_ = whole;
 }
 
-void BallisticBatch::avoid(const Box3d& box, double radius)
+// Eight points. Returns bit 3 p for each point p that is left as it is. Unless it is known to be finite, `largest`
+// keeps the magnitude of what is written.
+template <bool Dragged, bool Avoids, bool Checks>
+[[gnu::always_inline]] inline std::uint32_t BallisticBatch::advance_pack(float* P, float* v, const Propagators& by,
+                                                                         Largest& largest) const
 {
-    const Vec3d margin = Vec3d::Constant(radius * (1 + 0x1p-21));
-    boxes_.emplace_back(box.min() - margin, box.max() + margin);
-    limits_.push_back({by_axis(boxes_.back().min()), by_axis(boxes_.back().max())});
-}
-
-// One period. near(p) is told, for each of its points, whether it stays; `largest`, by coordinate, keeps the size of
-// what is written, unless that is known to be finite.
-template <bool Dragged, bool Avoids, bool Checks, class Near>
-void BallisticBatch::advance_period(float* P, float* v, const Times& times, std::uint32_t* largest,
-                                    const Near& near) const
-{
-    float P1[period], v1[period];
-    [[maybe_unused]] double lowest[period], highest[period];
-    for (int l = 0; l < period; ++l) {
-        const double x = P[l], u = v[l], t = times.t[l];
-        double x1, u1, bend;  // how far the path is off the straight line at most
+    PackedPoints<Floats> P0, v0, P1, v1;
+    [[maybe_unused]] PathExtent<Doubles> extent[3];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+        P0[k] = load_pack(P + lanes * k);
+        v0[k] = load_pack(v + lanes * k);
+        const Doubles x = widen(P0[k]), u = widen(v0[k]), &t = by.t[k];
+        Doubles x1, u1, sagging;
         if constexpr (Dragged) {
-            x1 = x + (times.x_of_v[l] * u + times.fallen[l]);
-            u1 = times.v_of_v[l] * u + times.gained[l];
-            // The velocity goes from u to u1 and not back: a quarter of the difference, for t. And by as much as
-            // another quarter of this are the parabolas of Collisions off the path.
-            bend = 0.25 * (t * std::abs(u1 - u) + std::abs(times.fallen[l]));
+            x1 = x + (by.x_of_v[k] * u + by.fallen[k]);
+            u1 = by.v_of_v[k] * u + by.gained[k];
+            // The velocity changes monotonically from u to u1: a quarter of the difference, for t. The parabolas of
+            // Collisions are off this path by as much as another quarter of the fall.
+            sagging = 0.25 * (t * magnitude(u1 - u) + magnitude(by.fallen[k]));
         } else {
-            const double gain = t * g_[l];
+            const Doubles gain = t * packed_g_[k];
             x1 = x + t * (u + 0.5 * gain);
             u1 = u + gain;
-            bend = std::abs(0.125 * t * gain);
+            sagging = magnitude(0.125 * t * gain);
         }
-        P1[l] = static_cast<float>(x1);
-        v1[l] = static_cast<float>(u1);
-        if constexpr (Checks) largest[l] = std::max({largest[l], magnitude_bits(P1[l]), magnitude_bits(v1[l])});
-        if constexpr (Avoids) {
-            // The factor keeps a point that is flush with a box and rounded away from it.
-            const double margin = bend + 0x1p-21 * std::abs(x);
-            lowest[l] = std::min(x, x1) - margin;
-            highest[l] = std::max(x, x1) + margin;
+        P1[k] = narrow(x1);
+        v1[k] = narrow(u1);
+        if constexpr (Checks)
+            largest[k] = largest_of(largest[k], largest_of(magnitude_bits(P1[k]), magnitude_bits(v1[k])));
+        if constexpr (Avoids) extent[k] = PathExtent<Doubles>::of(x, x1, sagging);
+    }
+    std::uint32_t near = 0;
+    if constexpr (Avoids) {
+        for (const Limits& box : limits_) {
+            std::uint32_t misses = 0;
+            for (std::uint32_t k = 0; k < 3; ++k) misses |= bits(extent[k].misses(box.min[k], box.max[k])) << lanes * k;
+            near |= every_point & ~any_of_point(misses);
+        }
+        if (near != 0) {
+            const std::uint32_t stays = near | near << 1 | near << 2;
+            for (std::uint32_t k = 0; k < 3; ++k) {
+                const FloatFlags stay = float_flags(stays >> lanes * k);
+                P1[k] = stay ? P0[k] : P1[k];
+                v1[k] = stay ? v0[k] : v1[k];
+            }
         }
     }
-    if constexpr (!Avoids) {
-        std::copy_n(P1, period, P);
-        std::copy_n(v1, period, v);
-        return;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+        store_pack(P1[k], P + lanes * k);
+        store_pack(v1[k], v + lanes * k);
     }
-
-    double clear[points_a_period];
-    std::fill_n(clear, points_a_period, std::numeric_limits<double>::infinity());
-    for (const Limits& box : limits_) {
-        double beyond[period];
-        for (int l = 0; l < period; ++l) beyond[l] = std::max(box.least[l] - highest[l], lowest[l] - box.most[l]);
-        for (int p = 0; p < points_a_period; ++p)
-            clear[p] = std::min(clear[p], std::max(std::max(beyond[3 * p], beyond[3 * p + 1]), beyond[3 * p + 2]));
-    }
-    std::uint32_t goes[period];
-    for (int p = 0; p < points_a_period; ++p) std::fill_n(goes + 3 * p, 3, clear[p] > 0 ? ~0u : 0u);
-    for (int l = 0; l < period; ++l) {
-        P[l] = chosen(goes[l], P1[l], P[l]);
-        v[l] = chosen(goes[l], v1[l], v[l]);
-    }
-    for (int p = 0; p < points_a_period; ++p) near(p, !(clear[p] > 0));
+    return near;
 }
 
-BallisticBatch::Extent BallisticBatch::extent_of(std::span<const Vec3f> values)
+BallisticBatch::Bounds BallisticBatch::bounds_of(std::span<const Vec3f> values)
 {
-    // Three vectors of eight are a period. They stay in registers.
-    typedef float Lanes __attribute__((vector_size(32)));
-    typedef std::int32_t Bits __attribute__((vector_size(32)));
-    constexpr std::int32_t infinity = infinity_bits;
     const float* x = coordinates(values);
     const std::size_t size = 3 * values.size();
-    float few[period];
-    if (size < period) {
-        for (std::size_t l = 0; l < period; ++l) few[l] = x[l % size];
+    float few[coordinates_per_pack];
+    if (size < coordinates_per_pack) {
+        for (std::size_t l = 0; l < coordinates_per_pack; ++l) few[l] = x[l % size];
         x = few;
     }
-    const auto load = [&](std::size_t l) {
-        Lanes some;
-        std::memcpy(&some, x + l, sizeof some);
-        return some;
-    };
-    Lanes least[3] = {load(0), load(8), load(16)}, most[3] = {least[0], least[1], least[2]};
-    Bits largest[3] = {};
-    const auto take = [&](std::size_t l) {
-        for (int k = 0; k < 3; ++k) {
-            const Lanes some = load(l + 8 * k);
-            least[k] = some < least[k] ? some : least[k];
-            most[k] = some > most[k] ? some : most[k];
-            const Bits magnitude = std::bit_cast<Bits>(some) & 0x7fffffff;
-            largest[k] = magnitude > largest[k] ? magnitude : largest[k];
+    PackedPoints<Floats> low, high;
+    Largest largest = {};
+    for (std::uint32_t k = 0; k < 3; ++k) low[k] = high[k] = load_pack(x + lanes * k);
+    const auto take = [&](std::size_t l) __attribute__((always_inline))
+    {
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            const Floats some = load_pack(x + l + lanes * k);
+            low[k] = some < low[k] ? some : low[k];
+            high[k] = some > high[k] ? some : high[k];
+            largest[k] = largest_of(largest[k], magnitude_bits(some));
         }
     };
-    for (std::size_t l = 0; l + period < size; l += period) take(l);
-    take(std::max<std::size_t>(size, period) - period);
+    for (std::size_t l = 0; l + coordinates_per_pack < size; l += coordinates_per_pack) take(l);
+    take(std::max<std::size_t>(size, coordinates_per_pack) - coordinates_per_pack);
 
-    std::array<float, period> low, high;
-    std::memcpy(&low, least, sizeof low);
-    std::memcpy(&high, most, sizeof high);
-    for (int half = period / 2; half >= 3; half /= 2)
-        for (int l = 0; l < half; ++l) {
-            low[l] = std::min(low[l], low[l + half]);
-            high[l] = std::max(high[l], high[l + half]);
-        }
-    const Bits finite = (largest[0] < infinity) & (largest[1] < infinity) & (largest[2] < infinity);
-    bool all = true;
-    for (int l = 0; l < 8; ++l) all &= finite[l] != 0;
-    return {Box3d(Vec3d(low[0], low[1], low[2]), Vec3d(high[0], high[1], high[2])), all};
+    Bounds bounds{Box3d(), progress(0, largest).finite};
+    for (std::uint32_t l = 0; l < coordinates_per_pack; l += 3) {
+        const auto at = [l](const PackedPoints<Floats>& packed, std::uint32_t axis) {
+            return double(packed[(l + axis) / lanes][(l + axis) % lanes]);
+        };
+        bounds.box.extend(Vec3d(at(low, 0), at(low, 1), at(low, 2)));
+        bounds.box.extend(Vec3d(at(high, 0), at(high, 1), at(high, 2)));
+    }
+    return bounds;
 }
 
-// Whether no point of these places and velocities comes near a box in t seconds, and all stay finite.
-bool BallisticBatch::are_far(const Box3d& places, const Box3d& speeds, double t) const
+// Whether no point with these positions and velocities comes near a box in t seconds, and all stay finite.
+bool BallisticBatch::are_far(const Box3d& positions, const Box3d& velocities, double t) const
 {
-    const Vec3d g = Eigen::Map<const Vec3d>(g_.data()), pulled = t * g;
-    // Drag makes less of the velocity and of what the acceleration adds, each by itself.
-    const Vec3d slowest = k_ == 0 ? Vec3d(speeds.min().cwiseMin(speeds.min() + pulled).cwiseMin(0.0))
-                                  : Vec3d(speeds.min().cwiseMin(0.0) + pulled.cwiseMin(0.0));
-    const Vec3d fastest = k_ == 0 ? Vec3d(speeds.max().cwiseMax(speeds.max() + pulled).cwiseMax(0.0))
-                                  : Vec3d(speeds.max().cwiseMax(0.0) + pulled.cwiseMax(0.0));
-    const Vec3d rounding = 0x1p-20 * places.min().cwiseAbs().cwiseMax(places.max().cwiseAbs());
-    const Box3d reach(places.min() + t * slowest - rounding, places.max() + t * fastest + rounding);
+    const Vec3d gain = t * g_;
+    // Drag reduces the velocity and what the acceleration adds, each by itself.
+    const Vec3d slowest = k_ == 0 ? Vec3d(velocities.min().cwiseMin(velocities.min() + gain).cwiseMin(0.0))
+                                  : Vec3d(velocities.min().cwiseMin(0.0) + gain.cwiseMin(0.0));
+    const Vec3d fastest = k_ == 0 ? Vec3d(velocities.max().cwiseMax(velocities.max() + gain).cwiseMax(0.0))
+                                  : Vec3d(velocities.max().cwiseMax(0.0) + gain.cwiseMax(0.0));
+    const Vec3d rounding = 0x1p-20 * positions.min().cwiseAbs().cwiseMax(positions.max().cwiseAbs());
+    const Box3d reach(positions.min() + t * slowest - rounding, positions.max() + t * fastest + rounding);
     static constexpr double most = std::numeric_limits<float>::max() / 2;
     const auto is_finite = [](const Vec3d& least, const Vec3d& greatest) {
         return (least.array() > -most).all() && (greatest.array() < most).all();
@@ -192,19 +173,14 @@ BallisticBatch::Progress BallisticBatch::advance(std::span<Vec3f> P, std::span<V
                                                  std::size_t begin, std::size_t end,
                                                  std::vector<std::uint32_t>& near) const
 {
-    if (limits_.empty()) return advance_any<false>(P, v, time, begin, end, near);
-    return advance_any<true>(P, v, time, begin, end, near);
+    if (limits_.empty())
+        return k_ == 0 ? advance_all<false, false>(P, v, time, begin, end, near)
+                       : advance_all<true, false>(P, v, time, begin, end, near);
+    return k_ == 0 ? advance_all<false, true>(P, v, time, begin, end, near)
+                   : advance_all<true, true>(P, v, time, begin, end, near);
 }
 
-template <bool Avoids>
-BallisticBatch::Progress BallisticBatch::advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time,
-                                                     std::size_t begin, std::size_t end,
-                                                     std::vector<std::uint32_t>& near) const
-{
-    return k_ == 0 ? advance_all<false, Avoids>(P, v, time, begin, end, near)
-                   : advance_all<true, Avoids>(P, v, time, begin, end, near);
-}
-
+// Among shapes, a block whose bounding box is far from all of them needs no test for each of its points: most blocks.
 template <bool Dragged, bool Avoids>
 BallisticBatch::Progress BallisticBatch::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time,
                                                      std::size_t begin, std::size_t end,
@@ -212,64 +188,61 @@ BallisticBatch::Progress BallisticBatch::advance_all(std::span<Vec3f> P, std::sp
 {
     const double longest = std::max(time.h, double(static_cast<float>(time.h)));
     Clock clock(*this, time, begin);
-    std::uint32_t largest[period] = {};
-    for (std::size_t at = begin; at < end; at += block) {
-        const std::size_t size = std::min(block, end - at);
+    Largest largest = {};
+    for (std::size_t at = begin; at < end; at += points_per_block) {
+        const std::size_t size = std::min(points_per_block, end - at);
         if constexpr (!Avoids) {
             if (!all_finite(P.subspan(at, size)) || !all_finite(v.subspan(at, size))) return progress(at, largest);
-            advance_block<Dragged, false, true>(P, v, clock, at, at + size, largest, nobody);
+            advance_block<Dragged, false, true>(P, v, clock, at, at + size, largest, nullptr);
         } else {
-            const Extent places = extent_of(P.subspan(at, size)), speeds = extent_of(v.subspan(at, size));
-            if (!places.finite || !speeds.finite) return progress(at, largest);
-            if (are_far(places.box, speeds.box, longest)) {
-                advance_block<Dragged, false, false>(P, v, clock, at, at + size, largest, nobody);
-                continue;
-            }
-            std::size_t count = near.size();
-            near.resize(count + size + points_a_period);
-            advance_block<Dragged, true, true>(P, v, clock, at, at + size, largest, [&](std::uint32_t i, bool stays) {
-                near[count] = i;
-                count += stays && i < end;
-            });
-            near.resize(count);
+            const Bounds positions = bounds_of(P.subspan(at, size)), velocities = bounds_of(v.subspan(at, size));
+            if (!positions.finite || !velocities.finite) return progress(at, largest);
+            if (are_far(positions.box, velocities.box, longest))
+                advance_block<Dragged, false, false>(P, v, clock, at, at + size, largest, nullptr);
+            else
+                advance_block<Dragged, true, true>(P, v, clock, at, at + size, largest, &near);
         }
     }
     return progress(end, largest);
 }
 
-BallisticBatch::Progress BallisticBatch::progress(std::size_t end, const std::uint32_t* largest)
+BallisticBatch::Progress BallisticBatch::progress(std::size_t end, const Largest& largest)
 {
-    return {end, *std::max_element(largest, largest + period) < infinity_bits};
+    std::int32_t most = 0;
+    for (std::uint32_t l = 0; l < coordinates_per_pack; ++l) most = std::max(most, largest[l / lanes][l % lanes]);
+    return {end, most < static_cast<std::int32_t>(infinity_bits)};
 }
 
-template <bool Dragged, bool Avoids, bool Checks, class Near>
+template <bool Dragged, bool Avoids, bool Checks>
 void BallisticBatch::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin,
-                                   std::size_t end, std::uint32_t* largest, const Near& near) const
+                                   std::size_t end, Largest& largest, std::vector<std::uint32_t>* near) const
 {
-    std::uint32_t own_largest[period];
-    std::copy_n(largest, period, own_largest);
-    for (std::size_t at = begin; at < end; at += points_a_period) {
-        // What the next block will look at is fetched while this one is computed.
+    Largest own_largest = largest;  // in registers
+    for (std::size_t at = begin; at < end; at += lanes) {
+        // The next block is fetched while this one is computed.
         for (int line = 0; line < 2; ++line) {
-            __builtin_prefetch(P.data()->data() + 3 * (at + block) + 16 * line);
-            __builtin_prefetch(v.data()->data() + 3 * (at + block) + 16 * line);
+            __builtin_prefetch(P.data()->data() + 3 * (at + points_per_block) + 16 * line);
+            __builtin_prefetch(v.data()->data() + 3 * (at + points_per_block) + 16 * line);
         }
-        const std::size_t n = std::min<std::size_t>(points_a_period, end - at);
-        const Times& times = clock.of(at, n);
-        float *P_some = P[at].data(), *v_some = v[at].data(), P_end[period] = {}, v_end[period] = {};
-        if (n < points_a_period) {
-            P_some = std::copy_n(P_some, 3 * n, P_end) - 3 * n;
-            v_some = std::copy_n(v_some, 3 * n, v_end) - 3 * n;
+        const std::size_t n = std::min<std::size_t>(lanes, end - at);
+        const Propagators& by = clock.of(at, n);
+        std::uint32_t stay;
+        if (n == lanes) {
+            stay = advance_pack<Dragged, Avoids, Checks>(P[at].data(), v[at].data(), by, own_largest);
+        } else {
+            float P_some[coordinates_per_pack] = {}, v_some[coordinates_per_pack] = {};
+            std::copy_n(P[at].data(), 3 * n, P_some);
+            std::copy_n(v[at].data(), 3 * n, v_some);
+            stay = advance_pack<Dragged, Avoids, Checks>(P_some, v_some, by, own_largest);
+            std::copy_n(P_some, 3 * n, P[at].data());
+            std::copy_n(v_some, 3 * n, v[at].data());
+            stay &= (1u << 3 * n) - 1;
         }
-        advance_period<Dragged, Avoids, Checks>(P_some, v_some, times, own_largest, [&](int p, bool stays) {
-            near(static_cast<std::uint32_t>(at + p), stays);
-        });
-        if (n < points_a_period) {
-            std::copy_n(P_end, 3 * n, P[at].data());
-            std::copy_n(v_end, 3 * n, v[at].data());
-        }
+        if constexpr (Avoids)
+            for (; stay != 0; stay &= stay - 1)
+                near->push_back(static_cast<std::uint32_t>(at + std::countr_zero(stay) / 3));
     }
-    std::copy_n(own_largest, period, largest);
+    largest = own_largest;
 }
 
 }  // namespace rapid

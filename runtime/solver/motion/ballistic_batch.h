@@ -1,6 +1,8 @@
-// Points that one acceleration moves, and one drag, and nothing else: from single precision to single precision in one
-// go, whatever the sub-steps, because the closed form is exact and they would only repeat it. Points whose way may come
-// near a shape are left as they are, for Collisions.
+// Advances points on which only one uniform acceleration and one linear drag act: from single precision to single
+// precision in one pass over memory, whatever the sub-steps, because the closed form is exact and they would only
+// repeat it. Points that may come near a shape are left as they are, for Collisions.
+//
+// Why beside the sub-steps of a block (solver/block_step.h): it runs at the speed of memory (bench_solver, free_fall).
 #pragma once
 
 #include <array>
@@ -9,16 +11,18 @@
 #include <vector>
 
 #include "runtime/points/column.h"
+#include "runtime/simd.h"
+#include "runtime/solver/motion/packed_points.h"
 #include "runtime/vec.h"
 
 namespace rapid {
 
-// How long each point moves in the frame, s: by its own column, which a newborn's age has made shorter, or h.
+// How long each point moves in the frame, s: by its own column, which is shorter for a newborn, or h.
 struct OwnTime {
     double h = 0;
     Strided<float> own{nullptr, 0};  // null where all move for h
 
-    // The whole frame in double, whether or not newborn points make a column of it.
+    // The whole frame in double precision, whether or not the points have a column because of newborns.
     double operator()(std::size_t i) const
     {
         if (!own.data || own[i] == static_cast<float>(h)) return h;
@@ -31,83 +35,79 @@ public:
     // v' = g - k v: m/s², 1/s.
     BallisticBatch(const Vec3d& g, double k);
 
-    // No point is advanced that may come within `radius` of the box on its way, or has begun there: by the box around
-    // its path, and with what rounding a position to single precision can do.
+    // Points whose path may come within `radius` of the box, by their bounding boxes, are not advanced.
     void avoid(const Box3d& box, double radius);
 
     struct Progress {
-        std::size_t end;  // how far it came
-        bool finite;      // whether all states up to there are
+        std::size_t end;  // the points before it have been advanced, or left to Collisions
+        bool finite;      // whether all their states are finite
     };
 
-    // Advances the points [begin, end), up to the first few of which one is not finite. Those that are left as they
+    // Advances the points [begin, end), up to the first block of which one is not finite. Those that are left as they
     // are, are appended to `near`, in order.
     Progress advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
                      std::vector<std::uint32_t>& near) const;
 
 private:
-    // What belongs to the axes recurs along the packed coordinates: in whole vectors of 8, and whole points.
-    static constexpr int period = 24, points_a_period = period / 3;
-    using Period = std::array<double, period>;
-
+    // A widened box, repeated along the coordinates of eight points.
     struct Limits {
-        Period least, most;
+        PackedPoints<Doubles> min, max;
     };
 
-    // How long the points of a period move; with drag also what becomes of their velocities in this time, and what the
-    // acceleration adds: to their places, m, and to their velocities, m/s.
-    struct Times {
-        Period t, x_of_v, v_of_v, fallen, gained;
+    // The propagator of each of eight points: how long it moves, s; with drag also the factors of its velocity, and
+    // what the acceleration adds to its position, m, and to its velocity, m/s.
+    struct Propagators {
+        PackedPoints<Doubles> t, x_of_v, v_of_v, fallen, gained;
     };
 
-    // The times of one period after another: most points move for the whole frame, and share them.
+    // The propagators of one pack of points after the other: most points move for the whole frame, and share them.
     class Clock {
     public:
-        Clock(const BallisticBatch& fall, const OwnTime& time, std::size_t begin);
+        Clock(const BallisticBatch& batch, const OwnTime& time, std::size_t begin);
         // Of n points.
-        const Times& of(std::size_t first, std::size_t n)
+        const Propagators& of(std::size_t first, std::size_t n)
         {
             if (own_) set(first, n);
-            return times_;
+            return propagators_;
         }
 
     private:
         void set(std::size_t first, std::size_t n);
 
-        const BallisticBatch& fall_;
+        const BallisticBatch& batch_;
         const OwnTime& time_;
-        const float* own_;  // null where all move for the same time
-        bool of_h_;         // whether times_ are of the whole frame
-        Times times_;
+        const float* own_;        // null where all move for the same time
+        bool is_of_whole_frame_;  // propagators_
+        Propagators propagators_;
     };
 
-    // The box around some vectors, and whether all of them are finite; where they are not, the box means nothing.
-    struct Extent {
+    // The bounding box of some vectors, and whether all of them are finite; where they are not, the box means nothing.
+    struct Bounds {
         Box3d box;
         bool finite;
     };
+    // The largest magnitude that was written, as bits; by coordinate.
+    using Largest = PackedPoints<FloatFlags>;
 
-    static Period by_axis(const Vec3d& x);
-    static Extent extent_of(std::span<const Vec3f> values);
-    static Progress progress(std::size_t end, const std::uint32_t* largest);
-    void set_times(Times& times, int point, double t) const;
-    bool are_far(const Box3d& places, const Box3d& speeds, double t) const;
-    template <bool Dragged, bool Avoids, bool Checks, class Near>
-    void advance_period(float* P, float* v, const Times& times, std::uint32_t* largest, const Near& near) const;
-    template <bool Dragged, bool Avoids, bool Checks, class Near>
+    static Bounds bounds_of(std::span<const Vec3f> values);
+    static Progress progress(std::size_t end, const Largest& largest);
+    void set_propagator(Propagators& all, std::uint32_t point, double t) const;
+    bool are_far(const Box3d& positions, const Box3d& velocities, double t) const;
+
+    template <bool Dragged, bool Avoids, bool Checks>
+    std::uint32_t advance_pack(float* P, float* v, const Propagators& by, Largest& largest) const;
+    template <bool Dragged, bool Avoids, bool Checks>
     void advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock& clock, std::size_t begin, std::size_t end,
-                       std::uint32_t* largest, const Near& near) const;
+                       Largest& largest, std::vector<std::uint32_t>* near) const;
     template <bool Dragged, bool Avoids>
     Progress advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
                          std::size_t end, std::vector<std::uint32_t>& near) const;
-    template <bool Avoids>
-    Progress advance_any(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin,
-                         std::size_t end, std::vector<std::uint32_t>& near) const;
 
-    Period g_;
+    Vec3d g_;
     double k_;
+    PackedPoints<Doubles> packed_g_;
     std::vector<Box3d> boxes_;    // widened
-    std::vector<Limits> limits_;  // of these
+    std::vector<Limits> limits_;  // of the boxes
 };
 
 }  // namespace rapid

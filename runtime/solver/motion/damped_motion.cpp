@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/simd.h"
+
 namespace rapid {
 namespace {
 
-constexpr int terms = 22;  // of the series, whose last is then below rounding
+constexpr int terms = 22;  // of the series: the last one is below rounding
 constexpr auto one_over = [] {
     std::array<double, terms + 2> all{};
     for (int n = 1; n < terms + 2; ++n) all[n] = 1.0 / n;
@@ -32,22 +34,24 @@ Propagator by_series(double k, double w2, double t)
     return {t * h, t * t * integral, slope, t * h};
 }
 
-// Without a spring, by x = k t: e^-x, (1 - e^-x)/x and (e^-x - 1 + x)/x². Up to 1 by the series of the last, from which
-// the others follow without cancellation.
+// Without a spring, by x = k t: e^-x, (1 - e^-x)/x and (e^-x - 1 + x)/x². Up to 1 by the series of the last one, from
+// which the others follow without cancellation. T: double, or a pack.
+template <class T>
 struct Decay {
-    double slope, h, integral;
+    T slope, h, integral;
 };
 
-inline Decay small_decay(double x)
+template <class T>
+[[gnu::always_inline]] inline Decay<T> small_decay(const T& x)
 {
-    double integral = one_over[terms];
+    T integral = T{} + one_over[terms];
 #pragma GCC unroll 32
-    for (int n = terms - 1; n >= 2; --n) integral = (1 - x * integral) * one_over[n];
-    const double h = 1 - x * integral;
-    return {1 - x * h, h, integral};
+    for (int n = terms - 1; n >= 2; --n) integral = (1.0 - x * integral) * one_over[n];
+    const T h = 1.0 - x * integral;
+    return {1.0 - x * h, h, integral};
 }
 
-Decay large_decay(double x)
+Decay<double> large_decay(double x)
 {
     const double slope = std::exp(-x), h = (1 - slope) / x;
     return {slope, h, (1 - h) / x};
@@ -56,7 +60,7 @@ Decay large_decay(double x)
 Propagator respond_to_drag(double k, double t)
 {
     const double x = k * t;
-    const Decay decay = x <= 1 ? small_decay(x) : large_decay(x);
+    const Decay<double> decay = x <= 1 ? small_decay(x) : large_decay(x);
     return {t * decay.h, t * t * decay.integral, decay.slope, t * decay.h};
 }
 
@@ -93,23 +97,31 @@ Propagator respond(double k, double w2, double t)
 
 void DragPropagators::respond(std::span<const double> k, std::span<const double> t)
 {
-    const std::size_t size = k.size();
-    for (auto* column : {&x_of_v, &x_of_G, &v_of_v}) column->resize(size);
-    double *xv = x_of_v.data(), *xG = x_of_G.data(), *vv = v_of_v.data();
-    const auto set = [=](std::size_t i, const Decay& decay) {
-        xv[i] = t[i] * decay.h;
-        xG[i] = t[i] * t[i] * decay.integral;
-        vv[i] = decay.slope;
-    };
-    std::size_t small = 0;
-#pragma GCC ivdep
-    for (std::size_t i = 0; i < size; ++i) {
-        const double x = k[i] * t[i];
-        small += x <= 1;
-        set(i, small_decay(x));
+    const std::size_t size = k.size(), padded = (size + lanes - 1) / lanes * lanes;
+    for (auto* column : {&x_of_v, &x_of_G, &v_of_v}) column->resize(padded);
+    bool small = true;
+    for (std::size_t i = 0; i < size; i += lanes) {
+        double k_last[lanes] = {}, t_last[lanes] = {};
+        const bool whole = size - i >= lanes;
+        if (!whole) {
+            std::copy(k.begin() + i, k.end(), k_last);
+            std::copy(t.begin() + i, t.end(), t_last);
+        }
+        const Doubles time = load_pack(whole ? &t[i] : t_last), x = load_pack(whole ? &k[i] : k_last) * time;
+        const Decay<Doubles> decay = small_decay(x);
+        small &= !any(!(x <= 1));
+        store_pack(time * decay.h, &x_of_v[i]);
+        store_pack(time * time * decay.integral, &x_of_G[i]);
+        store_pack(decay.slope, &v_of_v[i]);
     }
-    for (std::size_t i = 0; small < size && i < size; ++i)
-        if (!(k[i] * t[i] <= 1)) set(i, large_decay(k[i] * t[i]));
+    for (std::size_t i = 0; !small && i < size; ++i) {
+        const double x = k[i] * t[i];
+        if (x <= 1) continue;
+        const Decay<double> decay = large_decay(x);
+        x_of_v[i] = t[i] * decay.h;
+        x_of_G[i] = t[i] * t[i] * decay.integral;
+        v_of_v[i] = decay.slope;
+    }
 }
 
 double mean_speed(double speed, double a, double c, double t)
@@ -117,7 +129,7 @@ double mean_speed(double speed, double a, double c, double t)
     if (!(t > 0)) return speed;
     const double rate2 = std::abs(a) * c;
     const double x = std::sqrt(rate2) * t, push = c * speed * t;
-    // ∫ c speed dt = ln of what the speed is divided by, which is 1 + push where nothing accelerates.
+    // ∫ c speed dt = ln of the factor by which the speed falls, which is 1 + push without acceleration.
     double log_ratio;
     if (x < 1e-4) {
         log_ratio = std::log1p(push + (a > 0 ? 0.5 : -0.5) * x * x);
@@ -125,7 +137,7 @@ double mean_speed(double speed, double a, double c, double t)
         // ln(cosh x + (push/x) sinh x), for any size of x
         log_ratio = x + std::log(0.5 * ((1 + push / x) + (1 - push / x) * std::exp(-2 * x)));
     } else {
-        // Slowed to rest at the time where the angle is atan(push/x); then it stays: what turns it round is no drag.
+        // Slowed to rest at the time when the angle is atan(push/x); from then on at rest: drag turns no point round.
         const double stop = std::atan2(push, x);
         const double angle = std::min(x, stop);
         log_ratio = std::log(std::cos(angle) + push / x * std::sin(angle));
@@ -144,7 +156,7 @@ double drag_rate_along(const Vec3d& direction, const Vec3d& v, const Vec3d& G, c
 double drag_rate(const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
 {
     if (!(linear.c > 0)) return linear.k;
-    // The direction of the way is not known before the rate is: a second time with that of the first.
+    // The direction of the motion depends on the rate: a second iteration with that of the first.
     const double first = drag_rate_along(v.squaredNorm() > 0 ? v : G, v, G, linear, t);
     const Propagator r = respond(first, linear.w2, t);
     return drag_rate_along(v + (v * r.v_of_v + G * r.v_of_G), v, G, linear, t);

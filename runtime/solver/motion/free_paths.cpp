@@ -1,20 +1,33 @@
 #include "runtime/solver/motion/free_paths.h"
 
 #include <algorithm>
-#include <limits>
+#include <bit>
+
+#include "runtime/path_extent.h"
+#include "runtime/solver/motion/packed_points.h"
 
 namespace rapid {
 namespace {
 
-// Along the packed coordinates what belongs to the axes recurs: in whole vectors of 8, and whole points.
-constexpr int period = 24, points_a_period = period / 3;
-using Period = Eigen::Array<double, period, 1>;
+using Coordinates = PackedPoints<Doubles>;
 
-Period by_axis(const Vec3d& x) { return x.array().replicate<points_a_period, 1>(); }
-
-Eigen::Map<const Period> period_at(const Eigen::ArrayXd& x, Eigen::Index at)
+[[gnu::always_inline]] inline Coordinates load(const Vec3d* from)
 {
-    return Eigen::Map<const Period>(x.data() + at);
+    const double* x = from->data();
+    return {{load_pack(x), load_pack(x + lanes), load_pack(x + 2 * lanes)}};
+}
+[[gnu::always_inline]] inline void store(const Coordinates& coordinates, Vec3d* to)
+{
+    for (std::uint32_t k = 0; k < 3; ++k) store_pack(coordinates[k], to->data() + lanes * k);
+}
+
+// The durations of eight points, each three times.
+[[gnu::always_inline]] inline Coordinates tripled(const double* t)
+{
+    const Doubles eight = load_pack(t);
+    return {{__builtin_shufflevector(eight, eight, 0, 0, 0, 1, 1, 1, 2, 2),
+             __builtin_shufflevector(eight, eight, 2, 3, 3, 3, 4, 4, 4, 5),
+             __builtin_shufflevector(eight, eight, 5, 5, 6, 6, 6, 7, 7, 7)}};
 }
 
 }  // namespace
@@ -22,68 +35,75 @@ Eigen::Map<const Period> period_at(const Eigen::ArrayXd& x, Eigen::Index at)
 void FreePaths::begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<Vec3d> a, std::span<const double> dt)
 {
     size_ = P.size();
-    const auto n = static_cast<Eigen::Index>(3 * size_);
-    const Eigen::Index padded = (n + period - 1) / period * period;
-    for (Eigen::ArrayXd* x : {&t_, &gain_, &P_, &v_}) x->resize(n);
-    lowest_.resize(padded);
-    highest_.resize(padded);
-
-    for (std::size_t i = 0; i < size_; ++i) t_.segment<3>(3 * i).setConstant(dt[i]);
-    if (a.stride == 0) {
-        const Period g = by_axis(a[0]);
-        Eigen::Index at = 0;
-        for (; at + period <= n; at += period) gain_.segment<period>(at) = t_.segment<period>(at) * g;
-        gain_.tail(n - at) = t_.tail(n - at) * g.head(n - at);
-    } else {
-        gain_ = t_ * Eigen::Map<const Eigen::ArrayXd>(a.data->data(), n);
-    }
-
-    const Eigen::Map<const Eigen::ArrayXd> p(coordinates(P), n), u(coordinates(v), n);
-    P_ = p + t_ * (u + 0.5 * gain_);
-    v_ = u + gain_;
-    // The parabola is off the straight line by a t²/8 at most. The factor keeps a point that is flush with a box and
-    // rounded away from it.
-    gain_ = (0.125 * t_ * gain_).abs() + 0x1p-21 * p.abs();
-    lowest_.head(n) = p.min(P_) - gain_;
-    highest_.head(n) = p.max(P_) + gain_;
-
-    // What is beyond the last point is a copy of it.
-    for (Eigen::Index at = n; at < padded; ++at) {
-        lowest_[at] = lowest_[at - 3];
-        highest_[at] = highest_[at - 3];
-    }
-    Period lowest = period_at(lowest_, 0), highest = period_at(highest_, 0);
-    for (Eigen::Index at = period; at < padded; at += period) {
-        lowest = lowest.min(period_at(lowest_, at));
-        highest = highest.max(period_at(highest_, at));
-    }
+    const std::size_t padded = (size_ + lanes - 1) / lanes * lanes;
+    for (std::vector<Vec3d>* x : {&P_, &v_, &lowest_, &highest_}) x->resize(padded);
     bounds_.setEmpty();
-    for (int at = 0; at < period; at += 3) {
-        bounds_.extend(Vec3d(lowest.segment<3>(at)));
-        bounds_.extend(Vec3d(highest.segment<3>(at)));
+    if (size_ == 0) return;
+
+    const Coordinates uniform = repeated(a[0]);
+    Coordinates lowest, highest;
+    for (std::size_t first = 0; first < size_; first += lanes) {
+        const Vec3d *P0 = P.data() + first, *v0 = v.data() + first, *a0 = a.data + first;
+        const double* t0 = dt.data() + first;
+        Vec3d P_last[lanes], v_last[lanes], a_last[lanes];
+        double t_last[lanes];
+        if (size_ - first < lanes) {
+            for (std::size_t p = 0; p < lanes; ++p) {
+                const std::size_t i = std::min(first + p, size_ - 1);
+                P_last[p] = P[i], v_last[p] = v[i], a_last[p] = a[i], t_last[p] = dt[i];
+            }
+            P0 = P_last, v0 = v_last, a0 = a_last, t0 = t_last;
+        }
+        const Coordinates x = load(P0), u = load(v0), t = tripled(t0);
+        const Coordinates g = a.stride == 0 ? uniform : load(a0);
+        Coordinates x1, u1, low, high;
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            const Doubles gain = t[k] * g[k];
+            x1[k] = x[k] + t[k] * (u[k] + 0.5 * gain);
+            u1[k] = u[k] + gain;
+            const auto extent = PathExtent<Doubles>::of(x[k], x1[k], magnitude(0.125 * t[k] * gain));
+            low[k] = extent.low;
+            high[k] = extent.high;
+            lowest[k] = first == 0 ? low[k] : least(lowest[k], low[k]);
+            highest[k] = first == 0 ? high[k] : most(highest[k], high[k]);
+        }
+        store(x1, &P_[first]);
+        store(u1, &v_[first]);
+        store(low, &lowest_[first]);
+        store(high, &highest_[first]);
+    }
+    Vec3d low[lanes], high[lanes];
+    store(lowest, low);
+    store(highest, high);
+    for (std::uint32_t p = 0; p < lanes; ++p) {
+        bounds_.extend(low[p]);
+        bounds_.extend(high[p]);
     }
 }
 
 void FreePaths::exchange(std::span<Vec3d> P, std::span<Vec3d> v)
 {
-    std::swap_ranges(P_.begin(), P_.end(), coordinates(P));
-    std::swap_ranges(v_.begin(), v_.end(), coordinates(v));
+    std::swap_ranges(P.begin(), P.end(), P_.begin());
+    std::swap_ranges(v.begin(), v.end(), v_.begin());
 }
 
 void FreePaths::find_near(const Box3d& box, double radius, std::vector<std::uint32_t>& near) const
 {
     near.clear();
-    const Vec3d margin = Vec3d::Constant(radius * (1 + 0x1p-21));
-    const Box3d wide(box.min() - margin, box.max() + margin);
+    const Box3d wide = widened(box, radius);
     if (!bounds_.intersects(wide)) return;
 
-    const Period least = by_axis(wide.min()), most = by_axis(wide.max());
-    for (std::size_t first = 0; first < size_; first += points_a_period) {
-        const auto at = static_cast<Eigen::Index>(3 * first);
-        const Period beyond = (least - period_at(highest_, at)).max(period_at(lowest_, at) - most);
-        const std::size_t last = std::min(size_, first + points_a_period);
-        for (std::size_t i = first, l = 0; i < last; ++i, l += 3)
-            if (std::max({beyond[l], beyond[l + 1], beyond[l + 2]}) <= 0) near.push_back(static_cast<std::uint32_t>(i));
+    const Coordinates min = repeated(wide.min()), max = repeated(wide.max());
+    for (std::size_t first = 0; first < size_; first += lanes) {
+        const Coordinates low = load(&lowest_[first]), high = load(&highest_[first]);
+        std::uint32_t misses = 0;
+        for (std::uint32_t k = 0; k < 3; ++k)
+            misses |= bits(PathExtent<Doubles>{low[k], high[k]}.misses(min[k], max[k])) << lanes * k;
+        std::uint32_t reach = every_point & ~any_of_point(misses);
+        for (; reach != 0; reach &= reach - 1) {
+            const std::size_t i = first + std::countr_zero(reach) / 3;
+            if (i < size_) near.push_back(static_cast<std::uint32_t>(i));
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-// Points that fall in one go, against the parabola in double, and against points that take the way of all others.
+// The ballistic batch, against the parabola in double precision, and against the sub-steps of other points.
 #include "runtime/solver/motion/ballistic_batch.h"
 
 #include <cmath>
@@ -33,7 +33,7 @@ struct Crowd {
     OwnTime time(bool own) const { return own ? OwnTime{h, {dt.data(), 1}} : OwnTime{h}; }
 };
 
-// Whether a parabola's box, sampled along it, comes within a margin of a box.
+// Whether a parabola, sampled along it, comes within a margin of a box.
 bool comes_near(const Vec3d& P, const Vec3d& v, double t, const Box3d& box, double margin)
 {
     for (int k = 0; k <= 256; ++k) {
@@ -63,7 +63,7 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[ballisti
     }
 }
 
-TEST_CASE("points that come near a box stay as they are, and are listed in order", "[ballistic]")
+TEST_CASE("points that come near a box are not advanced, and are listed in order", "[ballistic]")
 {
     const double radius = GENERATE(0.0, 0.1);
     const double away = GENERATE(0.0, 1.0, 1.2, 1.3, 1.34, 1.5, 4.0);  // the fastest come by a third of a metre
@@ -77,7 +77,7 @@ TEST_CASE("points that come near a box stay as they are, and are listed in order
     BallisticBatch batch(g, 0);
     for (const Box3d& box : boxes) batch.avoid(box, radius);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
-    std::vector<std::uint32_t> near{42};  // what is there stays
+    std::vector<std::uint32_t> near{42};  // entries of before are kept
     batch.advance(P, v, crowd.time(true), 0, n, near);
 
     REQUIRE(near.front() == 42);
@@ -94,7 +94,7 @@ TEST_CASE("points that come near a box stay as they are, and are listed in order
         if (comes) REQUIRE(stays[i]);
         met += comes;
     }
-    // The boxes around paths are larger than paths, but not so much that all were listed.
+    // The bounding boxes of paths are larger than paths, but not so much that all points are listed.
     if (away == 0) CHECK(met > 100);
     CHECK(near.size() - 1 <= 2 * met + 8);
 }
@@ -112,7 +112,7 @@ struct Dragged {
     }
 };
 
-TEST_CASE("points in air go by the closed form, each for its own time", "[ballistic]")
+TEST_CASE("points under drag follow the closed form, each for its own time", "[ballistic]")
 {
     const double k = GENERATE(0.5, 24.0, 1e5);
     const bool own = GENERATE(false, true);
@@ -129,7 +129,7 @@ TEST_CASE("points in air go by the closed form, each for its own time", "[ballis
     }
 }
 
-TEST_CASE("points in air that come near a box stay as they are", "[ballistic]")
+TEST_CASE("points under drag that come near a box are not advanced", "[ballistic]")
 {
     const double k = GENERATE(1.0, 50.0, 1000.0);
     const double away = GENERATE(0.0, 1.0, 1.1, 1.2);
@@ -161,7 +161,7 @@ TEST_CASE("points in air that come near a box stay as they are", "[ballistic]")
     CHECK(near.size() <= 3 * met + 30);
 }
 
-TEST_CASE("points in air and points among shapes there go the same way", "[ballistic]")
+TEST_CASE("under drag, points near and far from shapes have the same path", "[ballistic]")
 {
     struct Air : Force {
         void contribute(const Chunk&, Forces&) const override {}
@@ -174,7 +174,7 @@ TEST_CASE("points in air and points among shapes there go the same way", "[balli
         }
     };
     const Crowd crowd(500);
-    // A plane out of line with the axes has a box without bounds: no point is far from it, and none comes to it.
+    // The box of a plane that is not aligned with the axes is unbounded: no point is far from it, and none reaches it.
     const auto run = [&](int substeps, const Vec3d& normal) {
         PointSet set = test::points(crowd.P);
         std::copy(crowd.v.begin(), crowd.v.end(), set.v().write().begin());
@@ -191,7 +191,7 @@ TEST_CASE("points in air and points among shapes there go the same way", "[balli
     }
 }
 
-TEST_CASE("what sub-steps are asked for does not change a fall by a bit", "[ballistic]")
+TEST_CASE("the number of sub-steps does not change free fall by a bit", "[ballistic]")
 {
     const Crowd crowd(500);
     const auto run = [&](int substeps) {

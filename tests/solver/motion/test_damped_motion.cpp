@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// Of drag alone; where k t is small by series, for there the closed forms cancel.
+// Of drag alone; for small k t by series, where the closed forms cancel.
 struct Exact {
     long double x_of_v, x_of_G, v_of_v;
 
@@ -46,7 +46,7 @@ TEST_CASE("drag without a spring is exact to rounding for k t from 1e-9 to 1e9",
     }
 }
 
-TEST_CASE("many drags at once have the bits of each alone", "[damped]")
+TEST_CASE("drags of many points have the bits of each alone", "[damped]")
 {
     std::vector<double> k, t;
     for (double x = 1e-9; x < 2e9; x *= 3.1) {
@@ -92,13 +92,13 @@ TEST_CASE("a damped spring has its closed form below, at and above critical damp
     CHECK(found.x_of_G == Approx(double((1 - slope - k * S) / w2)).epsilon(1e-13).margin(4 * phase / w2));
 }
 
-TEST_CASE("one response leads on from the other: two halves of a time are the whole", "[damped]")
+TEST_CASE("responses compose: two half times are the whole", "[damped]")
 {
     const double k = GENERATE(0.0, 0.3, 20.0, 1e4), w2 = GENERATE(1e-6, 1.0, 90.0, 100.0, 110.0, 1e6);
     const double t = GENERATE(1e-3, 1.0 / 24, 1.0);
     CAPTURE(k, w2, t);
     const Propagator half = respond(k, w2, t / 2), whole = respond(k, w2, t);
-    // G acts at rest where the point is: it is w2 x less there.
+    // G is the acceleration at rest at the position of the point: less by w2 x.
     const auto twice = [&](double v, double G) {
         const double x1 = v * half.x_of_v + G * half.x_of_G, v1 = v * half.v_of_v + G * half.v_of_G;
         const double G1 = G - w2 * x1;
@@ -111,7 +111,7 @@ TEST_CASE("one response leads on from the other: two halves of a time are the wh
     CHECK(whole.v_of_G == Approx(twice(0, 1).second).margin(scale * t));
 }
 
-TEST_CASE("who is asked the same again knows it", "[damped]")
+TEST_CASE("the responder caches its last result", "[damped]")
 {
     Responder responder;
     for (const double k : {0.0, 2.0, 2.0, 0.0, 30.0})

@@ -81,7 +81,7 @@ public:
     {
         bond(points);
         bonds->rows.follow(points, group);
-        if (strength < std::exchange(bonds->strength, strength)) bonds->rows.rouse_all();
+        if (strength < std::exchange(bonds->strength, strength)) bonds->rows.wake_all();
         return std::make_shared<ClumpCoupling>(bonds, strength);
     }
 

@@ -62,7 +62,7 @@ public:
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
         rows_->follow(points, group);
-        return rows_->size() > 0 || rows_->rouses() ? rows_ : nullptr;
+        return rows_->size() > 0 || rows_->wakes() ? rows_ : nullptr;
     }
 
 private:

@@ -3,6 +3,7 @@
 // Rigid, a pinned point has its place and velocity given, and no other constraint moves it: what hangs from it hangs
 // from a wall. With a compliance it is three springs, one along each axis.
 #include "runtime/graph/node.h"
+#include "runtime/points/id_index.h"
 #include "runtime/points/members.h"
 #include "runtime/shapes/motion/animated.h"
 #include "runtime/shapes/motion/motion.h"
@@ -154,7 +155,7 @@ public:
         }
         pins->springs.follow(points, group);
         std::sort(held.begin(), held.end());
-        if (held != pins->held) keep_changed_awake(*coupling, PlacesById(points.id()), held);
+        if (held != pins->held) keep_changed_awake(*coupling, IdIndex(points.id()), held);
         const bool any = !held.empty() || !pins->held.empty();
         pins->held = std::move(held);
         return any ? coupling : nullptr;
@@ -162,14 +163,13 @@ public:
 
 private:
     // Points that are held in only one of two frames; their ids ascend.
-    void keep_changed_awake(PinCoupling& coupling, const PlacesById& places,
-                            const std::vector<std::int64_t>& held) const
+    void keep_changed_awake(PinCoupling& coupling, const IdIndex& index, const std::vector<std::int64_t>& held) const
     {
         std::vector<std::int64_t> changed;
         std::set_symmetric_difference(held.begin(), held.end(), pins->held.begin(), pins->held.end(),
                                       std::back_inserter(changed));
         for (const std::int64_t id : changed)
-            if (places[id] != PlacesById::none) coupling.keep_awake(places[id]);
+            if (index[id] != IdIndex::none) coupling.keep_awake(index[id]);
     }
 };
 

@@ -143,12 +143,10 @@ public:
 
     void rouse(Substep& now) override
     {
-        const auto [least, largest] = std::minmax_element(radius_.begin(), radius_.end());
-        if (near_.begin.empty() || searched_.outrun(now)) {
-            searched_.set(now, radius_, *largest, *least);
-            std::swap(near_, before_);
-            search_.find(searched_.places(), {searched_.reach().data(), 1},
-                         RadiusGrids({radius_.data(), 1}, now.size(), *largest / 4, 8), near_);
+        if (near_.begin.empty() || list_.expired(now)) {
+            const float largest = *std::max_element(radius_.begin(), radius_.end());
+            list_.build(now, radius_, RadiusGrids({radius_.data(), 1}, now.size(), largest / 4, 8));
+            before_ = std::exchange(near_, list_.pairs());
             take_over();
         }
         rows_.clear();
@@ -271,8 +269,7 @@ private:
 
     std::vector<float> radius_;
     double friction_ = 0;
-    SearchedPlaces searched_;
-    ContactSearch search_;
+    NeighbourList list_;
     Pairs near_, before_;
     std::vector<double> pressed_;
     std::vector<Vec3d> rubbed_;

@@ -5,9 +5,9 @@
 
 namespace rapid {
 
-Colours::Colours(std::span<const std::uint32_t> points, std::size_t arity, std::size_t size)
+GraphColouring::GraphColouring(std::span<const std::uint32_t> points, std::size_t arity, std::size_t size)
 {
-    constexpr std::size_t most = 64;  // bits of a word; a point of more rows than that is a hub, whose rows wait
+    constexpr std::size_t most = 64;  // bits of a word; what is left over are the rows of hubs
     const std::size_t rows = points.size() / arity;
     std::vector<std::uint64_t> taken(size);
     std::vector<std::uint8_t> colour(rows);
@@ -22,10 +22,10 @@ Colours::Colours(std::span<const std::uint32_t> points, std::size_t arity, std::
         if (first < static_cast<int>(most))
             for (const std::uint32_t i : of_row) taken[i] |= std::uint64_t{1} << first;
     }
-    in_turn = count[most + 1];
+    uncoloured = count[most + 1];
     for (std::size_t c = 0; c <= most; ++c) count[c + 1] += count[c];
     begin.push_back(0);
-    for (std::size_t c = 0; c < most && count[c] < rows - in_turn; ++c) begin.push_back(count[c + 1]);
+    for (std::size_t c = 0; c < most && count[c] < rows - uncoloured; ++c) begin.push_back(count[c + 1]);
     order.resize(rows);
     for (std::size_t r = 0; r < rows; ++r) order[count[colour[r]]++] = static_cast<std::uint32_t>(r);
 }

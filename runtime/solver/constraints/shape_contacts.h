@@ -1,10 +1,11 @@
-// Shapes as rows of the projection: they keep out points that other constraints push into them.
+// Contacts with shapes within the projection: shapes keep out points that other constraints push into them.
 //
-// A point's own way has been taken around all shapes before (collide.h); what is left to a shape here is what the other
-// points press on it: along the normal, and with Coulomb's friction of that. A row is C = n·x - level >= 0, the shape's
-// tangent plane where the point's free way ended; at the end of the sub-step the exact distance has the last word.
+// The free motion of a point has been taken around all shapes before (collisions.h); what is left to a shape here is
+// what the other points press on it: along the normal, and by Coulomb friction of that. A contact is
+// C = n·x - level >= 0, with the shape's tangent plane where the point's free motion ended; at the end of the sub-step
+// what is inside of the shape itself is moved out.
 //
-// The impulses of a sub-step are where the next one begins, across frames too: a pile at rest is then solved before it
+// Each sub-step begins with the impulses of the one before, across frames too: a pile at rest is then solved before it
 // is iterated.
 #pragma once
 
@@ -14,10 +15,11 @@
 
 #include "runtime/solver/collision/collisions.h"
 #include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/constraints/shape_clearance.h"
 
 namespace rapid {
 
-// What the shapes bore at the end of a frame, for the next one to begin with.
+// What shapes bore at the end of a frame: the warm start of the next.
 struct ShapeLoads {
     struct Load {
         std::int64_t id;
@@ -35,35 +37,35 @@ public:
     void recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt);
     void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, double dt) const;
 
-    // free: where the points' free ways have ended; `now.at` may be there already, or beyond.
-    void prepare(Substep& now, std::span<const Vec3d> free);
-    void project(Substep& now);
-    void settle(Substep& now);
+    // free: where the points' free motion has ended; `step.at` may be there, or beyond.
+    void prepare(Substep& step, std::span<const Vec3d> free);
+    void project(Substep& step);
+    void settle(Substep& step);
 
 private:
-    struct Row {
+    struct ShapeContact {
         std::uint32_t i, obstacle;
-        Vec3d n, vc;                   // unit normal out of the shape; its velocity, m/s
-        double level;                  // m: on the shape's outer side n·x is more
-        double friction;               // μ
-        double pressed;                // N s along n, by positions
-        double held;                   // N s along n, by velocities
-        Vec3d rubbed = Vec3d::Zero();  // N s along the surface
+        Vec3d n, vc;             // unit normal out of the shape; its velocity, m/s
+        double level;            // m: on the shape's outer side n·x is more
+        double friction;         // μ
+        double normal_impulse;   // N s along n: at first of the projection of positions, then the whole
+        double carried_impulse;  // N s along n: that the warm start gives to velocities alone
+        Vec3d tangential_impulse = Vec3d::Zero();  // N s along the surface
     };
-    using Batch = std::vector<Row>;  // of a chunk of points, by obstacle and then by point
+    using Batch = std::vector<ShapeContact>;  // of a chunk of points, by obstacle and then by point
 
-    void find(Batch& rows, Batch& before, const Substep& now, std::span<const Vec3d> free, std::size_t begin,
+    void find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free, std::size_t begin,
               std::size_t end);
-    static void keep_of_sleepers(Batch& rows, std::size_t begin, const Batch& before, std::size_t obstacle,
-                                 const Substep& now);
-    void put_out(Batch& rows, Substep& now) const;
+    ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle) const;
+    static void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle,
+                                 const Substep& step);
+    static void solve_velocity(ShapeContact& contact, Substep& step);
+    void move_out(const Batch& contacts, Substep& step) const;
 
     std::span<const Obstacle> obstacles_;
     std::size_t size_;
-    std::vector<Batch> rows_, before_;  // a chunk of points each
-    std::vector<float> clearance_;      // m, [obstacles, size]: at least as far off is a point from it
-    std::vector<Vec3d> asked_at_;       // where that was
-    std::vector<float> room_;           // m: as far a point may go, and be pushed, before it can be near any of them
+    ShapeClearance clearance_;
+    std::vector<Batch> contacts_, before_;  // a chunk of points each
 };
 
 }  // namespace rapid

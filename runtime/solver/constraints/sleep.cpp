@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "runtime/parallel.h"
+#include "runtime/points/id_index.h"
 #include "runtime/solver/collision/collisions.h"
 #include "runtime/solver/constraints/constraint.h"
-#include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/motion/ballistic_batch.h"
 
 namespace rapid {
@@ -55,10 +55,10 @@ Sleepers::Sleepers(PointSet& points, const SleepMemory& memory, std::span<const 
         slept_.push_back(
             std::all_of(island.begin(), island.end(), [&](std::uint32_t i) { return still[i] >= after_; }));
     }
-    const PlacesById place(points.id());
+    const IdIndex index(points.id());
     for (const SleepMemory::Bed& bed : memory.beds) {
-        const std::uint32_t i = place[bed.id];
-        if (i == PlacesById::none) continue;
+        const std::uint32_t i = index[bed.id];
+        if (i == IdIndex::none) continue;
         if (P[i] != bed.P || weight_[i] != bed.weight) asleep_[i] = 0;
         pull_[i] = bed.pull.cast<double>();
         grip_[i] = bed.grip;

@@ -1,4 +1,4 @@
-// SearchedPlaces: what is not outrun has been found, and what moves together is not looked for again.
+// NeighbourList: as long as it is valid it misses no contact, and a common motion does not expire it.
 #include "runtime/solver/constraints/neighbour_list.h"
 
 #include <random>
@@ -8,45 +8,44 @@
 namespace rapid {
 namespace {
 
-// Points of one kind of motion, and which of them a search has found.
+// Moving points, and the pairs of them that a search has not listed.
 struct Swarm {
     std::vector<Place> at;
     std::vector<Vec3d> v;
     std::vector<float> radius;
-    SearchedPlaces searched;
-    std::vector<std::pair<std::size_t, std::size_t>> unfound;
+    NeighbourList list;
+    std::vector<std::pair<std::size_t, std::size_t>> unlisted;
 
-    Substep now()
+    Substep step()
     {
-        Substep now;
-        now.at = at;
-        now.v = v;
-        now.dt = 1e-3;
-        return now;
+        Substep step;
+        step.at = at;
+        step.v = v;
+        step.dt = 1e-3;
+        return step;
     }
     void search()
     {
-        const auto [least, largest] = std::minmax_element(radius.begin(), radius.end());
-        searched.set(now(), radius, *largest, *least);
-        unfound.clear();
+        list.build(step(), radius, RadiusGrids({radius.data(), 1}, radius.size(), 0.1, 8));
+        unlisted.clear();
         for (std::size_t i = 0; i < at.size(); ++i)
             for (std::size_t j = 0; j < i; ++j)
-                if ((at[i].P - at[j].P).norm() >= double(searched.reach()[i]) + double(searched.reach()[j]))
-                    unfound.emplace_back(i, j);
+                if ((at[i].P - at[j].P).norm() >= double(list.reach()[i]) + double(list.reach()[j]))
+                    unlisted.emplace_back(i, j);
     }
     bool misses_one() const
     {
-        return std::any_of(unfound.begin(), unfound.end(), [&](const auto& pair) {
+        return std::any_of(unlisted.begin(), unlisted.end(), [&](const auto& pair) {
             const auto [i, j] = pair;
             return (at[i].P - at[j].P).norm() < double(radius[i]) + double(radius[j]);
         });
     }
 };
 
-TEST_CASE("points that have not outrun their search touch none that it has not found", "[contacts]")
+TEST_CASE("no points touch that a valid list does not hold", "[contacts]")
 {
     const float largest = GENERATE(0.02f, 0.3f);    // m; the least is 0.02
-    const double wild = GENERATE(0.0, 3.0, 100.0);  // m/s, besides what they do together
+    const double wild = GENERATE(0.0, 3.0, 100.0);  // m/s, besides the common motion
     CAPTURE(largest, wild);
     std::mt19937 random(3);
     std::uniform_real_distribution<double> in(-1, 1);
@@ -60,15 +59,15 @@ TEST_CASE("points that have not outrun their search touch none that it has not f
     }
     swarm.search();
     int searches = 1;
-    for (int step = 0; step < 100; ++step) {
+    for (int k = 0; k < 100; ++k) {
         for (std::size_t i = 0; i < swarm.at.size(); ++i) swarm.at[i].P += 1e-3 * swarm.v[i];
-        if (swarm.searched.outrun(swarm.now())) swarm.search(), ++searches;
+        if (swarm.list.expired(swarm.step())) swarm.search(), ++searches;
         REQUIRE_FALSE(swarm.misses_one());
     }
     CHECK(searches > (wild > 0 ? 5 : 1));
 }
 
-TEST_CASE("points that fall together need no new search, whatever others do far away", "[contacts]")
+TEST_CASE("a common motion does not expire the list, whatever others do far away", "[contacts]")
 {
     Swarm swarm;
     for (int cluster = 0; cluster < 2; ++cluster)
@@ -78,13 +77,13 @@ TEST_CASE("points that fall together need no new search, whatever others do far 
             swarm.radius.push_back(0.02f);
         }
     swarm.search();
-    for (int step = 0; step < 50; ++step) {
+    for (int k = 0; k < 50; ++k) {
         for (std::size_t i = 0; i < swarm.at.size(); ++i) swarm.at[i].P += 1e-3 * swarm.v[i];
-        CHECK_FALSE(swarm.searched.outrun(swarm.now()));
+        CHECK_FALSE(swarm.list.expired(swarm.step()));
     }
 }
 
-TEST_CASE("a point that is put elsewhere is looked for there", "[contacts]")
+TEST_CASE("a point that is put elsewhere expires the list", "[contacts]")
 {
     Swarm swarm;
     for (int k = 0; k < 100; ++k) {
@@ -93,9 +92,9 @@ TEST_CASE("a point that is put elsewhere is looked for there", "[contacts]")
         swarm.radius.push_back(0.02f);
     }
     swarm.search();
-    CHECK_FALSE(swarm.searched.outrun(swarm.now()));
+    CHECK_FALSE(swarm.list.expired(swarm.step()));
     swarm.at[0].P = swarm.at[99].P;
-    CHECK(swarm.searched.outrun(swarm.now()));
+    CHECK(swarm.list.expired(swarm.step()));
 }
 
 }  // namespace

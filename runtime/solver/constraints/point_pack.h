@@ -1,4 +1,4 @@
-// Eight places of points that are coupled, loaded into and stored from vectors.
+// Points of the projection in simd packs of eight.
 #pragma once
 
 #include "runtime/simd.h"
@@ -6,13 +6,13 @@
 
 namespace rapid {
 
-// Eight places, with their inverse masses.
-struct Places {
+// Eight positions with their inverse masses.
+struct PointPack {
     Vectors<Doubles> P;
     Doubles w;
 };
 
-[[gnu::always_inline]] inline Places gather(std::span<const Place> at, const Indices& i)
+[[gnu::always_inline]] inline PointPack gather(std::span<const Place> at, const Indices& i)
 {
     const auto c = detail::gathered([&](std::uint32_t l) __attribute__((always_inline)) {
         detail::Four row;
@@ -23,11 +23,11 @@ struct Places {
 }
 
 // Of the first `count` lanes.
-[[gnu::always_inline]] inline void scatter(const Places& places, std::span<Place> at, const Indices& i,
+[[gnu::always_inline]] inline void scatter(const PointPack& pack, std::span<Place> at, const Indices& i,
                                            std::uint32_t count)
 {
     detail::store_rows(
-        {places.P.x, places.P.y, places.P.z, places.w},
+        {pack.P.x, pack.P.y, pack.P.z, pack.w},
         count, [&](std::uint32_t l, const auto& row) __attribute__((always_inline)) {
             std::memcpy(static_cast<void*>(&at[i[l]]), &row, sizeof(Place));
         });

@@ -1,8 +1,10 @@
-#include "runtime/solver/constraints/rows.h"
+#include "runtime/points/id_index.h"
+
+#include <algorithm>
 
 namespace rapid {
 
-PlacesById::PlacesById(const Column<std::int64_t>& ids) : ids_(ids.read()), size_(ids.size())
+IdIndex::IdIndex(const Column<std::int64_t>& ids) : ids_(ids.read()), size_(ids.size())
 {
     bool ascend = true;
     for (std::size_t i = 1; i < size_; ++i) ascend &= ids_[i - 1] < ids_[i];
@@ -12,13 +14,16 @@ PlacesById::PlacesById(const Column<std::int64_t>& ids) : ids_(ids.read()), size
     std::sort(sorted_.begin(), sorted_.end());
 }
 
-std::uint32_t PlacesById::operator[](std::int64_t id) const
+std::uint32_t IdIndex::operator[](std::int64_t id) const
 {
-    if (!sorted_.empty()) {
-        const auto found = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair(id, std::uint32_t{0}));
-        return found != sorted_.end() && found->first == id ? found->second : none;
-    }
-    if (size_ > 0) {  // where none has died yet
+    if (sorted_.empty()) return find_ascending(id);
+    const auto found = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair(id, std::uint32_t{0}));
+    return found != sorted_.end() && found->first == id ? found->second : none;
+}
+
+std::uint32_t IdIndex::find_ascending(std::int64_t id) const
+{
+    if (size_ > 0) {  // while no point has died, ids are consecutive
         const auto nth = static_cast<std::uint64_t>(id) - static_cast<std::uint64_t>(ids_[0]);
         if (nth < size_ && ids_[nth] == id) return static_cast<std::uint32_t>(nth);
     }

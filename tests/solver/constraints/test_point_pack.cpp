@@ -1,5 +1,5 @@
-// Lanes: what is gathered and scattered is at its place, whatever the places and however many lanes count.
-#include "runtime/solver/constraints/gather.h"
+// Packs of eight: gather and scatter by any indices, and arithmetic lane by lane.
+#include "runtime/solver/constraints/point_pack.h"
 
 #include <cmath>
 #include <vector>
@@ -9,34 +9,34 @@
 namespace rapid {
 namespace {
 
-constexpr Indices places = {3, 17, 4, 15, 9, 2, 6, 5};
+constexpr Indices indices = {3, 17, 4, 15, 9, 2, 6, 5};
 
-TEST_CASE("places and vectors that are gathered are those that were asked for, lane by lane", "[lanes]")
+TEST_CASE("gather loads points and vectors by their indices, lane by lane", "[simd]")
 {
     std::vector<Place> at(20);
     std::vector<Vec3d> v(20);
     for (int k = 0; k < 20; ++k) at[k] = {Vec3d(k, 100 + k, 200 + k), 300.0 + k}, v[k] = Vec3d(k, -k, 0.5 * k);
-    const Places got = gather(std::span<const Place>(at), places);
-    const Vectors<Doubles> vectors = gather(std::span<const Vec3d>(v), places);
+    const PointPack got = gather(std::span<const Place>(at), indices);
+    const Vectors<Doubles> vectors = gather(std::span<const Vec3d>(v), indices);
     for (std::uint32_t l = 0; l < lanes; ++l) {
-        CHECK(got.P[l] == at[places[l]].P);
-        CHECK(got.w[l] == at[places[l]].w);
-        CHECK(vectors[l] == v[places[l]]);
+        CHECK(got.P[l] == at[indices[l]].P);
+        CHECK(got.w[l] == at[indices[l]].w);
+        CHECK(vectors[l] == v[indices[l]]);
     }
 }
 
-TEST_CASE("of what is scattered the first lanes are written, and nothing else", "[lanes]")
+TEST_CASE("scatter writes the first lanes, and nothing else", "[simd]")
 {
     const std::uint32_t count = GENERATE(range(1u, lanes + 1));
     CAPTURE(count);
     std::vector<Place> at(20, Place{Vec3d(1, 2, 3), 4});
     std::vector<Vec3d> v(20, Vec3d(1, 2, 3));
-    Places to;
+    PointPack to;
     for (std::uint32_t l = 0; l < lanes; ++l) to.P.set(l, Vec3d(10 + l, 20 + l, 30 + l)), to.w[l] = 40 + l;
-    scatter(to, at, places, count);
-    scatter(to.P, v, places, count);
+    scatter(to, at, indices, count);
+    scatter(to.P, v, indices, count);
     for (std::uint32_t k = 0; k < 20; ++k) {
-        const auto l = static_cast<std::uint32_t>(std::find(places.begin(), places.end(), k) - places.begin());
+        const auto l = static_cast<std::uint32_t>(std::find(indices.begin(), indices.end(), k) - indices.begin());
         const bool written = l < count;
         CHECK(at[k].P == (written ? Vec3d(10 + l, 20 + l, 30 + l) : Vec3d(1, 2, 3)));
         CHECK(at[k].w == (written ? 40 + l : 4));
@@ -44,7 +44,7 @@ TEST_CASE("of what is scattered the first lanes are written, and nothing else", 
     }
 }
 
-TEST_CASE("lanes are reckoned with as numbers are", "[lanes]")
+TEST_CASE("arithmetic on packs is that of numbers, lane by lane", "[simd]")
 {
     const Floats x = {1, -2, 3, -4, 5, 0, 7, 8};
     const Doubles wide = widen(x), root = sqrt(wide * wide + 0.25), low = least(wide, Doubles{} + 3),

@@ -1,0 +1,171 @@
+#include "runtime/solver/constraints/cell_grid.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "runtime/parallel.h"
+
+namespace rapid {
+namespace {
+
+constexpr double farthest_cell = 1 << 20;
+
+// Cells a sphere up to which all of them are kept, empty or not: finding one is then a look-up.
+constexpr double dense_below = 8;
+
+}  // namespace
+
+std::size_t bucket_size(std::size_t n) { return std::clamp<std::size_t>(n / 8, 2048, 8192); }
+
+std::int64_t cell_coordinate(double x, double width)
+{
+    return static_cast<std::int64_t>(std::clamp(std::floor(x / width), -farthest_cell, farthest_cell));
+}
+
+CellGrid::Run CellGrid::find_run(std::uint64_t a, std::uint64_t b) const
+{
+    const auto first = std::lower_bound(key_.begin(), key_.end(), a);
+    auto last = first;
+    while (last != key_.end() && *last <= b) ++last;
+    return {begin_[static_cast<std::size_t>(first - key_.begin())],
+            begin_[static_cast<std::size_t>(last - key_.begin())]};
+}
+
+CellGrid::Run CellGrid::row(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const
+{
+    if (j < least_[1] || j >= least_[1] + count_[1] || k < least_[2] || k >= least_[2] + count_[2]) return {0, 0};
+    i0 = std::max(i0, least_[0]);
+    i1 = std::min(i1, least_[0] + count_[0] - 1);
+    if (i0 > i1) return {0, 0};
+    const std::uint64_t first = key_of(i0, j, k);
+    return run(first, first + static_cast<std::uint64_t>(i1 - i0));
+}
+
+std::size_t CellGrid::cell_of_sphere(std::size_t sphere) const
+{
+    return static_cast<std::size_t>(std::upper_bound(begin_.begin(), begin_.end(), static_cast<std::uint32_t>(sphere)) -
+                                    begin_.begin() - 1);
+}
+
+void CellSorter::fill(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members)
+{
+    const std::size_t n = members.size();
+    const std::size_t cells = bound(grid, spheres, members);
+    find_keys(grid, spheres, members);
+    for (std::vector<float>* column : {&grid.x, &grid.y, &grid.z, &grid.r}) column->resize(n + lanes);
+    grid.place.resize(n);
+    if (grid.dense_)
+        sort_dense(grid, cells, spheres, members);
+    else
+        sort_sparse(grid, spheres, members);
+}
+
+// Finds the cells that the spheres are in, and how many these are where all of them are kept.
+std::size_t CellSorter::bound(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members) const
+{
+    Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+    for (const std::uint32_t i : members) {
+        const Eigen::Array3d at = (spheres.P[i] - spheres.middle).array();
+        low = low.min(at), high = high.max(at);
+    }
+    double all = 1;
+    for (int k = 0; k < 3; ++k) {
+        grid.least_[k] = cell_coordinate(low[k], grid.width) - 1;
+        grid.count_[k] = cell_coordinate(high[k], grid.width) + 2 - grid.least_[k];
+        all *= static_cast<double>(grid.count_[k]);
+    }
+    grid.dense_ = all <= dense_below * static_cast<double>(members.size()) + 4096;
+    return grid.dense_ ? static_cast<std::size_t>(all) : 0;
+}
+
+void CellSorter::find_keys(const CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members)
+{
+    const double per_width = 1 / grid.width;
+    keys_.resize(members.size());
+    for_each_chunk(members.size(), [&](std::size_t first, std::size_t last) {
+        for (std::size_t m = first; m < last; ++m) {
+            std::int64_t c[3];
+            for (int k = 0; k < 3; ++k) {
+                const double x = (spheres.P[members[m]][k] - spheres.middle[k]) * per_width;
+                c[k] = static_cast<std::int64_t>(std::clamp(std::floor(x), -farthest_cell, farthest_cell));
+                c[k] = std::clamp(c[k], grid.least_[k] + 1, grid.least_[k] + grid.count_[k] - 2);
+            }
+            keys_[m] = grid.key_of(c[0], c[1], c[2]);
+        }
+    });
+}
+
+inline CellSorter::Sphere CellSorter::sphere(const SpheresView& spheres, std::uint32_t place, std::uint64_t cell)
+{
+    const Vec3f at = (spheres.P[place] - spheres.middle).cast<float>();
+    return {at.x(), at.y(), at.z(), spheres.reach[place], place, static_cast<std::uint32_t>(cell)};
+}
+
+inline void CellSorter::put(CellGrid& grid, std::size_t m, const Sphere& sphere)
+{
+    grid.x[m] = sphere.x, grid.y[m] = sphere.y, grid.z[m] = sphere.z, grid.r[m] = sphere.r;
+    grid.place[m] = sphere.place;
+}
+
+// Into buckets of cells first, and then each bucket into its cells: in the order of the set, within a cell.
+void CellSorter::sort_dense(CellGrid& grid, std::size_t cells, const SpheresView& spheres,
+                            std::span<const std::uint32_t> members)
+{
+    const std::size_t n = members.size(), each_size = bucket_size(n), buckets = n / each_size + 1;
+    const std::size_t chunks = (n + each_size - 1) / each_size, cells_each = cells / buckets + 1;
+    starts_.assign(buckets * chunks + 1, 0);
+    const auto each = [&](const auto& f) { for_each_chunk(n, f, each_size); };
+    each([&](std::size_t first, std::size_t last) {
+        for (std::size_t m = first; m < last; ++m) ++starts_[keys_[m] / cells_each * chunks + first / each_size];
+    });
+    std::exclusive_scan(starts_.begin(), starts_.end(), starts_.begin(), 0u);
+    ends_ = starts_;
+    spheres_.resize(n);
+    each([&](std::size_t first, std::size_t last) {
+        for (std::size_t m = first; m < last; ++m)
+            spheres_[ends_[keys_[m] / cells_each * chunks + first / each_size]++] =
+                sphere(spheres, members[m], keys_[m]);
+    });
+    grid.begin_.resize(cells + 1);
+    grid.begin_[0] = 0;
+    const auto sort = [&](std::size_t bucket) {
+        const std::span<const Sphere> here = std::span(spheres_).subspan(
+            starts_[bucket * chunks], starts_[(bucket + 1) * chunks] - starts_[bucket * chunks]);
+        std::uint32_t* end = grid.begin_.data() + 1;  // of each cell, once its spheres are there
+        const std::size_t first = bucket * cells_each, last = std::min(cells, first + cells_each);
+        if (first >= last) return;
+        std::fill(end + first, end + last, 0);
+        for (const Sphere& s : here) ++end[s.cell];
+        std::exclusive_scan(end + first, end + last, end + first, starts_[bucket * chunks]);
+        for (const Sphere& s : here) put(grid, end[s.cell]++, s);
+    };
+    for_each_chunk(
+        buckets, [&](std::size_t bucket, std::size_t) { sort(bucket); }, 1);
+}
+
+void CellSorter::sort_sparse(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members)
+{
+    const std::size_t n = members.size();
+    order_.resize(n);
+    std::iota(order_.begin(), order_.end(), 0u);
+    tbb::parallel_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+        return std::pair(keys_[a], a) < std::pair(keys_[b], b);
+    });
+    grid.key_.clear();
+    grid.begin_.clear();
+    for (std::size_t m = 0; m < n; ++m) {
+        if (m > 0 && keys_[order_[m]] == grid.key_.back()) continue;
+        grid.key_.push_back(keys_[order_[m]]);
+        grid.begin_.push_back(static_cast<std::uint32_t>(m));
+    }
+    grid.begin_.push_back(static_cast<std::uint32_t>(n));
+    for_each_chunk(n, [&](std::size_t first, std::size_t last) {
+        for (std::size_t m = first; m < last; ++m) put(grid, m, sphere(spheres, members[order_[m]], 0));
+    });
+}
+
+}  // namespace rapid

@@ -1,0 +1,35 @@
+#include "runtime/solver/constraints/contact_material.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "runtime/points/members.h"
+
+namespace rapid {
+
+ContactMaterial::ContactMaterial(const PointSet& points, const ContactOptions& options, const std::string& group)
+{
+    const std::size_t n = points.size();
+    const Strided<float> radii = radii_of(options.radius, points);
+    const Strided<float> friction = options.friction.read(points), bounce = options.bounce.read(points);
+    const Strided<std::uint8_t> members = members_of(points, group);
+    radius.resize(n);
+    root_friction.resize(n);
+    restitution.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!(radii[i] >= 0) || !std::isfinite(radii[i]))
+            throw Error(fmt::format("point {}: its radius is {:g}; it must be finite and at least 0", points.id()[i],
+                                    radii[i]));
+        if (!(friction[i] >= 0))
+            throw Error(
+                fmt::format("point {}: its friction is {:g}; it must be at least 0", points.id()[i], friction[i]));
+        radius[i] = members[i] ? radii[i] : 0;
+        root_friction[i] = std::sqrt(friction[i]);
+        restitution[i] = bounce[i];
+        bounces |= bounce[i] > 0;
+        largest_radius = std::max(largest_radius, radius[i]);
+    }
+}
+
+}  // namespace rapid

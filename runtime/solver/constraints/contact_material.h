@@ -1,0 +1,35 @@
+// What contacts read of each point: its radius, friction and restitution.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/points/per_point.h"
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+struct ContactOptions {
+    std::optional<PerPoint<float>> radius;  // the attribute pscale where the points have it, else 0
+    PerPoint<float> bounce{0.0f};           // ε in [0, 1]; of two points the larger
+    PerPoint<float> friction{0.0f};         // μ >= 0; of two points the geometric mean
+    std::optional<double> max_difference;   // m, of the radii in a grid; a quarter of the largest radius
+    int max_grids = 8;
+    double mass_scaling = 0;  // at least 0: a point counts as e^mass_scaling times lighter than what it stands on
+};
+
+struct ContactMaterial {
+    std::vector<float> radius;  // m; 0 of points that take no part
+    std::vector<float> root_friction, restitution;
+    float largest_radius = 0;  // m
+    bool bounces = false;      // some restitution is above 0
+
+    ContactMaterial() = default;
+    // Error: a radius that is negative or not finite, a friction below 0, with the point's id; an attribute is missing.
+    ContactMaterial(const PointSet& points, const ContactOptions& options, const std::string& group);
+
+    double reach(std::uint32_t i, std::uint32_t j) const { return double(radius[i]) + double(radius[j]); }
+};
+
+}  // namespace rapid

@@ -1,0 +1,84 @@
+// Contacts in packs of eight that share no point, so that all of a pack are solved at once.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/simd.h"
+#include "runtime/solver/constraints/pair_impulses.h"
+
+namespace rapid {
+
+// A contact in each lane; lanes from `count` on repeat the first, and their results are dropped.
+struct alignas(64) ContactPack {
+    Indices i, j, pair;
+    std::uint32_t count;
+    Floats reach;                        // m: r_i + r_j
+    Floats initial_gap;                  // m: C at the beginning of the sub-step, at most 0
+    Floats normal_impulse;               // N s along n: at first of the projection of positions, then the whole
+    Floats carried_impulse;              // N s along n: that the warm start gives to velocities alone
+    Floats friction;                     // μ
+    Floats rebound;                      // m/s, along n: by restitution
+    Floats effective_mass;               // kg: 1 / (w_i + w_j)
+    Floats scale;                        // what w_i is multiplied by, and w_j divided by, under mass scaling
+    Vectors<Floats> n;                   // from j to i, unit
+    Vectors<Floats> tangential_impulse;  // N s, across n
+
+    void repeat_first()
+    {
+        for (std::uint32_t l = count; l < lanes; ++l) i[l] = i[0], j[l] = j[0], pair[l] = pair[0];
+    }
+};
+
+// One contact of a pack.
+struct PairContact {
+    std::uint32_t i, j, pair;
+    double reach, initial_gap;
+    Vec3d n;
+};
+
+template <class F>
+void for_each_contact(const ContactPack& pack, const F& f)
+{
+    for (std::uint32_t l = 0; l < pack.count; ++l)
+        f(PairContact{pack.i[l], pack.j[l], pack.pair[l], pack.reach[l], pack.initial_gap[l], pack.n[l]});
+}
+
+// The contacts of a sub-step, block by block.
+class ContactPacks {
+public:
+    void resize(std::size_t blocks)
+    {
+        size_ = blocks;
+        if (packs_.size() < blocks) packs_.resize(blocks);
+    }
+    std::vector<ContactPack>& operator[](std::size_t block) { return packs_[block]; }
+
+    // On one thread.
+    template <class F>
+    void for_each(const F& f) const
+    {
+        for (std::size_t b = 0; b < size_; ++b)
+            for (const ContactPack& pack : packs_[b]) for_each_contact(pack, f);
+    }
+
+    // Before packing; points: in the set.
+    void begin(std::size_t points) { last_.assign(points, {}); }
+    // Packs pairs of a block, which are indices in `all`. To be called for blocks at the same time that share no point.
+    void pack(std::size_t block, std::span<const std::uint32_t> pairs, std::span<const ContactPair> all);
+
+private:
+    std::size_t size_ = 0;
+    std::vector<std::vector<ContactPack>> packs_;  // beyond size_ kept for their memory
+
+    // Of each point: the open packs up to the last that it is in, by bits, if the window is the same still.
+    struct Open {
+        std::uint32_t window = 0;
+        std::uint64_t packs = 0;
+    };
+    std::vector<Open> last_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,65 @@
+#include "runtime/solver/constraints/heavy_contacts.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "runtime/solver/constraints/resting_speed.h"
+
+namespace rapid {
+namespace {
+
+// An overlap that is corrected, as a part of the smaller radius.
+constexpr double too_deep = 0.05;
+
+// An overlap of which a sub-step leaves more than this part, where four fifths are to be recovered, is stuck.
+constexpr double stuck = 0.9;
+
+// Ratio of masses above which iterations are too few.
+constexpr double uneven = 2;
+
+}  // namespace
+
+void HeavyContacts::begin(const Substep& step)
+{
+    double most = 0, least = std::numeric_limits<double>::infinity();
+    for (const Place& at : step.at)
+        if (at.w > 0) most = std::max(most, at.w), least = std::min(least, at.w);
+    any_ = most > uneven * least;
+}
+
+void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
+{
+    for (std::uint32_t l = 0; l < pack.count; ++l) {
+        if (!(pack.normal_impulse[l] > 0)) continue;
+        const std::uint32_t i = pack.i[l], j = pack.j[l];
+        const std::uint8_t support_i = step.borne[i], support_j = step.borne[j];
+        std::uint8_t &next_i = step.found_borne[i], &next_j = step.found_borne[j];
+        next_i = std::max<std::uint8_t>(next_i, std::max<std::uint8_t>(support_j, 1) - 1);
+        next_j = std::max<std::uint8_t>(next_j, std::max<std::uint8_t>(support_i, 1) - 1);
+    }
+}
+
+// The lighter one is a wall where it is better supported; or where the heavy one wedges it against its support: what
+// parts them then moves the light one, and that is put back. Of the heavy one's velocity what is its own into the
+// lighter is taken off; a light one that is squeezed out, or thrown, does not give it more than weight takes, which is
+// what a shape that lifts both has to.
+void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& material, Substep& step)
+{
+    const bool first = step.at[contact.i].w < step.at[contact.j].w;  // is the heavier
+    const std::uint32_t heavy = first ? contact.i : contact.j, light = first ? contact.j : contact.i;
+    if (!(step.at[heavy].w > 0) || step.borne[light] == 0) return;
+    const Vec3d d = step.at[heavy].P - step.at[light].P;
+    const double distance = d.norm(), overlap = contact.reach - distance;
+    const double allowed = too_deep * std::min(material.radius[contact.i], material.radius[contact.j]);
+    const double depth = overlap - allowed;
+    if (!(depth > 0) || !(distance > 0)) return;
+    const bool wedged = -contact.initial_gap > allowed && overlap > stuck * -contact.initial_gap &&
+                        step.at[light].w > uneven * step.at[heavy].w;
+    if (step.borne[light] <= step.borne[heavy] && !wedged) return;
+    const Vec3d n = d / distance;
+    step.at[heavy].P += depth * n;
+    const double own = -n.dot(step.v[heavy]), closing = own + n.dot(step.v[light]);
+    step.v[heavy] += std::clamp(closing, 0.0, std::max(own, resting_speed(step))) * n;
+}
+
+}  // namespace rapid

@@ -1,0 +1,61 @@
+// Mass scaling (Macklin et al. 2014): of two points in contact the upper one counts as lighter.
+//
+// With c = n·up, the upper point is taken as e^(k c) times lighter than the lower: in touch, as if mass fell by
+// e^(-k h / (r_i + r_j)) with the height h. Loads then do not add up. A contact bears
+//
+//   p = m g dt / (2 c sinh(k c / 2)),   as   w e^(k c / 2) c p = g dt + w e^(-k c / 2) c p
+//
+// under a stack of any height, w = 1/m. What the warm start has above that, as a fall leaves it, is not carried over:
+// released, it would throw the light ones, as a whip does its end.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/solver/constraints/contact_pack.h"
+#include "runtime/solver/constraints/point_pack.h"
+
+namespace rapid {
+
+class MassScaling {
+public:
+    // k, at least 0.
+    void set(double k) { k_ = k; }
+    void begin(const Substep& step) { active_ = k_ > 0 && !step.up.isZero(0); }
+
+    void apply(ContactPack& pack, const PointPack& a, const PointPack& b, const Substep& step) const
+    {
+        if (!active_) return;
+        for (std::uint32_t l = 0; l < lanes; ++l) {
+            const double c = pack.n[l].dot(step.up), scale = std::exp(0.5 * k_ * c);
+            pack.scale[l] = static_cast<float>(scale);
+            pack.effective_mass[l] = static_cast<float>(1 / (scale * a.w[l] + b.w[l] / scale));
+            const double borne = step.pull * step.dt / ((c > 0 ? a.w[l] : b.w[l]) * std::abs(c * (scale - 1 / scale)));
+            pack.normal_impulse[l] = pack.carried_impulse[l] =
+                std::min(pack.normal_impulse[l], static_cast<float>(0.5 * borne));
+        }
+    }
+
+    // Calls f(weights), where weights(pack, a, b) are the inverse masses of the contacts' points. Of another type where
+    // masses are not scaled: that costs nothing.
+    template <class F>
+    void with_weights(const F& f) const
+    {
+        struct Weights {
+            Doubles a, b;
+        };
+        if (!active_)
+            f([](const ContactPack&, const PointPack& a, const PointPack& b) { return Weights{a.w, b.w}; });
+        else
+            f([](const ContactPack& pack, const PointPack& a, const PointPack& b) {
+                const Doubles scale = widen(pack.scale);
+                return Weights{scale * a.w, b.w / scale};
+            });
+    }
+
+private:
+    double k_ = 0;
+    bool active_ = false;  // in this sub-step
+};
+
+}  // namespace rapid

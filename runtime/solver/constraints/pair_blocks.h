@@ -1,0 +1,77 @@
+// The order in which Gauss-Seidel goes through contact pairs: by blocks of space, in eight colours.
+//
+// A pair belongs to the block that its points are in, or to the least of their blocks along each axis: it then touches
+// points of that block and of those after it. Blocks of one colour are two apart along some axis and share no point, so
+// that they are solved at the same time, to the same bits on any number of threads.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solver/constraints/neighbour_list.h"
+#include "runtime/solver/constraints/pair_impulses.h"
+
+namespace rapid {
+
+class PairBlocks {
+public:
+    // Orders the pairs of the list: colour by colour, block by block.
+    void build(const NeighbourList& list, std::vector<ContactPair>& ordered);
+    void clear();
+
+    std::size_t size() const { return begin_.size() - 1; }
+    std::uint32_t begin(std::size_t block) const { return begin_[block]; }
+    std::uint32_t end(std::size_t block) const { return begin_[block + 1]; }
+    // Of each pair of the list, its index among the ordered ones.
+    std::span<const std::uint32_t> slots() const { return slot_; }
+
+    // Calls f(block) for all blocks: at the same time for those of a colour.
+    template <class F>
+    void for_each_coloured(bool backwards, const F& f) const
+    {
+        const std::size_t colours = colours_.empty() ? 0 : colours_.size() - 1;
+        for (std::size_t k = 0; k < colours; ++k) {
+            const std::size_t c = backwards ? colours - 1 - k : k;
+            run(colours_[c], colours_[c + 1], f);
+        }
+    }
+
+private:
+    template <class F>
+    void run(std::size_t from, std::size_t to, const F& f) const
+    {
+        constexpr std::size_t worth_a_task = 2048;  // pairs: tens of microseconds
+        const std::size_t pairs = begin_[to] - begin_[from];
+        if (pairs < worth_a_task) {
+            for (std::size_t b = from; b < to; ++b) f(b);
+            return;
+        }
+        const std::size_t grain = std::max<std::size_t>(1, (to - from) * worth_a_task / (2 * pairs));
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(from, to, grain),
+                          [&](const tbb::blocked_range<std::size_t>& range) {
+                              for (std::size_t b = range.begin(); b < range.end(); ++b) f(b);
+                          });
+    }
+    void find_owners(const NeighbourList& list);
+    void begin_blocks();
+    void take_turns(std::size_t block, const Pairs& pairs, std::span<ContactPair> ordered);
+
+    std::vector<std::uint32_t> begin_{0};  // of each block's pairs, and the end
+    std::vector<std::uint32_t> colours_;   // the first of each colour's blocks, and the end
+    std::vector<std::uint32_t> slot_;
+
+    // While it is built.
+    std::vector<std::uint16_t> owner_;  // of each pair, its block, empty ones counted
+    std::vector<std::uint32_t> next_;   // of each of these blocks, where its next pair goes
+    struct PointAndPair {
+        std::uint32_t point, pair;
+    };
+    std::vector<PointAndPair> by_block_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,72 @@
+#include "runtime/solver/constraints/pair_impulses.h"
+
+#include <algorithm>
+
+#include "runtime/parallel.h"
+#include "runtime/points/id_index.h"
+
+namespace rapid {
+
+void PairImpulses::scale(float factor)
+{
+    for (float& impulse : normal) impulse *= factor;
+    for (Vec3f& impulse : tangential) impulse *= factor;
+    for (Vec3f& impulse : resting) impulse *= factor;
+}
+
+void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& bereft)
+{
+    struct Kept {
+        ContactPair pair;
+        float normal;
+        Vec3f tangential, resting;
+    };
+    std::vector<Kept> kept;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+        if (!(normal[k] > 0)) continue;
+        const std::uint32_t i = index[pairs[k][0]], j = index[pairs[k][1]];
+        if (i == IdIndex::none && j != IdIndex::none) bereft.push_back(j);
+        if (j == IdIndex::none && i != IdIndex::none) bereft.push_back(i);
+        if (i == IdIndex::none || j == IdIndex::none) continue;
+        const float sign = i > j ? -1.0f : 1.0f;
+        const Vec3f rested = resting.empty() ? Vec3f(Vec3f::Zero()) : resting[k];
+        kept.push_back({{std::min(i, j), std::max(i, j)}, normal[k], sign * tangential[k], sign * rested});
+    }
+    std::sort(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) { return a.pair < b.pair; });
+    const bool some_resting = !resting.empty();
+    *this = {};
+    for (const Kept& k : kept) {
+        pairs.push_back(k.pair);
+        normal.push_back(k.normal);
+        tangential.push_back(k.tangential);
+        if (some_resting) resting.push_back(k.resting);
+    }
+}
+
+void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std::span<const std::uint32_t> slot,
+                             Sleepers* sleepers)
+{
+    const std::size_t m = pairs.size();
+    normal.assign(m, 0);
+    tangential.assign(m, Vec3f::Zero());
+    resting.assign(before.resting.empty() ? 0 : m, Vec3f::Zero());
+    for_each_chunk(before.pairs.size(), [&](std::size_t first, std::size_t last) {
+        for (std::size_t k = first; k < last; ++k) {
+            const bool pressed = before.normal[k] > 0;
+            if (!pressed && (resting.empty() || before.resting[k].isZero(0))) continue;
+            const auto [i, j] = before.pairs[k];
+            const auto here = list.of(i);
+            const auto found = std::lower_bound(here.begin(), here.end(), j);
+            if (found == here.end() || *found != j) {
+                if (pressed && sleepers) sleepers->wake(i), sleepers->wake(j);
+                continue;
+            }
+            const std::uint32_t to = slot[list.begin[i] + static_cast<std::size_t>(found - here.begin())];
+            normal[to] = before.normal[k];
+            tangential[to] = before.tangential[k];
+            if (!resting.empty()) resting[to] = before.resting[k];
+        }
+    });
+}
+
+}  // namespace rapid

@@ -1,0 +1,59 @@
+// In which order rows are projected: those that form trees directly, tree by tree; all others by Gauss-Seidel, colour
+// by colour.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/parallel.h"
+#include "runtime/solver/constraints/forest.h"
+#include "runtime/solver/constraints/graph_colouring.h"
+
+namespace rapid {
+
+class RowSchedule {
+public:
+    RowSchedule() = default;
+    // rows: those to be projected; points: `arity` of each. fixed: 1 for points of infinite mass.
+    RowSchedule(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> points, std::size_t arity,
+                std::span<const std::uint8_t> fixed, bool trees);
+
+    // Calls solve(tree, index of its first link).
+    template <class Solve>
+    void for_each_tree(const Solve& solve)
+    {
+        const std::size_t trees = forest_.begin.empty() ? 0 : forest_.begin.size() - 1;
+        const auto solve_trees = [&](std::size_t from, std::size_t to) {
+            for (std::size_t t = from; t < to; ++t) {
+                const std::uint32_t begin = forest_.begin[t];
+                solve(std::span(forest_.links).subspan(begin, forest_.begin[t + 1] - begin), std::size_t{begin});
+            }
+        };
+        constexpr std::size_t worth_a_task = 256;  // links: tens of microseconds
+        if (forest_.links.size() < worth_a_task) return solve_trees(0, trees);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, trees),
+                          [&](const auto& range) { solve_trees(range.begin(), range.end()); });
+    }
+
+    // Calls project(row) for the rows that are in no tree.
+    template <class Project>
+    void for_each_coloured(const Project& project) const
+    {
+        const std::span<const std::uint32_t> order = colours_.order;
+        for (std::size_t c = 0; c + 1 < colours_.begin.size(); ++c)
+            for_each_chunk(colours_.begin[c + 1] - colours_.begin[c], [&](std::size_t begin, std::size_t end) {
+                for (std::size_t k = begin; k < end; ++k) project(order[colours_.begin[c] + k]);
+            });
+        for (const std::uint32_t row : order.last(colours_.uncoloured)) project(row);
+    }
+
+private:
+    Forest forest_;
+    GraphColouring colours_;
+};
+
+}  // namespace rapid

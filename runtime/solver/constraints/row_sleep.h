@@ -1,0 +1,96 @@
+// Sleep of the points that rows hold together: which rows sleep, and what wakes their points.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "runtime/points/point_set.h"
+#include "runtime/solver/constraints/row.h"
+#include "runtime/solver/constraints/sleep.h"
+
+namespace rapid {
+
+template <class Function>
+class RowSleep {
+public:
+    using Row = rapid::Row<Function>;
+    using Traits = FunctionTraits<Function>;
+
+    // A frame begins: wakes the points of rows that act otherwise than before, and of those whose residual is not what
+    // the last frame left: a point that no row moves has been moved.
+    void begin() { disturbed_.clear(); }
+    void check(Row& row, bool acts_otherwise, const PointSet& points)
+    {
+        if (Traits::rests && (acts_otherwise || (row.active && has_moved(row, points)))) disturb(row);
+    }
+    void disturb(const Row& row)
+    {
+        for (const std::uint32_t i : row.points)
+            if (i != IdIndex::none) disturbed_.push_back(i);
+    }
+    // Points that are awake in this frame, even where no row is left.
+    const std::vector<std::uint32_t>& disturbed() const { return disturbed_; }
+
+    static bool is_asleep(const Row& row, const Substep& step)
+    {
+        if (!Traits::rests || !row.active || !step.sleepers) return false;
+        bool any = false;
+        for (const std::uint32_t i : row.points) {
+            if (step.at[i].w > 0) return false;
+            any |= step.asleep(i);
+        }
+        return any;
+    }
+
+    // A point of infinite mass that moves wakes the sleepers that are linked to it.
+    static void wake_by_motion(const Row& row, const Substep& step)
+    {
+        const bool moves = std::any_of(row.points.begin(), row.points.end(),
+                                       [&](std::uint32_t i) { return !step.asleep(i) && !step.v[i].isZero(0); });
+        if (!moves) return;
+        for (const std::uint32_t i : row.points) step.sleepers->wake(i);
+    }
+
+    // A one-sided row wakes sleepers that it begins to load.
+    static void wake_by_load(const Row& row, const Substep& step)
+    {
+        constexpr double disturbing = 0.1;  // of what they bear
+        for (int k = 0; row.active && !row.asleep && row.lambda > 0 && k < Row::arity; ++k) {
+            const std::uint32_t i = row.points[k];
+            if (step.asleep(i) && row.lambda > disturbing * step.dt * step.dt * step.sleepers->burden(i))
+                step.sleepers->wake(i);
+        }
+    }
+
+    // The points of a row that is gone do not fall asleep in this frame.
+    static void release(const Row& row, const Substep& step)
+    {
+        if (step.sleepers)
+            for (const std::uint32_t i : row.points) step.sleepers->keep_awake(i);
+    }
+
+private:
+    static bool has_moved(Row& row, const PointSet& points)
+    {
+        const Strided<Vec3f> places = points.P().read(), v = points.v().read();
+        typename Row::Vectors P, gradient;
+        for (int k = 0; k < Row::arity; ++k) {
+            if (!v[row.points[k]].isZero(0)) return row.resting_residual_exact = false;
+            P[k] = places[row.points[k]].template cast<double>();
+        }
+        const double C = row.function.residual(P, gradient);
+        double rounding = 0;
+        for (int k = 0; k < Row::arity && !row.resting_residual_exact; ++k)
+            rounding += 0x1p-22 * P[k].norm() * gradient[k].norm();
+        const double change = std::abs(C - row.resting_residual);
+        row.resting_residual = C;
+        row.resting_residual_exact = true;
+        return change > rounding;
+    }
+
+    std::vector<std::uint32_t> disturbed_;
+};
+
+}  // namespace rapid

@@ -91,7 +91,7 @@ void CoupledStep::begin_sleep()
 void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
 {
     const StepScene& scene = context_.scene;
-    Collisions collisions(scene.obstacles, context_.consequences());
+    Collisions collisions(scene.obstacles, context_.collision_context());
     BlockStep step(context_);
     const PointBlock& block = step.block;
     std::vector<std::uint32_t> places;
@@ -112,7 +112,7 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         step.advance(collisions, now_.index);
         // A point that was put out of a shape gets no velocity from that towards those that it is put into, as if it
         // had been born there.
-        for (const auto& [k, by] : collisions.put_out()) begin_[block.places[k]] += by;
+        for (const auto& [k, by] : collisions.displacements()) begin_[block.places[k]] += by;
         for (std::size_t k = 0; k < block.size(); ++k) take_point(block, k);
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k) pull = std::max(pull, block.a[k].norm());
     }
@@ -187,7 +187,7 @@ Vec3d CoupledStep::pull_on(const PointBlock& block, std::size_t k, bool asleep) 
 void CoupledStep::store(std::size_t begin, std::size_t end)
 {
     const bool collides = !context_.scene.obstacles.empty();
-    Collisions collisions(context_.scene.obstacles, context_.consequences());
+    Collisions collisions(context_.scene.obstacles, context_.collision_context());
     BlockStep step(context_);
     PointBlock& block = step.block;
     std::vector<std::uint32_t> places;

@@ -21,7 +21,7 @@ StepContext::StepContext(PointSet& set, const Dynamics& dynamics, const SolveOpt
     if (points.has("dt")) time.own = points.column<float>("dt").read();
 }
 
-Consequences StepContext::consequences()
+CollisionContext StepContext::collision_context()
 {
     return {hits_ ? &*hits_ : nullptr, dead, options.met, scene.mass, options.time, options.h};
 }
@@ -29,11 +29,12 @@ Consequences StepContext::consequences()
 void StepContext::count(const Collisions& collisions, double deepest, std::size_t first)
 {
     const std::scoped_lock lock(mutex_);
-    result_.collisions += collisions.contacts;
-    result_.contact_limit += collisions.limited;
-    result_.trapped += collisions.trapped;
+    const ContactCounts& counts = collisions.counts();
+    result_.collisions += counts.contacts;
+    result_.contact_limit += counts.limited;
+    result_.trapped += counts.trapped;
     result_.penetration_max = std::max(result_.penetration_max, deepest);
-    if (collisions.energy != ContactEnergy()) energies_.emplace_back(first, collisions.energy);
+    if (counts.energy != ContactEnergy()) energies_.emplace_back(first, counts.energy);
 }
 
 void StepContext::count_penetration(double deepest)

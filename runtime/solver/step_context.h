@@ -36,7 +36,7 @@ public:
     // Whether the step advances a point: those outside options.group stay where they are.
     bool advances_all() const { return !members_.data; }
     bool advances(std::size_t i) const { return !members_.data || members_[i]; }
-    Consequences consequences();
+    CollisionContext collision_context();
 
     // Calls f(begin, end) for each chunk, in parallel. Of several errors that of the first chunk is thrown.
     template <class F>

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/collision/obstacle.h"
 #include "runtime/solver/constraints/projection.h"
 #include "runtime/solver/dynamics.h"
 

@@ -67,7 +67,7 @@ BlockResult BlockRun::result(const Collisions& collisions)
     put_off_.assign(block.size(), 0);
     for (std::size_t i = 0; !scene.obstacles.empty() && i < block.size(); ++i) {
         if (collisions.has_met(i)) paths_[i] = PathKind::Broken;
-        put_off_[i] = collisions.put_off(i);
+        put_off_[i] = collisions.position_error(i);
     }
     dead_.clear();
     if (!context_.dead.empty())
@@ -121,8 +121,8 @@ BallisticBatch::Progress UncoupledStep::advance_ballistic(std::size_t begin, std
 void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> places)
 {
     // Contacts are counted in the first run of each block only.
-    Collisions counted(context_.scene.obstacles, context_.consequences());
-    Collisions others(context_.scene.obstacles, context_.consequences());
+    Collisions counted(context_.scene.obstacles, context_.collision_context());
+    Collisions others(context_.scene.obstacles, context_.collision_context());
     BlockRun run(context_);
     const std::unique_ptr<BlockRefinement> refinement = refinement_ ? refinement_->begin() : nullptr;
     double deepest = 0;

@@ -1,12 +1,12 @@
-// What contacts do to the energy of points: the audit of a method (numerics.md, Collision).
+// The energy that contacts add to points and take from them: the audit of a method (numerics.md, Collision).
 #pragma once
 
 #include <cmath>
 
 namespace rapid {
 
-// J, kinetic and in the constant acceleration of each sub-step. A contact with what is at rest can add none: what is
-// added is the work of shapes that move, and the error of a method.
+// J, kinetic energy and that in the constant acceleration of each sub-step. A contact with a shape at rest adds none:
+// any gain is the work of moving shapes, or the error of a method.
 struct ContactEnergy {
     double added = 0, lost = 0;  // summed over points and sub-steps apart
 

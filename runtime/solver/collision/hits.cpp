@@ -17,17 +17,16 @@ Hits::Hits(PointSet& points, bool begins_frame)
     if (begins_frame) std::fill(num_.begin(), num_.end(), 0);
 }
 
-void Hits::record(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double time, double impulse,
-                  int collider)
+void Hits::record(std::size_t point, int collider, const Impact& impact, double impulse)
 {
-    ++total_[i];
-    ++num_[i];
-    pos_[i] = P.cast<float>();
-    nml_[i] = n.cast<float>();
-    v_[i] = vc.cast<float>();
-    time_[i] = static_cast<float>(time);
-    impulse_[i] = static_cast<float>(impulse);
-    path_[i] = collider;
+    ++total_[point];
+    ++num_[point];
+    pos_[point] = impact.P.cast<float>();
+    nml_[point] = impact.n.cast<float>();
+    v_[point] = impact.vc.cast<float>();
+    time_[point] = static_cast<float>(impact.time);
+    impulse_[point] = static_cast<float>(impulse);
+    path_[point] = collider;
 }
 
 }  // namespace rapid

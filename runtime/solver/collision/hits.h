@@ -4,7 +4,7 @@
 //   hitpos     where, m                      hitnml    normal of the surface, unit
 //   hitv       velocity of the surface, m/s  hittime   s since the start
 //   hitimpulse mass times the change of velocity, kg m/s
-//   hitpath    place of the collider among those of the chain, from 0
+//   hitpath    index of the collider among those of the chain, from 0
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,14 @@
 
 namespace rapid {
 
+// A contact that has changed the velocity of a point.
+struct Impact {
+    Vec3d P, n, vc;  // where, m; the surface's normal, unit, and velocity, m/s
+    double speed;    // of approach, m/s
+    Vec3d change;    // of the velocity, m/s
+    double time;     // s since the start
+};
+
 class Hits {
 public:
     static constexpr const char* names[] = {"hitimpulse", "hitnml",  "hitnum",   "hitpath",
@@ -22,8 +30,8 @@ public:
     // Makes the columns writable, on one thread. They must exist.
     Hits(PointSet& points, bool begins_frame);
 
-    void record(std::size_t i, const Vec3d& P, const Vec3d& n, const Vec3d& vc, double time, double impulse,
-                int collider);
+    // Of the point at this index of the set; impulse: kg m/s.
+    void record(std::size_t point, int collider, const Impact& impact, double impulse);
 
 private:
     std::span<float> impulse_, time_;

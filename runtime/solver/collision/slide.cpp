@@ -9,19 +9,25 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// How far the direction of friction may turn within a piece, in radians. The error of a piece is of the third order in
-// it; a point that slides straight down, or along, is exact at any.
+// How far the direction of friction may turn within a piece, in radians. The error of a piece is of third order in it;
+// a point that slides straight down a slope, or on a level floor, is exact at any length.
 constexpr double most_turn = 0.05;
 
 // Two surfaces within 0.06 degrees of each other are one: along their edge the forces would be ill determined.
 constexpr double parallel = 1e-3;  // sine of the angle between the normals
 
-// Of an acceleration, what rounding leaves of a part along the surface that is exactly 0.
+// The part of an acceleration that rounding leaves along the surface where there is none.
 constexpr double rounding = 0x1p-48;
 
 }  // namespace
 
-// With a the acceleration in the surface's frame, N = g - κ |vt|² the surface's force a mass, g = -a·n, at = a + g n:
+Vec3d tangential_to(const Support& on, const Vec3d& v)
+{
+    const Vec3d relative = v - on.vc;
+    return on.vc + (relative - relative.dot(on.n) * on.n);
+}
+
+// With a the acceleration in the surface's frame, N = g - κ |vt|² the normal force per mass, g = -a·n, at = a + g n:
 //
 //   at rest    the point stays while |at| <= μ N, else a' = at (1 - μ N / |at|)
 //   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece
@@ -66,7 +72,7 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
 }
 
 // x - (n + n1) (n1·x) / (1 + n·n1), for n·x = 0.
-Vec3d carried(const Vec3d& x, const Vec3d& n, const Vec3d& n1)
+Vec3d transported(const Vec3d& x, const Vec3d& n, const Vec3d& n1)
 {
     const double cosine = n.dot(n1);
     if (1 + cosine < parallel) return x - n1.dot(x) * n1;

@@ -1,5 +1,5 @@
-// How a point moves that rests on a surface: along it, with the surface's force just large enough to keep it there, and
-// with Coulomb's friction.
+// The motion of a point that rests on a surface: along it, with the normal force just large enough to keep it there,
+// and with Coulomb friction.
 #pragma once
 
 #include "runtime/vec.h"
@@ -8,23 +8,27 @@ namespace rapid {
 
 // A surface that a point rests on.
 struct Support {
-    int collider;      // place among the colliders
-    Vec3d n, vc;       // unit normal out of it, and its velocity, m/s
-    double curvature;  // 1/m, in the direction of motion; above 0 where the surface falls away
-    double friction;   // μ
-    bool flat;         // a plane
-    double feature;    // m, the shape's smallest
-
-    // m/s², of what goes straight on along the surface as the body sees it (RigidBody)
-    Vec3d ac = Vec3d::Zero();
+    int collider = 0;          // index among the colliders
+    Vec3d n = Vec3d::Zero();   // unit normal out of it
+    Vec3d vc = Vec3d::Zero();  // its velocity, m/s
+    double curvature = 0;      // 1/m, in the direction of motion; above 0 where the surface falls away
+    double friction = 0;       // μ
+    bool flat = false;         // a plane
+    double feature = 0;        // m, the shape's smallest
+    Vec3d ac = Vec3d::Zero();  // m/s², of uniform motion along the surface in the body's frame (RigidBody)
 };
 
-// What comes next: the parabola of constant acceleration `a`, in the surface's frame, for `duration`, if the surface
-// stays flat.
+// The shortest piece of a slide whose direction of friction turns, as a part of the sub-step.
+constexpr double min_turning_piece = 1.0 / 256;
+
+// A velocity without its part along the normal, in the surface's frame.
+Vec3d tangential_to(const Support& on, const Vec3d& v);
+
+// The next part of the motion: a parabola of constant acceleration in the surface's frame, if the surface stays flat.
 struct Slide {
     enum Kind {
         Leaves,  // nothing presses the point to the surface: it moves freely
-        Sticks,  // it stays where it is, until something else changes
+        Sticks,  // static friction holds it
         Moves,
     };
     Kind kind;
@@ -33,19 +37,18 @@ struct Slide {
     bool stops = false;       // at the end of the duration the point has come to a stop on the surface
 };
 
-// `v` is tangential to the surface in its own frame. `least` (s) is the shortest piece that a change of direction
-// makes.
+// `v` is tangential to the surface in its own frame; `least` (s) is the shortest piece that turning friction makes.
 Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& a, double left, double least);
 
-// A vector x along a surface of normal n, carried to where the normal is n1: turned by the least rotation that takes n
-// to n1.
-Vec3d carried(const Vec3d& x, const Vec3d& n, const Vec3d& n1);
+// Parallel transport of a vector x along a surface, from where its normal is n to where it is n1: by the smallest
+// rotation that takes n to n1.
+Vec3d transported(const Vec3d& x, const Vec3d& n, const Vec3d& n1);
 
-// The edge that two surfaces make, as the unit vector along it; zero where they are (nearly) parallel.
+// The unit vector along the edge of two surfaces; zero where they are (nearly) parallel.
 Vec3d edge_of(const Support& A, const Support& B);
 
-// The same along the edge of two surfaces; `v` is along it. `lifted` says which surface the acceleration draws the
-// point off (0 or 1), or -1.
+// The same along the edge of two surfaces; `v` is along it. `lifted`: the surface that the acceleration pulls the point
+// off (0 or 1), or -1.
 Slide slide_along(const Support& A, const Support& B, const Vec3d& v, const Vec3d& a, double left, int& lifted);
 
 }  // namespace rapid

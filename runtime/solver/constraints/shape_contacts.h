@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/collision/obstacle.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/shape_clearance.h"
 

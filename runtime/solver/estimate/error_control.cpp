@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
-#include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/collision/obstacle.h"
 #include "runtime/solver/refinement.h"
 
 namespace rapid {

@@ -1,0 +1,78 @@
+// A point that has met a shape in this sub-step: what is left of the sub-step, the surfaces that bear it, and its next
+// path.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "runtime/shapes/shape.h"
+#include "runtime/solver/collision/slide.h"
+
+namespace rapid {
+
+// What a point may meet in one sub-step before the rest of it is dropped, counted in contacts and in pieces of a path
+// along a curved surface.
+constexpr int max_contacts = 100000;
+
+// The shortest piece of a path along a curved surface whose shape has no smallest feature, as a part of the sub-step.
+constexpr double min_piece = 1.0 / 4096;
+
+struct CollidingPoint {
+    enum PathKind {
+        Free,
+        Straight,  // along flat surfaces
+        Curved,    // along a curved surface; `path` is then the chord
+        Waits,     // its path is planned again, with what has become known of the surface
+    };
+
+    // The end of a piece along a curved surface.
+    struct PieceEnd {
+        Vec3d P = Vec3d::Zero(), v = Vec3d::Zero(), n = Vec3d::Zero();
+        Vec3d a = Vec3d::Zero();  // of the piece, at its beginning
+        double curvature = 0;     // 1/m
+    };
+
+    std::uint32_t i = 0;  // in the block
+    double left = 0;      // s of the sub-step
+    double piece = 0;     // s: the length of the next piece along a curved surface
+    int events = 0;       // towards max_contacts
+    int ejections = 0;    // times that it was taken out of a shape
+
+    // Where it was, after how many events, when chatter was last looked for.
+    int checked_events = 0;
+    Vec3d checked_P = Vec3d::Constant(std::numeric_limits<double>::infinity());
+
+    int supports = 0;  // surfaces that it rests on; on two it moves along their edge
+    Support on[2] = {};
+
+    // The next path.
+    Path path{Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), 0, 0};
+    PathKind kind = Free;
+    bool stops = false;  // at the end of the path, on the surface
+    PieceEnd end;        // of a curved path
+
+    void begin(std::uint32_t point, double dt)
+    {
+        i = point;
+        left = piece = dt;
+        events = ejections = checked_events = supports = 0;
+        checked_P.setConstant(std::numeric_limits<double>::infinity());
+        kind = Free;
+        stops = false;
+    }
+
+    bool rests_on(int obstacle) const
+    {
+        return (supports > 0 && on[0].collider == obstacle) || (supports > 1 && on[1].collider == obstacle);
+    }
+    // Flat along all the surfaces that it rests on.
+    bool is_on_flat() const { return on[0].flat && (supports < 2 || on[1].flat); }
+
+    // Ends the path after `duration`, unless it is over sooner.
+    void limit_path(double duration)
+    {
+        if (path.duration > duration) path.duration = duration, stops = false;
+    }
+};
+
+}  // namespace rapid

@@ -1,0 +1,29 @@
+#include "runtime/solver/collision/contact_audit.h"
+
+#include <cmath>
+
+namespace rapid {
+
+void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
+{
+    ++counts_.contacts;
+    const std::optional<double>& record = block_.obstacles[obstacle].record;
+    if (!record || !(impact.speed >= *record)) return;
+    const std::uint32_t index = block_.indices[i];
+    block_.context.hits->record(index, obstacle, impact, block_.context.mass[index] * impact.change.norm());
+}
+
+// A free path keeps v²/2 - a·P, so any change of it is the work of contacts.
+void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion)
+{
+    for (const std::uint32_t i : touched.list()) {
+        const double mass = block_.context.mass[block_.indices[i]];
+        if (stuck.has(i) || std::isinf(mass)) continue;
+        const Vec3d P = motion.initial_P(i), v = motion.initial_v(i);
+        const double change =
+            0.5 * (block_.v[i] - v).dot(block_.v[i] + v) - motion.acceleration(i).dot(block_.P[i] - P);
+        counts_.energy.take(mass * change);
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,39 @@
+// The audit of contacts: how many there were, what is written of them to the points, and what they did to the energy.
+#pragma once
+
+#include <cstdint>
+
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/collision/free_motion.h"
+#include "runtime/solver/collision/stuck_points.h"
+#include "runtime/solver/collision/touched_points.h"
+
+namespace rapid {
+
+struct ContactCounts {
+    std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
+    std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
+    std::uint64_t trapped = 0;   // points that are in a shape at the end of the frame, with no way out
+    ContactEnergy energy;        // of points without linear forces, which take energy all the time
+};
+
+class ContactAudit {
+public:
+    explicit ContactAudit(const CollisionBlock& block) : block_(block) {}
+
+    // An impact of a point of the block.
+    void add(std::size_t i, int obstacle, const Impact& impact);
+    void add_limited() { ++counts_.limited; }
+    void add_trapped(std::size_t points) { counts_.trapped += points; }
+    // At the end of a sub-step.
+    void add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion);
+
+    const ContactCounts& counts() const { return counts_; }
+
+private:
+    const CollisionBlock& block_;
+    ContactCounts counts_;
+};
+
+}  // namespace rapid

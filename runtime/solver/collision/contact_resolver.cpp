@@ -1,0 +1,180 @@
+#include "runtime/solver/collision/contact_resolver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/solver/collision/response.h"
+
+namespace rapid {
+namespace {
+
+// The part of its size that a velocity after a bounce may have along the normal of a surface that the point rests on,
+// and leave the point on it: rounding.
+constexpr double tangential = 1e-9;
+
+// The part of its size that a velocity along one side of a valley may have out of the other side, for the point to stay
+// in the valley: what two responses leave of a velocity across it.
+constexpr double valley = 1e-6;
+
+}  // namespace
+
+void ContactResolver::resolve(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o)
+{
+    const Response response = block_.obstacles[o].response;
+    block_.P[point.i] = arrival.P;
+    block_.v[point.i] = arrival.v;
+    point.left -= contact.time;
+    if (++point.events >= max_contacts) {
+        audit_.add_limited();
+        point.left = 0;
+    }
+    if (response == Response::Stick || response == Response::Die)
+        capture(point, contact, o);
+    else if (contact.depth > 0)
+        ejection_.eject(point, contact, o, arrival.a);
+    else
+        respond(point, arrival, contact, o);
+}
+
+void ContactResolver::resolve_on_path(CollidingPoint& point, const Contact& contact, int o)
+{
+    const Path& path = point.path;
+    const double s = contact.time;
+    if (point.kind == CollidingPoint::Curved)
+        resolve(point, arrival_on_chord(point, s), contact, o);
+    else
+        resolve(point, {place(path, s), path.v + s * path.a, path.a}, contact, o);
+}
+
+// A contact that was found on the chord of a piece along a curved surface: the arc is off the chord by
+// κ d²/2 u (1 - u).
+ContactResolver::Arrival ContactResolver::arrival_on_chord(CollidingPoint& point, double time) const
+{
+    const Path& chord = point.path;
+    const CollidingPoint::PieceEnd& end = point.end;
+    const double u = chord.duration > 0 ? time / chord.duration : 0;
+    Support& on = point.on[0];
+    const Vec3d d = end.P - chord.P, v0 = block_.v[point.i];
+    on.n = ((1 - u) * on.n + u * end.n).normalized();
+    on.curvature = end.curvature;
+    Vec3d v = (1 - u) * v0 + u * end.v - on.vc;
+    v += on.vc - v.dot(on.n) * on.n;
+    return {chord.P + u * d + 0.5 * end.curvature * d.squaredNorm() * u * (1 - u) * on.n, v, end.a};
+}
+
+// The shape keeps the point, or ends its life: its sub-step is over.
+void ContactResolver::capture(CollidingPoint& point, const Contact& contact, int o)
+{
+    const Obstacle& obstacle = block_.obstacles[o];
+    const std::size_t i = point.i;
+    const Vec3d P = block_.P[i], v = block_.v[i];
+    const double when = block_.time(i, point.left);
+    if (contact.depth > 0) block_.P[i] += contact.depth * contact.n;
+    block_.v[i] = contact.vc;
+    audit_.add(i, o, {P, contact.n, contact.vc, -(v - contact.vc).dot(contact.n), contact.vc - v, when});
+    if (obstacle.response == Response::Die)
+        block_.context.dead[block_.indices[i]] = 1;
+    else
+        block_.P[i] += point.left * contact.vc;
+    point.left = 0;
+    point.supports = 1;
+    point.on[0] = {o, contact.n, contact.vc, contact.curvature, 0, contact.flat, obstacle.feature};
+}
+
+// After a contact that leaves with the speed u, under the acceleration g into the surface, all further bounces together
+// take 2u/(g (1 - ε)). Where they would be over within this sub-step the point rests from now on. The momentum that
+// they would take from the tangent by friction is that of one contact with ε = 0 and the sliding after it, to the last
+// digit: μ (1 + ε) |vn| (1 + ε + ε² + ...) = μ |vn| + μ g 2u/(g (1 - ε)).
+void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o)
+{
+    const Obstacle& obstacle = block_.obstacles[o];
+    const std::size_t i = point.i;
+    const double epsilon = obstacle.restitution(block_.indices[i]), friction = obstacle.friction[block_.indices[i]];
+    const auto& [P, v, a] = arrival;
+    const Vec3d& n = contact.n;
+    const Vec3d relative = v - contact.vc;
+    const double vn = relative.dot(n);
+    const Vec3d along = v - vn * n;
+    const Vec3d ac = obstacle.acceleration_at(P, along, block_.frame_time(i, point.left));
+    const double g = -(a - ac).dot(n) - contact.curvature * (along - contact.vc).squaredNorm();
+    const double u = vn < 0 ? -epsilon * vn : vn;
+    const double tolerance = obstacle.contact_tolerance(P, block_.radius(obstacle, i));
+    const double rising2 = g > 0 ? 2 * g * tolerance : 0;  // of a speed that lifts by less than rounding
+    const bool hits = vn < 0 && vn * vn > rising2;
+    const double when = block_.time(i, point.left);
+
+    const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature, ac};
+    if (g < 0 && vn >= -tangential * relative.norm())
+        part(point, arrival, contact, vn);
+    else if (vn >= 0 || u * u <= rising2 || 2 * u <= g * (1 - epsilon) * point.left)
+        rest(point, support, contact_response(v, contact.vc, n, 0, friction));
+    else
+        bounce(point, support, epsilon);
+    if (hits) audit_.add(i, o, {P, n, contact.vc, -vn, block_.v[i] - v, when});
+}
+
+// The point touches the surface, and is pulled off it.
+void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, double vn)
+{
+    const std::size_t i = point.i;
+    if (contact.flat) {
+        // An approach by rounding alone would be met again and again at the same moment. What the point rests on
+        // besides still bears it.
+        block_.v[i] -= std::min(vn, 0.0) * contact.n;
+        return;
+    }
+    // It touches as far as a field can tell: the next moments belong to the path.
+    const double s = std::min(point.left, min_piece * block_.dt[i]);
+    block_.P[i] += s * (arrival.v + 0.5 * s * arrival.a);
+    block_.v[i] += s * arrival.a;
+    point.left -= s;
+    point.supports = 0;
+}
+
+void ContactResolver::bounce(CollidingPoint& point, const Support& support, double epsilon)
+{
+    Vec3d& v = block_.v[point.i];
+    v = contact_response(v, support.vc, support.n, epsilon, support.friction);
+    const double off = tangential * v.norm();
+    const auto leaves = [&](const Support& on) { return std::abs((v - on.vc).dot(on.n)) > off; };
+    if (point.supports == 2 && leaves(point.on[1])) point.supports = 1;
+    if (point.supports >= 1 && leaves(point.on[0])) point.on[0] = point.on[1], --point.supports;
+    if (point.left == 0 && point.supports == 0) point.on[0] = support, point.supports = 1;
+}
+
+// The point rests on one more surface: on one it slides, on two along their edge, on three nowhere.
+void ContactResolver::rest(CollidingPoint& point, const Support& support, const Vec3d& v)
+{
+    Vec3d along = tangential_to(support, v) - support.vc;
+    if (point.supports == 0 || is_same_surface(point, support, along)) {
+        point.supports = std::max(point.supports, 1);
+        point.on[point.supports - 1] = support;
+    } else if (point.supports == 1 && !edge_of(point.on[0], support).isZero()) {
+        point.on[1] = support;
+        point.supports = 2;
+    } else if (point.supports == 1) {
+        point.on[0] = support;
+    } else {
+        along.setZero();
+        point.left = 0;
+    }
+    if (point.supports == 2) {
+        const Vec3d edge = edge_of(point.on[0], point.on[1]);
+        along = along.dot(edge) * edge;
+    }
+    block_.v[point.i] = support.vc + along;
+}
+
+// Whether the last support goes on in this one. Two facets of one field are two surfaces where they make a valley, and
+// the point lies in it: neither moving out of it nor pulled out.
+bool ContactResolver::is_same_surface(const CollidingPoint& point, const Support& support, const Vec3d& along) const
+{
+    if (point.supports == 0 || point.on[point.supports - 1].collider != support.collider) return false;
+    if (point.supports != 1) return true;
+    const Vec3d& other = point.on[0].n;
+    const Vec3d& a = motion_.acceleration(point.i);
+    const Vec3d pull = a - a.dot(support.n) * support.n;
+    return along.dot(other) > valley * along.norm() || pull.dot(other) >= 0 || edge_of(point.on[0], support).isZero();
+}
+
+}  // namespace rapid

@@ -1,0 +1,44 @@
+// What a contact does to a point: it bounces, comes to rest on the surface, sticks, dies, or is taken out of the shape.
+#pragma once
+
+#include "runtime/solver/collision/colliding_point.h"
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/contact_audit.h"
+#include "runtime/solver/collision/ejection.h"
+#include "runtime/solver/collision/free_motion.h"
+
+namespace rapid {
+
+class ContactResolver {
+public:
+    // The state with which a point arrives at a contact.
+    struct Arrival {
+        Vec3d P, v, a;
+    };
+
+    ContactResolver(const CollisionBlock& block, const FreeMotion& motion, Ejection& ejection, ContactAudit& audit)
+        : block_(block), motion_(motion), ejection_(ejection), audit_(audit)
+    {
+    }
+
+    // Takes a point to a contact on its path, and gives it the velocity that it leaves with.
+    void resolve(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int obstacle);
+    // The contact is on the path that was planned.
+    void resolve_on_path(CollidingPoint& point, const Contact& contact, int obstacle);
+
+private:
+    Arrival arrival_on_chord(CollidingPoint& point, double time) const;
+    void capture(CollidingPoint& point, const Contact& contact, int obstacle);
+    void respond(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int obstacle);
+    void part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, double vn);
+    void bounce(CollidingPoint& point, const Support& support, double bounce);
+    void rest(CollidingPoint& point, const Support& support, const Vec3d& v);
+    bool is_same_surface(const CollidingPoint& point, const Support& support, const Vec3d& along) const;
+
+    const CollisionBlock& block_;
+    const FreeMotion& motion_;
+    Ejection& ejection_;
+    ContactAudit& audit_;
+};
+
+}  // namespace rapid

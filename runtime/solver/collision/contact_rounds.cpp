@@ -1,0 +1,86 @@
+#include "runtime/solver/collision/contact_rounds.h"
+
+#include "runtime/shapes/first_contact.h"
+
+namespace rapid {
+
+void ContactRounds::start(std::uint32_t i)
+{
+    const std::size_t slot = started_++;
+    if (slot == points_.size()) points_.emplace_back();
+    CollidingPoint& point = points_[slot];
+    point.begin(i, block_.dt[i]);
+    const double s = contacts_.contact(i).time;
+    resolver_.resolve(point, {place(motion_.path(i), s), motion_.velocity_after(i, s), motion_.acceleration(i)},
+                      contacts_.contact(i), contacts_.obstacle(i));
+    if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
+}
+
+void ContactRounds::run()
+{
+    while (!going_.empty()) {
+        curved_.find_ends(points_, going_);
+        find_contacts();
+        going_on_.clear();
+        for (const std::uint32_t slot : going_) {
+            CollidingPoint& point = points_[slot];
+            if (point.kind != CollidingPoint::Waits) {
+                if (contacts_.has(point.i))
+                    resolver_.resolve_on_path(point, contacts_.contact(point.i), contacts_.obstacle(point.i));
+                else
+                    planner_.finish_path(point);
+            }
+            if (goes_on(point)) going_on_.push_back(slot);
+        }
+        going_.swap(going_on_);
+    }
+    started_ = 0;
+}
+
+// Plans the next path of a point, and takes the point along it where no shape has to be asked; false when its sub-step
+// is over.
+bool ContactRounds::goes_on(CollidingPoint& point)
+{
+    while (planner_.plan(point)) {
+        if (point.kind == CollidingPoint::Curved || may_meet_shape(point)) return true;
+        planner_.finish_path(point);
+    }
+    const auto surface = [&](int k) {
+        return k < point.supports ? TouchedPoints::Surface{point.on[k].collider, point.on[k].n}
+                                  : TouchedPoints::Surface{};
+    };
+    touched_.set_surfaces(point.i, {surface(0), surface(1)});
+    return false;
+}
+
+bool ContactRounds::may_meet_shape(const CollidingPoint& point) const
+{
+    for (std::size_t o = 0; o < block_.obstacles.size(); ++o)
+        if (may_meet(point, o)) return true;
+    return false;
+}
+
+// Whether the path may lead to a shape that the point is not on.
+bool ContactRounds::may_meet(const CollidingPoint& point, std::size_t obstacle) const
+{
+    return !point.rests_on(static_cast<int>(obstacle)) && block_.may_reach_obstacle(point.i, point.path, obstacle);
+}
+
+// After a bounce any shape may be in the way.
+void ContactRounds::find_contacts()
+{
+    for (const std::uint32_t slot : going_) contacts_.clear(points_[slot].i);
+    for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
+        for (const std::uint32_t slot : going_) {
+            const CollidingPoint& point = points_[slot];
+            if (point.kind == CollidingPoint::Waits || !may_meet(point, o)) continue;
+            Path path = point.path;
+            path.radius = block_.radius(block_.obstacles[o], point.i);
+            path.begin = block_.frame_time(point.i, point.left);
+            contacts_.add(point.i, path);
+        }
+        contacts_.ask(o);
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,56 @@
+// Takes the points of a block that have met a shape through the rest of their sub-step. They go on together, round by
+// round, each by one path a round, so that a shape is called once a round and never once a point.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/solver/collision/colliding_point.h"
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/contact_resolver.h"
+#include "runtime/solver/collision/curved_motion.h"
+#include "runtime/solver/collision/first_contacts.h"
+#include "runtime/solver/collision/path_planner.h"
+#include "runtime/solver/collision/touched_points.h"
+
+namespace rapid {
+
+class ContactRounds {
+public:
+    ContactRounds(const CollisionBlock& block, FreeMotion& motion, FirstContacts& contacts, ContactResolver& resolver,
+                  TouchedPoints& touched, ContactAudit& audit)
+        : block_(block),
+          motion_(motion),
+          contacts_(contacts),
+          resolver_(resolver),
+          touched_(touched),
+          planner_(block, motion, audit),
+          curved_(block, motion, resolver)
+    {
+    }
+
+    // Takes a point, which is at the beginning of its sub-step, to the first contact on its free path.
+    void start(std::uint32_t i);
+    // Takes all points that were started to the end of the sub-step.
+    void run();
+
+private:
+    bool goes_on(CollidingPoint& point);
+    bool may_meet_shape(const CollidingPoint& point) const;
+    bool may_meet(const CollidingPoint& point, std::size_t obstacle) const;
+    void find_contacts();
+
+    const CollisionBlock& block_;
+    FreeMotion& motion_;
+    FirstContacts& contacts_;
+    ContactResolver& resolver_;
+    TouchedPoints& touched_;
+    PathPlanner planner_;
+    CurvedMotion curved_;
+
+    std::vector<CollidingPoint> points_;  // the first started_ are of this sub-step
+    std::size_t started_ = 0;
+    std::vector<std::uint32_t> going_, going_on_;  // of points_, whose sub-step is not over: now and in the next round
+};
+
+}  // namespace rapid

@@ -1,0 +1,195 @@
+#include "runtime/solver/collision/curved_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/shapes/first_contact.h"
+
+namespace rapid {
+namespace {
+
+// How far a surface may turn within a piece, as the cosine of 0.2 radians. The length of a path around a circle is then
+// right to 1e-5 a piece.
+constexpr double min_cosine = 0.98;
+
+// A surface that curves inwards by a smaller radius than its field can show is a kink, at which a point bounces. A turn
+// of less than this, in radians, is the field's noise.
+constexpr double min_kink = 0.02;
+
+// The shortest piece, s.
+double shortest_piece(const Obstacle& obstacle, const Path& path, double dt)
+{
+    if (!(obstacle.feature > 0)) return min_piece * dt;
+    return detail::time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm());
+}
+
+}  // namespace
+
+void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> going)
+{
+    for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
+        begin_pieces(points, going, static_cast<int>(o));
+        if (query_.empty()) continue;
+        const Obstacle& obstacle = block_.obstacles[o];
+        query_.find_gradients_at_times(*obstacle.shape);
+        std::size_t kept = 0;
+        for (std::size_t j = 0; j < query_.size(); ++j)
+            if (follow_arc(points[query_.point[j]], j)) query_.move(j, kept++);
+        query_.truncate(kept);
+        project(points, obstacle);
+        for (std::size_t j = 0; j < kept; ++j) end_piece(points[query_.point[j]], j);
+    }
+}
+
+// The tangential pieces along one shape, and the question of where the surface is at their ends.
+void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> going, int o)
+{
+    const double feature = block_.obstacles[o].feature;
+    query_.clear();
+    for (const std::uint32_t slot : going) {
+        CollidingPoint& point = points[slot];
+        const Support& on = point.on[0];
+        if (point.kind != CollidingPoint::Curved || on.collider != o) continue;
+        Path& path = point.path;
+        path.v -= on.vc + on.n.dot(path.v - on.vc) * on.n;  // along the surface, in its frame
+        // Beyond its smallest feature the field may have anything: a wall across, or an edge.
+        if (feature > 0) point.limit_path(detail::time_to_travel(2 * feature, path.v.norm(), path.a.norm()));
+        query_.add(slot, place(path, path.duration), block_.frame_time(point.i, point.left));  // in the surface's frame
+    }
+}
+
+// Bends the piece to the chord of its arc. False where the surface does not let the point go as far as that.
+bool CurvedMotion::follow_arc(CollidingPoint& point, std::size_t j)
+{
+    const Path& path = point.path;
+    const Support& on = point.on[0];
+    const Obstacle& obstacle = block_.obstacles[on.collider];
+    const Vec3d d = query_.P[j] - path.P, n = on.n;
+    const double length = d.norm(), slope = query_.gradient[j].norm();
+    const Vec3d n1 = slope > 0 ? Vec3d(query_.gradient[j] / slope) : n;
+    const double cosine = n.dot(n1), turn = length > 0 ? (n1 - n).dot(d) / length : 0;
+    const double curvature = length > 0 ? turn / length : 0;
+    const double shortest = shortest_piece(obstacle, path, block_.dt[point.i]);
+    const bool leaves = -(motion_.acceleration(point.i) - on.ac).dot(n) - curvature * path.v.squaredNorm() < 0;
+    const bool kink = turn < -min_kink && -curvature * 2 * obstacle.feature > 1;
+    if (path.duration > shortest && (cosine < min_cosine || leaves || kink || !(slope > 0)))
+        return wait_for(point, shortest), false;
+    if (leaves) return leave_surface(point), false;
+    if (turn < 0 && (kink || cosine < min_cosine)) return meet_kink(point, n1), false;
+
+    const Vec3d tangent = length > 0 ? Vec3d(d / length) : Vec3d(Vec3d::Zero());
+    const Vec3d tangent1 = transported(tangent, n, n1);
+    const Vec3d middle = tangent + tangent1;
+    const double angle2 = 2 * (1 - std::min(1.0, cosine));
+    point.end.curvature = curvature;
+    query_.P[j] = path.P + length * (1 - angle2 / 24) * (length > 0 ? middle.normalized() : middle);
+    return true;
+}
+
+// For the next round, with a shorter piece.
+void CurvedMotion::wait_for(CollidingPoint& point, double shortest) const
+{
+    point.piece = std::max(point.path.duration / 4, shortest);
+    point.kind = CollidingPoint::Waits;
+}
+
+// The next moments belong to the path: at an edge the surface may seem to curve less where the point touches than along
+// its path, and would be met at once again.
+void CurvedMotion::leave_surface(CollidingPoint& point) const
+{
+    Vec3d &P = block_.P[point.i], &v = block_.v[point.i];
+    const Vec3d& a = motion_.acceleration(point.i);
+    const double dt = block_.dt[point.i];
+    const double moment = std::min(point.left, std::max(point.path.duration, min_piece * dt));
+    P += moment * (v + 0.5 * moment * a);
+    v += moment * a;
+    point.left -= moment;
+    point.supports = 0;
+    point.piece = dt;
+    point.kind = CollidingPoint::Free;
+    point.path = {P, v, a, point.left, point.path.radius};
+}
+
+// The surface turns up in front of the point, with the normal n.
+void CurvedMotion::meet_kink(CollidingPoint& point, const Vec3d& n)
+{
+    const Support& on = point.on[0];
+    Contact contact;
+    contact.time = 0;
+    contact.n = n;
+    contact.vc = on.vc;
+    Path& path = point.path;
+    path.v += contact.vc;
+    resolver_.resolve(point, {path.P, path.v, path.a + on.ac}, contact, on.collider);
+    point.kind = CollidingPoint::Waits;
+}
+
+// Onto the surface: two steps of Newton's method. Leaves the gradients there.
+void CurvedMotion::project(std::span<const CollidingPoint> points, const Obstacle& obstacle)
+{
+    for (int step = 0; step < 2; ++step) {
+        query_.find_gradients_at_times(*obstacle.shape);
+        for (std::size_t j = 0; j < query_.size(); ++j) {
+            const double slope2 = query_.gradient[j].squaredNorm();
+            if (!(slope2 > 0)) continue;
+            const double radius = block_.radius(obstacle, points[query_.point[j]].i);
+            query_.P[j] -= (query_.phi[j] - radius) / slope2 * query_.gradient[j];
+        }
+    }
+    query_.find_gradients_at_times(*obstacle.shape);
+}
+
+void CurvedMotion::end_piece(CollidingPoint& point, std::size_t j) const
+{
+    Path& path = point.path;
+    CollidingPoint::PieceEnd& end = point.end;
+    const Support& on = point.on[0];
+    const double slope = query_.gradient[j].norm(), s = path.duration;
+    end.P = query_.P[j];
+    end.a = path.a + on.ac;
+    end.n = slope > 0 ? Vec3d(query_.gradient[j] / slope) : on.n;
+    if (point.stops)
+        end.v = Vec3d::Zero();
+    else if (!find_end_velocity(point))
+        return;
+    end.v += on.vc + s * on.ac;
+    end.P += s * (on.vc + 0.5 * s * on.ac);
+    point.piece = std::min(2 * s, block_.dt[point.i]);
+    // Other shapes are looked for along the chord.
+    if (s > 0) path.v = (end.P - path.P) / s;
+    path.a.setZero();
+}
+
+// In the surface's frame. False where the surface does not bear the point up to there: it waits.
+bool CurvedMotion::find_end_velocity(CollidingPoint& point) const
+{
+    const Path& path = point.path;
+    CollidingPoint::PieceEnd& end = point.end;
+    const Support& on = point.on[0];
+    const Vec3d& a = motion_.acceleration(point.i);
+    const double s = path.duration;
+    const auto turned = [&](const Vec3d& x) { return transported(x, on.n, end.n); };
+    Support there = on;
+    there.n = end.n;
+    there.curvature = end.curvature;
+    const Vec3d v1 = turned(path.v + s * path.a);
+    const Slide next = slide_on(there, v1 + on.vc, a, 0, 0);
+    if (next.kind == Slide::Leaves) {
+        const double shortest = shortest_piece(block_.obstacles[on.collider], path, block_.dt[point.i]);
+        if (s > shortest) return wait_for(point, shortest), false;
+    }
+    const Vec3d pull = a - on.ac;
+    const Vec3d a1 = next.kind == Slide::Moves ? next.a : Vec3d(pull - pull.dot(end.n) * end.n);
+    end.v = turned(path.v + 0.5 * s * path.a) + 0.5 * s * a1;
+    end.v -= end.n.dot(end.v) * end.n;
+    // The energy is known better than the velocity, whose direction that leaves: the work of the weight along the path,
+    // less that of friction, which is the rest of the accelerations. A point that turns back is left out: its speed is
+    // the small difference of larger ones.
+    const double friction0 = (pull - path.a).dot(path.v), friction1 = (pull - a1).dot(end.v);
+    const double speed2 = path.v.squaredNorm() + 2 * pull.dot(end.P - path.P) - s * (friction0 + friction1);
+    const double scale2 = speed2 / end.v.squaredNorm();
+    if (scale2 > 0.8 && scale2 < 1.25) end.v *= std::sqrt(scale2);
+    return true;
+}
+
+}  // namespace rapid

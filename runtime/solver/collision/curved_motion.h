@@ -1,0 +1,48 @@
+// Motion along curved surfaces, in pieces of second order in position and velocity: velocity Verlet in the plane that
+// turns with the surface. Points on the same shape take their pieces together.
+//
+// The piece d = v s + a s²/2 is tangential at its beginning. Where it ends the surface has turned by θ, so the chord of
+// the arc of this length is d (1 - θ²/24), halfway between the tangents of both ends. The remaining distance from the
+// surface is removed along the gradient.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "runtime/solver/collision/colliding_point.h"
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/contact_resolver.h"
+#include "runtime/solver/collision/distance_query.h"
+#include "runtime/solver/collision/free_motion.h"
+
+namespace rapid {
+
+class CurvedMotion {
+public:
+    CurvedMotion(const CollisionBlock& block, const FreeMotion& motion, ContactResolver& resolver)
+        : block_(block), motion_(motion), resolver_(resolver)
+    {
+    }
+
+    // Finds the ends of the curved paths among those of the points at the places `going`; each path is then the chord
+    // to its end, in the world's frame. Where the surface is too uneven for the piece the point waits; where it falls
+    // away, the point leaves it.
+    void find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> going);
+
+private:
+    void begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> going, int obstacle);
+    bool follow_arc(CollidingPoint& point, std::size_t j);
+    void wait_for(CollidingPoint& point, double shortest) const;
+    void leave_surface(CollidingPoint& point) const;
+    void meet_kink(CollidingPoint& point, const Vec3d& n);
+    void project(std::span<const CollidingPoint> points, const Obstacle& obstacle);
+    void end_piece(CollidingPoint& point, std::size_t j) const;
+    bool find_end_velocity(CollidingPoint& point) const;
+
+    const CollisionBlock& block_;
+    const FreeMotion& motion_;
+    ContactResolver& resolver_;
+    DistanceQuery query_;  // by place among the points
+};
+
+}  // namespace rapid

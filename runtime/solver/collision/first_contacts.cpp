@@ -1,0 +1,24 @@
+#include "runtime/solver/collision/first_contacts.h"
+
+namespace rapid {
+
+void FirstContacts::ask(std::size_t obstacle)
+{
+    if (asked_.empty()) return;
+    answers_.resize(asked_.size());
+    block_.obstacles[obstacle].shape->first_contact(paths_, answers_);
+    for (std::size_t j = 0; j < asked_.size(); ++j) {
+        const std::uint32_t i = asked_[j];
+        if (answers_[j].time == Contact::none) continue;
+        if (!has(i))
+            found_.push_back(i);
+        else if (!(answers_[j].time < contact_[i].time))
+            continue;
+        obstacle_[i] = static_cast<int>(obstacle);
+        contact_[i] = answers_[j];
+    }
+    asked_.clear();
+    paths_.clear();
+}
+
+}  // namespace rapid

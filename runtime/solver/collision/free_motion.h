@@ -1,0 +1,64 @@
+// How the points of a block move in a sub-step while nothing touches them: along a parabola; under forces with linear
+// parts, along the parabola that stands for their damped motion.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/motion/damped_motion.h"
+#include "runtime/solver/motion/free_paths.h"
+
+namespace rapid {
+
+// One sub-step, or a part of it, of all points of a block.
+struct Drift {
+    Strided<Vec3d> a;                // m/s², constant within it
+    std::span<const double> dt;      // s
+    std::span<const double> after;   // s, from its end to the end of the frame
+    std::span<const Damped> damped;  // where it is not empty, in place of a
+};
+
+class FreeMotion {
+public:
+    explicit FreeMotion(const CollisionBlock& block) : block_(block) {}
+
+    void begin(const Drift& drift);
+    bool is_damped() const { return !damped_.empty(); }
+
+    // m/s², without the forces of surfaces; under damping the mean of what is left of the sub-step.
+    const Vec3d& acceleration(std::size_t i) const { return a_[i]; }
+    // Sets that mean, from the velocity of the point now.
+    void update_acceleration(std::size_t i, double left)
+    {
+        if (is_damped()) mean_a_[i] = damped_[i].mean_acceleration(block_.v[i], left);
+    }
+
+    // The free paths of all points, from where they are.
+    void trace();
+    FreePaths& paths() { return paths_; }
+    Path path(std::size_t i, double radius = 0) const;
+    Vec3d velocity_after(std::size_t i, double s) const;
+
+    // Takes all points to the ends of their paths, and one of them back.
+    void go_to_ends() { paths_.exchange(block_.P, block_.v); }
+    void go_back(std::size_t i)
+    {
+        block_.P[i] = initial_P(i);
+        block_.v[i] = initial_v(i);
+    }
+    // The state at the beginning of the path, once points have gone to the ends.
+    Vec3d initial_P(std::size_t i) const { return paths_.P(i); }
+    Vec3d initial_v(std::size_t i) const { return paths_.v(i); }
+
+private:
+    const CollisionBlock& block_;
+    Strided<Vec3d> a_{nullptr, 0};
+    FreePaths paths_;
+
+    // Where a force has a linear part, by point; a_ then points to the means.
+    std::span<const Damped> damped_;
+    std::vector<Vec3d> path_v_, path_a_, mean_a_;
+};
+
+}  // namespace rapid

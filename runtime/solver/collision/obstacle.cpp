@@ -1,0 +1,62 @@
+#include "runtime/solver/collision/obstacle.h"
+
+#include <algorithm>
+
+#include "runtime/points/members.h"
+#include "runtime/solver/collision/distance_query.h"
+
+namespace rapid {
+
+Obstacle::Obstacle(const Collider& collider, const PointSet& points)
+    : shape(collider.shape.get()),
+      bounds(shape->bounds()),
+      feature(shape->smallest_feature()),
+      moves(shape->moves()),
+      body(dynamic_cast<const RigidBody*>(shape)),
+      plane(shape->half_space()),
+      method(collider.method),
+      response(collider.response),
+      record(collider.record),
+      bounce(collider.bounce.read(points)),
+      friction(collider.friction.read(points)),
+      radius(radii_of(collider.radius, points)),
+      members(members_of(points, collider.group))
+{
+}
+
+double Obstacle::largest_radius(std::span<const std::uint32_t> points) const
+{
+    float largest = 0;
+    for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i)
+        largest = std::max(largest, radius[points[i]]);
+    return largest;
+}
+
+Vec3d Obstacle::normal_at(const Vec3d& P, double time) const
+{
+    double phi = 0;
+    Vec3d gradient = Vec3d::Zero();
+    shape->distance_at({&P, 1}, {&time, 1}, {&phi, 1}, {&gradient, 1});
+    return gradient.normalized();
+}
+
+void keep_outside(std::span<const Obstacle> obstacles, std::span<const std::uint32_t> points, std::span<const Vec3d> P,
+                  std::span<std::uint8_t> marks)
+{
+    DistanceQuery query;
+    for (const Obstacle& obstacle : obstacles) {
+        query.clear();
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (!marks[i] || !obstacle.members[points[i]]) continue;
+            const Vec3d x = P[i].cast<float>().cast<double>();
+            if (obstacle.is_clear_of(x, obstacle.radius[points[i]])) continue;
+            query.add(i, x);
+        }
+        if (query.empty()) continue;
+        query.find_distances(*obstacle.shape);
+        for (std::size_t j = 0; j < query.size(); ++j)
+            if (!(query.phi[j] > obstacle.radius[points[query.point[j]]])) marks[query.point[j]] = 0;
+    }
+}
+
+}  // namespace rapid

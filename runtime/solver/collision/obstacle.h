@@ -1,0 +1,68 @@
+// A collider as the solver asks it: its shape, and its parameters looked up for all points of a set.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "runtime/points/column.h"
+#include "runtime/shapes/first_contact.h"
+#include "runtime/shapes/motion/moving.h"
+#include "runtime/shapes/shape.h"
+#include "runtime/solver/dynamics.h"
+
+namespace rapid {
+
+struct Obstacle {
+    // Error: a parameter's attribute is missing.
+    Obstacle(const Collider& collider, const PointSet& points);
+
+    const Shape* shape;
+    Box3d bounds;
+    double feature;  // m, the shape's smallest
+    bool moves;
+    const RigidBody* body;  // null where it does not move as one
+    std::optional<HalfSpace> plane;
+    Method method;
+    Response response;
+    std::optional<double> record;  // m/s
+    Strided<float> bounce, friction, radius;
+    Strided<std::uint8_t> members;  // of its group; 1 for all where it has none
+
+    bool is_continuous() const { return method == Method::Continuous; }
+
+    // Of the point at this index of the set.
+    double restitution(std::size_t point) const { return response == Response::Slide ? 0.0 : double(bounce[point]); }
+
+    // The largest radius of these points, m.
+    double largest_radius(std::span<const std::uint32_t> points) const;
+
+    // How near to the surface counts as touching it, m: the rounding of a position to single precision, and the error
+    // of the shape's field.
+    double contact_tolerance(const Vec3d& P, double point_radius) const
+    {
+        return flush_within(P, point_radius, feature * 0x1p-21);
+    }
+
+    bool is_clear_of(const Vec3d& P, double point_radius) const
+    {
+        return ((P - bounds.max()).array() > point_radius).any() || ((bounds.min() - P).array() > point_radius).any();
+    }
+
+    // The unit normal of the shape's field; zero where it has none. time: s since the beginning of the frame.
+    Vec3d normal_at(const Vec3d& P, double time) const;
+
+    // The acceleration, m/s², of a point that moves with constant velocity in the body's frame; zero where the body's
+    // motion is not known.
+    Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const
+    {
+        return body ? body->acceleration_at(P, v, time) : Vec3d(Vec3d::Zero());
+    }
+};
+
+// Clears the marks of points that are inside or on an obstacle at the end of the frame, with P rounded to single
+// precision. points: indices in the set; all spans have shape [n].
+void keep_outside(std::span<const Obstacle> obstacles, std::span<const std::uint32_t> points, std::span<const Vec3d> P,
+                  std::span<std::uint8_t> marks);
+
+}  // namespace rapid

@@ -1,0 +1,130 @@
+#include "runtime/solver/collision/path_planner.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/shapes/first_contact.h"
+
+namespace rapid {
+namespace {
+
+// A point that has gone nowhere, to rounding, in this many contacts and pieces is at rest: in a pit of a field it can
+// chatter at 1e-10 m/s between facets that each would let it slide. Real impacts move a point farther than that.
+constexpr int chatter_events = 1024;
+
+// The longest piece along the edge of curved surfaces, as a part of the sub-step.
+constexpr double max_edge_piece = 1.0 / 16;
+
+}  // namespace
+
+bool PathPlanner::plan(CollidingPoint& point)
+{
+    const std::size_t i = point.i;
+    while (point.left > 0) {
+        motion_.update_acceleration(i, point.left);
+        point.path = {block_.P[i], block_.v[i], motion_.acceleration(i), point.left, 0};
+        point.kind = CollidingPoint::Free;
+        point.stops = false;
+        if (point.supports == 0) return true;
+        if (chatters(point)) return ride(point), false;
+        const Slide next = slide(point);
+        if (next.kind == Slide::Leaves) continue;
+        if (next.kind == Slide::Sticks) return ride(point), false;
+        return slide_along_surface(point, next);
+    }
+    return false;
+}
+
+// Along what the point rests on. A surface that it leaves no longer bears it.
+Slide PathPlanner::slide(CollidingPoint& point)
+{
+    const Vec3d &v = block_.v[point.i], &a = motion_.acceleration(point.i);
+    if (point.supports == 1) {
+        const Slide next = slide_on(point.on[0], v, a, point.left, min_turning_piece * block_.dt[point.i]);
+        if (next.kind == Slide::Leaves) point.supports = 0;
+        return next;
+    }
+    int lifted = -1;
+    const Slide next = slide_along(point.on[0], point.on[1], v, a, point.left, lifted);
+    if (next.kind == Slide::Leaves) {
+        if (lifted == 0) point.on[0] = point.on[1];
+        point.supports = 1;
+    }
+    return next;
+}
+
+bool PathPlanner::slide_along_surface(CollidingPoint& point, const Slide& slide)
+{
+    Path& path = point.path;
+    path.a = slide.a;
+    path.duration = slide.duration;
+    point.stops = slide.stops;
+    if (point.is_on_flat()) {
+        point.kind = CollidingPoint::Straight;
+        path.a += point.on[0].ac;
+        return true;
+    }
+    if (point.supports == 1) {
+        point.kind = CollidingPoint::Curved;  // in the surface's frame, to the end of the piece
+        point.limit_path(point.piece);
+    } else {
+        // Along the edge of curved surfaces in short straight pieces; each ends in the air, or within rounding of the
+        // surfaces, where the next contact finds it.
+        point.kind = CollidingPoint::Straight;
+        path.a += point.on[0].ac;
+        double longest = max_edge_piece * block_.dt[point.i];
+        if (const double feature = std::max(point.on[0].feature, point.on[1].feature); feature > 0)
+            longest = std::min(longest, detail::time_to_travel(feature, path.v.norm(), path.a.norm()));
+        point.limit_path(longest);
+    }
+    if (++point.events < max_contacts) return true;
+    audit_.add_limited();
+    return false;
+}
+
+// Whether a point on a surface has been busy for long without getting anywhere in the surface's frame. On one that
+// moves it gets somewhere with it.
+bool PathPlanner::chatters(CollidingPoint& point) const
+{
+    if (point.events < point.checked_events + chatter_events) return false;
+    point.checked_events = point.events;
+    const Vec3d& P = block_.P[point.i];
+    const Vec3d before = std::exchange(point.checked_P, P);
+    const Obstacle& obstacle = block_.obstacles[point.on[0].collider];
+    return (P - before).norm() <= obstacle.contact_tolerance(P, block_.radius(obstacle, point.i));
+}
+
+// For the rest of the sub-step the point moves with the surface.
+void PathPlanner::ride(CollidingPoint& point)
+{
+    const Support& on = point.on[0];
+    block_.P[point.i] += point.left * (on.vc + 0.5 * point.left * on.ac);
+    block_.v[point.i] = on.vc + point.left * on.ac;
+}
+
+void PathPlanner::finish_path(CollidingPoint& point)
+{
+    Vec3d &P = block_.P[point.i], &v = block_.v[point.i];
+    const Path& path = point.path;
+    Support& on = point.on[0];
+    if (point.kind == CollidingPoint::Curved) {
+        P = point.end.P;
+        v = point.end.v;
+        on.n = point.end.n;
+        on.curvature = point.end.curvature;
+    } else {
+        P = place(path, path.duration);
+        v = path.v + path.duration * path.a;
+    }
+    point.left -= path.duration;
+    if (point.supports > 0 && !on.ac.isZero(0)) {
+        const Obstacle& obstacle = block_.obstacles[on.collider];
+        const double now = block_.frame_time(point.i, point.left);
+        on.vc = obstacle.shape->velocity_at(P, now);
+        on.ac = obstacle.acceleration_at(P, point.stops ? on.vc : v, now);
+    }
+    if (point.stops) v = on.vc;
+    if (point.supports == 2 && !point.is_on_flat()) point.supports = 0;
+}
+
+}  // namespace rapid

@@ -1,0 +1,35 @@
+// The next path of a point that has met a shape: a free parabola, a slide along a flat surface or along an edge, or a
+// piece along a curved surface.
+#pragma once
+
+#include "runtime/solver/collision/colliding_point.h"
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/contact_audit.h"
+#include "runtime/solver/collision/free_motion.h"
+
+namespace rapid {
+
+class PathPlanner {
+public:
+    PathPlanner(const CollisionBlock& block, FreeMotion& motion, ContactAudit& audit)
+        : block_(block), motion_(motion), audit_(audit)
+    {
+    }
+
+    // False when there is none, because the point's sub-step is over.
+    bool plan(CollidingPoint& point);
+    // Takes the point to the end of its path, which is free.
+    void finish_path(CollidingPoint& point);
+
+private:
+    Slide slide(CollidingPoint& point);
+    bool slide_along_surface(CollidingPoint& point, const Slide& slide);
+    bool chatters(CollidingPoint& point) const;
+    void ride(CollidingPoint& point);
+
+    const CollisionBlock& block_;
+    FreeMotion& motion_;
+    ContactAudit& audit_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,42 @@
+// The final penetration correction, and what is left of penetration.
+//
+// Parts of a body that meet one another, or two bodies, leave no room to a point between them: at the end of the frame
+// it is brought out of both, with the velocity that it has. By the shortest way; and where that leads from one side of
+// a closed gap to the other, to the nearest place that is free.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/contact_audit.h"
+#include "runtime/solver/collision/distance_query.h"
+#include "runtime/solver/collision/touched_points.h"
+
+namespace rapid {
+
+class PenetrationCorrection {
+public:
+    PenetrationCorrection(const CollisionBlock& block, const TouchedPoints& touched, ContactAudit& audit)
+        : block_(block), touched_(touched), audit_(audit)
+    {
+    }
+
+    // P at the end of the frame. lost: points that found no way out of a shape in their sub-steps.
+    void run(std::span<Vec3d> P, const std::vector<std::uint32_t>& lost);
+
+    // The deepest that a touched point is in an obstacle, m, given the rounded positions.
+    double deepest(std::span<const Vec3f> P);
+
+private:
+    void move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_place);
+
+    const CollisionBlock& block_;
+    const TouchedPoints& touched_;
+    ContactAudit& audit_;
+    std::vector<std::uint32_t> inside_, still_inside_;
+    DistanceQuery query_;
+};
+
+}  // namespace rapid

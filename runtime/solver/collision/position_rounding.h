@@ -1,0 +1,53 @@
+// Positions at the end of a frame, rounded to single precision on the outer side of the surfaces that points are on.
+//
+// To nearest, a point can end up on the inner side of its surface by half an ulp an axis. Then the coordinate that
+// matters most is moved by the least that brings the point out again. A point that has not moved keeps its bits, so
+// that nothing creeps.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/collision/distance_query.h"
+#include "runtime/solver/collision/touched_points.h"
+
+namespace rapid {
+
+class PositionRounding {
+public:
+    PositionRounding(const CollisionBlock& block, const TouchedPoints& touched) : block_(block), touched_(touched) {}
+
+    // A new block.
+    void begin()
+    {
+        initial_P_.resize(block_.size());
+        for (auto& side : moved_on_) side.resize(block_.obstacles.size());
+    }
+
+    // Before rounding: moves points that have moved on surfaces onto them as far as double goes, so that the error of
+    // their paths is not seen. initial: positions at the beginning of the frame.
+    void snap(std::span<Vec3d> P, std::span<const Vec3f> initial);
+    // After rounding: lifts those points to the outer sides of their surfaces.
+    void lift(std::span<Vec3f> rounded);
+
+private:
+    void find_moved(std::span<const Vec3d> P, std::span<const Vec3f> initial);
+    template <class Position, class Use>
+    void ask_surfaces(const Position& position, const Use& use);
+    double tolerance(std::size_t i, const Vec3d& P, const Obstacle& obstacle) const;
+
+    const CollisionBlock& block_;
+    const TouchedPoints& touched_;
+    std::vector<Vec3f> initial_P_;
+
+    // Points of the block that are elsewhere on a surface than at the beginning of the frame: by the surface's side of
+    // an edge and obstacle; and those that can have touched one plane only.
+    std::array<std::vector<std::vector<std::uint32_t>>, 2> moved_on_;
+    std::vector<std::uint32_t> moved_on_plane_;
+    DistanceQuery query_;
+};
+
+}  // namespace rapid

@@ -1,5 +1,4 @@
-// Shapes for tests that no shape of ours is: a hollow ball, whose inside is free, and a ball with a narrow band, as a
-// level set has one.
+// Shapes for tests: a hollow ball, which keeps points inside, and a ball with a narrow band, like that of a level set.
 #pragma once
 
 #include "runtime/shapes/first_contact.h"

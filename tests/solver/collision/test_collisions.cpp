@@ -58,9 +58,8 @@ TEST_CASE("a bouncing ball is on its parabolas, at one sub-step as at many", "[c
     CHECK(scene.penetration_max == 0);
 }
 
-// A second plane that nothing touches reaches everywhere, so that points on the floor have it to look out for.
-TEST_CASE("points fall, bounce, slide and rest on a floor alike with and without another shape to look out for",
-          "[collide]")
+// A second plane that nothing touches reaches everywhere, so points on the floor are not near one shape alone.
+TEST_CASE("points fall, bounce, slide and rest on a floor alike with and without another shape nearby", "[collide]")
 {
     std::mt19937 random(11);
     std::uniform_real_distribution<float> place(-2, 2), speed(-4, 4);
@@ -210,7 +209,7 @@ TEST_CASE("the bounces that a rest leaves out would have taken as much by fricti
     CHECK(coarse.v().y() == 0);
 }
 
-TEST_CASE("friction across a slope turns the way downhill", "[collide]")
+TEST_CASE("friction across a slope turns the path downhill", "[collide]")
 {
     // The hodograph of a point sliding on a slope with μ = tan θ: v + v·downhill is constant, so v tends to half of it.
     const double angle = 30 * degrees;
@@ -297,7 +296,7 @@ TEST_CASE("a point at the foot of a wall that it nears by rounding alone slides 
     CHECK(scene.P().y() == double(r));
     CHECK(scene.v() == Vec3d(0, 0, 0));
     CHECK(scene.penetration_max < 1e-8);
-    // A path or two a sub-step: not at each moment anew, of the floor and of the wall by turns.
+    // A path or two a sub-step, not the floor and the wall by turns at each moment.
     CHECK(floor->asked + wall->asked < 4u * 24u * static_cast<unsigned>(substeps));
 }
 
@@ -460,7 +459,7 @@ TEST_CASE("a point slides over the edge of a table and falls", "[collide]")
     CHECK(scene.penetration_max < 1e-6);
 }
 
-TEST_CASE("a point that is born in a shape leaves it by the nearest way, without gaining speed", "[collide]")
+TEST_CASE("a point that is born in a shape leaves it by the shortest way, without gaining speed", "[collide]")
 {
     const double depth = GENERATE(1e-5, 0.01, 0.4);
     const float speed = GENERATE(-3.0f, 0.0f, 3.0f);
@@ -497,7 +496,7 @@ TEST_CASE("a point at the centre of a ball finds its way out", "[collide][extrem
     CHECK(scene.last.trapped == 0);
 }
 
-TEST_CASE("a point in two shapes that bar each other's way out is counted, and does not hang", "[collide][extreme]")
+TEST_CASE("a point in two shapes that block each other's way out is counted, and does not hang", "[collide][extreme]")
 {
     Scene scene(points({{0, 0, 0}}).v({{0, -1, 0}}));
     scene.gravity().collide(make_plane({0, 1, 0}, 1), 0.5f).collide(make_plane({0, -1, 0}, 1), 0.5f).run(1);

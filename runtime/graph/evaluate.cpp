@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/graph/at_node.h"
+#include "runtime/at_node.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/undeclared_columns.h"
 #include "runtime/stopwatch.h"
@@ -95,13 +95,10 @@ void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size
         if (!takes_part(planned) || (planned.once && next_ > plan_.first_frame())) continue;
         const Simulation& simulation = *simulations_[planned.simulation];
         const Frame now = simulation.frame(simulation.clock().step_of(next_) - left);
-        try {
+        name_errors(planned.node->name, planned.node->location, [&] {
             bind_arguments(*planned.node, *planned.op, now, true);
             planned.op->check();
-        } catch (Error& error) {
-            error.in_node(planned.node->name).at(planned.node->location);
-            throw;
-        }
+        });
     }
     for (std::size_t s = 0; s < simulations_.size(); ++s) {
         simulations_[s]->columns = plan_.columns_of(s);

@@ -6,6 +6,8 @@
 #include <array>
 #include <cctype>
 
+#include "runtime/points/point_names.h"
+
 namespace rapid {
 namespace {
 
@@ -99,14 +101,12 @@ const Table& names_only(const Param& param, const Value& value, Map& field)
     return *table;
 }
 
-// Error: a name that Rapid itself uses (of a column, a parameter of every node, or what a kernel asks a point), or one
-// that files and scripts can't spell.
+// Error: a name that every point has, a parameter of every node, or one that files and scripts can't spell.
 void check_attribute_name(std::string_view name)
 {
-    for (const std::string_view own :
-         {"P", "v", "id", "dt", "name", "group", "index", "join", "leave", "within", "kill", "rand"})
-        if (name == own)
-            throw Error(fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", name));
+    const bool of_every_node = name == "name" || name == "group";
+    if (of_every_node || find_point_name(name))
+        throw Error(fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", name));
     const auto letter = [](unsigned char c) { return std::isalpha(c) || c == '_'; };
     const auto part = [&](unsigned char c) { return letter(c) || std::isdigit(c); };
     if (name.empty() || !letter(name.front()) || !std::all_of(name.begin(), name.end(), part))

@@ -5,23 +5,13 @@
 #include <algorithm>
 #include <set>
 
+#include "runtime/at_node.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/registry.h"
+#include "runtime/points/point_names.h"
 
 namespace rapid {
 namespace {
-
-// Runs f and gives an Error that rises from it the node's name and place.
-template <class F>
-void at_node(const Node& node, const F& f)
-{
-    try {
-        f();
-    } catch (Error& error) {
-        error.in_node(node.name).at(node.location);
-        throw;
-    }
-}
 
 // An argument that is never a function, or the parameter's default.
 double constant_argument(const Node& node, std::string_view param)
@@ -67,9 +57,6 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
         throw placed;
     }
 }
-
-// A column that every point has, or that Solve and the emitters have among themselves.
-bool is_own(std::string_view name) { return name == "P" || name == "v" || name == "id" || name == "dt"; }
 
 void add(std::vector<std::size_t>& places, std::size_t place)
 {
@@ -150,7 +137,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     std::map<std::uint64_t, std::size_t> place;
     std::map<std::string, const Node*> by_name;
     for (const auto& [serial, node] : reached) {
-        at_node(*node, [&, &made = node] {
+        name_errors(node->name, node->location, [&, &made = node] {
             if (const auto [other, fresh] = by_name.emplace(made->name, made.get()); !fresh)
                 throw Error(fmt::format("the name is taken by the node at line {}; give each its own",
                                         other->second->location.line));
@@ -187,7 +174,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         if (options.seed) simulation.seed = *options.seed;
 
     for (const PlannedNode& planned : nodes)
-        at_node(*planned.node, [&] {
+        name_errors(planned.node->name, planned.node->location, [&] {
             const PlannedSimulation& simulation = simulations[planned.simulation];
             const Frame start =
                 FrameClock{simulation.fps, simulation.start, simulation.subframes}.at_step(simulation.start);
@@ -229,7 +216,7 @@ void Plan::find_simulations()
         if (node.type->kind == NodeKind::Source) {
             PlannedSimulation simulation;
             simulation.create = planned.node;
-            at_node(node, [&] { bind_arguments(node, *planned.op, {}, false); });
+            name_errors(node.name, node.location, [&] { bind_arguments(node, *planned.op, {}, false); });
             simulation.fps = constant_argument(node, "fps");
             simulation.start = static_cast<std::int64_t>(constant_argument(node, "start"));
             simulation.subframes = static_cast<int>(constant_argument(node, "subframes"));
@@ -280,14 +267,12 @@ void Plan::check_names() const
         AttributeSpec spec;
         std::size_t node;
     };
-    const std::vector<std::string> always = {"P", "v", "id", "dt"};
-
     for (std::size_t s = 0; s < simulations.size(); ++s) {
         std::map<std::string, Maker> makers;
         std::set<std::string> groups;
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             if (nodes[i].simulation != s) continue;
-            at_node(*nodes[i].node, [&] {
+            name_errors(nodes[i].node->name, nodes[i].node->location, [&] {
                 const Uses uses = uses_of(nodes[i]);
                 groups.insert(uses.makes_groups.begin(), uses.makes_groups.end());
                 for (const AttributeSpec& spec : uses.makes) {
@@ -302,7 +287,7 @@ void Plan::check_names() const
             });
         }
 
-        std::vector<std::string> names = always;
+        std::vector<std::string> names = point_names_of(PointName::OwnColumn);
         for (const auto& [name, maker] : makers) names.push_back(name);
         for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
         const std::vector<std::string> group_names(groups.begin(), groups.end());
@@ -312,11 +297,12 @@ void Plan::check_names() const
             // here.
             if (planned.simulation != s) continue;
             const bool brings_others = planned.carries.size() > 1;
-            at_node(*planned.node, [&] {
+            name_errors(planned.node->name, planned.node->location, [&] {
                 const Uses uses = uses_of(planned);
                 for (const auto* list : {&uses.reads, &uses.writes}) {
                     for (const std::string& name : *list) {
-                        if (is_own(name) || makers.count(name) || known_attribute(name) || brings_others) continue;
+                        if (is_own_column(name) || makers.count(name) || known_attribute(name) || brings_others)
+                            continue;
                         const std::string near = nearest_name(name, names);
                         throw Error(
                             near.empty()

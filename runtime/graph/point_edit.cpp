@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <functional>
 
-#include "runtime/graph/at_node.h"
-#include "runtime/graph/first_error.h"
+#include "runtime/at_node.h"
+#include "runtime/first_error.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "runtime/points/point_names.h"
+
 namespace rapid {
 namespace {
 
@@ -20,7 +22,7 @@ std::string text_of_point(const PointSet& points, std::size_t i)
 {
     std::string text = fmt::format("P = {}, v = {}", text_of(points.P()[i]), text_of(points.v()[i]));
     for (const auto& [name, column] : points.columns())
-        if (name != "P" && name != "v" && name != "id" && name != "dt")
+        if (!is_own_column(name))
             text += fmt::format(", {} = {}", name, std::visit([&](const auto& c) { return text_of(c[i]); }, column));
     for (const auto& [name, members] : points.groups())
         if (members[i]) text += fmt::format(", in \"{}\"", name);

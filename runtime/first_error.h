@@ -1,5 +1,5 @@
-// The error that a loop over points in parallel reports: of those that rise, that which one loop after the other, point
-// by point, would have met, whichever thread comes upon one first.
+// The error of a parallel loop over points: among those that are thrown, the one that a serial loop would have thrown
+// first, whatever the scheduling.
 #pragma once
 
 #include <atomic>
@@ -12,8 +12,8 @@ namespace rapid {
 
 class FirstError {
 public:
-    // Runs f, the part of a loop (of several, one after the other) from a point on. False where it throws, or where an
-    // error before it has made it needless.
+    // Runs f, the part of a loop that begins at a point; `loop` numbers loops that would run one after the other.
+    // Returns false if f throws, or if an error before it has made it needless.
     template <class F>
     bool guard(std::size_t loop, std::size_t point, const F& f)
     {

@@ -17,14 +17,14 @@
 #include <memory>
 #include <string>
 
-#include "bindings/host/script_host.h"
+#include "bindings/host/modules.h"
 #include "runtime/error.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {
 namespace {
 
-Error no_wall(const std::string& what, int error)
+Error refused(const std::string& what, int error)
 {
     return Error(fmt::format("--untrusted: {} ({}); the graph was not run", what, std::strerror(error)));
 }
@@ -45,7 +45,7 @@ private:
     int descriptor_;
 };
 
-// Rights of the versions of Landlock that Debian 12's headers do not know yet (linux/landlock.h of 6.2, 6.10).
+// Rights of versions of Landlock that are newer than Debian 12's headers (linux/landlock.h of 6.2, 6.10).
 constexpr std::uint64_t truncate_right = 1ULL << 14, device_ioctl_right = 1ULL << 15;
 
 constexpr std::uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
@@ -54,7 +54,7 @@ constexpr std::uint64_t write_rights = read_rights | LANDLOCK_ACCESS_FS_WRITE_FI
 constexpr std::uint64_t file_rights =
     LANDLOCK_ACCESS_FS_EXECUTE | LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | truncate_right;
 
-// All rights of the first version; those after it as far as the kernel knows them.
+// All rights of the first version, and those of later ones that the kernel knows.
 std::uint64_t handled_rights(int version)
 {
     std::uint64_t rights = (1ULL << 13) - 1;
@@ -64,16 +64,16 @@ std::uint64_t handled_rights(int version)
     return rights;
 }
 
-void open_for(int ruleset, const std::filesystem::path& path, std::uint64_t rights)
+void allow(int ruleset, const std::filesystem::path& path, std::uint64_t rights)
 {
     const File folder(open(path.c_str(), O_PATH | O_CLOEXEC));
-    if (folder < 0) throw no_wall(fmt::format("can't open {}", path.string()), errno);
+    if (folder < 0) throw refused(fmt::format("can't open {}", path.string()), errno);
     if (!std::filesystem::is_directory(path)) rights &= file_rights;
     landlock_path_beneath_attr rule{};
     rule.allowed_access = rights;
     rule.parent_fd = folder;
     if (syscall(SYS_landlock_add_rule, int(ruleset), LANDLOCK_RULE_PATH_BENEATH, &rule, 0) != 0)
-        throw no_wall(fmt::format("Landlock refuses {}", path.string()), errno);
+        throw refused(fmt::format("Landlock refuses {}", path.string()), errno);
 }
 
 std::vector<std::filesystem::path> own_files()
@@ -90,33 +90,33 @@ std::vector<std::filesystem::path> own_files()
     return files;
 }
 
-void wall_off_files(const Openings& openings)
+void restrict_files(const SandboxAccess& access)
 {
     const auto version =
         static_cast<int>(syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION));
-    if (version < 1) throw no_wall("this system has no Landlock (Linux 5.13 has, where it is switched on)", errno);
+    if (version < 1) throw refused("this system has no Landlock (Linux 5.13 has, where it is switched on)", errno);
     landlock_ruleset_attr attributes{};
     attributes.handled_access_fs = handled_rights(version);
     const File ruleset(static_cast<int>(syscall(SYS_landlock_create_ruleset, &attributes, sizeof attributes, 0)));
-    if (ruleset < 0) throw no_wall("Landlock refuses a set of rules", errno);
+    if (ruleset < 0) throw refused("Landlock refuses a set of rules", errno);
     for (const std::filesystem::path& path : own_files())
-        open_for(ruleset, path, read_rights | LANDLOCK_ACCESS_FS_EXECUTE);
-    for (const std::filesystem::path& path : openings.readable)
-        open_for(ruleset, path, read_rights & attributes.handled_access_fs);
-    for (const std::filesystem::path& path : openings.writable)
-        open_for(ruleset, path, (write_rights | truncate_right) & attributes.handled_access_fs);
-    if (syscall(SYS_landlock_restrict_self, int(ruleset), 0) != 0) throw no_wall("Landlock refuses", errno);
+        allow(ruleset, path, read_rights | LANDLOCK_ACCESS_FS_EXECUTE);
+    for (const std::filesystem::path& path : access.readable)
+        allow(ruleset, path, read_rights & attributes.handled_access_fs);
+    for (const std::filesystem::path& path : access.writable)
+        allow(ruleset, path, (write_rights | truncate_right) & attributes.handled_access_fs);
+    if (syscall(SYS_landlock_restrict_self, int(ruleset), 0) != 0) throw refused("Landlock refuses", errno);
 }
 
-void wall_off_system()
+void restrict_system_calls()
 {
     const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(seccomp_init(SCMP_ACT_ALLOW), seccomp_release);
-    if (!filter) throw no_wall("this system has no seccomp", ENOSYS);
+    if (!filter) throw refused("this system has no seccomp", ENOSYS);
     const auto check = [](int status) {
-        if (status != 0) throw no_wall("seccomp refuses a rule", -status);
+        if (status != 0) throw refused("seccomp refuses a rule", -status);
     };
     check(seccomp_attr_set(filter.get(), SCMP_FLTATR_CTL_TSYNC, 1));  // all threads
-    // io_uring would do the same calls unseen.
+    // io_uring would bypass the filter.
     for (const int call : {SCMP_SYS(socket),
                            SCMP_SYS(socketpair),
                            SCMP_SYS(connect),
@@ -166,36 +166,36 @@ void wall_off_system()
 void limit(__rlimit_resource resource, rlim_t most)
 {
     const rlimit value{most, most};
-    if (setrlimit(resource, &value) != 0) throw no_wall("a limit can't be set", errno);
+    if (setrlimit(resource, &value) != 0) throw refused("a limit can't be set", errno);
 }
 
 }  // namespace
 
-void enter_walls(const Openings& openings)
+void enter_sandbox(const SandboxAccess& access)
 {
-    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) throw no_wall("new privileges can't be given up", errno);
+    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) throw refused("new privileges can't be given up", errno);
 
     std::ifstream command("/proc/self/cmdline", std::ios::binary);
     std::vector<std::string> words;
     for (std::string word; std::getline(command, word, '\0');) words.push_back(word);
-    words.push_back(within_walls);
+    words.push_back(sandboxed_option);
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     const std::string program = std::filesystem::read_symlink("/proc/self/exe");
 
-    wall_off_files(openings);
+    restrict_files(access);
     execv(program.c_str(), arguments.data());
-    throw no_wall("can't begin anew behind the walls", errno);
+    throw refused("can't begin anew behind the walls", errno);
 }
 
-void close_walls()
+void complete_sandbox()
 {
     const File root(open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; the graph was not run");
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_DATA, static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)));
-    wall_off_system();
+    restrict_system_calls();
 }
 
 }  // namespace rapid

@@ -1,11 +1,11 @@
-// The system's walls around a process that runs a graph which nobody vouches for.
+// A sandbox around a process that runs an untrusted graph.
 //
-// The interpreter's own environment (lua/sandbox.lua) is the first wall; no interpreter is the last. What gets through
-// it meets these, which the process can't take down again:
+// The interpreter's own environment (lua/sandbox.lua) comes first, but no interpreter is safe enough alone. What gets
+// through it meets the limits of the system, which the process can't lift again:
 //
 //   Landlock    it reads `readable` and what is below, Rapid's own files and the system's libraries, creates and
 //               changes files below `writable`, and nothing else
-//   seccomp     it opens no socket, starts no process, and looks into no other one
+//   seccomp     it opens no socket, starts no process, and inspects no other process
 //   limits      no core file; no more memory of its own than the machine has
 //
 // Not promised: that it ends (see --script-timeout), that it leaves the processor to others, or that it does not fill
@@ -17,18 +17,18 @@
 
 namespace rapid {
 
-struct Openings {
+struct SandboxAccess {
     std::vector<std::filesystem::path> readable, writable;  // files, or folders with all that is below
 };
 
-// A library that is linked starts threads before main, and Landlock holds the calling thread alone: so the process
-// begins anew inside of it, with its arguments and `within_walls` behind them. Returns only to throw. Error: the kernel
-// has no Landlock, or an opening does not exist.
-inline constexpr const char* within_walls = "--within-walls";
-[[noreturn]] void enter_walls(const Openings& openings);
+// Landlock holds the calling thread alone, and linked libraries start threads before main: so the process restarts
+// inside of it, with its arguments and `sandboxed_option` behind them. Returns only to throw. Error: the kernel has no
+// Landlock, or a path does not exist.
+inline constexpr const char* sandboxed_option = "--within-walls";
+[[noreturn]] void enter_sandbox(const SandboxAccess& access);
 
-// Within: the rest of the walls, around all threads. Error: the process is not inside of Landlock, or the kernel has no
-// seccomp; then nothing may be run.
-void close_walls();
+// In the restarted process: the other limits, for all threads. Error: the process is not inside of Landlock, or the
+// kernel has no seccomp; then nothing may be run.
+void complete_sandbox();
 
 }  // namespace rapid

@@ -41,12 +41,12 @@ public:
             "--untrusted", untrusted_,
             "keeps the process from all files but the graph's folder, --allow-read and the outputs' folders, from "
             "sockets and from other processes");
-        app.add_flag(within_walls, within_walls_)->group("");  // our own: the run itself
+        app.add_flag(sandboxed_option, sandboxed_)->group("");  // internal: the restarted process
         app.add_option("--allow-read", allowed_, "a file or folder that an --untrusted graph may read, too")
             ->type_name("PATH")
             ->allow_extra_args(false);
         app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
-        app.add_flag(Watch::tell_option, tell_)->group("");  // our own: a run of --watch
+        app.add_flag(Watch::tell_option, tell_)->group("");  // internal: a run of --watch
     }
 
     int run(const CommonOptions& common) override
@@ -55,12 +55,12 @@ public:
             throw Error("--allow-read is for --untrusted; a graph reads what it names");
         if (watch_ && untrusted_) throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
-        if (untrusted_ && !within_walls_) enter_walls(openings());
+        if (untrusted_ && !sandboxed_) enter_sandbox(sandbox_access());
         if (untrusted_) {
-            load_deferred();  // which needs what walls take
-            close_walls();
+            load_deferred();  // the sandbox forbids it
+            complete_sandbox();
         }
-        std::signal(SIGPIPE, SIG_IGN);  // a run outlives who watches it
+        std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
         std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
         Threads threads(common.threads);
         RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose},
@@ -85,21 +85,21 @@ public:
     }
 
 private:
-    // What the run itself needs, besides what is allowed.
-    Openings openings() const
+    // The run's own needs, and --allow-read.
+    SandboxAccess sandbox_access() const
     {
         const auto folder_of = [](const std::filesystem::path& file) {
             return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
         };
-        Openings openings;
-        openings.readable = {folder_of(graph_.file())};
-        openings.readable.insert(openings.readable.end(), allowed_.begin(), allowed_.end());
-        openings.writable = files_.folders();
+        SandboxAccess access;
+        access.readable = {folder_of(graph_.file())};
+        access.readable.insert(access.readable.end(), allowed_.begin(), allowed_.end());
+        access.writable = files_.folders();
         if (!stats_.empty()) {
-            openings.writable.push_back(folder_of(stats_));
-            std::filesystem::create_directories(openings.writable.back());
+            access.writable.push_back(folder_of(stats_));
+            std::filesystem::create_directories(access.writable.back());
         }
-        return openings;
+        return access;
     }
 
     FrameSelection range_of(const Plan& plan) const
@@ -138,7 +138,7 @@ private:
         }
     }
 
-    // The frames before the one that failed are complete: they are written, or it is said why not.
+    // Writes the frames before the one that failed, which are complete, or says why not.
     void finish_files(const Error& reason, RunReport& report)
     {
         try {
@@ -152,7 +152,7 @@ private:
     FrameFiles files_;
     std::optional<FrameSelection> frames_;
     std::string stats_;
-    bool keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, within_walls_ = false;
+    bool keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, sandboxed_ = false;
     std::vector<std::string> allowed_;
 };
 RAPID_COMMAND(Run);

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <optional>
 
 #include "bindings/command/command.h"
 #include "runtime/graph/plugin.h"
@@ -32,8 +33,8 @@ bool takes_value(CLI::App& app, const std::string& argument)
     return false;
 }
 
-// The place of the command's name: the first argument that is one, and that is not another option's value. The order of
-// options never matters, so they may stand before the name as well.
+// The place of the command's name: the first argument that is one, and that is not an option's value. Options may stand
+// before the name as well.
 std::size_t find_command(CLI::App& app, const Arguments& arguments)
 {
     for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i)
@@ -79,42 +80,34 @@ int finish(int status)
     return status == status_done ? status_failed : status;
 }
 
-int run(Arguments arguments)
+// The options that every command takes.
+void declare_common(CLI::App& command, CommonOptions& common)
 {
-    CLI::App app("Rapid: particles from Lua graphs, without a user interface.", "rapid");
-    app.set_version_flag("--version", "rapid " RAPID_VERSION);
-    app.footer(
-        "`rapid COMMAND --help` tells more. Exit status: 0 done; 1 found while a frame ran, a failed test, a\n"
-        "difference; 2 found before (usage, a mistake in the graph, a missing file).");
+    command
+        .add_option_function<std::string>(
+            "--threads",
+            [&](const std::string& text) {
+                constexpr int most = 4096;  // a typing error, not a machine
+                const std::int64_t threads = read_whole("--threads", text, 0);
+                if (threads > most) throw Error(fmt::format("--threads = {}; it must be at most {}", text, most));
+                common.threads = static_cast<int>(threads);
+            },
+            "threads to use; 0, the default, is all that the machine has")
+        ->type_name("N");
+    command
+        .add_option_function<std::vector<std::string>>(
+            "--plugin", [&](const std::vector<std::string>& files) { common.plugins = files; },
+            "loads nodes from a library built against Rapid; so does RAPID_PLUGIN_PATH, a list of files and folders")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
+    command.add_flag("--verbose", common.verbose, "with the script's call stack, where an error has one");
+    command.allow_extras();
+}
 
-    CommonOptions common;
-    const std::vector<std::unique_ptr<Command>> commands = make_commands();
-    for (const auto& command : commands) {
-        CLI::App* sub = app.add_subcommand(command->name(), command->doc());
-        command->declare(*sub);
-        sub->add_option_function<std::string>(
-               "--threads",
-               [&](const std::string& text) {
-                   constexpr int most = 4096;  // a typing error, not a machine
-                   const std::int64_t threads = read_whole("--threads", text, 0);
-                   if (threads > most) throw Error(fmt::format("--threads = {}; it must be at most {}", text, most));
-                   common.threads = static_cast<int>(threads);
-               },
-               "threads to use; 0, the default, is all that the machine has")
-            ->type_name("N");
-        sub->add_option_function<std::vector<std::string>>(
-               "--plugin", [&](const std::vector<std::string>& files) { common.plugins = files; },
-               "loads nodes from a library built against Rapid; so does RAPID_PLUGIN_PATH, a list of files and folders")
-            ->type_name("FILE")
-            ->allow_extra_args(false);
-        sub->add_flag("--verbose", common.verbose, "with the script's call stack, where an error has one");
-        sub->allow_extras();
-    }
-
-    if (arguments.empty()) {
-        print(app.help());
-        return finish(status_done);
-    }
+// Reads the arguments into the options of the command that they name. Returns the exit status where that is the end: of
+// --help and --version, and of a usage error.
+std::optional<int> read_arguments(CLI::App& app, Arguments arguments)
+{
     std::string who = "rapid";
     try {
         const std::size_t place = find_command(app, arguments);
@@ -129,33 +122,56 @@ int run(Arguments arguments)
         std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
         app.parse(arguments);
         refuse_rest(*chosen);
+        return std::nullopt;
     } catch (const CLI::Success& request) {  // --help, --version
         return app.exit(request), finish(status_done);
     } catch (const CLI::ParseError& error) {
         print_error(Error(fmt::format("{}: {}; see \"{} --help\"", who, error.what(), who)), false);
-        return status_refused;
     } catch (const Error& error) {
         print_error(Error(fmt::format("{}: {}", who, error.what())), false);
+    }
+    return status_refused;
+}
+
+int run_command(Command& command, const CommonOptions& common)
+{
+    try {
+        if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
+        for (const std::string& file : common.plugins) load_plugin(file);
+        return finish(command.run(common));
+    } catch (const Error& error) {
+        print_error(error, common.verbose);
         return status_refused;
+    } catch (const std::bad_alloc&) {
+        print_error(Error("out of memory"), false);
+    } catch (const std::exception& error) {  // of a library: what it says is all that is known
+        print_error(Error(error.what()), false);
+    }
+    return status_failed;
+}
+
+int run(const Arguments& arguments)
+{
+    CLI::App app("Rapid: particles from Lua graphs, without a user interface.", "rapid");
+    app.set_version_flag("--version", "rapid " RAPID_VERSION);
+    app.footer(
+        "`rapid COMMAND --help` tells more. Exit status: 0 done; 1 found while a frame ran, a failed test, a\n"
+        "difference; 2 found before (usage, a mistake in the graph, a missing file).");
+    CommonOptions common;
+    const std::vector<std::unique_ptr<Command>> commands = make_commands();
+    for (const auto& command : commands) {
+        CLI::App* options = app.add_subcommand(command->name(), command->doc());
+        command->declare(*options);
+        declare_common(*options, common);
     }
 
-    for (const auto& command : commands) {
-        if (!app.got_subcommand(command->name())) continue;
-        try {
-            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
-            for (const std::string& file : common.plugins) load_plugin(file);
-            return finish(command->run(common));
-        } catch (const Error& error) {
-            print_error(error, common.verbose);
-            return status_refused;
-        } catch (const std::bad_alloc&) {
-            print_error(Error("out of memory"), false);
-            return status_failed;
-        } catch (const std::exception& error) {  // of a library: what it says is all that is known
-            print_error(Error(error.what()), false);
-            return status_failed;
-        }
+    if (arguments.empty()) {
+        print(app.help());
+        return finish(status_done);
     }
+    if (const std::optional<int> status = read_arguments(app, arguments)) return *status;
+    for (const auto& command : commands)
+        if (app.got_subcommand(command->name())) return run_command(*command, common);
     return status_refused;
 }
 

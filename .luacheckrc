@@ -3,7 +3,7 @@ std = "luajit"
 max_line_length = 120
 cache = false
 color = false
-exclude_files = { "lua/rapid.d.lua" } -- declarations without bodies
+exclude_files = { "lua/annotations.lua", "lua/rapid.d.lua" } -- declarations without bodies
 
 local graph_code = { read_globals = { "vec3", "quat" } }
 files["graphs"] = graph_code

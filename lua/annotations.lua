@@ -1,0 +1,284 @@
+-- Annotations of the graph language that no declaration of a node or a maker gives: values, kernels, rapid.math.
+--
+-- `rapid nodes --annotations` writes lua/rapid.d.lua from the next line on. It replaces --@makers by the functions of
+-- all makers except those that are declared here, --@point_fields by a point's attributes, and --@nodes by the nodes.
+---@meta rapid
+-- The graph language, for editors with the Lua language server. Written by `rapid nodes --annotations`; do not edit.
+
+---Three numbers that do not change.
+---@class rapid.Vec3
+---@field x number
+---@field y number
+---@field z number
+---@operator add(rapid.Vec3): rapid.Vec3
+---@operator sub(rapid.Vec3): rapid.Vec3
+---@operator mul(number|rapid.Vec3): rapid.Vec3
+---@operator div(number|rapid.Vec3): rapid.Vec3
+---@operator unm: rapid.Vec3
+local Vec3 = {}
+---@param w rapid.Vec3
+---@return number
+function Vec3:dot(w) end
+---@param w rapid.Vec3
+---@return rapid.Vec3
+function Vec3:cross(w) end
+---@return number
+function Vec3:length() end
+---Of length 1; zero stays zero.
+---@return rapid.Vec3
+function Vec3:normalized() end
+---This at t = 0, w at t = 1.
+---@param w rapid.Vec3
+---@param t number
+---@return rapid.Vec3
+function Vec3:lerp(w, t) end
+
+---A rotation that does not change: q * r turns by r, and then by q.
+---@class rapid.Quat
+---@field x number
+---@field y number
+---@field z number
+---@field w number
+---@operator mul(rapid.Quat): rapid.Quat
+local Quat = {}
+---@param v rapid.Vec3
+---@return rapid.Vec3
+function Quat:rotate(v) end
+---@return rapid.Quat
+function Quat:inverse() end
+---@return number
+function Quat:length() end
+---@return rapid.Quat
+function Quat:normalized() end
+---The shortest way from this (t = 0) to r (t = 1).
+---@param r rapid.Quat
+---@param t number
+---@return rapid.Quat
+function Quat:slerp(r, t) end
+
+---@class rapid.StudyDefinition
+---@field name string
+---@field scene fun(knobs: table): rapid.Node|table<string, rapid.Node>
+---@field frames integer[]  the first and the last
+---@field sweep table<string, (number|string|boolean)[]>  the values of each knob
+---@field lines? string|string[]  the knobs that tell the lines of the plot apart
+---@field reference? table|fun(frame: rapid.Frame, knobs: table): table  knobs, or a closed form: { P = {...} }
+---@field error? "rms"|"max"|"p95"|"residual"|fun(points: table, reference: table): number  of columns, place by place
+---@field error_frames? "all"|"last"
+---@field repeat_runs? integer  timed runs of each row, 5 if not given
+
+---What `rapid study` runs; its file returns it.
+---@param definition rapid.StudyDefinition
+---@return table
+function rapid.study(definition) end
+
+---@overload fun(list: number[]): rapid.Vec3
+---@param x number
+---@param y number
+---@param z number
+---@return rapid.Vec3
+function vec3(x, y, z) end
+
+---@param x number
+---@param y number
+---@param z number
+---@param w number
+---@return rapid.Quat
+function quat(x, y, z, w) end
+
+---@alias rapid.Place rapid.Vec3|number[]
+
+---@class rapid.Frame
+---@field number number  counted from the scene's start
+---@field time number    seconds since the start
+---@field dt number      seconds to the next frame
+
+---A point's own time, in an action.
+---@class rapid.Step
+---@field time number    seconds since the start
+---@field dt number      seconds of this sub-step
+---@field index integer  of the sub-step
+
+---@class rapid.Attribute  each point's own value, from rapid.attr
+---@class rapid.Points
+
+---@class rapid.Motion  a * b moves by b, and then by a
+---@operator mul(rapid.Motion): rapid.Motion
+
+---@class rapid.Mesh
+local Mesh = {}
+---@param motion rapid.Motion
+---@return rapid.Mesh
+function Mesh:transform(motion) end
+
+---@class rapid.Shape
+local Shape = {}
+---Metres, negative inside.
+---@param P rapid.Vec3
+---@return number
+function Shape:distance(P) end
+---Out of the shape.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Shape:gradient(P) end
+
+---@class rapid.LevelSet: rapid.Shape
+local LevelSet = {}
+---Writes a .vdb file, in a run.
+---@param path string  relative to the current folder
+---@param options? { grid?: string }
+---@return rapid.LevelSet
+function LevelSet:write(path, options) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:union(other) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:intersect(other) end
+---@param other rapid.LevelSet
+---@return rapid.LevelSet
+function LevelSet:subtract(other) end
+
+---@class rapid.Grid  of vectors
+local Grid = {}
+---Between the voxels' values.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Grid:sample(P) end
+
+---@class rapid
+local rapid = {}
+rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
+
+---@class rapid.options.grid_from
+---@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once
+---@field size? rapid.Place    full edge lengths [m, default 1]
+---@field center? rapid.Place  its middle [m, default 0]
+---@field voxel? number        between nodes [m, default 0.1]
+
+---A grid of vectors by a function of the place.
+---@param options rapid.options.grid_from
+---@return rapid.Grid
+function rapid.grid.from(options) end
+
+---A value that --set can replace.
+---@generic T
+---@param name string
+---@param default T  a number, a boolean, a string or a vec3
+---@param doc? string
+---@return T
+function rapid.param(name, default, doc) end
+
+---Each point's own value of an attribute, for parameters that take it.
+---@param name string
+---@return rapid.Attribute
+function rapid.attr(name) end
+
+---@class rapid.NodeParameter
+---@field [1] "bool"|"float"|"floats"|"group"|"int"|"ramp"|"read"|"shape"|"string"|"vec3"|"vec3s"|"write"
+---@field default? any
+---@field required? boolean
+---@field min? number
+---@field max? number
+---@field unit? string
+---@field choices? string[]
+---@field doc string
+
+---@class rapid.NodeDefinition
+---@field name string  of its file, too
+---@field doc string
+---@field params? table<string, rapid.NodeParameter>
+---@field makes? table<string, number|number[]>  attributes that it brings into being, with their value
+---@field points? fun(p: rapid.Point, frame: rapid.Frame, params: table)
+---@field action? fun(p: rapid.Point, step: rapid.Step, params: table)  inside Solve, at every sub-step
+---@field expand? fun(input: rapid.Node, params: table): rapid.Node
+
+---A node written in Lua; its file returns it.
+---@param definition rapid.NodeDefinition
+---@return rapid.NodeDefinition
+function rapid.node(definition) end
+
+---@param x number
+---@param y number
+---@param z number
+---@return rapid.Motion
+function rapid.translate(x, y, z) end
+
+---@param columns table<string, any[]>  { P = {{x, y, z}, ...}, ANY = {...} }
+---@return rapid.Points
+function rapid.points.from(columns) end
+
+---@param x number
+---@param lo number
+---@param hi number
+---@return number
+function rapid.math.clamp(x, lo, hi) end
+
+---x carried from [lo, hi] to [from, to], and held at its ends.
+---@param x number
+---@param lo number
+---@param hi number
+---@param from number
+---@param to number
+---@return number
+function rapid.math.fit(x, lo, hi, from, to) end
+
+---0 up to lo, 1 from hi on, smooth between.
+---@param lo number
+---@param hi number
+---@param x number
+---@return number
+function rapid.math.smoothstep(lo, hi, x) end
+
+---A number in [-1, 1] that changes smoothly in place and time.
+---@param P rapid.Vec3
+---@param time? number
+---@param octaves? integer
+---@param seed? integer
+---@return number
+function rapid.math.noise(P, time, octaves, seed) end
+
+---A flow, about 1 long, that neither gathers nor spreads points.
+---@param P rapid.Vec3
+---@param time? number
+---@param octaves? integer
+---@param seed? integer
+---@return rapid.Vec3
+function rapid.math.curl_noise(P, time, octaves, seed) end
+
+---@param axis rapid.Vec3
+---@param degrees number
+---@return rapid.Quat
+function rapid.math.rotation(axis, degrees) end
+
+---@param from rapid.Vec3
+---@param to rapid.Vec3
+---@return rapid.Quat
+function rapid.math.rotation_between(from, to) end
+--@makers except grid.of_values levelset.combine levelset.write motion.product motion.translate points.from transform
+
+---The point that a kernel sees. Other attributes are those that the scene makes.
+---@class rapid.Point
+--@point_fields
+---@field [string] any
+local Point = {}
+---@param group string
+function Point:join(group) end
+---@param group string
+function Point:leave(group) end
+---@param group string
+---@return boolean
+function Point:within(group) end
+---Removes the point when its node ends.
+function Point:kill() end
+---In [0, 1): the point's own number k, the same in every frame, or with the frame anew in each.
+---@param k number
+---@param frame? rapid.Frame|number
+---@return number
+function Point:rand(k, frame) end
+
+---@class rapid.Node
+local Node = {}
+--@nodes
+
+return rapid

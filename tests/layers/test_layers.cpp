@@ -54,12 +54,12 @@ struct Include {
     bool ours;                 // in quotes
 };
 
-std::vector<Include> includes_of_runtime()
+std::vector<Include> includes_below(const std::string& folder)
 {
     const fs::path root = RAPID_SOURCE_DIR;
     const std::regex directive(R"re(^\s*#\s*include\s*(["<])([^">]+)[">].*)re");
     std::vector<Include> result;
-    for (const auto& entry : fs::recursive_directory_iterator(root / "runtime")) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
         if (entry.path().extension() != ".h" && entry.path().extension() != ".cpp") continue;
         const fs::path file = fs::relative(entry.path(), root);
         std::ifstream text(entry.path());
@@ -75,7 +75,7 @@ std::vector<Include> includes_of_runtime()
 
 TEST_CASE("a file of the runtime includes only its own folder and those below", "[layers]")
 {
-    const auto includes = includes_of_runtime();
+    const auto includes = includes_below("runtime");
     REQUIRE(includes.size() > 100);  // the sources were found and read
 
     for (const Include& include : includes) {
@@ -87,9 +87,20 @@ TEST_CASE("a file of the runtime includes only its own folder and those below", 
     }
 }
 
+TEST_CASE("what embeds Lua does not know the command", "[layers]")
+{
+    const auto includes = includes_below("bindings/host");
+    REQUIRE(includes.size() > 100);
+
+    for (const Include& include : includes) {
+        CAPTURE(include.file, include.included);
+        CHECK(include.included.rfind("bindings/command/", 0) != 0);
+    }
+}
+
 TEST_CASE("only shapes, formats and the search for neighbours know OpenVDB", "[layers]")
 {
-    for (const Include& include : includes_of_runtime()) {
+    for (const Include& include : includes_below("runtime")) {
         if (include.included.rfind("openvdb/", 0) != 0) continue;
         CAPTURE(include.file, include.included);
         CHECK((include.folder.rfind("runtime/shapes/", 0) == 0 || include.folder == "runtime/io" ||

@@ -1,23 +1,23 @@
--- What a kernel does, read from its bytecode before it runs.
+-- Analysis of a kernel: its effects, read from its bytecode before it runs.
 --
 -- An abstract interpretation over the instructions of a function: each register holds the kernel's point, a constant
 -- string, a method of the point, a value that is shared with other points (it came from an upvalue or a global), or
--- something unknown. Where two ways meet, unequal values become unknown (or stay shared). The result:
+-- something unknown. Where two paths meet, unequal values become unknown (or stay shared). The result:
 --
 --   reads, writes    names indexed on the point itself
---   may              names indexed anywhere in helpers, and on values that are not known to be no point
+--   may              names indexed anywhere in helpers, and on values that may be the point
 --   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
 --                    are the calls of a method `join` of anything
---   computes_names   whether it indexes the point, or what may be it, by what is no constant
---   asks_places      whether it may ask a point for its place: whether it says `index` of anything, or indexes by what
---                    is no constant what is not known
---   calls            names on the point itself that it calls as if they were methods
+--   computes_names   whether it indexes the point, or a value that may be the point, by a computed name
+--   asks_places      whether it may read a point's `index`: whether it has this name, or indexes an unknown value by a
+--                    computed name
+--   calls            names on the point itself that it calls like methods
 --   kills            whether `kill` is called or could be
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
 --
 -- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
--- they are when the graph file has run. They are followed with what they are called with, and what they return.
--- Not followed is what lies in the tables that a kernel makes: `rapid check --races` runs it to see.
+-- they are when the graph file has run. Their arguments and results are followed, too. Values in tables that a
+-- kernel makes are not followed: `rapid check --races` finds these by running it.
 local bit = require "bit"
 local util = require "jit.util"
 local vmdef = require "jit.vmdef"
@@ -40,8 +40,6 @@ end
 local point = { kind = "point" }
 local shared = { kind = "shared" } -- of unknown value
 local parameters = { kind = "shared", value = {} } -- of a Lua node
-
-local methods = { join = true, leave = true, within = true, kill = true, rand = true }
 
 local function join(a, b)
   if a == b then return a end
@@ -66,9 +64,8 @@ end
 
 local analyse_function
 
--- What the upvalue of a function holds: { kind = "shared", value } or, where it is a local of the kernel around a
--- closure, nil. A closure that the kernel makes does not exist yet; its upvalues are told from the kernel's own by
--- name.
+-- The value of a function's upvalue: { kind = "shared", value }, or nil where it is a local of the kernel around a
+-- closure. A closure that the kernel makes does not exist yet; its upvalues are told from the kernel's own by name.
 local function upvalue_of(f, place, outer)
   if type(f) == "function" then
     local _, value = getupvalue(f, place + 1)
@@ -93,7 +90,7 @@ local writers = {
   [table.move] = { "table.move", 5 },
 }
 
--- Native functions that give back what they are given, or what lies in it. `pairs` and `next` are ours.
+-- Native functions that return their arguments, or elements of them. `pairs` and `next` are the sandbox's.
 local handing_on = { [ipairs] = true, [unpack] = true, [select] = true, [assert] = true, [setmetatable] = true }
 
 -- All other native functions that graph code finds; any further one is an iterator that it has made.
@@ -102,7 +99,7 @@ for _, functions in ipairs { _G, string, math, table, coroutine, bit } do
   for _, f in pairs(functions) do library[f] = true end
 end
 
--- Whether a function of the sandbox stands for one that hands on: they are Lua, so known by name.
+-- Whether a function hands on its arguments; those of the sandbox are written in Lua, so they are known by name.
 local function hands_on(f, env)
   return handing_on[f] or f == rawget(env, "pairs") or f == rawget(env, "next") or f == rawget(env, "setmetatable")
 end
@@ -119,174 +116,277 @@ local function analyse_inside(value, found)
   end
 end
 
--- One pass of instructions from `pc` with the registers `regs`; returns the successors. Findings go to `found`.
-local function step(f, pc, regs, found, outer, call)
-  local ins, mode = util.funcbc(f, pc)
-  if not ins then return {} end
-  local name = names[band(ins, 0xff)]
-  local a, b, c, d = band(rshift(ins, 8), 0xff), rshift(ins, 24), band(rshift(ins, 16), 0xff), rshift(ins, 16)
-  local writes_a = band(mode, 7) == 1
-  local result, over_shared
+-- The place of an instruction, and what is known there: f and pc; the operands a, b, c, d; the registers; what has been
+-- found; `outer` as analyse_function() has it; the call that is being followed.
+local At = {}
+At.__index = At
 
-  local function line()
-    return util.funcinfo(f, pc).currentline
-  end
-  local function refuse(message)
-    found.stores[#found.stores + 1] = { line = line(), source = util.funcinfo(f).source, message = message }
-  end
-  local function store(what)
-    refuse(("the kernel %s; %s"):format(what, found.remedy))
-  end
-  local function index_read(object, key)
-    if key == "index" then found.asks_places = true end
-    if object == point then
-      if methods[key] then
-        if key == "kill" then found.kills = true end
-        return { kind = "method", value = key }
-      end
-      found.reads[key] = found.reads[key] or line()
-      return { kind = "attribute", value = key }
-    elseif object and object.kind == "shared" then
-      return { kind = "shared", value = field(object.value, key) }
-    else
-      found.may[key] = true
+function At:line()
+  return util.funcinfo(self.f, self.pc).currentline
+end
+
+function At:string_constant(index)
+  return string_constant(self.f, index)
+end
+
+function At:refuse(message)
+  local stores = self.found.stores
+  stores[#stores + 1] = { line = self:line(), source = util.funcinfo(self.f).source, message = message }
+end
+
+function At:refuse_store(what)
+  self:refuse(("the kernel %s; %s"):format(what, self.found.remedy))
+end
+
+-- The line of the first mention of a name.
+function At:mention(map, name)
+  map[name] = map[name] or self:line()
+end
+
+-- Of object.key or object[key] with a constant.
+function At:read_field(object, key)
+  local found = self.found
+  if key == "index" then found.asks_places = true end
+  if object == point then
+    if found.methods[key] then
       if key == "kill" then found.kills = true end
-      if methods[key] then return { kind = "method", value = key, of_unknown = true } end
+      return { kind = "method", value = key }
     end
-    return nil
+    self:mention(found.reads, key)
+    return { kind = "attribute", value = key }
+  elseif object and object.kind == "shared" then
+    return { kind = "shared", value = field(object.value, key) }
   end
+  found.may[key] = true
+  if key == "kill" then found.kills = true end
+  if found.methods[key] then return { kind = "method", value = key, of_unknown = true } end
+end
 
-  if name == "MOV" then
-    result = regs[d]
-  elseif name == "KSTR" then
-    result = { kind = "string", value = string_constant(f, d) }
-    if result.value == "index" then found.asks_places = true end
-  elseif name == "UGET" then
-    result = upvalue_of(f, d, outer)
-  elseif name == "GGET" then
-    local key = string_constant(f, d)
-    result = { kind = "shared", value = rawget(found.env, key) }
-  elseif name == "TGETS" then
-    result = index_read(regs[b], string_constant(f, c))
-  elseif name == "TGETV" or name == "TGETB" or name == "TGETR" then
-    local object, key = regs[b], regs[c]
-    if name == "TGETV" and key and key.kind == "string" then
-      result = index_read(object, key.value)
-    elseif object and object.kind == "shared" then
-      if name == "TGETV" and object.value == nil then found.asks_places = true end
-      analyse_inside(object.value, found)
-      result = { kind = "shared", value = name == "TGETB" and field(object.value, c) or nil }
-    elseif name == "TGETV" and (not object or object == point) then
-      found.computes_names = true
-    end
-  elseif name == "TSETS" then
-    local object, key = regs[b], string_constant(f, c)
-    if object == point then
-      found.writes[key] = found.writes[key] or line()
-    elseif object == parameters then
-      refuse(("params.%s can't be assigned; parameters are the graph's"):format(key))
-    elseif object and object.kind == "shared" then
-      store(("assigns the field %q of a table that all points share"):format(key))
-    else
-      found.may[key] = true
-      found.may_write[key] = true
-    end
-  elseif name == "TSETV" or name == "TSETB" or name == "TSETR" or name == "TSETM" then
-    local object = regs[b]
-    if name == "TSETM" then object = regs[a - 1] end
-    local key = name == "TSETV" and regs[c] or nil
-    if object == point and key and key.kind == "string" then
-      found.writes[key.value] = found.writes[key.value] or line()
-    elseif object and object ~= parameters and object.kind == "shared" then
-      store("assigns into a table that all points share")
-    end
-  elseif name == "USETV" or name == "USETS" or name == "USETN" or name == "USETP" then
-    if upvalue_of(f, a, outer) then store(("assigns the upvalue %q"):format(util.funcuvname(f, a))) end
-  elseif name == "GSET" then
-    store(("assigns the global %q"):format(string_constant(f, d)))
-  elseif name == "FNEW" then
-    local child = util.funck(f, -d - 1)
-    if child then
-      result = { kind = "closure", value = child, outer = upvalues_by_name(f, outer) }
-      analyse_function(child, found, nil, result.outer)
-    end
-  elseif name == "CALL" or name == "CALLM" or name == "CALLT" or name == "CALLMT" then
-    local callee, first = regs[a], a + 2 -- two slots a frame
-    local arguments = name == "CALL" and c - 1 or name == "CALLM" and c or name == "CALLT" and d - 1 or d
-    local given = {} -- of what all points share, by place from 0
-    for place = 0, arguments - 1 do
-      local argument = regs[first + place]
-      if argument and argument.kind == "shared" then given[place] = argument end
-    end
-    if callee and callee.kind == "method" and (callee.value == "join" or callee.value == "leave") then
-      local group = regs[first + 1]
-      if group and group.kind == "string" then
-        found.joins[group.value] = true
-      elseif not callee.of_unknown then
-        found.computed_group = found.computed_group or line()
-      end
-    elseif callee and callee.kind == "method" and callee.value == "within" then
-      local group = regs[first + 1]
-      if group and group.kind == "string" then found.asks[group.value] = true else found.asks_any = true end
-    elseif callee and callee.kind == "attribute" then
-      found.calls[callee.value] = found.calls[callee.value] or line()
-    elseif callee and callee.kind == "closure" then
-      result = analyse_function(callee.value, found, given, callee.outer)
-    elseif callee and callee.kind == "shared" and type(callee.value) == "function" then
-      local called = callee.value
-      local writer = writers[called]
-      result = analyse_function(called, found, given)
-      if writer and given[arguments >= writer[2] and writer[2] - 1 or 0] then
-        store(("changes a table that all points share by %s"):format(writer[1]))
-      elseif hands_on(called, found.env) then
-        for _, argument in pairs(given) do
-          analyse_inside(argument.value, found)
-          result = shared
-        end
-      elseif found.resumes(called, given[0]) or not library[called] and not util.funcinfo(called).bytecodes then
-        store "resumes a coroutine, or an iterator, that was made outside of it"
-      end
-    end
-    for slot = a, a + 250 do regs[slot] = nil end
-    if result then
-      for slot = a, a + math.max(b - 2, 0) do regs[slot] = shared end
-      regs[a] = result
-    end
-  elseif name == "ITERC" or name == "ITERN" then
-    -- of pairs(t): the iterator, t and the last key lie before it
-    if regs[a - 2] and regs[a - 2].kind == "shared" then over_shared = true end
+-- Of object[key] by a number, or by what is not constant: `key` is the number, if there is one.
+function At:read_element(object, key)
+  if object and object.kind == "shared" then
+    analyse_inside(object.value, self.found)
+    return { kind = "shared", value = key and field(object.value, key) or nil }
   end
+end
 
-  -- A shared function that is passed on, or kept in a local, may be called by whoever gets it.
-  -- So may those of a table's metatable, by an operator.
-  if result and result.kind == "shared" then
-    if type(result.value) == "function" then analyse_function(result.value, found) end
-    if type(result.value) == "table" and debug.getmetatable(result.value) then analyse_inside(result.value, found) end
+function At:write_element(object)
+  if object and object ~= parameters and object.kind == "shared" then
+    self:refuse_store "assigns into a table that all points share"
   end
+end
 
-  if writes_a then
-    regs[a] = result
-  elseif name == "KNIL" then
-    for slot = a, d do regs[slot] = nil end
-  elseif name == "VARG" or name == "ITERC" or name == "ITERN" or name == "TNEW" then
-    for slot = a, a + 250 do regs[slot] = nil end
-    if over_shared then regs[a], regs[a + 1] = shared, shared end
-  elseif name == "FORI" or name == "FORL" or name == "IFORL" then
-    regs[a + 3] = nil
+function At:forget(first, last)
+  for slot = first, last do self.regs[slot] = nil end
+end
+
+-- By opcode: what an instruction does. It returns the value of its first operand's register, or of its call.
+local effects = {}
+
+-- The same effect for several opcodes.
+local function on(names_of_ops, effect)
+  for _, name in ipairs(names_of_ops) do effects[name] = effect end
+end
+
+function effects.MOV(at)
+  return at.regs[at.d]
+end
+
+function effects.KSTR(at)
+  local text = at:string_constant(at.d)
+  if text == "index" then at.found.asks_places = true end
+  return { kind = "string", value = text }
+end
+
+function effects.UGET(at)
+  return upvalue_of(at.f, at.d, at.outer)
+end
+
+function effects.GGET(at)
+  return { kind = "shared", value = rawget(at.found.env, at:string_constant(at.d)) }
+end
+
+function effects.TGETS(at)
+  return at:read_field(at.regs[at.b], at:string_constant(at.c))
+end
+
+function effects.TGETV(at)
+  local object, key = at.regs[at.b], at.regs[at.c]
+  if key and key.kind == "string" then return at:read_field(object, key.value) end
+  if not object or object == point then
+    at.found.computes_names = true
+  elseif object.kind == "shared" and object.value == nil then
+    at.found.asks_places = true
   end
+  return at:read_element(object)
+end
 
-  if name:find "^RET" then
-    for slot = a, name == "RETM" and a + 250 or a + d - 2 do
-      if regs[slot] and regs[slot].kind == "shared" then call.returned = regs[slot] end
+function effects.TGETB(at)
+  return at:read_element(at.regs[at.b], at.c)
+end
+
+function effects.TGETR(at)
+  return at:read_element(at.regs[at.b])
+end
+
+function effects.TSETS(at)
+  local object, key = at.regs[at.b], at:string_constant(at.c)
+  local found = at.found
+  if object == point then
+    at:mention(found.writes, key)
+  elseif object == parameters then
+    at:refuse(("params.%s can't be assigned; parameters are the graph's"):format(key))
+  elseif object and object.kind == "shared" then
+    at:refuse_store(("assigns the field %q of a table that all points share"):format(key))
+  else
+    found.may[key] = true
+    found.may_write[key] = true
+  end
+end
+
+function effects.TSETV(at)
+  local object, key = at.regs[at.b], at.regs[at.c]
+  if object == point and key and key.kind == "string" then
+    at:mention(at.found.writes, key.value)
+  else
+    at:write_element(object)
+  end
+end
+
+on({ "TSETB", "TSETR" }, function(at)
+  at:write_element(at.regs[at.b])
+end)
+
+function effects.TSETM(at)
+  at:write_element(at.regs[at.a - 1])
+end
+
+on({ "USETV", "USETS", "USETN", "USETP" }, function(at)
+  if upvalue_of(at.f, at.a, at.outer) then
+    at:refuse_store(("assigns the upvalue %q"):format(util.funcuvname(at.f, at.a)))
+  end
+end)
+
+function effects.GSET(at)
+  at:refuse_store(("assigns the global %q"):format(at:string_constant(at.d)))
+end
+
+function effects.FNEW(at)
+  local child = util.funck(at.f, -at.d - 1)
+  if not child then return nil end
+  local outer = upvalues_by_name(at.f, at.outer)
+  analyse_function(child, at.found, nil, outer)
+  return { kind = "closure", value = child, outer = outer }
+end
+
+-- By name: what a method of the point finds out about the group that it is given.
+local group_calls = {}
+
+function group_calls.join(at, callee, group)
+  if group and group.kind == "string" then
+    at.found.joins[group.value] = true
+  elseif not callee.of_unknown then
+    at.found.computed_group = at.found.computed_group or at:line()
+  end
+end
+group_calls.leave = group_calls.join
+
+function group_calls.within(at, _, group)
+  if group and group.kind == "string" then at.found.asks[group.value] = true else at.found.asks_any = true end
+end
+
+-- A shared function, called with these shared values. Returns what it returns, if all points share it.
+local function call_shared(at, called, given, arguments)
+  local found = at.found
+  local writer = writers[called]
+  local result = analyse_function(called, found, given)
+  if writer and given[arguments >= writer[2] and writer[2] - 1 or 0] then
+    at:refuse_store(("changes a table that all points share by %s"):format(writer[1]))
+  elseif hands_on(called, found.env) then
+    for _, argument in pairs(given) do
+      analyse_inside(argument.value, found)
+      result = shared
     end
-  elseif name == "CALLT" or name == "CALLMT" then
-    if result and result.kind == "shared" then call.returned = result end
+  elseif found.resumes(called, given[0]) or not library[called] and not util.funcinfo(called).bytecodes then
+    at:refuse_store "resumes a coroutine, or an iterator, that was made outside of it"
   end
+  return result
+end
 
-  local target = pc + d - 0x7fff
-  if name:find "^RET" or name == "CALLT" or name == "CALLMT" then return {} end
-  if name == "JMP" or name == "ISNEXT" then return { target } end
-  if name == "UCLO" then return { target } end
+local function call_function(at, arguments)
+  local regs, first = at.regs, at.a + 2 -- two slots a frame
+  local callee = regs[at.a]
+  local given = {} -- arguments that all points share, by place from 0
+  for place = 0, arguments - 1 do
+    local argument = regs[first + place]
+    if argument and argument.kind == "shared" then given[place] = argument end
+  end
+  local result
+  if callee and callee.kind == "method" then
+    local of_group = group_calls[callee.value]
+    if of_group then of_group(at, callee, regs[first + 1]) end
+  elseif callee and callee.kind == "attribute" then
+    at:mention(at.found.calls, callee.value)
+  elseif callee and callee.kind == "closure" then
+    result = analyse_function(callee.value, at.found, given, callee.outer)
+  elseif callee and callee.kind == "shared" and type(callee.value) == "function" then
+    result = call_shared(at, callee.value, given, arguments)
+  end
+  at:forget(at.a, at.a + 250)
+  if result then
+    for slot = at.a, at.a + math.max(at.b - 2, 0) do regs[slot] = shared end
+    regs[at.a] = result
+  end
+  return result
+end
+
+function effects.CALL(at) return call_function(at, at.c - 1) end
+function effects.CALLM(at) return call_function(at, at.c) end
+function effects.CALLT(at) return call_function(at, at.d - 1) end
+function effects.CALLMT(at) return call_function(at, at.d) end
+
+function effects.KNIL(at)
+  at:forget(at.a, at.d)
+end
+
+function effects.VARG(at)
+  at:forget(at.a, at.a + 250)
+end
+
+-- Of pairs(t): the iterator, t and the last key lie before it.
+on({ "ITERC", "ITERN" }, function(at)
+  local map = at.regs[at.a - 2]
+  at:forget(at.a, at.a + 250)
+  if map and map.kind == "shared" then at.regs[at.a], at.regs[at.a + 1] = shared, shared end
+end)
+
+on({ "FORI", "FORL", "IFORL" }, function(at)
+  at.regs[at.a + 3] = nil
+end)
+
+local function return_values(at, last)
+  for slot = at.a, last do
+    local value = at.regs[slot]
+    if value and value.kind == "shared" then at.call.returned = value end
+  end
+end
+on({ "RET", "RET0", "RET1" }, function(at) return_values(at, at.a + at.d - 2) end)
+function effects.RETM(at) return_values(at, at.a + 250) end
+
+local tail_calls = { CALLT = true, CALLMT = true }
+
+-- A shared function that is passed on, or kept in a local, may be called by whoever gets it. So may those of a table's
+-- metatable, by an operator.
+local function follow(value, found)
+  if not value or value.kind ~= "shared" then return end
+  if type(value.value) == "function" then analyse_function(value.value, found) end
+  if type(value.value) == "table" and debug.getmetatable(value.value) then analyse_inside(value.value, found) end
+end
+
+-- The places of the instructions that may come next.
+local function successors(name, pc, target)
+  if name:find "^RET" or tail_calls[name] then return {} end
+  if name == "JMP" or name == "ISNEXT" or name == "UCLO" then return { target } end
   if conditional[name] then return { pc + 1, pc + 2 } end
   if name == "FORI" or name == "FORL" or name == "IFORL" or name == "ITERL" or name == "IITERL" then
     return { pc + 1, target }
@@ -294,9 +394,28 @@ local function step(f, pc, regs, found, outer, call)
   return { pc + 1 }
 end
 
-local most_calls = 8 -- of one helper, with shared values of its own; further ones are looked at together
+-- Runs the instruction at `pc` on the registers; returns its successors.
+local function step(f, pc, regs, found, outer, following)
+  local ins, mode = util.funcbc(f, pc)
+  if not ins then return {} end
+  local name = names[band(ins, 0xff)]
+  local at = setmetatable({
+    f = f, pc = pc, regs = regs, found = found, outer = outer, call = following,
+    a = band(rshift(ins, 8), 0xff), b = rshift(ins, 24), c = band(rshift(ins, 16), 0xff), d = rshift(ins, 16),
+  }, At)
+  local effect = effects[name]
+  local result
+  if effect then result = effect(at) end
+  follow(result, found)
+  local writes_first = band(mode, 7) == 1 -- its first operand is the register that it writes
+  if writes_first then regs[at.a] = result end
+  if tail_calls[name] and result and result.kind == "shared" then following.returned = result end
+  return successors(name, pc, pc + at.d - 0x7fff)
+end
 
--- What is known of f, called with these shared values: { given, returned }, and whether it is new.
+local most_calls = 8 -- of one helper that are told apart by their shared values; further ones are merged
+
+-- The call of f with these shared values, { given, returned }, and whether it is new.
 local function call_of(f, given, found)
   local calls = found.calls_of[f] or {}
   found.calls_of[f] = calls
@@ -318,8 +437,8 @@ local function call_of(f, given, found)
   return call, true
 end
 
--- f: a function, or the prototype of one that a kernel makes; given: what is known of its arguments, by place from 0;
--- outer: of a prototype, what finds the upvalues of the functions around it by name. Returns what f returns, if all
+-- f: a function, or the prototype of one that a kernel makes; given: its shared arguments, by place from 0;
+-- outer: for a prototype, finds upvalues of the functions around it by name. Returns the value that f returns, if all
 -- points share it.
 function analyse_function(f, found, given, outer)
   local info = util.funcinfo(f)
@@ -367,15 +486,17 @@ local to_remember = {
 }
 
 -- env: the environment in which the kernel's globals live; resumes(f, first): whether calling f goes on with a
--- coroutine; of_a_point: the kernel's first parameter is a point.
-local function analyse(kernel, env, resumes, of_a_point)
+-- coroutine; of_a_point: the kernel's first parameter is a point; point_names: the table of the host.
+local function analyse(kernel, env, resumes, of_a_point, point_names)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
     inside = {}, env = env, resumes = resumes, remedy = of_a_point and to_remember.point or to_remember.set,
+    methods = {},
   }
+  for _, name in ipairs(point_names.methods) do found.methods[name] = true end
   -- Behind the point and the frame come the parameters of a Lua node, which all points share.
   analyse_function(kernel, found, of_a_point and { [0] = point, [2] = parameters } or { [2] = parameters })
-  found.calls_of, found.inside, found.env, found.resumes, found.remedy = nil, nil, nil, nil, nil
+  for _, own in ipairs { "calls_of", "inside", "env", "resumes", "remedy", "methods" } do found[own] = nil end
   return found
 end
 

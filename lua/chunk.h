@@ -12,6 +12,7 @@ typedef struct rapid_chunk {
     double substep;           // of an action, from 0
     int32_t size;             // points
     int32_t at;               // the point that is being worked on, -1 for none
+    int32_t not_finite;       // the point to which a value that is not finite was last assigned, -1 for none
     uint64_t random;          // key of the node's random numbers
     uint8_t* kill;            // shape [size], set to 1 by p:kill(); null where the kernel never kills
     uint8_t* result;          // shape [size], what a predicate returned; null for other kernels

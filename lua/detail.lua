@@ -1,29 +1,27 @@
--- What a :detail function sees: the whole set of points, in one state, in order.
+-- The points of a :detail function: the whole set, in one state, in order.
 --
 --   #points, points[i].P, points[i].heat = 1, points[i]:join "hot", :leave, :within, :kill(), :rand(k)
 --   points:add { P = vec3(0, 1, 0), heat = 3 }      appended when the function ends
 --   points:kill(i)                                  removed when the function ends
---   points:neighbours(i, radius)                    places of the points within the radius, in order, without i; the
---                                                   others as they lay when this radius was first asked for
+--   points:neighbours(i, radius)                    places of the points within the radius, in order, without i, by
+--                                                   the positions at the first search with this radius
 --   points:sum "heat", :mean, :min, :max, :bounds() two corners
 --   points:sort "heat", points:sort(function(p) return p.P.y end)
 --   points.detail.total = 3                         a value that kernels read as frame.detail.total
 --
--- A column's memory is asked of the host when it is first read, and again when it is first written: until then other
--- sets may share it. What a function keeps of its points is of no use when it has ended: each view knows the number of
--- the run that it belongs to. The types and functions are made once, as compiled code and FFI types are never freed.
+-- The host gives a column's memory when it is first read, and again when it is first written: until then other sets may
+-- share it. Views of points are invalid when the function has ended: each knows the number of its run. The types and
+-- functions are made once, as compiled code and FFI types are never freed.
+local describe = require "describe"
 local ffi = require "ffi"
 local vector = require "vec3"
-local words = require "words"
 
 local vec3, quat, istype = vector.type, vector.quat, ffi.istype
 local floor, huge = math.floor, math.huge
 local MAX = 3.4028234663852886e38
 
-local describe = words.value
-
 local function wrong_type(name, wanted, value)
-  error(("attribute %q takes %s, not %s"):format(name, wanted, describe(value)), 0)
+  error(("attribute %q takes %s, not %s"):format(name, wanted, describe.value(value)), 0)
 end
 
 local function within_float(x)
@@ -34,13 +32,13 @@ local function check_whole(limit)
   return function(name, x)
     if type(x) ~= "number" then wrong_type(name, "a whole number", x) end
     if not (x >= -limit and x <= limit and floor(x) == x) then
-      error(("attribute %q takes a whole number, not %s"):format(name, describe(x)), 0)
+      error(("attribute %q takes a whole number, not %s"):format(name, describe.value(x)), 0)
     end
   end
 end
 
 local function not_finite(name, x)
-  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe(x)), 0)
+  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe.value(x)), 0)
 end
 
 local function load_number(data, k) return tonumber(data[k]) end
@@ -84,25 +82,25 @@ local types = {
   },
 }
 
-local read_only = { id = true, dt = true, index = true }
-
 local over = "points can't be used outside the :detail function that they were given to"
 
--- native: the host's functions, all about the set that the function runs on; rand: as kernels draw.
--- Returns run(f, frame, params, size, random, details): the places (from 0) of the killed, and the details.
-local function make(native, rand)
+-- native: the host's functions, all about the set that the function runs on; rand: as kernels draw; point_names: the
+-- table of the host. Returns run(f, frame, params, size, random, details): the places (from 0) of the killed, and the
+-- details.
+local function make(native, rand, point_names)
+  local read_only = point_names.read_only
   -- Of the run: one at a time.
   local columns, groups, killed, added, size, frame, random, details
   local serial = ffi.cast("const int32_t*", native.serial) -- of the run; another one as soon as it has ended
 
-  -- Names of fields that no attribute is likely to have: fields hide what __index would find.
+  -- Fields hide attributes of the same name from __index, so they have unlikely names.
   local point_view = ffi.typeof "struct { const int32_t rapid_place, rapid_serial; }"
   local set_view = ffi.typeof "struct { const int32_t rapid_serial; }"
 
   local function column_of(name, writable)
     local column = columns[name]
     if column and (column.writable or not writable) then return column end
-    if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe(name)), 0) end
+    if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe.value(name)), 0) end
     local data, stride, kind = native.column(name, writable) -- says which attributes there are
     local about = types[kind]
     column = {
@@ -113,7 +111,7 @@ local function make(native, rand)
     return column
   end
   local function group_of(name, writable)
-    if type(name) ~= "string" then error(("a group has a name, not %s"):format(describe(name)), 0) end
+    if type(name) ~= "string" then error(("a group has a name, not %s"):format(describe.value(name)), 0) end
     local group = groups[name]
     if group and (group.writable or not writable) then return group end
     local data, stride = native.group(name, writable)
@@ -129,7 +127,7 @@ local function make(native, rand)
     return column.load(column.data, i * column.stride)
   end
 
-  -- Checked before any memory is touched: methods can be called with anything.
+  -- Checked before any memory is touched, as scripts can call methods with any value.
   local function place_in(p, method)
     if not istype(point_view, p) then
       error(("p:%s is called on a point: with a colon, not a dot"):format(method), 0)
@@ -162,6 +160,8 @@ local function make(native, rand)
     end
     return rand(random, load("id", place), use, anew == 0 and 5e-324 or anew or 0)
   end
+  for _, name in ipairs(point_names.methods) do assert(methods[name], name) end
+
   ffi.metatype(point_view, {
     __index = function(p, name)
       if p.rapid_serial ~= serial[0] then error(over, 0) end
@@ -187,7 +187,7 @@ local function make(native, rand)
 
   local function place_of(what, i)
     if type(i) ~= "number" or floor(i) ~= i or i < 1 or i > size then
-      error(("%s: there is no point %s; the set has 1 to %d"):format(what, describe(i), size), 0)
+      error(("%s: there is no point %s; the set has 1 to %d"):format(what, describe.value(i), size), 0)
     end
     return i - 1
   end
@@ -213,7 +213,7 @@ local function make(native, rand)
   local function smaller(a, b) return b < a and b or a end
   local function larger(a, b) return b > a and b or a end
 
-  local set = {}
+  local set = {} -- the methods of `points`
   function set.sum(points, name)
     check_set(points, "sum")
     return fold(name, 0, 0, plus)
@@ -244,7 +244,7 @@ local function make(native, rand)
     local copy, names = {}, {}
     for name in pairs(values) do
       if type(name) ~= "string" then
-        error(("points:add takes values by name, { P = vec3(x, y, z) }, not by %s"):format(describe(name)), 0)
+        error(("points:add takes values by name, { P = vec3(x, y, z) }, not by %s"):format(describe.value(name)), 0)
       end
       names[#names + 1] = name
     end
@@ -259,7 +259,7 @@ local function make(native, rand)
   function set.neighbours(points, i, radius)
     check_set(points, "neighbours")
     if type(radius) ~= "number" then
-      error(("points:neighbours takes a place and a radius, not %s"):format(describe(radius)), 0)
+      error(("points:neighbours takes a place and a radius, not %s"):format(describe.value(radius)), 0)
     end
     return native.neighbours(place_of("points:neighbours", i), radius)
   end
@@ -269,13 +269,14 @@ local function make(native, rand)
     if type(key) == "string" then
       of = function(p) return p[key] end
     elseif type(key) ~= "function" then
-      error(("points:sort takes the name of an attribute or a function of a point, not %s"):format(describe(key)), 0)
+      error(("points:sort takes the name of an attribute or a function of a point, not %s")
+        :format(describe.value(key)), 0)
     end
     local keys, order = {}, {}
     for i = 1, size do
       keys[i], order[i] = of(point_view(i - 1, serial[0])), i
       if type(keys[i]) ~= "number" or keys[i] ~= keys[i] then
-        error(("points:sort: the key of point %d is %s; it must be a number"):format(i, describe(keys[i])), 0)
+        error(("points:sort: the key of point %d is %s; it must be a number"):format(i, describe.value(keys[i])), 0)
       end
     end
     check_set(points, "sort") -- a key function that yields may come back when the run has ended
@@ -298,10 +299,19 @@ local function make(native, rand)
   of_values.__newindex = function(_, name, value)
     local finite = type(value) == "number" and value > -huge and value < huge or istype(vec3, value)
     if type(name) ~= "string" or not finite then
-      error(("points.detail.%s = %s; a detail value is a finite number or a vec3"):format(words.name(name),
-        describe(value)), 0)
+      error(("points.detail.%s = %s; a detail value is a finite number or a vec3"):format(describe.name(name),
+        describe.value(value)), 0)
     end
     details[name] = value
+  end
+
+  -- "add, bounds, detail, ... and sum"
+  local function names_of_set()
+    local names = { "detail" }
+    for name in pairs(set) do names[#names + 1] = name end
+    table.sort(names)
+    local last = table.remove(names)
+    return table.concat(names, ", ") .. " and " .. last
   end
 
   ffi.metatype(set_view, {
@@ -313,13 +323,12 @@ local function make(native, rand)
       if key == "detail" then return values_view end
       local known = set[key]
       if known == nil then
-        error(("points have no %s; they have add, bounds, detail, kill, max, mean, min, neighbours, sort and sum")
-          :format(describe(key)), 0)
+        error(("points have no %s; they have %s"):format(describe.value(key), names_of_set()), 0)
       end
       return known
     end,
     __newindex = function(_, key)
-      error(("points[%s] can't be assigned; assign its attributes"):format(describe(key)), 0)
+      error(("points[%s] can't be assigned; assign its attributes"):format(describe.value(key)), 0)
     end,
   })
 

@@ -1,11 +1,12 @@
--- What the host runs first in each of its states: it makes the environment of graph code, and gives the host the few
--- functions that it calls.
+-- The host runs this first in each of its states: it makes the environment of graph code, and returns the functions
+-- that the host calls.
 --
 -- The chunk is called with the host's native functions and returns a table of entry points.
 local native = ...
 
 local bytecode = require "bytecode"
 local detail = require "detail"
+local engine_errors = require "engine_errors"
 local kernel = require "kernel"
 local sandbox = require "sandbox"
 local language = require "rapid"
@@ -16,12 +17,12 @@ local study = require "study"
 local vector = require "vec3"
 local ffi = require "ffi"
 
--- Runs the body of a file; the place of a call that ends it is kept for errors, because no frame of it is left then.
+-- Runs the body of a file. The place of a tail call that ends it is kept for errors, as it leaves no stack frame.
 local function run(chunk, name, ...)
   return native.run(chunk, (name:gsub("^@", "")), bytecode.tail_call_line(chunk), ...)
 end
 
--- Nothing of ours is on the search path of graph code; what it may load stands beside the graph, or on RAPID_PATH.
+-- Rapid's own modules are not on the search path of graph code: it loads files beside the graph, or on RAPID_PATH.
 local env, loaded, load_text = sandbox.make(native, run)
 string.dump = nil -- it is reached through no copy, and through no method of strings
 
@@ -45,30 +46,30 @@ local function load_node(name)
   return definition
 end
 
--- Loops are compiled at once, before the functions that they call count as hot; large kernels get room.
+-- Loops are compiled early, before the functions that they call count as hot. The limits leave room for large kernels.
 jit.opt.start("hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxirconst=2000", "maxmcode=16384")
 
 ffi.cdef(native.chunk_header)
 local shapes = shape.make(native)
-local engine = kernel.prepare(native.rand, shapes.pointer_of)
+local engine = kernel.prepare(native.rand, shapes.pointer_of, native.point_names)
 
 local studies = study.make(native, vector)
 local rapid = language.make(native, load_node, numeric.make(native.noise, native.curl_noise), shapes, studies)
 loaded.rapid = rapid
 env.vec3, env.quat = vector.make, vector.make_quat
 
-local run_detail = detail.make(native.detail, engine.rand)
+local run_detail = detail.make(native.detail, engine.rand, native.point_names)
 
 local entry = {}
 
-local asked -- what the study file that was run asks
+local asked -- the definition of the study file that was run
 
--- Runs the graph and returns what it returned: a node, or a table of nodes by name. With knobs the file is a study, and
--- the graph that of its scene; without any of them there, none.
+-- Runs the graph and returns what it returned: a node, or a table of nodes by name. With knobs the file is a study,
+-- and the graph is that of its scene; with an empty table of knobs there is no graph.
 function entry.run(text, name, knobs)
   local chunk, message = load_text(text, name)
   if not chunk then error(message, 0) end
-  -- Interpreted: a graph's body runs once, and bytecode that is compiled is no longer what bytecode.lua reads.
+  -- Interpreted: a graph's body runs once, and compilation changes the bytecode that bytecode.lua reads.
   jit.off()
   local result = run(chunk, name)
   asked = studies.definition_of(result)
@@ -88,10 +89,11 @@ function entry.load_node(name)
 end
 
 function entry.analyse(f, of_a_point)
-  return bytecode.analyse(f, env, sandbox.resumes, of_a_point)
+  return bytecode.analyse(f, env, sandbox.resumes, of_a_point, native.point_names)
 end
 
 entry.fingerprint = bytecode.fingerprint
+entry.engine_errors = engine_errors(native.memory_limit_text)
 
 function entry.runner(f, layout, memory)
   return engine.runner(f, layout, memory)
@@ -134,7 +136,7 @@ function entry.watch_traces()
   end, "trace")
 end
 
--- A parameter given as a function.
+-- Evaluates a parameter that is a function of the frame.
 function entry.call(f, number, time, dt)
   return f(engine.frame(number, time, dt))
 end
@@ -152,6 +154,8 @@ entry.make_ramp = ramp.make
 
 -- Called once a pass or a frame, not worth a trace; and with jit.attach an event at a function that C calls directly
 -- ends the process (LuaJIT 2.1 of 2022).
-for _, f in pairs(entry) do jit.off(f) end
+for _, f in pairs(entry) do
+  if type(f) == "function" then jit.off(f) end
+end
 
 return entry

@@ -1,13 +1,13 @@
--- Runners: what carries a kernel over the points of a chunk.
+-- Runners: each carries a kernel over the points of a chunk.
 --
--- A kernel sees the point through a view `p` whose reads and writes go to the chunk's columns, at this one point; it
--- never gets a pointer, and an index outside its own point cannot be said. The trace compiler inlines all of it. Each
--- kernel gets a runner from generated text, with function prototypes of its own: kernels that share one runner share
--- its traces, and fall to a fifth of their speed.
+-- A kernel sees its point through a view `p` whose reads and writes go to the chunk's columns, at this one point; it
+-- never gets a pointer, and can't express an index outside its own point. The trace compiler inlines all of it. Each
+-- kernel gets a runner from generated text, with function prototypes of its own: kernels that share a runner share its
+-- traces, and fall to a fifth of their speed.
+local describe = require "describe"
 local ffi = require "ffi"
 local util = require "jit.util"
 local vector = require "vec3"
-local words = require "words"
 
 local vec3, quat = vector.type, vector.quat
 
@@ -22,7 +22,7 @@ local getter_text = {
   quat = "local a = $C[$I] return (quat(a.x, a.y, a.z, a.w))",
 }
 
--- A sum of squares below MAX2 says in one comparison that all are finite and none is too large; near it, each is asked.
+-- A sum of squares below MAX2 proves in one comparison that all are finite and in range; near MAX2, each is tested.
 local setter_text = {
   float = [[
     if type(x) ~= "number" then wrong_type($S, "a number", x) end
@@ -67,8 +67,6 @@ local element_type = {
   int64 = "int64_t",
 }
 
-local describe = words.value
-
 -- The host adds the place, the nearest line of graph code, and the point.
 local function wrong_type(name, wanted, value)
   local remedy = ""
@@ -76,13 +74,13 @@ local function wrong_type(name, wanted, value)
     remedy = wanted == "a vec3" and "; vec3(x, y, z) makes one" or wanted == "a quat" and "; quat(x, y, z, w) makes one"
       or ""
   end
-  error(("attribute %q takes %s, not %s%s"):format(name, wanted, describe(value), remedy), 0)
+  error(("attribute %q takes %s, not %s%s"):format(name, wanted, describe.value(value), remedy), 0)
 end
 local function not_finite(name, value)
-  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe(value)), 0)
+  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe.value(value)), 0)
 end
 local function not_whole(name, value)
-  error(("attribute %q takes a whole number, not %s"):format(name, describe(value)), 0)
+  error(("attribute %q takes a whole number, not %s"):format(name, describe.value(value)), 0)
 end
 
 local function sorted_names(map)
@@ -92,18 +90,18 @@ local function sorted_names(map)
   return list
 end
 
--- A view's refusals.
+-- The errors of a view.
 local function missing(name, names)
-  name = words.name(name)
+  name = describe.name(name)
   error(("no attribute %q here; a name that is computed is declared, reads = { %q }, or also named as a constant " ..
     "(the kernel names %s)"):format(name, name, table.concat(sorted_names(names), ", ")), 0)
 end
 
--- Names are compared one after the other: in a trace they are constants, and nothing is left of the comparisons, where
--- a look-up in a table would leave its checks. What lies in upvalues that are never assigned, and is no longer than two
--- pointers, is a constant there too: the chunk's address, the view, the frame.
+-- Names are compared one after the other: in a trace they are constants, and the comparisons are folded away, while a
+-- look-up in a table would leave its checks. Upvalues that are never assigned, and are no longer than two pointers, are
+-- constants there too: the chunk's address, the view, the frame.
 local text_head = [[
-local ffi, vec3, quat, kernel, memory, frame_type, rand, adopt, shown, refuse, names, flush = ...
+local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush = ...
 local istype, floor, type, tonumber, error = ffi.istype, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
@@ -113,26 +111,31 @@ local point_type, step_type = ffi.typeof "struct {}", ffi.typeof "struct {}"
 local p, step = point_type(), step_type()
 local params, details = nil, {}
 
--- What the view, its methods and the step do outside of the loop: columns may be gone by then.
+-- Called when the view, its methods or the step are used outside of the loop: columns may be gone by then.
 local function dead()
   error("a point can't be used outside its kernel", 0)
 end
 ]]
 
+-- Those that do more than set a byte of the point; $ID is the point's id.
 local text_methods = [[
-local function draw(...)
+local function rand(...)
   local _, use, frame_or_number = ...
   local i = chunk.at
   if i < 0 then dead() end
   if type(use) ~= "number" then wrong_use("a number, which of the point's random numbers", use) end
-  local anew = 0
+  local frame_number = 0
   if frame_or_number ~= nil then
-    anew = frame_or_number
-    if istype(frame_type, anew) then anew = anew.number elseif istype(step_type, anew) then anew = chunk.times[i] end
-    if type(anew) ~= "number" then wrong_use("the frame, or a number, behind the comma", anew) end
-    if anew == 0 then anew = 5e-324 end -- 0 is the number that stays the same in every frame
+    frame_number = frame_or_number
+    if istype(frame_type, frame_number) then
+      frame_number = frame_number.number
+    elseif istype(step_type, frame_number) then
+      frame_number = chunk.times[i]
+    end
+    if type(frame_number) ~= "number" then wrong_use("the frame, or a number, behind the comma", frame_number) end
+    if frame_number == 0 then frame_number = 5e-324 end -- 0 stands for a number that is the same in every frame
   end
-  local drawn = rand(chunk.random, $ID, use, anew)
+  local drawn = draw(chunk.random, $ID, use, frame_number)
   return drawn
 end
 
@@ -144,7 +147,7 @@ local function kill(...)
 end
 ]]
 
--- What an action gets in place of the frame: the point's own time.
+-- An action gets the step in place of the frame: it has the point's own time.
 local text_step = [[
 ffi.metatype(step_type, refuse.operators("the step is no number; compute with what it has, by name: step.dt", {
   __metatable = false,
@@ -167,10 +170,11 @@ ffi.metatype(step_type, refuse.operators("the step is no number; compute with wh
 -- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve.
 -- memory: a userdata with room for rapid_chunk and, behind it, a pointer for each column and then each group. The host
 -- writes it before each run().
--- Returns run(), and set_params(values, details): the third argument of a Lua node's kernel, and what frame.detail
--- shows.
-local function make_runner(kernel, layout, memory, pointers)
-  local fields, names = { "rapid_chunk chunk;" }, { dt = true, index = true }
+-- Returns run(), and set_params(values, details): the third argument of a Lua node's kernel, and the values of
+-- frame.detail.
+local function make_runner(kernel, layout, memory, shared)
+  local fields, names = { "rapid_chunk chunk;" }, { dt = true }
+  for _, name in ipairs(shared.point_names.fields) do names[name] = true end
   local text = { text_head }
   local function add(lines, entry, pointer)
     local values = {
@@ -218,13 +222,11 @@ local function make_runner(kernel, layout, memory, pointers)
     end
     text[#text + 1] = [[
 if name == "dt" then return (frame.dt) end
-if name == "index" then return (chunk.first + i + 1) end
-if name == "rand" then return draw end
-if name == "within" then return within end
-if name == "join" then return join end
-if name == "leave" then return leave end
-if name == "kill" then return kill end
-missing(name, names)]]
+if name == "index" then return (chunk.first + i + 1) end]]
+    for _, method in ipairs(shared.point_names.methods) do
+      text[#text + 1] = ("if name == %q then return %s end"):format(method, method)
+    end
+    text[#text + 1] = "missing(name, names)"
   end)
   add_function("write", "_, name, x", function()
     for place, column in ipairs(layout.columns) do
@@ -247,10 +249,10 @@ ffi.metatype(point_type, refuse.operators("p is the point; compute with what it 
   if layout.predicate then body = "chunk.result[k] = " .. body .. " and 1 or 0" end
   if layout.masked then body = "if chunk.members[k] ~= 0 then " .. body .. " end" end
   body = "chunk.at = k " .. body
-  -- Vararg, so that no trace starts at run() itself. A loop that is always left at once would be refused, and where one
-  -- point after the other has made a trace of the kernel, a loop could only jump to it.
-  -- A trace's loop goes the way of the point at which it was recorded; other ways branch off it, at half the speed. The
-  -- first points are not typical, so the traces are made anew after a while: of most points' way, most likely.
+  -- Vararg, so that no trace starts at run() itself. Single points are called without a loop: a loop that always ends
+  -- after one point is not compiled, and a trace that single calls have made of the kernel would be in a loop's way.
+  -- A trace follows the branches of the point at which it was recorded; other branches leave it, at half the speed. The
+  -- first points are not typical, so the traces are recorded again after a while, most likely at a typical point.
   text[#text + 1] = [[
 local run
 local calls, renewal, single = 0, 64, false
@@ -286,26 +288,31 @@ end
 jit.off(set_params) -- once a pass
 return run, set_params
 ]]
-  local refuse = { wrong_type = wrong_type, not_finite = not_finite, not_whole = not_whole, missing = missing }
+  local refuse = { wrong_type = wrong_type, not_whole = not_whole, missing = missing }
+  function refuse.not_finite(name, value)
+    local chunk = ffi.cast("rapid_chunk*", memory)
+    chunk.not_finite = chunk.at
+    not_finite(name, value)
+  end
   function refuse.write(name)
-    if layout.predicate then error(("assigns %q; a test must not change its point"):format(words.name(name)), 0) end
-    if name == "id" or name == "dt" or name == "index" then error(("%s is read only"):format(name), 0) end
+    if layout.predicate then error(("assigns %q; a test must not change its point"):format(describe.name(name)), 0) end
+    if shared.point_names.read_only[name] then error(("%s is read only"):format(name), 0) end
     if names[name] then
       error(("assigns %q under a computed name; declare it: writes = { %q }"):format(name, name), 0)
     end
-    name = words.name(name)
+    name = describe.name(name)
     error(("no attribute %q here; add :attribute{ %s = 0 } before it, or where its name is computed writes = { %q }")
       :format(name, name, name), 0)
   end
   function refuse.param(name, values)
-    error(("no parameter %q; the node has %s"):format(words.name(name), table.concat(sorted_names(values), ", ")), 0)
+    error(("no parameter %q; the node has %s"):format(describe.name(name), table.concat(sorted_names(values), ", ")), 0)
   end
   function refuse.assign(name)
-    error(("params.%s can't be assigned; parameters are the graph's"):format(words.name(name)), 0)
+    error(("params.%s can't be assigned; parameters are the graph's"):format(describe.name(name)), 0)
   end
   function refuse.group(name, what)
     error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
-      :format(what, describe(name), what), 0)
+      :format(what, describe.value(name), what), 0)
   end
   function refuse.operators(what, meta)
     for _, name in ipairs(operators) do
@@ -314,19 +321,20 @@ return run, set_params
     return meta
   end
   function refuse.step(name)
-    error(("the step has no %q; it has time, dt, index and detail"):format(words.name(name)), 0)
+    error(("the step has no %q; it has time, dt, index and detail"):format(describe.name(name)), 0)
   end
   function refuse.use(wanted, value)
-    error(("p:rand takes %s, not %s"):format(wanted, describe(value)), 0)
+    error(("p:rand takes %s, not %s"):format(wanted, describe.value(value)), 0)
   end
   local make = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
   local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
-  return make(ffi, vec3, quat, kernel, pointer, pointers.frame_type, pointers.rand, pointers.adopt, pointers.shown,
+  return make(ffi, vec3, quat, kernel, pointer, shared.frame_type, shared.draw, shared.adopt, shared.shown,
     refuse, names, jit.flush)
 end
 
--- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua).
-local function prepare(rand, adopt)
+-- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua);
+-- point_names: the table of the host.
+local function prepare(rand, adopt, point_names)
   -- The detail values that frame.detail and step.detail show: those of the pass that runs.
   local shown = { details = {} }
   shown.view = newproxy(true) -- no table: table.insert would write into it
@@ -338,14 +346,14 @@ local function prepare(rand, adopt)
     local value = shown.details[name]
     if value == nil then
       local names = sorted_names(shown.details)
-      name = words.name(name)
+      name = describe.name(name)
       error(("no detail value %q; %s"):format(name, #names > 0 and "there are " .. table.concat(names, ", ")
         or "a :detail node sets one: points.detail." .. name .. " = 0"), 0)
     end
     return value
   end
   of_view.__newindex = function(_, name)
-    name = words.name(name)
+    name = describe.name(name)
     error(("detail.%s can't be assigned in a kernel; points.detail.%s can, in :detail"):format(name, name), 0)
   end
 
@@ -355,17 +363,20 @@ local function prepare(rand, adopt)
     __index = function(...)
       local _, name = ...
       if name == "detail" then return shown.view end
-      error(("the frame has no %q; it has number, time, dt and detail"):format(words.name(name)), 2)
+      error(("the frame has no %q; it has number, time, dt and detail"):format(describe.name(name)), 2)
     end,
   })
-  local pointers = { frame_type = frame_type, rand = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown }
+  local shared = {
+    frame_type = frame_type, draw = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown,
+    point_names = point_names,
+  }
   return {
     frame = function(number, time, dt, details)
       shown.details = details or {}
       return frame_type(number, time, dt)
     end,
-    runner = function(kernel, layout, memory) return make_runner(kernel, layout, memory, pointers) end,
-    rand = pointers.rand,
+    runner = function(kernel, layout, memory) return make_runner(kernel, layout, memory, shared) end,
+    rand = shared.draw,
   }
 end
 

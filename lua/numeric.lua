@@ -1,4 +1,4 @@
--- rapid.math: what artists' formulas are made of, in kernels as in a graph's body.
+-- rapid.math: functions for artists' formulas, in kernels and in a graph's body.
 --
 --   clamp(x, lo, hi)             x, but at least lo and at most hi
 --   fit(x, lo, hi, from, to)     x carried from [lo, hi] to [from, to], and held at its ends
@@ -8,18 +8,16 @@
 --   rotation(axis, degrees)      a quat: the turn about an axis of any length but zero
 --   rotation_between(from, to)   a quat: the shortest turn of one direction into another
 --
--- The noises are those of runtime/noise.h: cells of 1 m and 1 s. Behind P all may be left out (0 s, 1 octave, seed 0).
+-- The noises are those of runtime/noise.h: cells of 1 m and 1 s. All but P are optional (0 s, 1 octave, seed 0).
 -- The functions are vararg for the reason that vec3.lua gives.
 local ffi = require "ffi"
+local describe = require "describe"
 local vector = require "vec3"
 
 local abs, cos, floor, max, min, pi, sin = math.abs, math.cos, math.floor, math.max, math.min, math.pi, math.sin
 local vec3, quat, istype, type = vector.type, vector.quat, ffi.istype, type
 
-local function show(value)
-  local kind = type(value)
-  return (kind == "number" or kind == "cdata") and tostring(value) or value == nil and "nil" or "a " .. kind
-end
+local show = describe.operand
 
 local function need_numbers(call, ...)
   for place = 1, select("#", ...) do
@@ -36,7 +34,7 @@ function numeric.clamp(...)
     need_numbers("clamp(x, lo, hi)", x, lo, hi)
   end
   if lo > hi then error(("clamp(x, lo, hi): lo = %g is above hi = %g"):format(lo, hi), 0) end
-  return (min(hi, max(lo, x))) -- no branch, which each point would take its own way
+  return (min(hi, max(lo, x))) -- no branch, which would differ from point to point
 end
 
 function numeric.fit(...)

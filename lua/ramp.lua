@@ -1,6 +1,6 @@
--- Ramps: a number, or a vec3, by way of keys {position, value} between which it is linear; held at its ends.
+-- Ramps: numbers or vec3 values, linear between keys {position, value}, and constant beyond the first and the last.
 --
--- A ramp is a function from generated text, a branch for each interval: compiled traces hold no loop and no table.
+-- A ramp is a function from generated text, with a branch for each interval: compiled traces have no loop and no table.
 local vector = require "vec3"
 
 jit.off(true, true) -- all of this file, but not the functions that it makes
@@ -12,7 +12,7 @@ local function literal(value)
   return format("vec3(%.17g, %.17g, %.17g)", value.x, value.y, value.z)
 end
 
--- By text: a ramp is handed to its kernel once a frame, and must be the same function, or its traces were made anew.
+-- By text: a kernel gets its ramp once a frame; if it were a new function each time, traces would not last.
 local made, count = {}, 0
 local most = 1000 -- kept; a ramp that is a function of the frame may be another one in each
 

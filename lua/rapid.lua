@@ -1,10 +1,10 @@
 -- The graph language: the table that `require "rapid"` gives to graph code.
 --
--- Everything here only gathers arguments; the host makes the values, checks them and remembers where they were asked
--- for. A call with a place of its own among the arguments (a path, a mesh, a motion) is turned into named arguments.
+-- Everything here only gathers arguments; the host makes the values, checks them and remembers the places of the calls.
+-- Positional arguments (a path, a mesh, a motion) are turned into named ones.
 local ffi = require "ffi"
 local vector = require "vec3"
-local words = require "words"
+local describe = require "describe"
 
 local function options_of(what, options)
   if options == nil then return {} end
@@ -61,7 +61,7 @@ local function make(native, load_node, numeric, shapes, studies)
     box = maker "levelset.box",
     torus = maker "levelset.torus",
   }
-  -- Asks the function at each node of the lattice, z fastest.
+  -- Evaluates the function at each node of the lattice, z fastest.
   local function grid_from(options)
     options = options_of("rapid.grid.from", options)
     local function fault(name, what)
@@ -215,7 +215,7 @@ local function make(native, load_node, numeric, shapes, studies)
 
   rapid.study = studies.define -- returned by a study file
 
-  -- Methods of values, by what they are.
+  -- Methods of objects, by their kind.
   local function transformed(object, motion)
     return native.make("transform", { object = object, motion = motion })
   end
@@ -264,7 +264,7 @@ local function make(native, load_node, numeric, shapes, studies)
 
   native.set_index(function(...)
     local object, name = ...
-    local query = shapes.queries[name] -- in kernels: what traces can follow comes first
+    local query = shapes.queries[name] -- first, as traces of kernels can follow it
     if query and shapes.pointer_of(object) then return query end
     if name == "sample" and shapes.grid_of(object) then return shapes.sample end
     local kind = native.kind(object)
@@ -276,7 +276,7 @@ local function make(native, load_node, numeric, shapes, studies)
     if known[name] then return known[name] end
     local what = kind == "points" and "points have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
       or "a " .. kind .. " has"
-    name = words.name(name)
+    name = describe.name(name)
     error(("%s no %q%s"):format(what, name, native.did_you_mean(name, names_of(known))), 2)
   end, function(a, b)
     return native.make("motion.product", { first = a, second = b })
@@ -286,7 +286,7 @@ local function make(native, load_node, numeric, shapes, studies)
   local function closed(library, what)
     return setmetatable(library, {
       __index = function(_, name)
-        name = words.name(name)
+        name = describe.name(name)
         error(("%s has no %q%s"):format(what, name, native.did_you_mean(name, names_of(library))), 2)
       end,
       __metatable = false,

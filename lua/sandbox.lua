@@ -1,10 +1,10 @@
 -- The environment of graph code: ordinary Lua without a way out.
 --
--- Out of reach: files, processes, ffi, debug, bytecode, other environments, addresses, and whatever depends on chance
--- (the order of a string hash, math.random). Libraries are copies, so nothing that graph code does to them reaches
--- ours.
+-- Out of reach: files, processes, ffi, debug, bytecode, other environments, addresses, and all sources of chance (the
+-- order of a string hash, math.random). Libraries are copies, so changes that graph code makes to them do not reach
+-- Rapid's own.
 local ffi = require "ffi"
-local words = require "words"
+local describe = require "describe"
 
 local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
 
@@ -53,7 +53,7 @@ local function sorted_keys(map, what)
 end
 
 local function sorted_pairs(map)
-  if type(map) ~= "table" then error(("pairs takes a table, not %s"):format(words.article(map)), 2) end
+  if type(map) ~= "table" then error(("pairs takes a table, not %s"):format(describe.kind(map)), 2) end
   local keys, place = sorted_keys(map, "pairs"), 0
   return function()
     repeat
@@ -65,7 +65,7 @@ local function sorted_pairs(map)
 end
 
 local function sorted_next(map, key)
-  if type(map) ~= "table" then error(("next takes a table, not %s"):format(words.article(map)), 2) end
+  if type(map) ~= "table" then error(("next takes a table, not %s"):format(describe.kind(map)), 2) end
   local keys = sorted_keys(map, "next")
   if key == nil then return keys[1], map[keys[1]] end
   for place, known in ipairs(keys) do
@@ -91,7 +91,7 @@ local function safe_format(format, ...)
 end
 jit.off(safe_format) -- unpack is not compiled: its loop would be, in vain
 
--- Coroutines that run each other, and functions of C that call Lua, lie on the C stack, which Lua does not watch.
+-- Nested coroutines, and C functions that call Lua, use the C stack, whose depth Lua does not limit.
 local most_nested = 100
 local nested = 0
 
@@ -118,12 +118,12 @@ local function safe_gsub(text, pattern, replacement, count)
 end
 
 local function safe_resume(thread, ...)
-  if type(thread) ~= "thread" then error("coroutine.resume takes a coroutine, not " .. words.article(thread), 2) end
+  if type(thread) ~= "thread" then error("coroutine.resume takes a coroutine, not " .. describe.kind(thread), 2) end
   enter "coroutines"
   return leave(coroutine.resume(thread, ...))
 end
 
-local wrapped = setmetatable({}, { __mode = "k" }) -- what coroutine.wrap has given
+local wrapped = setmetatable({}, { __mode = "k" }) -- results of coroutine.wrap
 
 local function result_of(ok, ...)
   if not ok then error((...), 0) end
@@ -131,7 +131,7 @@ local function result_of(ok, ...)
 end
 
 local function safe_wrap(f)
-  if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. words.article(f), 2) end
+  if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. describe.kind(f), 2) end
   local thread = coroutine.create(f)
   local function run(...)
     enter "coroutines"
@@ -141,20 +141,20 @@ local function safe_wrap(f)
   return run
 end
 
--- Whether calling f with these arguments goes on where another call of it has stopped.
+-- Whether a call of f with these arguments resumes a coroutine.
 local function resumes(f, first)
   return wrapped[f] or (f == safe_resume and first ~= nil)
 end
 
 -- native.read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and
 -- where it was looked for; native.outside_kernels(what, remedy) is an error while a kernel runs. In a quiet environment
--- (a worker's) print says nothing: the first state has said it.
+-- (a worker's) print does nothing: the first state has printed.
 local function make(native, run)
   local env = {}
   local strings = copy(string, { "dump" })
   strings.format, strings.gsub = safe_format, safe_gsub
 
-  -- Methods of strings are a copy of their own, which graph code gets no hold of: our modules call them too.
+  -- The methods of strings are a copy that graph code can't reach, since Rapid's own modules call them, too.
   local of_strings = debug.getmetatable("")
   of_strings.__index = copy(strings)
   of_strings.__metatable = false
@@ -186,15 +186,15 @@ local function make(native, run)
     print(table.concat(texts, "\t"))
   end
 
-  -- Text only: bytecode could say what Lua cannot.
+  -- Text only: bytecode can do more than Lua.
   local function load_text(text, name)
-    if type(text) ~= "string" then return nil, "load takes a text, not " .. words.article(text) end
+    if type(text) ~= "string" then return nil, "load takes a text, not " .. describe.kind(text) end
     if text:byte(1) == 27 then return nil, "bytecode is not loaded" end
     local chunk, message = loadstring(text, name)
     if not chunk then return nil, message end
     return setfenv(chunk, env)
   end
-  -- A chunk named "=..." would pass for one of ours.
+  -- A chunk named "=..." would pass for one of Rapid's own.
   function env.load(text, name)
     native.outside_kernels("load", "what it makes can't be checked there")
     return load_text(text, "@" .. (type(name) == "string" and name:gsub("^[@=]", "") or "text given to load"))

@@ -1,7 +1,8 @@
--- rapid.study: one scene at many settings of its knobs; how wrong is each, and how long does it take?
+-- rapid.study: error and run time of one scene at many settings of its knobs.
 --
--- A study file returns rapid.study{ ... }. The command runs the file once for what it asks (described below), then once
--- more, in a fresh session, for each choice of the knobs: what study.scene returns is then the graph.
+-- A study file returns rapid.study{ ... }. The command runs the file once for its description, then once more, in a
+-- fresh session, for each choice of the knobs: the graph is then that which study.scene returns.
+local describe = require "describe"
 
 local function names_of(map)
   local names = {}
@@ -14,13 +15,7 @@ local fields = { name = true, scene = true, frames = true, sweep = true, lines =
   error_frames = true, repeat_runs = true }
 local norms = { rms = true, max = true, p95 = true, residual = true }
 
--- A value in a message: as it is written, where it is short; any other by its type, never by its address.
-local function shown(value)
-  local kind = type(value)
-  if kind == "string" then return ("%q"):format(value) end
-  if kind == "number" or kind == "cdata" or kind == "boolean" or value == nil then return tostring(value) end
-  return "a " .. kind
-end
+local shown = describe.value
 
 -- native: the host's functions; vector: lua/vec3.lua.
 local function make(native, vector)
@@ -97,8 +92,8 @@ local function make(native, vector)
     return study
   end
 
-  -- What the command needs to know before it runs a scene.
-  local function describe(definition)
+  -- The description that the command needs before it runs a scene.
+  local function describe_study(definition)
     local own = type(definition.error) == "function"
     local lines = definition.lines
     return {
@@ -113,7 +108,7 @@ local function make(native, vector)
     }
   end
 
-  -- A column of numbers in a row, `width` each, as the values that graph code knows.
+  -- The values of a flat column, of `width` numbers each.
   local function column_of(flat, width)
     if width == 1 then return flat end
     local values = {}
@@ -140,7 +135,7 @@ local function make(native, vector)
   return {
     define = define,
     definition_of = function(value) return definitions[value] end,
-    describe = describe,
+    describe = describe_study,
     error_of = error_of,
   }
 end

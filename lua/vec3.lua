@@ -2,10 +2,10 @@
 --
 -- They are const structs: assigning a component is an error of the language, and compiled traces keep them in
 -- registers, so arithmetic on them allocates nothing. The functions are vararg because the trace compiler starts no
--- trace at such a function: they are called so often that it would, in vain, and then refuse the loops that they are
--- called from. And none ends in a tail call, hence the parentheses: the compiler gives up after fifteen of them.
+-- trace at such a function: they are called so often that it would, in vain, and then refuse the loops that call them.
+-- And none ends in a tail call, hence the parentheses: the compiler gives up after fifteen tail calls.
 local ffi = require "ffi"
-local words = require "words"
+local describe = require "describe"
 
 -- Locals: in a trace they are constants, and a global is looked up.
 local sqrt, sin, acos = math.sqrt, math.sin, math.acos
@@ -14,12 +14,7 @@ local istype, type = ffi.istype, type
 local vec3 = ffi.typeof "struct { const double x, y, z; }"
 local quat = ffi.typeof "struct { const double x, y, z, w; }"
 
--- As a message shows a value: a vec3 or a number as it is written, any other by its type.
-local function show(value)
-  local kind = type(value)
-  if kind == "cdata" or kind == "number" or kind == "nil" then return tostring(value) end
-  return "a " .. kind
-end
+local show = describe.operand
 
 local remedies = {
   ["+"] = "both must be a vec3",
@@ -78,12 +73,12 @@ local function lerp(...)
   return (vec3(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, a.z + (b.z - a.z) * t))
 end
 
--- Of values that have a text of their own.
+-- Of numbers, strings and vec3 values.
 local function concat(a, b)
   for _, value in ipairs { a, b } do
     local kind = type(value)
     if kind ~= "cdata" and kind ~= "string" and kind ~= "number" then
-      error(("attempt to concatenate %s"):format(words.article(value)), 2)
+      error(("attempt to concatenate %s"):format(describe.kind(value)), 2)
     end
   end
   return tostring(a) .. tostring(b)
@@ -132,20 +127,20 @@ ffi.metatype(vec3, {
   __call = function() error("a vec3 is not a function", 2) end,
   __concat = concat,
   __newindex = function(_, name)
-    error(("a vec3 has no %q, and can't be changed; make a new one: vec3(x, y, z)"):format(words.name(name)), 2)
+    error(("a vec3 has no %q, and can't be changed; make a new one: vec3(x, y, z)"):format(describe.name(name)), 2)
   end,
   __tostring = function(a)
     return ("vec3(%.9g, %.9g, %.9g)"):format(a.x, a.y, a.z)
   end,
   __index = function(...)
     local _, name = ...
-    -- Compared one after the other: in a trace nothing is left of it, where a look-up in a table leaves its checks.
+    -- Compared one after the other: traces fold the comparisons away, while a look-up in a table leaves its checks.
     if name == "cross" then return cross end
     if name == "dot" then return dot end
     if name == "length" then return length end
     if name == "lerp" then return lerp end
     if name == "normalized" then return normalized end
-    error(("a vec3 has no %q; it has x, y, z, dot, cross, length, normalized and lerp"):format(words.name(name)), 2)
+    error(("a vec3 has no %q; it has x, y, z, dot, cross, length, normalized and lerp"):format(describe.name(name)), 2)
   end,
 })
 
@@ -154,7 +149,7 @@ local function need_quat(what, value)
   if not istype(quat, value) then error(("%s takes a quat, not %s"):format(what, show(value)), 0) end
 end
 
--- v, turned: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
+-- v, rotated: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
 local function rotate(...)
   local q, v = ...
   if not istype(quat, q) then need_quat("q:rotate(v)", q) end
@@ -165,7 +160,7 @@ local function rotate(...)
     v.z + 2 * (w * z + q.x * y - q.y * x)))
 end
 
--- The turn back, for a quaternion of length 1.
+-- The inverse rotation, for a quaternion of length 1.
 local function inverse(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:inverse()", q) end
@@ -178,7 +173,7 @@ local function quat_length(...)
   return (sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w))
 end
 
--- Of length 1; zero becomes no turn.
+-- Of length 1; zero becomes the identity.
 local function quat_normalized(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:normalized()", q) end
@@ -187,14 +182,14 @@ local function quat_normalized(...)
   return (quat(q.x / size, q.y / size, q.z / size, q.w / size))
 end
 
--- The shortest turn from q (t = 0) to r (t = 1), at even speed; both of length 1.
+-- The shortest rotation from q (t = 0) to r (t = 1), at constant speed; both of length 1.
 local function slerp(...)
   local q, r, t = ...
   if not istype(quat, q) then need_quat("q:slerp(r, t)", q) end
   if not istype(quat, r) then need_quat("q:slerp(r, t)", r) end
   if type(t) ~= "number" then error(("q:slerp(r, t) takes a number t, not %s"):format(show(t)), 0) end
   local cosine = q.x * r.x + q.y * r.y + q.z * r.z + q.w * r.w
-  local sign = cosine < 0 and -1 or 1 -- r and -r are the same turn
+  local sign = cosine < 0 and -1 or 1 -- r and -r are the same rotation
   cosine = cosine * sign
   local a, b = 1 - t, t * sign
   if cosine < 0.9999995 then -- else the arc is a line, within rounding
@@ -206,7 +201,7 @@ local function slerp(...)
 end
 
 ffi.metatype(quat, {
-  -- The turn r, and then q.
+  -- The rotation r, and then q.
   __mul = function(...)
     local q, r = ...
     if not (istype(quat, q) and istype(quat, r)) then
@@ -220,7 +215,7 @@ ffi.metatype(quat, {
     return istype(quat, a) and istype(quat, b) and a.x == b.x and a.y == b.y and a.z == b.z and a.w == b.w
   end,
   __newindex = function(_, name)
-    error(("a quat has no %q, and can't be changed; make a new one: quat(x, y, z, w)"):format(words.name(name)), 2)
+    error(("a quat has no %q, and can't be changed; make a new one: quat(x, y, z, w)"):format(describe.name(name)), 2)
   end,
   __tostring = function(a)
     return ("quat(%.9g, %.9g, %.9g, %.9g)"):format(a.x, a.y, a.z, a.w)
@@ -234,7 +229,7 @@ ffi.metatype(quat, {
     if name == "rotate" then return rotate end
     if name == "slerp" then return slerp end
     error(("a quat has no %q; it has x, y, z, w, rotate, inverse, length, normalized and slerp"):format(
-      words.name(name)), 2)
+      describe.name(name)), 2)
   end,
 })
 

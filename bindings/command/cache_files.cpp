@@ -8,7 +8,7 @@ namespace rapid {
 
 CacheFiles find_cache(const std::string& text)
 {
-    // A file may be called like a pattern; then it is meant.
+    // A file whose name looks like a pattern takes precedence.
     if (std::filesystem::is_directory(text))
         throw Error("is a folder; name a file, or a sequence such as cache.####.vdb").at({text, 0});
     if (std::filesystem::exists(text)) return {text, false, {{0, text}}};

@@ -1,4 +1,4 @@
-// What a user names as a cache: one file, or the pattern of a sequence of them.
+// A cache by the name that a user gives: one file, or the pattern of a sequence of files.
 #pragma once
 
 #include <filesystem>
@@ -10,10 +10,10 @@ namespace rapid {
 struct CacheFiles {
     std::string text;
     bool sequence = false;
-    std::map<int, std::filesystem::path> frames;  // one, numbered 0, where it is no sequence
+    std::map<int, std::filesystem::path> frames;  // a single file has the number 0
 };
 
-// Error: nothing is there by that name, or it is a folder.
+// Error: no such file, or it is a folder.
 CacheFiles find_cache(const std::string& text);
 
 }  // namespace rapid

@@ -1,5 +1,5 @@
-// rapid check: everything that can be wrong before the first frame, without running one, and what is stiff; with
-// --races, whether kernels keep something from point to point, by running two.
+// rapid check: finds all errors that can be found before the first frame, and stiff nodes, without running a frame;
+// with --races, runs two frames to find kernels that keep state from point to point.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -39,7 +39,7 @@ public:
             const std::unique_ptr<Session> session = graph_.load(false, on_timeout);
             for (const std::string& warning : session->warnings()) print_warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
-            options.keep_all = races_;  // what no file asks for may be what tells
+            options.keep_all = races_;  // an attribute that no file needs may show the race
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) print_warning(warning);
             files_.resolve(plan, true);
@@ -64,7 +64,7 @@ private:
         }
     }
 
-    // The first frame is tried out for it, with a sample of the points. What is wrong there is for the run to tell.
+    // Tries out the first frame, with a sample of the points. Its errors are left to the run to report.
     static std::string advice_on(const Plan& plan)
     {
         try {

@@ -1,5 +1,5 @@
-// A piece of work in a process of its own, so that one that crashes, hangs in a script or ends the process is one
-// failure of many.
+// Work in a child process, so that a piece that crashes, hangs in a script or ends its process is only one failure of
+// many.
 #pragma once
 
 #include <functional>
@@ -10,16 +10,16 @@ namespace rapid {
 
 using TellParent = std::function<void(const nlohmann::json& event)>;
 
-// Forks. The child does `work`, tells events and ends; this process hears each as it comes. Empty, or how the child
-// ended where it did not end by itself: "signal 11 (Segmentation fault)", "status 1".
+// Forks. The child does `work`, tells events and ends; this process hears each as it comes. Returns an empty text, or
+// how the child ended abnormally: "signal 11 (Segmentation fault)", "status 1".
 //
-// This process must have no other threads (a child would inherit locks that nobody frees), so all that starts some,
-// sessions and the runtime, belongs into children. A child's standard output is standard error: what a script prints
-// does not get between the parent's results.
+// This process must have no other threads (a child would inherit locks that are never freed), so sessions and the
+// runtime, which start threads, belong in children. A child's standard output goes to standard error, so that output of
+// scripts does not mix with the parent's results.
 std::string run_in_child(const std::function<void(const TellParent& tell)>& work,
                          const std::function<void(const nlohmann::json& event)>& hear);
 
-// This process ends with its parent, however that ends.
+// Makes this process end when its parent does, however the parent ends.
 void end_with_parent(int parent);
 
 }  // namespace rapid

@@ -10,14 +10,14 @@
 namespace rapid {
 namespace {
 
-// A function's static, so that it is there before the first registration, whichever file that is in.
+// Static in a function, so that it exists before the first registration, in whichever file that is.
 std::vector<std::unique_ptr<Command> (*)()>& makers()
 {
     static std::vector<std::unique_ptr<Command> (*)()> all;
     return all;
 }
 
-// The number that `text` is, all of it.
+// Parses all of `text` as a number.
 template <class T>
 bool parse(std::string_view text, T& value)
 {

@@ -1,7 +1,7 @@
 // A command of `rapid`: one file in this folder, which registers itself; nothing else names it.
 //
-// Exit statuses are those of the contract: 0 done, 1 found while a frame ran (or a test failed, or a difference was
-// found), 2 found before. An Error that rises out of run() is one found before the first frame.
+// Exit statuses: 0 done; 1 an error while a frame ran, a failed test, a difference; 2 an error before the first frame,
+// which is any Error that rises out of run().
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -17,9 +17,9 @@ namespace rapid {
 
 enum ExitStatus : int { status_done = 0, status_failed = 1, status_refused = 2 };
 
-// What every command takes.
+// Options of every command.
 struct CommonOptions {
-    int threads = 0;  // 0: all that the machine has
+    int threads = 0;  // 0: as many as the machine has
     bool verbose = false;
     std::vector<std::string> plugins;  // files
 };
@@ -44,14 +44,14 @@ struct CommandRegistration {
     static const ::rapid::CommandRegistration registration_of_##Type( \
         []() -> std::unique_ptr<::rapid::Command> { return std::make_unique<Type>(); })
 
-// Text to standard output. Unlike fmt::print it does not throw where the reader has gone; main() reports what could not
-// be written.
+// Writes to standard output. Unlike fmt::print it does not throw when the reader has gone; main() reports a failure to
+// write.
 void print(std::string_view text);
-// To standard error: the error as it is, and its trace behind it with --verbose. Above a progress bar, if there is one.
+// Writes the error to standard error, and with --verbose its trace. Above a progress bar, if there is one.
 void print_error(const Error& error, bool verbose);
 void print_warning(const std::string& warning);
 
-// Values of options. Error: what was given, and what would be right.
+// Parse values of options. Errors quote the value and say which would be right.
 std::int64_t read_whole(const std::string& option, const std::string& text, std::int64_t least);
 std::uint64_t read_seed(const std::string& text);
 double read_positive(const std::string& option, const std::string& text);

@@ -1,4 +1,4 @@
-// rapid diff: compares two cache files, or two sequences frame by frame, point by point of the same id.
+// rapid diff: compares two cache files, or two sequences frame by frame; points are matched by id.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -63,7 +63,7 @@ private:
         return comparison.same ? status_done : status_failed;
     }
 
-    // A frame that one sequence alone has is a difference.
+    // A frame that only one sequence has is a difference.
     int compare_sequences(const CacheFiles& a, const CacheFiles& b) const
     {
         std::vector<int> both, only_a, only_b;

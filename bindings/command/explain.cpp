@@ -1,4 +1,4 @@
-// rapid explain: what of a scene is kept and what is left out, and why; and what one scene needs that another does not.
+// rapid explain: which parts of a scene are kept or left out, and why; and which ones a scene needs over another one.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -60,7 +60,7 @@ ordered_json json_of(const Explanation& plan)
             {"bytes_per_point", plan.bytes_per_point()}};
 }
 
-// Rows of a table: a name, and what is said of it, in columns.
+// Rows of a table in columns: a name, a fact and a reason.
 class Rows {
 public:
     void add(std::string name, std::string fact, std::string why)
@@ -128,7 +128,7 @@ std::string text_of(const Explanation& plan)
     return text + text_of(plan, false);
 }
 
-// What `one` keeps that `other` does not: nodes by type, as their names are each scene's own.
+// The part that `one` keeps and `other` does not. Nodes are compared by type, as names differ from scene to scene.
 Explanation surplus(const Explanation& one, const Explanation& other)
 {
     const auto lacks = [](const auto& all, const auto& key, const std::string& value) {

@@ -231,7 +231,7 @@ void FrameFiles::write_node(const std::string& pattern, const PointSet& points, 
 
 void FrameFiles::finish()
 {
-    // All of them, also where one failed: what the others hold is not lost for it.
+    // All writers, even after a failure, so that the frames that the others hold are not lost.
     std::exception_ptr first;
     for (auto& [key, writer] : writers_) try {
             writer->finish();

@@ -1,4 +1,4 @@
-// What a run writes: the files of -o and those of `:write` nodes, each pattern by a writer of its own.
+// The output files of a run: those of -o and of `:write` nodes. Each pattern has a writer of its own.
 #pragma once
 
 #include <filesystem>
@@ -26,7 +26,7 @@ public:
     // output to output, the one above. Error: one can't be made.
     std::vector<std::filesystem::path> folders() const;
 
-    // What the plan must keep alive for what -o asks for.
+    // Options of the plan, which must keep all attributes that -o names.
     PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
 
     // The -o as the user gave them.
@@ -41,7 +41,7 @@ public:
     // Queues the file of a `:write` node.
     void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
 
-    // Waits until all is written. Error: what could not be.
+    // Waits until all files are written. Error: one could not be.
     void finish();
 
     // The first name of each pattern and output, once it is known; then no more.

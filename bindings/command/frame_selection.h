@@ -1,4 +1,4 @@
-// The frames that -f names.
+// The frames of -f.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct FrameSelection {
     bool single() const { return first + step > last; }
 };
 
-// Error: what is wrong with the text, and what would be right.
+// Error: the text is not of this form.
 FrameSelection read_frames(const std::string& text);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// The options of all commands that load a graph, and the loading.
+// The options that all commands share which load a graph, and how it is loaded.
 #pragma once
 
 #include <filesystem>
@@ -20,13 +20,13 @@ public:
     const std::optional<std::uint64_t>& seed() const { return seed_; }
     const SessionOptions& session() const { return session_; }
 
-    // Error: what is wrong with the file or with --set. may_write, on_timeout, on_read: see SessionOptions.
+    // Error: the file or a --set is wrong. may_write, on_timeout, on_read: see SessionOptions.
     std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,
                                   std::function<void(const std::filesystem::path& file)> on_read = {}) const;
-    // Another graph, with the same limits; --set is of the first one only.
+    // Another graph, with the same limits; --set applies to the first one only.
     std::unique_ptr<Session> load_other(const std::string& file,
                                         std::function<void(const std::string& message)> on_timeout) const;
-    // Once more, as load() has done it, without a word, and to run kernels in another order.
+    // The graph of load() once more, with `print` silenced and with kernels in another order.
     std::unique_ptr<Session> load_again(const KernelOrder& order,
                                         std::function<void(const std::string& message)> on_timeout) const;
 

@@ -1,4 +1,4 @@
-// rapid info: what a cache file holds, or each file of a sequence.
+// rapid info: describes a cache file, or each file of a sequence.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

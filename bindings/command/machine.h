@@ -1,4 +1,4 @@
-// What run times depend on, for whoever reads them elsewhere.
+// The machine and the versions on which run times depend.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace rapid {
 
-// Processor, threads, system, and the versions of what Rapid is built with; names and values, in order.
+// Processor, threads, system, and the versions of compiler and libraries; names and values, in order.
 std::vector<std::pair<std::string, std::string>> describe_machine(int threads);
 
 }  // namespace rapid

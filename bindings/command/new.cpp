@@ -1,4 +1,4 @@
-// rapid new: a scene that runs and a test that passes, to begin with; and what editors and luacheck need to know Rapid.
+// rapid new: makes a scene that runs, a test that passes, and the settings by which editors and luacheck know Rapid.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -13,7 +13,8 @@
 #include <sstream>
 
 #include "bindings/command/command.h"
-#include "bindings/host/script_host.h"
+#include "bindings/host/modules.h"
+#include "bindings/host/session.h"
 
 namespace rapid {
 namespace {
@@ -35,7 +36,7 @@ std::string fill_in(const char* file, const std::string& name)
     return filled;
 }
 
-// Makes a file that is not there yet. False: it is. Error: it can't be written; nothing is left of it.
+// Makes a file. Returns false if it exists already. Error: it can't be written; nothing is left of it.
 bool make_file(const std::string& file, const std::string& text)
 {
     const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
@@ -97,7 +98,7 @@ private:
                             name_));
     }
 
-    // What is there stays: a second scene in a folder finds .luacheckrc and .luarc.json.
+    // An existing file is kept: a second scene in a folder finds .luacheckrc and .luarc.json.
     static void make(const std::string& file, const std::string& text)
     {
         if (make_file(file, text)) print(fmt::format("made {}\n", file));

@@ -1,4 +1,4 @@
-// rapid nodes: the node types, native and Lua-authored, as their declarations tell of them.
+// rapid nodes: documents the node types, native and Lua-authored, from their declarations.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// A default in JSON; what JSON has no form for, as a message shows it.
+// A default in JSON; a value that JSON has no form for is written as in messages.
 ordered_json json_of(const Value& value)
 {
     if (value.is_nil()) return nullptr;

@@ -1,4 +1,4 @@
-// What stands behind a parameter's documentation, on its page and in an editor.
+// The facts behind a parameter's documentation, on its page and in an editor.
 #pragma once
 
 #include <string>

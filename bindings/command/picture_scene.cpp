@@ -9,15 +9,15 @@
 namespace rapid {
 namespace {
 
-// A shape without a surface mesh is infinite. Of those a picture can show a plane: its distance is n · x - offset, and
-// five points tell whether it is.
+// A shape without a surface mesh is infinite. Among infinite shapes a picture can show planes. The distance of a plane
+// is n · x - offset, which five points verify.
 std::optional<PictureScene::Plane> plane_of(const Shape& shape)
 {
     const std::array<Vec3d, 5> P = {Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, 0, 1), Vec3d(-3, 5, 7)};
     std::array<double, 5> phi{};
     shape.distance(P, phi, {});
     const PictureScene::Plane plane{Vec3d(phi[1], phi[2], phi[3]) - Vec3d::Constant(phi[0]), -phi[0]};
-    // Each of them is rounded where it is computed: as far as |offset| from zero.
+    // Each distance is rounded at a magnitude of up to |offset|.
     const double rounding = 1e-9 * (1 + std::abs(phi[0]));
     const bool linear = std::abs(plane.normal.dot(P[4]) - plane.offset - phi[4]) <= 100 * rounding;
     if (!linear || std::abs(plane.normal.norm() - 1) > rounding) return std::nullopt;
@@ -54,7 +54,7 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
     auto scene = std::make_shared<PictureScene>();
     bool moves = false;
     for (const PlannedNode& planned : plan_.nodes) {
-        // What adds a dynamic is in the points' way; anything else is where they come from.
+        // Shapes of dynamics are colliders; those of all other nodes emit points.
         const auto role =
             planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
         const PlannedSimulation& simulation = plan_.simulations[planned.simulation];

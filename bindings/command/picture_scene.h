@@ -1,4 +1,4 @@
-// What a picture shows besides the points: the shapes that a plan's points collide with or are born from.
+// The shapes of a picture: those that a plan's points collide with or are born from.
 #pragma once
 
 #include <map>
@@ -13,8 +13,8 @@ class SceneOfPlan {
 public:
     explicit SceneOfPlan(const Plan& plan) : plan_(plan) {}
 
-    // Arguments that are functions, and motions, are asked at the frame's time. Level sets are turned into meshes, each
-    // once.
+    // Functions of the frame and motions are evaluated at the frame's time. Each level set is turned into a mesh, once
+    // only.
     std::shared_ptr<const PictureScene> at(std::int64_t frame);
 
 private:
@@ -22,7 +22,7 @@ private:
 
     const Plan& plan_;
     std::map<ObjectPtr, MeshPtr> surfaces_;
-    std::shared_ptr<const PictureScene> still_;  // where nothing moves
+    std::shared_ptr<const PictureScene> still_;  // if nothing moves
 };
 
 }  // namespace rapid

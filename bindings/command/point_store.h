@@ -1,5 +1,5 @@
-// Point sets by frame, for processes of one command to hand on: a nameless file in memory, which is gone when the last
-// of them ends.
+// Point sets by frame that the processes of one command share: an anonymous file in memory, which is gone when the last
+// of these processes ends.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace rapid {
 
 class PointStore {
 public:
-    // Made before the processes that share it. Error: the system has no memory for it.
+    // Make it before the processes that share it. Error: the system has no memory for it.
     PointStore();
     ~PointStore();
     PointStore(const PointStore&) = delete;
@@ -18,7 +18,7 @@ public:
 
     // Columns without groups; frames in the order in which they will be read.
     void keep(std::int64_t frame, const PointSet& points);
-    // Reads on from `place`, 0 at first. Error: the next frame is another one.
+    // Reads the frame at `place`, 0 at first, and advances it. Error: it is another frame.
     PointSet read(std::int64_t frame, std::uint64_t& place) const;
 
 private:

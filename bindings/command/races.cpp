@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// What a node left at a frame.
+// The points after a node, at a frame.
 struct Result {
     std::string node;
     Location location;
@@ -20,7 +20,7 @@ struct Result {
 };
 
 struct Difference {
-    const Result* result;           // of the run in order, after which the sets differ
+    const Result* result;           // of the run in order, the first that differs
     std::string what, here, there;  // "heat of point id 3", "1", "2"
 };
 
@@ -93,10 +93,10 @@ std::optional<Difference> compare_details(const PointSet& a, const PointSet& b)
     return std::nullopt;
 }
 
-// The first difference of two sets that should be the same, bit by bit.
+// The first difference in the bits of two sets that should be the same.
 std::optional<Difference> compare(const PointSet& a, const PointSet& b)
 {
-    // Where points were killed or sorted, the values beside their ids are of no interest.
+    // Where ids differ, as points were killed or sorted, their values are of no interest.
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
         if (a.id()[i] != b.id()[i])
             return Difference{nullptr, fmt::format("the id at place {}", i + 1), text_of(a.id()[i]),
@@ -129,7 +129,7 @@ struct Trials {
     const std::function<void(const std::string& message)>& on_timeout;
     const std::vector<Result>& expected;
 
-    // Computes the frames in another order; each node's result is compared as soon as it is there.
+    // Computes the frames in another order, and compares the result of each node.
     std::optional<Difference> run(const KernelOrder& order) const
     {
         const std::unique_ptr<Session> session = graph.load_again(order, on_timeout);
@@ -156,9 +156,9 @@ bool has_kernel(const Node& node)
     return false;
 }
 
-// What an action does shows only after its Solve, and what a kernel does to the points that another one then asks for
-// may show late: each kernel of the plan is put into the other order alone, and the first that makes a difference is
-// the one.
+// The effect of an action shows only after its Solve, and that of a kernel may show only in later nodes. So each kernel
+// of the plan is run in the other order alone: the first one that makes a difference is the culprit. Failing that, it
+// is the node after which a difference was seen.
 std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan& plan, const Difference& seen,
                                                 KernelOrder order)
 {
@@ -179,8 +179,8 @@ std::optional<Error> find_race(const GraphOptions& graph, const Plan& plan, cons
 {
     const std::vector<Result> expected = results_in_order(plan);
     const Trials trials{graph, options, on_timeout, expected};
-    for (const KernelOrder::Way way : {KernelOrder::Reversed, KernelOrder::TwoStates}) {
-        const KernelOrder order{way, ""};
+    for (const KernelOrder::Sequence sequence : {KernelOrder::Reversed, KernelOrder::TwoStates}) {
+        const KernelOrder order{sequence, ""};
         const std::optional<Difference> seen = trials.run(order);
         if (!seen) continue;
         const auto [found, culprit] = find_culprit(trials, plan, *seen, order);
@@ -190,8 +190,8 @@ std::optional<Error> find_race(const GraphOptions& graph, const Plan& plan, cons
             "frame {}: {}{} is {} in the order of the points, and {} {}; a kernel must not remember other points: keep "
             "what it needs in an attribute of the point, or find it once for the whole set in :detail",
             found.result->frame, found.what, after, found.here, found.there,
-            way == KernelOrder::Reversed ? "in reverse order"
-                                         : "where every other point is worked on in another state"));
+            sequence == KernelOrder::Reversed ? "in reverse order"
+                                              : "where every other point is worked on in another state"));
         error.at(culprit->location).in_node(culprit->name);
         return error;
     }

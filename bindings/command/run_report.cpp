@@ -70,7 +70,7 @@ int RunReport::fail(const Error& error)
 
 void RunReport::abandon(int status, const std::string& why)
 {
-    // The run's own thread holds the lock for moments only, unless its terminal is stopped; then go without.
+    // The run's own thread holds the lock only briefly, unless its terminal is stopped; then do without it.
     if (mutex_.try_lock_for(std::chrono::seconds(1))) {
         if (progress_) progress_->finish();
         print_error(Error(why), false);

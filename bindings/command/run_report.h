@@ -1,4 +1,4 @@
-// What `rapid run` tells while it runs and when it ends, however it ends.
+// The output of `rapid run` while it runs and when it ends, however it ends.
 #pragma once
 
 #include <functional>
@@ -32,14 +32,14 @@ public:
     void begin(std::int64_t first, std::int64_t last);
     void frame(const FrameResult& result);
     void line(const std::string& text);
-    // Once, with the frame where it is of one: what is doubtful in one frame often is in the next ones.
+    // Each text once, with its frame if it has one: warnings tend to repeat in the next frames.
     void warning(const std::string& text, std::optional<std::int64_t> frame = {});
 
     // The statistics file and the summary. Error: the file can't be written.
     void finish();
-    // An error that ends the run: says it, and writes the statistics of the frames so far.
+    // An error that ends the run: reports it, and writes the statistics of the frames so far.
     int fail(const Error& error);
-    // From another thread, at any moment: says why, writes the statistics, removes what is unfinished, ends the
+    // From another thread, at any moment: says why, writes the statistics, removes unfinished files, and ends the
     // process.
     [[noreturn]] void abandon(int status, const std::string& why);
 

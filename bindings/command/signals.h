@@ -1,5 +1,5 @@
-// Ends a run that the user (Ctrl-C) or the system (SIGTERM) wants ended, from an ordinary thread: locks may be taken
-// and files written there, which a signal handler can't do.
+// Ends a run on Ctrl-C or SIGTERM from an ordinary thread, which may take locks and write files; a signal handler may
+// not.
 #pragma once
 
 #include <atomic>
@@ -10,8 +10,8 @@ namespace rapid {
 
 class SignalThread {
 public:
-    // `end` gets the signal and must not return. Made before any other thread, which then inherits that these signals
-    // are not its own. A signal that was ignored when the program started (nohup) stays so.
+    // `end` gets the signal and must not return. Make it before any other thread, as threads inherit the mask that
+    // blocks these signals. A signal that was ignored when the program started (nohup) stays ignored.
     explicit SignalThread(std::function<void(int signal)> end);
     ~SignalThread();
     SignalThread(const SignalThread&) = delete;

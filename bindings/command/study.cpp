@@ -1,7 +1,7 @@
 // rapid study: error against run time, of the scenes of a study file or of any graph by --sweep.
 //
-// This process only keeps the books: the file is read, and each scene run, in a process of its own, so that a setting
-// that crashes or never ends is one failed row of the table.
+// This process only coordinates: the file is read, and each scene run, in a child process, so that a setting that
+// crashes or never ends is only a failed row of the table.
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <tbb/info.h>
@@ -39,7 +39,7 @@ Value read_value_of(const std::string& option, const std::string& text)
     return Value(text);
 }
 
-// "solve.substeps=1,2,4" -> its name and its texts.
+// "solve.substeps=1,2,4" -> the name and the values.
 std::pair<std::string, std::vector<std::string>> split_setting(const std::string& option, const std::string& text)
 {
     const std::size_t equals = text.find('=');
@@ -98,7 +98,7 @@ private:
     bool drawn_ = false;
 };
 
-// What a child told at its end, or how it ended without.
+// The result that a child told, or how it ended without one.
 struct Outcome {
     json event;
     std::string failed;
@@ -189,7 +189,7 @@ public:
     }
 
 private:
-    // The study that the options make of a graph.
+    // The study of a graph that the options describe.
     Study asked() const
     {
         Study study;
@@ -230,7 +230,7 @@ private:
         return study;
     }
 
-    // Error: what is wrong with the file, the graph or the options, found before any scene is run.
+    // Error: the file, the graph or the options are wrong; found before any scene is run.
     Study describe(const StudySource& source) const
     {
         if (!source.is_graph)
@@ -249,7 +249,7 @@ private:
         return described;
     }
 
-    // Error: it can't be written to, which is better known before the runs than after them.
+    // Error: it can't be written to; better found before the runs than after.
     void open_folder() const
     {
         std::error_code failure;
@@ -281,12 +281,12 @@ private:
     }
 
     struct Reference {
-        std::string label;  // of the knobs that it was run with; empty: closed forms need no run
+        std::string label;  // of its knobs; empty for a closed form, which needs no run
         PointStore store;
         Outcome outcome;
     };
 
-    // Rows of one line share a reference; it is kept until another one is asked for.
+    // Rows of one line share a reference, which is kept until another one is needed.
     const Reference& reference_of(const StudySource& source, const Study& study, const Knobs& knobs,
                                   StudyProgress& progress)
     {

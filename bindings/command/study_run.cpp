@@ -58,14 +58,14 @@ struct Scene {
     Graph graph;
 };
 
-// Empty knobs: of a study file no scene; of a graph the one that it is.
+// Without knobs a study file makes no scene, and a graph is the scene itself.
 Scene load(const StudySource& source, const Knobs& knobs, const TellParent& tell)
 {
     SessionOptions options = source.session;
     if (!source.is_graph) options.knobs = knobs;
     options.on_timeout = [tell](const std::string& message) {
         tell({{"failed", message}, {"refused", false}});
-        _exit(status_done);  // it is told
+        _exit(status_done);  // the parent knows
     };
     Scene scene;
     scene.session = std::make_unique<Session>(source.file, std::move(options));
@@ -94,9 +94,9 @@ bool is_compared(const Study& study, std::int64_t frame)
     return study.last_frame_only ? frame == study.last : frame > study.first && frame <= study.last;
 }
 
-// What rounding the state to single precision once a frame may have added to a position after n frames, m: each step
-// adds up to half an ulp of P and of v times what is left of t, in both directions, so that n of them grow as their
-// root.
+// The rounding error of a position after n frames, m, as the state is rounded to single precision once a frame: each
+// frame adds up to half an ulp of P, and of v times the remaining time, in both directions, so that n such errors grow
+// as sqrt(n).
 double rounding_of(const PointSet& points, std::int64_t frames, double time)
 {
     const auto ulp_of_largest = [&](const Column<Vec3f>& column) {
@@ -108,7 +108,7 @@ double rounding_of(const PointSet& points, std::int64_t frames, double time)
            2;
 }
 
-// The error of a run, gathered frame by frame.
+// The error of a run, accumulated frame by frame.
 class Measure {
 public:
     Measure(const Study& study, const Session& session) : study_(study), session_(session) {}
@@ -126,7 +126,7 @@ public:
         const IdMatch match = match_by_id(points, reference);
         row_.missing += match.only_a.size() + match.only_b.size();
         row_.compared += match.a.size();
-        if (match.a.empty()) return;  // reordered() takes no places for all
+        if (match.a.empty()) return;  // reordered() takes an empty list for all points
         if (study_.error == "own") {
             own_ = std::max(own_, session_.study_error(reordered(points, match.a), reordered(reference, match.b)));
             return;
@@ -137,7 +137,7 @@ public:
                 (points.P()[match.a[i]].cast<double>() - reference.P()[match.b[i]].cast<double>()).norm());
     }
 
-    // Error: there is no number.
+    // Error: the run has no error that is a number.
     StudyRow row() const
     {
         if (!study_.compares() && !constrained_)
@@ -170,11 +170,11 @@ private:
     StudyRow row_;
     double own_ = -std::numeric_limits<double>::infinity();
     double residual_ = 0;
-    bool constrained_ = false;  // there was something that could have one
+    bool constrained_ = false;  // some frame had constraints
     std::vector<double> distances_;
 };
 
-// Computes all frames; `keep` sees those that are compared. s.
+// Computes all frames, and gives those that are compared to `keep`. Returns the time, s.
 double run_frames(const Plan& plan, const Study& study,
                   const std::function<void(const FrameResult& result, const PointSet& points)>& keep)
 {
@@ -188,7 +188,7 @@ double run_frames(const Plan& plan, const Study& study,
     return stopwatch.seconds();
 }
 
-// Tells what `work` raises. `started` is set by it when its first frame is due.
+// Tells the error that `work` raises. It sets `started` when its first frame is due.
 void guarded(const StudySource& source, const TellParent& tell, const std::function<void(bool& started)>& work)
 {
     Threads threads(source.threads);
@@ -243,7 +243,7 @@ void describe_study(const StudySource& source, const Study& asked, bool default_
     guarded(source, tell, [&](bool&) {
         Study study = asked;
         if (source.is_graph) {
-            // The reference's knobs are looked at too: a misspelt node is found before any run.
+            // Loads it with the knobs of a row, so that a misspelt node is found before any run.
             Knobs knobs = study.rows().front();
             const Scene scene = load(source, knobs, tell);
             const Plan plan(scene.graph, {source.seed, {}});
@@ -278,8 +278,8 @@ void run_row(const StudySource& source, const Study& study, const Knobs& knobs, 
         const Scene scene = load(source, knobs, tell);
         Measure measure(study, *scene.session);
         std::vector<double> seconds;
-        // The first run warms caches, compiled kernels and the allocator, and is the one that is measured in metres:
-        // every run of a scene gives the same bits. Each has a plan of its own, so that none finds another's shapes.
+        // The first run warms caches, compiled kernels and the allocator, and measures the error: each run of a scene
+        // gives the same bits. Each run has a plan of its own, so that it does not reuse the shapes of another.
         for (int run = 0; run <= study.repeat_runs; ++run) {
             const Plan plan = plan_of(scene, source, study);
             started = true;

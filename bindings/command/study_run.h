@@ -1,5 +1,5 @@
-// The scenes of a study, run and measured. Every function here starts threads and runs scripts: call it in a process of
-// its own (child.h).
+// Runs and measures the scenes of a study. Every function here starts threads and runs scripts: call it in a child
+// process (child.h).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -13,7 +13,7 @@
 
 namespace rapid {
 
-// Where the scenes of a study come from.
+// The source of a study's scenes.
 struct StudySource {
     std::string file;
     bool is_graph = false;  // its knobs are arguments, NODE.PARAM; else a study file, which makes a scene of its knobs
@@ -24,7 +24,7 @@ struct StudySource {
 
 // Each tells one event, besides those of progress: {"failed": why, "refused": whether no frame was computed}, or
 //
-//   {"study": ...}  what the study file asks; of a graph, `asked` with its frames. Scenes are not run.
+//   {"study": ...}  the description of the study file; for a graph, `asked` with its frames. Runs no scene.
 //   {"kept": true}  the frames of the reference's scene are in `store`.
 //   {"row": ...}    a row, read by read_row(); after each of its runs {"run": how many are done}.
 void describe_study(const StudySource& source, const Study& asked, bool default_frames, const TellParent& tell);

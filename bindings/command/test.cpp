@@ -1,5 +1,5 @@
-// rapid test: script-level tests. Each file runs in a process of its own, so that one that crashes, hangs in a script
-// or ends the process is one failure, and the others run.
+// rapid test: script-level tests. Each file runs in a child process, so that one that crashes, hangs in a script or
+// ends its process is one failure, and the others run.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
@@ -22,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// Where a child finds the pipe to tell its parent of the tests: a JSON object a line.
+// A child's end of the pipe on which it tells its parent of the tests: one JSON object per line.
 constexpr int report_descriptor = 3;
 
-// test_*.lua below a folder, in order of path; any other file as it is.
+// test_*.lua below a folder, sorted by path; any other file as it is.
 std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
 {
     std::vector<fs::path> files;
@@ -48,7 +48,7 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
     return files;
 }
 
-// The child: runs the tests of one file and tells of each.
+// The child: runs the tests of one file and reports each.
 int run_child(const std::string& file, const TestOptions& options)
 {
     const auto send = [](const json& event) {
@@ -77,7 +77,7 @@ public:
             ->type_name("")
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(TestReport::formats), std::end(TestReport::formats))));
-        // Our own: the process of one file.
+        // Internal: the process of one file.
         app.add_option("--child-of", parent_)->group("");
         app.add_option("--already-run", already_run_)->group("");
     }
@@ -111,14 +111,14 @@ private:
                 }};
     }
 
-    // After a test that ended its process, the file goes on behind that test.
+    // If a test ends its process, a new process goes on with the next test of the file.
     void run_file(const std::string& program, const fs::path& file, const CommonOptions& common)
     {
         int already_run = 0;
         while (true) {
             const Ending ending = run_process(program, file, common, already_run);
             if (ending.orderly) return;
-            // Its own words, if it had any, are on standard error already.
+            // Its message, if any, is on standard error already.
             if (ending.running.empty())
                 return add({TestEvent::Broken, file.string(), "", "the tests ended with " + ending.how});
             add({TestEvent::Failed, file.string(), ending.running,
@@ -129,7 +129,7 @@ private:
 
     struct Ending {
         bool orderly;
-        std::string how;      // where it is not: "signal 9 (Killed)"
+        std::string how;      // if it did not end by itself: "signal 9 (Killed)"
         std::string running;  // the test that was running then
         int started;          // tests, in this process
     };
@@ -171,7 +171,7 @@ private:
         return child;
     }
 
-    // Reads what the child tells, to its end.
+    // Reads the events of the child until it ends.
     Ending follow(int descriptor, const std::string& file)
     {
         const std::unique_ptr<std::FILE, decltype(&std::fclose)> pipe(fdopen(descriptor, "r"), &std::fclose);

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// Each line of a text behind a prefix.
+// The text with a prefix before each line.
 std::string prefixed(const std::string& prefix, std::string text)
 {
     const std::string next = '\n' + prefix;
@@ -42,7 +42,7 @@ private:
     bool verbose_;
 };
 
-// Test Anything Protocol, version 13: a line a test as it ends, messages as comments, the plan last.
+// Test Anything Protocol, version 13: a line for each test as it ends, messages as comments, the plan last.
 class TapReport : public TestReport {
 public:
     TapReport() { print("TAP version 13\n"); }
@@ -93,7 +93,7 @@ std::string xml(const std::string& text)
     return escaped;
 }
 
-// A suite a file; its counts stand before its tests, so it is printed when all have ended.
+// One suite per file. Its counts come before its tests, so it is printed when all tests have ended.
 class JUnitReport : public TestReport {
 public:
     void add(const TestResult& result) override

@@ -1,10 +1,10 @@
-// What `rapid test` prints: failures in words, TAP 13 for test harnesses, or JUnit's XML for build servers.
+// The output of `rapid test`: plain text, TAP 13 for test harnesses, or JUnit's XML for build servers.
 #pragma once
 
 #include <memory>
 #include <string>
 
-#include "bindings/host/test_host.h"
+#include "bindings/host/testing/run_tests.h"
 
 namespace rapid {
 
@@ -24,7 +24,7 @@ struct TestCounts {
 
 class TestReport {
 public:
-    // verbose: tells of tests that pass, too.
+    // verbose: reports tests that pass, too.
     static std::unique_ptr<TestReport> make(const std::string& format, bool verbose);
     static constexpr const char* formats[] = {"text", "tap", "junit"};
 

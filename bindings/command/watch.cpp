@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int tell_descriptor = 3;  // of the run
-constexpr int settle_time = 100;    // ms without a further change: editors and exporters write several files at once
+constexpr int tell_descriptor = 3;  // in the child
+constexpr int settle_time = 100;    // ms without a change: editors and exporters write several files in a row
 
 sigset_t watched_signals()
 {
@@ -40,7 +40,7 @@ int checked(int descriptor, const char* what)
     return descriptor;
 }
 
-// This process's command line, with tell_option: a run that has it does not watch.
+// This process's command line with tell_option added: a run that has it does not watch.
 std::vector<std::string> arguments_of_run()
 {
     std::ifstream file("/proc/self/cmdline", std::ios::binary);
@@ -57,7 +57,7 @@ fs::path whole_path(const fs::path& path) { return fs::absolute(path).lexically_
 void Watch::tell(const fs::path& file)
 {
     const std::string line = whole_path(file).string() + '\n';
-    [[maybe_unused]] const ssize_t ignored = write(tell_descriptor, line.data(), line.size());  // nobody reads any more
+    [[maybe_unused]] const ssize_t ignored = write(tell_descriptor, line.data(), line.size());  // it may have gone
 }
 
 Watch::Watch(fs::path graph, bool quiet)
@@ -85,7 +85,7 @@ int Watch::run()
     bool running = true;
     while (true) {
         std::array<pollfd, 3> ready = {{{notify_, POLLIN, 0}, {signals_, POLLIN, 0}, {told_, POLLIN, 0}}};
-        // A run that is being stopped is waited for, then the changes settle.
+        // First the run that is being stopped must end, then the changes settle.
         const bool settling = !changed_.empty() && child_ == 0;
         const int events = poll(ready.data(), ready.size(), settling ? settle_time : -1);
         if (events < 0 && errno != EINTR) throw Error(fmt::format("--watch: {}", std::strerror(errno)));
@@ -109,7 +109,7 @@ int Watch::run()
     }
 }
 
-// The run's end, once: what is watched now is what this run read.
+// Once at the end of the run, says how many files are watched: those that it read.
 void Watch::collect(bool& running)
 {
     if (child_ != 0 && waitpid(child_, nullptr, WNOHANG) == child_) child_ = 0;
@@ -157,18 +157,18 @@ void Watch::start()
     if (error != 0) throw Error(fmt::format("--watch: the run can't be started: {}", std::strerror(error)));
 }
 
-// The frames that are complete stay; the run removes what is not.
+// Complete frames stay; the run removes unfinished files.
 void Watch::stop() { kill(child_, SIGTERM); }
 
 void Watch::add(const fs::path& file)
 {
     std::error_code none;
-    for (const fs::path& path : {file, fs::weakly_canonical(file, none)}) {  // what a link points to changes, too
+    for (const fs::path& path : {file, fs::weakly_canonical(file, none)}) {  // the target of a link may change, too
         if (path.empty() || !files_.insert(path).second) continue;
         const int number = inotify_add_watch(notify_, path.parent_path().c_str(),
                                              IN_CLOSE_WRITE | IN_MOVED_TO | IN_MOVED_FROM | IN_DELETE);
-        if (number >= 0) folders_[number] = path.parent_path();  // a folder that is not there holds nothing
-        // It may have changed before its folder was watched. (A clock that goes wrong may have dated it in the future.)
+        if (number >= 0) folders_[number] = path.parent_path();  // fails for a folder that does not exist
+        // It may have changed before its folder was watched. (A wrong clock may have dated it in the future.)
         const auto written = fs::last_write_time(path, none);
         if (!none && written > started_ && written <= fs::file_time_type::clock::now()) changed_.insert(path);
     }
@@ -210,7 +210,7 @@ void Watch::read_signals()
         if (info.ssi_signo == SIGCHLD) continue;
         ended_by_ = static_cast<int>(info.ssi_signo);
         if (child_ != 0)
-            kill(child_, ended_by_);  // of a terminal's Ctrl-C the run knows already: it is one end all the same
+            kill(child_, ended_by_);  // on Ctrl-C the terminal has signalled it already; twice does no harm
     }
 }
 

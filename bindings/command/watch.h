@@ -1,6 +1,6 @@
 // rapid run --watch: runs the graph again whenever a file changes that the last run read, or would have read.
 //
-// Each run is a process of its own, so that a scene that crashes, or never ends, ends nothing but its run. The run
+// Each run is a process of its own, so that a scene that crashes or never ends does not end the watch. The run
 // tells which files it reads; their folders are watched (inotify), so that an editor that saves by renaming is seen,
 // and a file that did not exist yet.
 #pragma once
@@ -40,8 +40,8 @@ private:
     const bool quiet_;
     const int notify_, signals_;  // descriptors: inotify, signalfd
     int told_ = -1;               // the pipe from the run
-    std::string told_text_;       // of it, what is no whole line yet
-    int child_ = 0;               // 0: none runs
+    std::string told_text_;       // of it, the part that is not yet a whole line
+    int child_ = 0;               // 0: no run
     int ended_by_ = 0;            // a signal that ends the watch
     std::filesystem::file_time_type started_;
 

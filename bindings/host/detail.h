@@ -1,24 +1,21 @@
-// Functions over a whole set of points, written in Lua: what :detail runs.
+// Functions over a whole set of points, written in Lua: the runs of :detail.
 #pragma once
 
-#include "runtime/graph/node.h"
+#include <map>
+#include <string>
 
-struct lua_State;
+#include "runtime/graph/node.h"
 
 namespace rapid {
 
 class Kernel;
-class State;
 struct KernelArguments;
 
-// Runs the function once, in the main state: function(points, frame, params). Points that it added are appended, with
-// ids of their own, and those that it killed removed, when it ends. Error: what it raised, with the frame.
+// Runs the function once, in the main state: function(points, frame, params). When it ends, the points that it added
+// are appended, with ids of their own, and those that it killed are removed. Error: what it raised, with the frame.
 void run_detail(const Kernel& function, Flow& flow, const Evaluation& now, const KernelArguments& arguments);
 
-// As scripts see it.
-Value value_of(const DetailValue& detail);
-
-// Pushes the table of native functions that lua/detail.lua is given.
-void push_detail_natives(State& state);
+// As scripts see them.
+std::map<std::string, Value> values_of(const std::map<std::string, DetailValue, std::less<>>& details);
 
 }  // namespace rapid

@@ -1,5 +1,5 @@
-// What graph code makes besides nodes (meshes, level sets, shapes, points, motions): each maker is declared once, with
-// parameters that are checked and documented as those of nodes are.
+// Makers of the objects of graph code (meshes, level sets, shapes, points, motions): each is declared once, with
+// parameters that are checked and documented like those of nodes.
 //
 //   struct MeshSphere {
 //       double radius; int divisions; Vec3d center;
@@ -22,7 +22,7 @@ namespace rapid {
 struct MakeContext {
     std::filesystem::path folder;  // of the graph file: relative paths start there
     std::vector<std::string>& warnings;
-    bool may_write;  // false in check, explain and test: nothing is written
+    bool may_write;  // false in check, explain and test, which write nothing
     std::function<void(const std::filesystem::path& file)> on_read;  // may be empty
 
     // The path of a file that will be read.

@@ -32,15 +32,15 @@ bool identical(const Value& a, const Value& b)
     return *a.get<ObjectPtr>() == *b.get<ObjectPtr>();
 }
 
-void MadeBefore::begin_call()
+void MakerCache::begin_call()
 {
-    last_ = std::move(made_);
-    made_.clear();
+    last_ = std::move(current_);
+    current_.clear();
 }
 
-ObjectPtr MadeBefore::find(const Maker& maker, const Table& arguments) const
+ObjectPtr MakerCache::find(const Maker& maker, const Table& arguments) const
 {
-    for (const auto* entries : {&made_, &last_})
+    for (const auto* entries : {&current_, &last_})
         for (const Entry& entry : *entries)
             if (entry.maker == &maker && identical(*entry.arguments, arguments)) return entry.object;
     return nullptr;

@@ -1,30 +1,48 @@
-// What a function of the frame made when it was called last: an equal call of a constructor is answered with that
-// object, so that what stays the same is not built again, and all that is kept by its identity stays valid.
+// The objects that a function of the frame made in its last call: a constructor that is called again with the same
+// arguments returns the same object, so that nothing is built twice, and caches by identity stay valid.
 //
-// Of two calls only: a function that returns another shape at each frame holds two of them, not one a frame.
+// It holds the objects of two calls: a function that returns another shape at each frame keeps two shapes, not one a
+// frame.
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "bindings/host/maker.h"
 
 namespace rapid {
 
-class MadeBefore {
+class MakerCache {
 public:
-    // Forgets all that the last call did not make.
-    void begin_call();
-
-    // The object that was made before of equal arguments, else what make() makes.
+    // The cached object of equal arguments, else the object that make() returns.
     template <class F>
     ObjectPtr get(const Maker& maker, std::shared_ptr<const Table> arguments, const F& make)
     {
         ObjectPtr object = find(maker, *arguments);
         if (!object) object = make();
-        made_.push_back({&maker, std::move(arguments), object});
+        current_.push_back({&maker, std::move(arguments), object});
         return object;
     }
+
+    // Forgets all objects that the last call did not make.
+    void begin_call();
+
+    // A call of the function: for as long as it lives, `active` points to its cache.
+    class Call {
+    public:
+        Call(MakerCache& cache, MakerCache*& active) : active_(active), before_(std::exchange(active, &cache))
+        {
+            cache.begin_call();
+        }
+        ~Call() { active_ = before_; }
+        Call(const Call&) = delete;
+        Call& operator=(const Call&) = delete;
+
+    private:
+        MakerCache*& active_;
+        MakerCache* before_;
+    };
 
 private:
     struct Entry {
@@ -34,10 +52,10 @@ private:
     };
     ObjectPtr find(const Maker& maker, const Table& arguments) const;
 
-    std::vector<Entry> last_, made_;  // in the call before, and in this one
+    std::vector<Entry> last_, current_;  // of the call before, and of this one
 };
 
-// Whether two values can't be told apart: numbers by their bits, objects by identity. Functions never are.
+// Whether two values can't be told apart: numbers by their bits, objects by identity. Functions always can.
 bool identical(const Value& a, const Value& b);
 
 }  // namespace rapid

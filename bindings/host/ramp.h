@@ -1,4 +1,4 @@
-// A ramp: keys {position, value} of a script node's parameter, which its kernel gets as a function of the position.
+// A ramp: keys {position, value} of a script node's parameter. Its kernel gets a function of the position.
 #pragma once
 
 #include <utility>
@@ -17,7 +17,7 @@ public:
     std::vector<std::pair<double, Value>> keys;
 };
 
-// Error: no list of keys; says what was found.
+// Error: the value is not a list of keys.
 std::shared_ptr<const Ramp> read_ramp(const Param& param, const Value& value);
 
 }  // namespace rapid

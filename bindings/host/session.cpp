@@ -18,7 +18,7 @@ const std::vector<std::string>& Session::warnings() const { return host_->warnin
 
 Registry Session::all_node_types()
 {
-    ScriptHost host{SessionOptions{}};
+    ScriptHost host({}, SessionOptions{});
     host.load_shipped_nodes();
     return host.registry;
 }

@@ -19,31 +19,32 @@
 
 namespace rapid {
 
-// How kernels go over the points. Anything but the first way is for `rapid check --races`, on one thread.
+// The sequence in which kernels go over the points. Any but Forward is for `rapid check --races`, on one thread.
 struct KernelOrder {
-    enum Way {
+    enum Sequence {
         Forward,    // in chunks, on all threads, each of which has a state of its own
         Reversed,   // one by one, from the last point to the first, in one state
         TwoStates,  // one by one, in two states by turns
     };
-    Way way = Forward;
-    std::string node;  // where given, of this node's kernel alone
+    Sequence sequence = Forward;
+    std::string node;  // if not empty, of this node's kernel alone
 };
 
 struct SessionOptions {
     std::map<std::string, std::string> set;            // --set NAME=VALUE
-    double script_timeout = 600;                       // s, a frame (or a load) may spend in scripts
-    std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory, a state
-    bool may_write = false;                            // levelset:write acts in a run alone
+    double script_timeout = 600;                       // s in scripts, for each frame and for loading
+    std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory for each state
+    bool may_write = false;                            // whether levelset:write acts; in a run only
     bool quiet = false;                                // print says nothing
     KernelOrder kernel_order;
-    // Of a study file: the knobs of the scene that is to be its graph. Empty: none is made; study() alone is asked.
+    // Of a study file: the knobs of the scene that becomes its graph. Empty: there is no graph, and only study() is
+    // called.
     std::optional<Knobs> knobs;
     // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
     std::function<void(const std::string& message)> on_timeout;
-    // Where given, told of each file before it is read, and of each where a module or node was looked for.
+    // If set, told of each file before it is read, and of each place where a module or node was looked for.
     std::function<void(const std::filesystem::path& file)> on_read;
-    // Where given, told of everything that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
+    // If set, told of each trace that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
     std::function<void(const std::string& message)> on_trace_abort;
 };
 
@@ -51,7 +52,7 @@ class ScriptHost;
 
 class Session {
 public:
-    // Runs the file. Error: it can't be read; what Lua or Rapid found wrong with it, with file and line; an unknown or
+    // Runs the file. Error: it can't be read; an error of Lua or Rapid in it, with file and line; an unknown or
     // ill-typed name in options.set, with the nearest.
     Session(const std::filesystem::path& file, SessionOptions options);
     ~Session();
@@ -66,16 +67,16 @@ public:
     // In the order in which the file declares them.
     const std::vector<Parameter>& parameters() const;
 
-    // What was doubtful while the file ran: a mesh with holes, ...
+    // Of the file's makers, such as that a mesh has holes.
     const std::vector<std::string>& warnings() const;
 
-    // Of a study file: what it asks; its closed form, with ids from 0 in order, for a row of these knobs; and its own
-    // measure of error, of points that are matched place by place. Error: what the script raised or returned.
+    // Of a study file: its description; its closed form, with ids from 0 in order, for a row of these knobs; and its
+    // own measure of error, of points that are matched place by place. Error: what the script raised or returned.
     Study study() const;
     PointSet study_reference(const Frame& frame, const Knobs& knobs) const;
     double study_error(const PointSet& points, const PointSet& reference) const;
 
-    // The node types that are there without any graph: the native ones and those of the shipped Lua nodes.
+    // The node types that need no graph: the native ones and those of the shipped Lua nodes.
     static Registry all_node_types();
 
 private:

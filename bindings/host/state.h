@@ -9,11 +9,9 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "runtime/error.h"
-#include "runtime/graph/value.h"
 
 struct lua_State;
 struct rapid_chunk;  // lua/chunk.h
@@ -31,7 +29,7 @@ public:
 
     static State& of(lua_State* L);
 
-    // The coroutine that runs now, or the main thread of the state.
+    // The running coroutine, or the main thread of the state.
     lua_State* lua() const { return L_; }
     ScriptHost& host() const { return host_; }
     bool is_main() const { return main_; }
@@ -59,24 +57,25 @@ public:
         State& state_;
     };
 
+    // Makes L the running coroutine: it has a stack of its own, where the arguments of a native function are.
+    class InCoroutine {
+    public:
+        InCoroutine(State& state, lua_State* L) : state_(state), before_(state.L_) { state_.L_ = L; }
+        ~InCoroutine() { state_.L_ = before_; }
+
+    private:
+        State& state_;
+        lua_State* before_;
+    };
+
     // Keeps the function at the top of the stack as the next kernel, and takes it off.
     std::size_t add_kernel();
     std::size_t kernel_count() const { return kernel_references_.size(); }
 
-    // Between Lua and the runtime's values. Functions become FrameFunctions (main state only).
-    Value to_value(int index);
-    void push(const Value& value);
-    void push_object(const ObjectPtr& object);
-    // Null where the value is no object of ours.
-    ObjectPtr to_object(int index);
-
-    // The nearest place of graph code on the stack.
-    Location where() const;
-
     // The number of the next constructor call.
     std::size_t next_made = 0;
 
-    // What carries a kernel over points in this state (lua/kernel.lua), for columns of one layout: functions in the
+    // Carries a kernel over points in this state (lua/kernel.lua), for columns of one layout: functions in the
     // registry, and the chunk that they see, with pointers to columns behind it.
     struct Runner {
         std::string layout;
@@ -86,21 +85,20 @@ public:
     };
     std::map<std::size_t, std::vector<Runner>> runners;  // by kernel
 
-    // Of the :detail function that runs, and another one when it has ended (lua/detail.lua).
+    // Number of the running :detail function; it changes when that ends (lua/detail.lua).
     std::int32_t detail_serial = 0;
 
-    // The place of the call that ends the body of the file that runs, `return ...:solve {}`: it leaves no frame behind
-    // for where(). Line 0: none.
+    // The call that ends the body of the running file, `return ...:solve {}`: it leaves no frame on the stack that
+    // would tell its place. Line 0: none.
     Location tail_call;
 
     // Bytes of Lua memory in use.
     std::size_t memory() const { return memory_; }
 
 private:
-    friend int guarded(lua_State* L, int (*f)(State& state));
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     void open_libraries();
-    void register_natives();
+    void run_host_file();
 
     ScriptHost& host_;
     bool main_;
@@ -111,12 +109,5 @@ private:
     int entries_ = 0;
     std::vector<int> kernel_references_;
 };
-
-// native.run(chunk, file, line, ...): calls the body of a file, or the scene of a study with its knobs, which ends in a
-// call at that line, or in none (nil).
-int run_body(lua_State* L);
-
-// Runs f and turns an Error into a Lua error with the place of the calling graph code. For functions that Lua calls.
-int guarded(lua_State* L, int (*f)(State& state));
 
 }  // namespace rapid

@@ -1,11 +1,13 @@
-// What a session tells of a study file: its description, its closed form and its own measure of error (lua/study.lua).
+// A session of a study file: its description, its closed form and its own measure of error (lua/study.lua).
 #include <fmt/format.h>
 
 #include <lua.hpp>
 
+#include "bindings/host/lua_text.h"
 #include "bindings/host/maker.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/session.h"
+#include "bindings/host/values.h"
 #include "runtime/graph/points_object.h"
 
 namespace rapid {
@@ -39,7 +41,7 @@ void push_columns(lua_State* L, const PointSet& points)
     int columns = 0;
     for (const auto& [name, any] : points.columns()) {
         lua_createtable(L, 3, 0);
-        lua_pushlstring(L, name.data(), name.size());
+        push_text(L, name);
         lua_rawseti(L, -2, 1);
         std::visit(
             [&](const auto& column) {
@@ -55,8 +57,6 @@ void push_columns(lua_State* L, const PointSet& points)
         lua_rawseti(L, -2, ++columns);
     }
 }
-
-Value knobs_value(const Knobs& knobs) { return Value(std::make_shared<const Table>(Table{{}, {}, knobs})); }
 
 // lua/study.lua has checked it: the fields are there, and of their types.
 Study study_of(const Table& asked)
@@ -84,7 +84,7 @@ Study Session::study() const
     State& state = host_->main();
     state.push_entry("study");
     state.call(0, 1);
-    const Value asked = state.to_value(-1);
+    const Value asked = to_value(state, -1);
     lua_pop(state.lua(), 1);
     try {
         Study study = study_of(*asked.table());
@@ -99,14 +99,14 @@ PointSet Session::study_reference(const Frame& frame, const Knobs& knobs) const
 {
     State& state = host_->main();
     lua_State* L = state.lua();
-    const ScriptHost::Section section(*host_, fmt::format("{}: the study's reference", host_->graph.file));
+    const Watchdog::Section section(host_->watchdog, fmt::format("{}: the study's reference", host_->graph.file));
     state.push_entry("reference");
     lua_pushnumber(L, frame.number);
     lua_pushnumber(L, frame.time);
     lua_pushnumber(L, frame.dt);
-    state.push(knobs_value(knobs));
+    push(state, knobs);
     state.call(4, 1);
-    const Value found = state.to_value(-1);
+    const Value found = to_value(state, -1);
     lua_pop(L, 1);
     try {
         if (!found.table())
@@ -125,7 +125,7 @@ double Session::study_error(const PointSet& points, const PointSet& reference) c
 {
     State& state = host_->main();
     lua_State* L = state.lua();
-    const ScriptHost::Section section(*host_, fmt::format("{}: the study's error", host_->graph.file));
+    const Watchdog::Section section(host_->watchdog, fmt::format("{}: the study's error", host_->graph.file));
     state.push_entry("study_error");
     push_columns(L, points);
     push_columns(L, reference);

@@ -1,4 +1,4 @@
--- What scripts say about points, besides busted's own assertions:
+-- Assertions about points, besides busted's own:
 --
 --   assert.near(expected, actual, tolerance)          numbers and vec3 (length of the difference); NaN is near nothing
 --   assert.points(p).finite()                         no NaN, no infinity
@@ -12,7 +12,7 @@ local say = require "say"
 local vector = require "vec3"
 local ffi = require "ffi"
 
--- An assertion whose callback returns what is wrong, or nil.
+-- An assertion whose callback returns the fault as a text, or nil.
 local function register(name, find_fault)
   local key = "assertion." .. name
   say:set(key .. ".positive", "%s")

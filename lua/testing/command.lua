@@ -61,8 +61,8 @@ function command.folder()
   return folder
 end
 
--- Runs a line of the shell; $RAPID is the command. options: cwd, a folder; environment, a table. The shell ends when
--- this process does, and with it what it has replaced itself with.
+-- Runs a line of the shell; $RAPID is the command. options: cwd, a folder; environment, a table. The shell, or
+-- the program that has replaced it, ends when this process does.
 function command.shell(line, options)
   options = options or {}
   local out = command.folder()

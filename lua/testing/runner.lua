@@ -1,6 +1,6 @@
 -- Runs one file of tests in busted's language, and tells the host of each test.
 --
--- busted's own command line is left out: what it prints, which files it looks for and how it ends are ours.
+-- busted's own command line is not used: output, search for files and exit status are those of `rapid test`.
 local native, path, filter, already_run = ...
 
 local ok, busted = pcall(function()
@@ -51,8 +51,8 @@ busted.subscribe({ "test", "end" }, function(element, _, status)
   return nil, true
 end)
 
--- In a test the message waits for the test's end; a file or a describe block that does not run hides its tests; what
--- fails before or after tests (before_each, setup, ...) is a failure of its own.
+-- In a test the message is kept until the test ends. A file or a describe block that does not run hides its tests. A
+-- failure before or after tests (before_each, setup, ...) is reported by itself.
 local function failed(element, _, text, trace)
   -- An error of a scene names the scene's file: the test's own line comes before it.
   if not text:find(path .. ":", 1, true) then

@@ -1,4 +1,4 @@
--- Runs scenes that a test has as text.
+-- Runs scenes from texts.
 --
 --   local scene = require "testing.scene"
 --   local result = scene.run("return rapid.create { points = two } :solve {}", { frames = {1, 4} })

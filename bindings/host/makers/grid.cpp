@@ -1,4 +1,4 @@
-// rapid.grid: fields of vectors in space.
+// rapid.grid: vector fields.
 #include <fmt/format.h>
 
 #include "bindings/host/maker.h"
@@ -22,7 +22,7 @@ struct ReadGrid {
 };
 RAPID_MAKER(ReadGrid);
 
-// lua/rapid.lua has asked the function at each node.
+// lua/rapid.lua has evaluated the function at each node.
 struct GridOfValues {
     Vec3d origin;
     double voxel;

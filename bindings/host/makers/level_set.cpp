@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// What every level set is made with.
+// The parameters of every level set.
 struct Grid {
     double voxel, half_width;
 

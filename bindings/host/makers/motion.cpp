@@ -1,4 +1,4 @@
-// rapid.translate, rapid.rotate, rapid.scale, their products, and what they move.
+// rapid.translate, rapid.rotate, rapid.scale, their products, and moved objects.
 #include "runtime/shapes/motion/motion.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// Nodes whose work is a kernel: `:points`, and the nodes that artists write in Lua (rapid.node).
+// Node types that artists write in Lua (rapid.node).
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@ struct NodeType;
 int define_node_type(State& state);    // rapid.node{...}: adds the type (main state) and keeps its kernel
 int complete_arguments(State& state);  // (type, arguments): the arguments, checked, with the defaults filled in
 
-// Whether a parameter of the type is the name of a group that its kernel changes.
+// Whether a parameter of the type names a group that its kernel changes.
 bool names_groups(const NodeType& type);
 
 // Pushes the kernel of a type that rapid.node has defined in this state; nil where it has none.
-void push_script_of(State& state, const std::string& type);
+void push_kernel_of_type(State& state, const std::string& type);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-#include "bindings/host/test_host.h"
+#include "bindings/host/testing/run_tests.h"
 
 #include <fmt/format.h>
 
@@ -9,16 +9,16 @@
 #include <optional>
 #include <utility>
 
-#include "bindings/host/script_host.h"
+#include "bindings/host/modules.h"
 #include "bindings/host/session.h"
-#include "bindings/host/test_points.h"
+#include "bindings/host/testing/test_points.h"
 #include "bindings/host/threads.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
 namespace {
 
-// What the functions that Lua calls need of their file.
+// The context of the functions that Lua calls.
 struct Host {
     const TestOptions& options;
     const std::function<void(const TestEvent&)>& tell;
@@ -48,10 +48,10 @@ struct SceneRun {
     std::optional<std::uint64_t> seed;
     int threads = 0;
     SessionOptions session;
-    bool watch_traces = false;  // the JIT's events are not safe in every run: a test asks for them
+    bool watch_traces = false;  // only on request: the JIT's events are not safe in every run
 };
 
-// The arguments that lua/testing/rapid.lua gives, checked there: (path, options).
+// The arguments (path, options) of lua/testing/rapid.lua, which has checked them.
 SceneRun read_run(lua_State* L)
 {
     const Host& host = host_of(L);
@@ -73,7 +73,7 @@ SceneRun read_run(lua_State* L)
     return run;
 }
 
-// Runs the scene and returns its warnings, each once; each frame from the first asked for goes to `keep`.
+// Runs the scene and returns its warnings, each once. Frames from run.first on go to `keep`.
 std::vector<std::string> run_scene(const SceneRun& run, const std::function<void(FrameResult&)>& keep)
 {
     Threads threads(run.threads);
@@ -108,8 +108,8 @@ void push_list(lua_State* L, const std::vector<std::string>& texts)
     }
 }
 
-// native.run(path, options): outputs by name, of them point sets by frame; the warnings, in order; and the traces that
-// were given up.
+// native.run(path, options): point sets by output and frame; the warnings, in order; and the traces that LuaJIT gave
+// up.
 int run(lua_State* L)
 {
     std::string error;

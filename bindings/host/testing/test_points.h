@@ -7,7 +7,7 @@ struct lua_State;
 
 namespace rapid {
 
-// Where the points come from, for messages: "frame 48", "frame 48, output sparks".
+// source: for messages, "frame 48", "frame 48, output sparks".
 void push_points(lua_State* L, PointSet points, std::string source);
 
 // Adds the functions on points to the table at the top of the stack, and `points_metatable`, whose __index is left to

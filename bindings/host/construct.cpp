@@ -1,0 +1,77 @@
+#include "bindings/host/construct.h"
+
+#include <fmt/format.h>
+
+#include <lua.hpp>
+
+#include "bindings/host/lua_text.h"
+#include "bindings/host/maker.h"
+#include "bindings/host/objects.h"
+
+namespace rapid {
+namespace {
+
+// A maker as graph code calls it: rapid.mesh.box, rapid.rotate, :transform, :offset.
+std::string shown_name(const Maker& maker, const Table& options)
+{
+    const std::size_t dot = maker.name.find('.');
+    if (dot == std::string::npos) return ":" + maker.name;
+    // A tool of a level set is its method.
+    if (maker.params.front().name == "levelset") {
+        const auto how = options.named.find("how");
+        return ":" + (how == options.named.end() ? maker.name.substr(dot + 1) : *how->second.get<std::string>());
+    }
+    return "rapid." + (maker.name.rfind("motion.", 0) == 0 ? maker.name.substr(dot + 1) : maker.name);
+}
+
+}  // namespace
+
+int make_object(State& state)
+{
+    const Maker& maker = find_maker(text_at(state.lua(), 1));
+    const auto options = table_at(state, 2);
+    refuse_in_kernels(state, shown_name(maker, *options), "make it outside, once");
+    return construct(state, [&] {
+        ScriptHost& host = state.host();
+        MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read};
+        try {
+            check_named(*options);
+            const auto make = [&] { return maker.make(maker, *options, context); };
+            return host.maker_cache ? host.maker_cache->get(maker, options, make) : make();
+        } catch (const Error& error) {
+            throw Error(
+                fmt::format("{}: {}", shown_name(maker, *options), error.what()));  // with the file that it names
+        }
+    });
+}
+
+int make_attribute(State& state)
+{
+    if (lua_type(state.lua(), 1) != LUA_TSTRING)
+        throw Error("rapid.attr takes the name of an attribute: rapid.attr \"bounce\"");
+    push_object(state, std::make_shared<AttributeName>(text_at(state.lua(), 1)));
+    return 1;
+}
+
+std::shared_ptr<const Table> table_at(State& state, int index)
+{
+    const Value value = to_value(state, index);
+    const auto* table = value.get<std::shared_ptr<const Table>>();
+    if (!table) throw Error(fmt::format("a table is expected, not {}", describe(value)));
+    return *table;
+}
+
+void check_named(const Table& options)
+{
+    const Value* value = !options.list.empty()       ? &options.list.front()
+                         : !options.numbered.empty() ? &options.numbered.begin()->second
+                                                     : nullptr;
+    if (value) throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}", describe(*value)));
+}
+
+void refuse_in_kernels(const State& state, const std::string& what, const std::string& remedy)
+{
+    if (state.runs_kernel()) throw Error(fmt::format("a kernel can't call {}; {}", what, remedy));
+}
+
+}  // namespace rapid

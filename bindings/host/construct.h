@@ -1,0 +1,56 @@
+// Constructors: what graph code makes, in the main state once and in each worker again, by the order of calls.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "bindings/host/script_host.h"
+#include "bindings/host/state.h"
+#include "bindings/host/values.h"
+
+namespace rapid {
+
+// Native functions of lua/rapid.lua.
+int make_object(State& state);     // (maker, options): the object
+int make_attribute(State& state);  // (name)
+
+// The table at `index`, which Rapid's Lua files have made or checked.
+std::shared_ptr<const Table> table_at(State& state, int index);
+
+// Error: a value without a name, as in :gravity { 0, -9.81, 0 }.
+void check_named(const Table& options);
+
+// Error: a kernel runs now. It would make an object for each point, in states that do not tell each other.
+void refuse_in_kernels(const State& state, const std::string& what, const std::string& remedy);
+
+// Pushes the object of a constructor call: in the main state the one that make() returns, in a worker that of the main
+// state's call.
+template <class F>
+int construct(State& state, const F& make)
+{
+    if (state.is_loaded()) {  // for a function of the frame, which workers never call
+        push_object(state, make());
+        return 1;
+    }
+    ScriptHost& host = state.host();
+    const std::size_t call = state.next_made++;
+    if (state.is_main()) {
+        host.made.emplace_back(ObjectPtr());
+        try {
+            ObjectPtr object = make();
+            host.made[call] = object;
+            push_object(state, object);
+        } catch (const Error& error) {
+            host.made[call] = std::string(error.what());
+            throw;
+        }
+        return 1;
+    }
+    if (call >= host.made.size())
+        throw Error("the graph file made more in a worker than at first; it must do the same each time it is run");
+    if (const auto* failed = std::get_if<std::string>(&host.made[call])) throw Error(*failed);
+    push_object(state, std::get<ObjectPtr>(host.made[call]));
+    return 1;
+}
+
+}  // namespace rapid

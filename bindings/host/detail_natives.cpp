@@ -1,0 +1,153 @@
+#include "bindings/host/detail_natives.h"
+
+#include <fmt/format.h>
+
+#include <lua.hpp>
+
+#include "bindings/host/lua_text.h"
+#include "bindings/host/script_error.h"
+#include "bindings/host/state.h"
+
+namespace rapid {
+namespace {
+
+constexpr char current[] = "rapid.detail";  // in the registry: the run that goes on
+
+DetailRun& detail_run_of(State& state)
+{
+    lua_State* L = state.lua();
+    lua_getfield(L, LUA_REGISTRYINDEX, current);
+    auto* run = static_cast<DetailRun*>(lua_touserdata(L, -1));
+    lua_pop(L, 1);
+    if (!run) throw Error("points can't be used outside the :detail function that they were given to");
+    return *run;
+}
+
+// native.column(name, writable): pointer, stride in scalars, type.
+int column(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    const std::string name = text_at(state.lua(), 1);
+    AnyColumn* any = lua_type(L, 1) == LUA_TSTRING ? detail.points.find(name) : nullptr;
+    if (!any) throw Error(fmt::format("no attribute \"{}\"{}", name, did_you_mean(name, detail.points.column_names())));
+    const bool writable = lua_toboolean(L, 2) != 0;
+    std::visit(
+        [&]<class T>(Column<T>& values) {
+            if (writable) values.write();
+            constexpr int scalars = std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1;
+            const Strided<T> memory = std::as_const(values).read();
+            lua_pushlightuserdata(L, const_cast<T*>(memory.data));
+            lua_pushnumber(L, static_cast<double>(scalars * memory.stride));
+        },
+        *any);
+    push_text(L, type_name(type_of(*any)));
+    return 3;
+}
+
+// native.has(name)
+int has(State& state)
+{
+    lua_pushboolean(state.lua(), detail_run_of(state).points.has(text_at(state.lua(), 1)));
+    return 1;
+}
+
+// native.group(name, writable): pointer and stride; nothing for a group that does not exist and is only read.
+int group(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    const std::string name = text_at(state.lua(), 1);
+    if (lua_toboolean(L, 2)) detail.points.group(name).write();
+    const Column<std::uint8_t>* members = detail.points.find_group(name);
+    if (!members) return 0;
+    const Strided<std::uint8_t> memory = members->read();
+    lua_pushlightuserdata(L, const_cast<std::uint8_t*>(memory.data));
+    lua_pushnumber(L, static_cast<double>(memory.stride));
+    return 2;
+}
+
+// native.append(n)
+int append(State& state)
+{
+    DetailRun& detail = detail_run_of(state);
+    detail.points.append(static_cast<std::size_t>(lua_tonumber(state.lua(), 1)));
+    detail.changed();
+    return 0;
+}
+
+// native.neighbours(place, radius): the places, from 1, of the others.
+int neighbours(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    const auto place = static_cast<std::uint32_t>(lua_tonumber(L, 1));
+    const double radius = lua_tonumber(L, 2);
+    const Strided<Vec3f> P = std::as_const(detail.points).P().read();
+    auto& grid = detail.neighbours[radius];
+    if (!grid) {
+        std::vector<Vec3f> places(detail.points.size());
+        for (std::size_t i = 0; i < places.size(); ++i) places[i] = P[i];
+        grid = index_neighbours(places, radius);
+    }
+    std::vector<std::uint32_t> found;
+    grid->find(P[place].cast<double>(), found);
+    lua_createtable(L, static_cast<int>(found.size()), 0);
+    int n = 0;
+    for (const std::uint32_t i : found) {
+        if (i == place) continue;
+        lua_pushnumber(L, i + 1.0);
+        lua_rawseti(L, -2, ++n);
+    }
+    return 1;
+}
+
+// native.reorder(places from 1)
+int reorder(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    std::vector<std::uint32_t> order(detail.points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        lua_rawgeti(L, 1, static_cast<int>(i) + 1);
+        order[i] = static_cast<std::uint32_t>(lua_tonumber(L, -1)) - 1;
+        lua_pop(L, 1);
+    }
+    detail.points.reorder(order);
+    detail.changed();
+    return 0;
+}
+
+}  // namespace
+
+DetailRun::DetailRun(State& state, PointSet& of) : points(of), state_(state), top_(lua_gettop(state.lua()))
+{
+    ++state_.detail_serial;
+    lua_pushlightuserdata(state_.lua(), this);
+    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, current);
+}
+
+DetailRun::~DetailRun()
+{
+    ++state_.detail_serial;
+    lua_settop(state_.lua(), top_);
+    lua_pushnil(state_.lua());
+    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, current);
+}
+
+void push_detail_natives(State& state)
+{
+    lua_State* L = state.lua();
+    constexpr luaL_Reg functions[] = {{"column", native<column>},         {"has", native<has>},
+                                      {"group", native<group>},           {"append", native<append>},
+                                      {"neighbours", native<neighbours>}, {"reorder", native<reorder>}};
+    lua_newtable(L);
+    for (const luaL_Reg& f : functions) {
+        lua_pushcfunction(L, f.func);
+        lua_setfield(L, -2, f.name);
+    }
+    lua_pushlightuserdata(L, &state.detail_serial);
+    lua_setfield(L, -2, "serial");
+}
+
+}  // namespace rapid

@@ -1,0 +1,89 @@
+#include "bindings/host/graph_parameter.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <lua.hpp>
+
+#include "bindings/host/construct.h"
+#include "bindings/host/lua_text.h"
+
+namespace rapid {
+namespace {
+
+// "5000" as a value of the type of the default. Error: the text is no such value.
+Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
+{
+    const auto refuse = [&](const char* wanted) -> Value {
+        throw Error(fmt::format("--set {}={}: the parameter is {}, as its default {} is", name, text, wanted,
+                                describe(fallback)));
+    };
+    if (fallback.get<std::string>()) return Value(text);
+    if (fallback.get<bool>()) {
+        if (text == "true" || text == "1") return Value(true);
+        if (text == "false" || text == "0") return Value(false);
+        return refuse("true or false");
+    }
+    std::vector<double> numbers;
+    std::string rest = text;
+    std::erase_if(rest, [](char c) { return c == '{' || c == '}' || c == ' '; });
+    for (std::size_t begin = 0; begin <= rest.size();) {
+        const std::size_t end = std::min(rest.find(',', begin), rest.size());
+        const std::string word = rest.substr(begin, end - begin);
+        char* stop = nullptr;
+        numbers.push_back(std::strtod(word.c_str(), &stop));
+        if (word.empty() || *stop != '\0' || std::isnan(numbers.back()))
+            return refuse(fallback.get<double>() ? "a number" : "a vec3 x,y,z");
+        begin = end + 1;
+    }
+    if (fallback.get<double>()) return numbers.size() == 1 ? Value(numbers[0]) : refuse("a number");
+    return numbers.size() == 3 ? Value(Vec3d(numbers[0], numbers[1], numbers[2])) : refuse("a vec3 x,y,z");
+}
+
+}  // namespace
+
+int declare_parameter(State& state)
+{
+    refuse_in_kernels(state, "rapid.param", "call it outside, once");
+    lua_State* L = state.lua();
+    ScriptHost& host = state.host();
+    if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param takes a name, a default and a line of documentation");
+    const std::string name = text_at(state.lua(), 1);
+    const auto known = std::find_if(host.parameters.begin(), host.parameters.end(),
+                                    [&](const Session::Parameter& p) { return p.name == name; });
+    if (known != host.parameters.end() && !state.is_main()) {
+        push(state, known->value);
+        return 1;
+    }
+    Value fallback = to_value(state, 2);
+    if (const Table* table = fallback.table(); table && table->list.size() == 3) {
+        Param param;
+        param.name = name;
+        param.type = "vec3";
+        Vec3d vector;
+        read_value(param, fallback, vector);
+        fallback = Value(vector);
+    }
+    if (!fallback.get<double>() && !fallback.get<bool>() && !fallback.get<std::string>() && !fallback.get<Vec3d>())
+        throw Error(
+            fmt::format("rapid.param(\"{}\"): the default is {}; it must be a number, a boolean, a string or a vec3",
+                        name, describe(fallback)));
+    if (known != host.parameters.end()) {
+        if (describe(known->fallback) != describe(fallback))
+            throw Error(
+                fmt::format("rapid.param(\"{}\"): its default was {} before and is {} here; give each parameter "
+                            "one default, or another name",
+                            name, describe(known->fallback), describe(fallback)));
+        push(state, known->value);
+        return 1;
+    }
+    const auto setting = host.options().set.find(name);
+    const Value value = setting == host.options().set.end() ? fallback : parse_setting(name, setting->second, fallback);
+    host.parameters.push_back({name, text_at(state.lua(), 3), value, fallback});
+    push(state, value);
+    return 1;
+}
+
+}  // namespace rapid

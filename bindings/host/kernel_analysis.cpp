@@ -1,0 +1,144 @@
+#include "bindings/host/kernel_analysis.h"
+
+#include <fmt/format.h>
+
+#include <lua.hpp>
+#include <vector>
+
+#include "bindings/host/lua_text.h"
+#include "bindings/host/state.h"
+#include "runtime/points/point_names.h"
+
+namespace rapid {
+namespace {
+
+// The keys of a field of the table at the top of the stack.
+std::set<std::string> keys_of(lua_State* L, const char* field)
+{
+    std::set<std::string> keys;
+    lua_getfield(L, -1, field);
+    lua_pushnil(L);
+    while (lua_next(L, -2)) {
+        lua_pop(L, 1);
+        keys.insert(lua_tostring(L, -1));
+    }
+    lua_pop(L, 1);
+    return keys;
+}
+
+bool flag_of(lua_State* L, const char* field)
+{
+    lua_getfield(L, -1, field);
+    const bool set = lua_toboolean(L, -1) != 0;
+    lua_pop(L, 1);
+    return set;
+}
+
+int number_of(lua_State* L, const char* field)
+{
+    lua_getfield(L, -1, field);
+    const int number = static_cast<int>(lua_tointeger(L, -1));
+    lua_pop(L, 1);
+    return number;
+}
+
+// The line that a field of the table at the top of the stack has for a name; 0 for none.
+int line_of(lua_State* L, const char* field, const std::string& name)
+{
+    lua_getfield(L, -1, field);
+    const int line = number_of(L, name.c_str());
+    lua_pop(L, 1);
+    return line;
+}
+
+// The functions below expect the result of lua/bytecode.lua at the top of the stack.
+
+void check_calls(lua_State* L, const Location& location)
+{
+    const std::vector<std::string> methods = point_names_of(PointName::Method);
+    for (const std::string& name : keys_of(L, "calls")) {
+        const std::string near = did_you_mean(name, methods);
+        const std::string remedy =
+            fmt::format("; it has {} and {}", fmt::join(methods.begin(), methods.end() - 1, ", "), methods.back());
+        throw Error(fmt::format("p has no method \"{}\"{}", name, near.empty() ? remedy : near))
+            .at({location.file, line_of(L, "calls", name)});
+    }
+}
+
+void check_assignments(lua_State* L, const Location& location)
+{
+    for (const PointName& known : point_names) {
+        const int line = known.read_only ? line_of(L, "writes", std::string(known.name)) : 0;
+        if (line > 0)
+            throw Error(fmt::format("the kernel assigns p.{}, which is read only", known.name))
+                .at({location.file, line});
+    }
+}
+
+// The first place where it writes upvalues, globals or tables that points share.
+void check_stores(lua_State* L)
+{
+    lua_getfield(L, -1, "stores");
+    lua_rawgeti(L, -1, 1);
+    if (lua_istable(L, -1)) {
+        lua_getfield(L, -1, "message");
+        lua_getfield(L, -2, "source");
+        const std::string message = text_at(L, -2), source = text_at(L, -1);
+        lua_pop(L, 2);
+        throw Error(message).at({source.substr(source.starts_with('@') ? 1 : 0), number_of(L, "line")});
+    }
+    lua_pop(L, 2);
+}
+
+void check_groups(lua_State* L, const KernelSource& kernel)
+{
+    const int line = number_of(L, "computed_group");
+    if (line > 0 && !kernel.may_compute_groups)
+        throw Error("the kernel joins or leaves a group under a computed name; name it as a constant: p:join \"old\"")
+            .at({kernel.location.file, line});
+}
+
+}  // namespace
+
+KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
+{
+    lua_State* L = state.lua();
+    struct Restored {
+        lua_State* L;
+        int top;
+        ~Restored() { lua_settop(L, top); }
+    } const restored{L, lua_gettop(L)};
+    state.push_entry("analyse");
+    state.push_kernel(kernel.number);
+    lua_pushboolean(L, !kernel.of_the_set);
+    state.call(2, 1);
+    check_calls(L, kernel.location);
+    check_assignments(L, kernel.location);
+    check_stores(L);
+    check_groups(L, kernel);
+
+    KernelAnalysis found;
+    found.reads = keys_of(L, "reads");
+    found.writes = keys_of(L, "writes");
+    found.may = keys_of(L, "may");
+    found.may_write = keys_of(L, "may_write");
+    found.joins = keys_of(L, "joins");
+    found.asks = keys_of(L, "asks");
+    found.asks_any = flag_of(L, "asks_any");
+    found.kills = flag_of(L, "kills");
+    found.asks_places = flag_of(L, "asks_places") || flag_of(L, "computes_names");
+    return found;
+}
+
+std::string fingerprint_of(State& state, std::size_t kernel)
+{
+    lua_State* L = state.lua();
+    state.push_entry("fingerprint");
+    state.push_kernel(kernel);
+    state.call(1, 1);
+    const std::string fingerprint = text_at(L, -1);
+    lua_pop(L, 1);
+    return fingerprint;
+}
+
+}  // namespace rapid

@@ -1,0 +1,36 @@
+// What a kernel does to points, read from its bytecode (lua/bytecode.lua).
+#pragma once
+
+#include <cstddef>
+#include <set>
+#include <string>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+class State;
+
+struct KernelAnalysis {
+    std::set<std::string> reads, writes;      // of the point itself
+    std::set<std::string> may, may_write;     // of values that may be the point
+    std::set<std::string> joins, asks;        // groups that it joins or leaves, and that it asks for
+    bool asks_any = false;                    // for groups by computed names
+    bool kills = false, asks_places = false;  // whether it may
+};
+
+struct KernelSource {
+    std::size_t number = 0;           // in each state
+    Location location;                // of the function
+    bool of_the_set = false;          // its first parameter is all points, not one (:detail)
+    bool may_compute_groups = false;  // it belongs to a node whose parameters name groups
+};
+
+// In the main state, once the file has run. Error: it writes what other points share, assigns what is read only, or
+// calls a method that there is not.
+KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel);
+
+// Of its bytecode: the same in each state that has run the same file.
+std::string fingerprint_of(State& state, std::size_t kernel);
+
+}  // namespace rapid

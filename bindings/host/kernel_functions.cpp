@@ -1,0 +1,79 @@
+#include "bindings/host/kernel_functions.h"
+
+#include <bit>
+#include <cstdint>
+#include <lua.hpp>
+
+#include "runtime/noise.h"
+#include "runtime/random.h"
+#include "runtime/shapes/level_set/vector_grid.h"
+#include "runtime/shapes/shape.h"
+
+namespace rapid {
+namespace {
+
+// frame: 0, or the frame's number where the numbers differ from frame to frame.
+double draw(std::uint64_t random, std::int64_t id, double use, double frame)
+{
+    RandomKey key;
+    key.value = random;
+    if (frame != 0) {
+        const auto mixed = uniform4(key, std::bit_cast<std::uint64_t>(frame), ~std::uint64_t{0});
+        key.value ^=
+            static_cast<std::uint64_t>(mixed[0] * 0x1p32) << 32 | static_cast<std::uint64_t>(mixed[1] * 0x1p32);
+    }
+    const auto numbers = uniform4(key, static_cast<std::uint64_t>(id), std::bit_cast<std::uint64_t>(use + 0.0));
+    return numbers[0] + numbers[1] * 0x1p-32 < 1 ? numbers[0] + numbers[1] * 0x1p-32 : numbers[0];
+}
+
+NoiseOptions noise_options(double time, double octaves, double seed)
+{
+    return {time, static_cast<int>(octaves), static_cast<std::uint32_t>(seed)};
+}
+
+// lua/numeric.lua has checked the numbers.
+double noise_at(double x, double y, double z, double time, double octaves, double seed)
+{
+    return noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
+}
+void curl_noise_at(double x, double y, double z, double time, double octaves, double seed, double* curl)
+{
+    Eigen::Map<Vec3d>(curl, 3) = curl_noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
+}
+
+// lua/shape.lua keeps the shape alive.
+double shape_distance(const void* shape, double x, double y, double z, double* gradient)
+{
+    const Vec3d P(x, y, z);
+    double phi = 0;
+    Vec3d slope;
+    static_cast<const Shape*>(shape)->distance({&P, 1}, {&phi, 1}, {&slope, 1});
+    Eigen::Map<Vec3d>(gradient, 3) = slope;
+    return phi;
+}
+
+// So it does the grid.
+void vector_grid_sample(const void* grid, double x, double y, double z, double* value)
+{
+    const Vec3d P(x, y, z);
+    Vec3d found;
+    static_cast<const VectorGrid*>(grid)->sample({&P, 1}, {&found, 1});
+    Eigen::Map<Vec3d>(value, 3) = found;
+}
+
+}  // namespace
+
+void set_kernel_functions(lua_State* L)
+{
+    const auto set = [L](const char* name, auto* function) {
+        lua_pushlightuserdata(L, reinterpret_cast<void*>(function));
+        lua_setfield(L, -2, name);
+    };
+    set("rand", &draw);
+    set("noise", &noise_at);
+    set("curl_noise", &curl_noise_at);
+    set("shape_distance", &shape_distance);
+    set("vector_grid_sample", &vector_grid_sample);
+}
+
+}  // namespace rapid

@@ -1,0 +1,115 @@
+// The nodes whose kernel is written in place: `:points`, `:action` and `:detail`.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bindings/host/detail.h"
+#include "bindings/host/kernel.h"
+#include "runtime/graph/registry.h"
+#include "runtime/points/point_names.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::string_view reads_doc = "attributes that the kernel reads under names that it computes";
+constexpr std::string_view writes_doc = "attributes that it assigns under names that it computes";
+
+// The names that a kernel computes, which its bytecode does not tell.
+KernelArguments declared(const std::vector<std::string>& reads, const std::vector<std::string>& writes)
+{
+    KernelArguments arguments;
+    arguments.reads.insert(reads.begin(), reads.end());
+    arguments.writes.insert(writes.begin(), writes.end());
+    return arguments;
+}
+
+void check_writable(const std::vector<std::string>& writes)
+{
+    for (const PointName& known : point_names)
+        if (known.read_only && std::find(writes.begin(), writes.end(), known.name) != writes.end())
+            throw Error(fmt::format("writes: {} is read only", known.name));
+}
+
+// points: an edit of the points, one by one, written in Lua.
+struct Points {
+    std::string group;
+    std::shared_ptr<const Kernel> kernel;
+    std::vector<std::string> reads, writes;
+
+    static NodeType declare()
+    {
+        return node<Points>("points", "Edits the points with a Lua function, one by one, in parallel.")
+            .param(&Points::kernel, "kernel", Value(), any_number(), "", "function(p, frame)")
+            .of_type(std::string(PointFunction::param_type))
+            .required()
+            .constant()
+            .varies()
+            .param(&Points::reads, "reads", Value(), any_number(), "", std::string(reads_doc))
+            .constant()
+            .param(&Points::writes, "writes", Value(), any_number(), "", std::string(writes_doc))
+            .constant();
+    }
+    static std::unique_ptr<Operator> make() { return std::make_unique<PointEditOf<Points>>(); }
+    void check() const { check_writable(writes); }
+    void uses(Uses& uses) const { kernel->uses(uses, declared(reads, writes)); }
+    bool removes_points() const { return kernel->kills(); }
+    bool asks_places() const { return kernel->asks_places(); }
+    std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
+    {
+        return kernel->prepare(points, group, now, declared(reads, writes), before);
+    }
+};
+RAPID_NODE(Points);
+
+// action: the same inside Solve, at every sub-step (paper §2.3).
+struct ScriptAction {
+    std::string group;
+    std::shared_ptr<const Kernel> kernel;
+    std::vector<std::string> reads, writes;
+
+    static NodeType declare()
+    {
+        return node<ScriptAction>("action", "Edits the points with a Lua function inside Solve, at every sub-step.")
+            .param(&ScriptAction::kernel, "kernel", Value(), any_number(), "", "function(p, step)")
+            .of_type(std::string(PointFunction::param_type))
+            .required()
+            .constant()
+            .varies()
+            .param(&ScriptAction::reads, "reads", Value(), any_number(), "", std::string(reads_doc))
+            .constant()
+            .param(&ScriptAction::writes, "writes", Value(), any_number(), "", std::string(writes_doc))
+            .constant();
+    }
+    void check() const { check_writable(writes); }
+    void uses(Uses& uses) const { kernel->uses_in_action(uses, declared(reads, writes)); }
+    std::shared_ptr<const Action> dynamic(const Evaluation& now) const
+    {
+        return kernel->action(group, now, declared(reads, writes));
+    }
+};
+RAPID_NODE(ScriptAction);
+
+// detail: a function over the whole set, once a frame.
+struct Detail {
+    std::shared_ptr<const Kernel> kernel;
+
+    static NodeType declare()
+    {
+        return node<Detail>("detail", "Runs a Lua function over the whole set of points, once.")
+            .param(&Detail::kernel, "kernel", Value(), any_number(), "", "function(points, frame)")
+            .of_type(std::string(Kernel::set_function_type))
+            .required()
+            .constant()
+            .varies();
+    }
+    void uses(Uses& uses) const { kernel->uses(uses); }
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        run_detail(*kernel, inputs[0], now, {});
+        return std::move(inputs[0]);
+    }
+};
+RAPID_NODE(Detail);
+
+}  // namespace
+}  // namespace rapid

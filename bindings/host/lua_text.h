@@ -1,0 +1,21 @@
+// Texts on Lua's stack.
+#pragma once
+
+#include <cstddef>
+#include <lua.hpp>
+#include <string>
+#include <string_view>
+
+namespace rapid {
+
+// The string, or the number, at `index`; empty for any other value.
+inline std::string text_at(lua_State* L, int index)
+{
+    std::size_t size = 0;
+    const char* text = lua_tolstring(L, index, &size);
+    return text ? std::string(text, size) : std::string();
+}
+
+inline void push_text(lua_State* L, std::string_view text) { lua_pushlstring(L, text.data(), text.size()); }
+
+}  // namespace rapid

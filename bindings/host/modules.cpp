@@ -1,0 +1,86 @@
+#include "bindings/host/modules.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+namespace rapid {
+namespace {
+
+std::vector<std::filesystem::path> rapid_path()
+{
+    std::vector<std::filesystem::path> folders;
+    const char* variable = std::getenv("RAPID_PATH");
+    const std::string list = variable ? variable : "";
+    for (std::size_t begin = 0; begin < list.size();) {
+        const std::size_t end = std::min(list.find(':', begin), list.size());
+        if (end > begin) folders.emplace_back(list.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return folders;
+}
+
+}  // namespace
+
+std::filesystem::path lua_folder()
+{
+    static const std::filesystem::path folder = [] {
+        std::error_code ignored;
+        const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+        const std::filesystem::path installed = program.parent_path().parent_path() / "share/rapid/lua";
+        return std::filesystem::exists(installed / "host.lua", ignored) ? installed
+                                                                        : std::filesystem::path(RAPID_SOURCE_LUA_DIR);
+    }();
+    return folder;
+}
+
+std::optional<std::string> read_lua_file(const std::filesystem::path& path)
+{
+    std::ifstream file(path, std::ios::binary);
+    if (!file || std::filesystem::is_directory(path)) return std::nullopt;
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+std::string shown(const std::filesystem::path& path) { return path.lexically_normal().string(); }
+
+std::optional<Modules::Source> Modules::find(std::string_view name, bool node, std::string& looked_in) const
+{
+    // A name is a path of words: nothing above the folders that are searched.
+    std::string relative(name);
+    const bool words = !relative.empty() && std::all_of(relative.begin(), relative.end(), [](unsigned char c) {
+        return std::isalnum(c) || c == '_' || c == '-' || c == '.';
+    });
+    if (!words || relative.find("..") != std::string::npos) {
+        looked_in = "nothing: a module's name is made of letters, digits, _ and dots";
+        return std::nullopt;
+    }
+    std::replace(relative.begin(), relative.end(), '.', '/');
+
+    std::vector<std::filesystem::path> folders = {graph_.parent_path()};
+    for (const std::filesystem::path& extra : rapid_path()) folders.push_back(extra);
+    if (node) folders.push_back(lua_folder() / "nodes");
+    for (const std::filesystem::path& where : folders) {
+        const std::filesystem::path path = where / (relative + ".lua");
+        if (std::error_code ignored; !graph_.empty() && std::filesystem::equivalent(path, graph_, ignored)) continue;
+        if (on_read_) on_read_(path);
+        if (std::optional<std::string> text = read_lua_file(path)) return Source{std::move(*text), shown(path)};
+        looked_in += (looked_in.empty() ? "" : ", ") + shown(path);
+    }
+    return std::nullopt;
+}
+
+std::vector<std::string> shipped_nodes()
+{
+    std::vector<std::string> names;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator(lua_folder() / "nodes", ignored))
+        if (entry.path().extension() == ".lua") names.push_back(entry.path().stem().string());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+}  // namespace rapid

@@ -1,0 +1,166 @@
+#include "bindings/host/script_error.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <lua.hpp>
+#include <new>
+#include <optional>
+
+#include "bindings/host/lua_text.h"
+#include "bindings/host/script_place.h"
+#include "bindings/host/state.h"
+
+namespace rapid {
+namespace {
+
+constexpr int levels_searched = 50;  // for an error's own line, which `error(text, level)` may put further down
+constexpr char engine_errors[] = "rapid.engine_errors";  // in the registry
+
+enum Description { message_field = 1, place_field, trace_field };  // of the table that describe_error() makes
+
+struct EngineError {
+    std::string message;
+    bool full_stack;  // Lua leaves no more than a few slots to the message handler
+};
+
+// The text for one of LuaJIT's own errors, those of limits and of assignments to constants.
+std::optional<EngineError> engine_error(lua_State* L, const std::string& message)
+{
+    const int top = lua_gettop(L);
+    std::optional<EngineError> found;
+    lua_getfield(L, LUA_REGISTRYINDEX, engine_errors);
+    if (lua_istable(L, -1)) {
+        lua_pushlstring(L, message.data(), message.size());
+        lua_rawget(L, -2);
+        if (lua_istable(L, -1)) {
+            lua_getfield(L, -1, "full_stack");
+            const bool full_stack = lua_toboolean(L, -1) != 0;
+            lua_getfield(L, -2, "message");
+            found = {text_at(L, -1), full_stack};
+        }
+    }
+    lua_settop(L, top);
+    return found;
+}
+
+std::string message_of(lua_State* L, int index)
+{
+    if (lua_type(L, index) == LUA_TSTRING || lua_type(L, index) == LUA_TNUMBER) return text_at(L, index);
+    if (lua_isnil(L, index)) return "error raised without a message";
+    return fmt::format("error raised with a {} instead of a message", luaL_typename(L, index));
+}
+
+std::string shown(const Location& place) { return fmt::format("{}:{}", place.file, place.line); }
+
+// The line of the error itself where that is graph code, else the nearest line of graph code that led there; empty
+// where there is none. Takes the position that Lua's `error` has put in front off the message.
+std::string find_place(lua_State* L, std::string& message)
+{
+    const Location& tail_call = State::of(L).tail_call;
+    std::string place;
+    lua_Debug info;
+    for (int level = 1; lua_getstack(L, level, &info); ++level) {
+        lua_getinfo(L, "Sl", &info);
+        if (place.empty() && is_run_body(L, info) && tail_call.line > 0) place = shown(tail_call);
+        if (info.currentline < 0) continue;
+        const std::string prefix = fmt::format("{}:{}: ", info.short_src, info.currentline);
+        const bool own = message.starts_with(prefix);
+        if (own) message.erase(0, prefix.size());
+        if (is_graph_code(info) && (place.empty() || own)) place = shown({info.source + 1, info.currentline});
+        if (own && is_graph_code(info)) break;
+        if (!place.empty() && level > levels_searched) break;
+    }
+    return place.empty() && tail_call.line > 0 ? shown(tail_call) : place;
+}
+
+void set_field(lua_State* L, int table, Description field, const std::string& text)
+{
+    lua_pushlstring(L, text.data(), text.size());
+    lua_rawseti(L, table, field);
+}
+
+std::string get_field(lua_State* L, int table, Description field)
+{
+    lua_rawgeti(L, table, field);
+    const std::string text = text_at(L, -1);
+    lua_pop(L, 1);
+    return text;
+}
+
+// "file:12" -> a Location.
+Location parse_place(const std::string& place)
+{
+    const std::size_t colon = place.rfind(':');
+    if (colon == std::string::npos) return {};
+    return {place.substr(0, colon), std::atoi(place.c_str() + colon + 1)};
+}
+
+// Lua has positions only as the beginning of a message, "file:12: what": one that is there, as the compiler's and the
+// nodes' messages have it, comes before `place`.
+Error with_place(const std::string& message, const std::string& place)
+{
+    const std::size_t end = message.find(": ");
+    const std::size_t colon = end == std::string::npos ? end : message.rfind(':', end - 1);
+    if (colon != std::string::npos && colon + 1 < end && message.find_first_not_of("0123456789", colon + 1) == end)
+        return Error(message.substr(end + 2)).at(parse_place(message.substr(0, end)));
+    if (!place.empty()) return Error(message).at(parse_place(place));
+    return Error(message);
+}
+
+}  // namespace
+
+int describe_error(lua_State* L)
+{
+    std::string message = message_of(L, 1);
+    const std::string place = find_place(L, message);
+    const std::optional<EngineError> of_engine = engine_error(L, message);
+    if (of_engine) message = of_engine->message;
+    std::string trace;
+    if (!of_engine || !of_engine->full_stack) {
+        luaL_traceback(L, L, nullptr, 1);
+        trace = text_at(L, -1);
+    }
+    lua_settop(L, 0);
+    lua_createtable(L, 3, 0);
+    set_field(L, 1, message_field, message);
+    set_field(L, 1, place_field, place);
+    set_field(L, 1, trace_field, trace);
+    return 1;
+}
+
+Error take_error(lua_State* L)
+{
+    const int top = lua_gettop(L);
+    std::string message, place, trace;
+    if (lua_istable(L, top)) {
+        message = get_field(L, top, message_field);
+        place = get_field(L, top, place_field);
+        trace = get_field(L, top, trace_field);
+    } else {  // no handler was called, or it failed: there was no memory, or no stack, to describe the error
+        message = lua_isstring(L, top) ? text_at(L, top) : "an error that could not be described";
+        if (const auto of_engine = engine_error(L, message)) message = of_engine->message;
+    }
+    lua_settop(L, top - 1);
+    return with_place(message, place).with_trace(trace);
+}
+
+void set_engine_errors(lua_State* L) { lua_setfield(L, LUA_REGISTRYINDEX, engine_errors); }
+
+int guarded(lua_State* L, int (*f)(State& state))
+{
+    State& state = State::of(L);
+    const State::InCoroutine running(state, L);
+    std::string message;
+    try {
+        return f(state);
+    } catch (const std::bad_alloc&) {
+        message = "out of memory";
+    } catch (const std::exception& error) {  // an Error's text has the place and the node that it knows
+        message = error.what();
+    }
+    lua_pushlstring(L, message.data(), message.size());
+    return lua_error(L);
+}
+
+}  // namespace rapid

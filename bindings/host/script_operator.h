@@ -1,0 +1,40 @@
+// The operator of a node type that rapid.node defines.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bindings/host/kernel.h"
+
+namespace rapid {
+
+// The parameters' values by name, the kernel, and the attributes that the node makes.
+struct ScriptFields {
+    std::string group;
+    std::shared_ptr<const Kernel> kernel;
+    KernelArguments arguments;
+    std::vector<AttributeSpec> makes;
+
+    // Points of another simulation, and those behind Solve, may not have them yet.
+    void add_attributes(PointSet& points, const Evaluation& now) const
+    {
+        for (const AttributeSpec& spec : makes)
+            if (now.keeps(spec.name)) points.add(spec);
+    }
+
+    // As an edit of the points, one by one.
+    void uses(Uses& uses) const { kernel->uses(uses, arguments); }
+    bool removes_points() const { return kernel->kills(); }
+    bool asks_places() const { return kernel->asks_places(); }
+    std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
+    {
+        add_attributes(points, now);
+        return kernel->prepare(points, group, now, arguments, before);
+    }
+};
+
+// For a kernel that edits the points one by one, an action, or a function of all points.
+std::unique_ptr<Operator> make_script_operator(NodeKind kind, bool edits_points, ScriptFields fields);
+
+}  // namespace rapid

@@ -1,0 +1,216 @@
+#include "bindings/host/testing/test_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <lua.hpp>
+#include <optional>
+#include <string>
+
+#include "bindings/host/testing/point_checks.h"
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+constexpr const char* metatable = "rapid.points";
+
+TestedPoints& points_at(lua_State* L, int index)
+{
+    return **static_cast<TestedPoints**>(luaL_checkudata(L, index, metatable));
+}
+
+std::string text_at(lua_State* L, int index)
+{
+    std::size_t size = 0;
+    const char* text = luaL_checklstring(L, index, &size);
+    return {text, size};
+}
+
+// Turns an Error into a Lua error with exactly its text.
+template <int (*function)(lua_State*)>
+int guarded(lua_State* L)
+{
+    try {
+        return function(L);
+    } catch (const Error& error) {
+        lua_pushstring(L, error.what());
+    }
+    return lua_error(L);
+}
+
+int push(lua_State* L, const Numbers& numbers)
+{
+    for (int k = 0; k < numbers.count; ++k) lua_pushnumber(L, numbers.x[k]);
+    return numbers.count;
+}
+
+const AnyColumn& column_of(const TestedPoints& points, const std::string& name)
+{
+    if (const AnyColumn* column = points.set.find(name)) return *column;
+    throw Error(fmt::format("{} has no attribute \"{}\"{}", points.source, name,
+                            did_you_mean(name, points.set.column_names())));
+}
+
+int size(lua_State* L)
+{
+    lua_pushinteger(L, static_cast<lua_Integer>(points_at(L, 1).set.size()));
+    return 1;
+}
+
+int source(lua_State* L)
+{
+    lua_pushstring(L, points_at(L, 1).source.c_str());
+    return 1;
+}
+
+int push_names(lua_State* L, const std::vector<std::string>& names)
+{
+    lua_newtable(L);
+    int i = 0;
+    for (const std::string& name : names) {
+        lua_pushstring(L, name.c_str());
+        lua_rawseti(L, -2, ++i);
+    }
+    return 1;
+}
+
+int names(lua_State* L) { return push_names(L, points_at(L, 1).set.column_names()); }
+
+int group_names(lua_State* L) { return push_names(L, points_at(L, 1).set.group_names()); }
+
+// value(points, place from 1, name): the numbers of the value.
+int value(lua_State* L)
+{
+    const TestedPoints& points = points_at(L, 1);
+    const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
+    return std::visit([&](const auto& column) { return push(L, numbers_of(column[place])); },
+                      column_of(points, text_at(L, 3)));
+}
+
+const Column<std::uint8_t>& group_of(const TestedPoints& points, const std::string& name)
+{
+    if (const Column<std::uint8_t>* group = points.set.find_group(name)) return *group;
+    throw Error(
+        fmt::format("{} has no group \"{}\"{}", points.source, name, did_you_mean(name, points.set.group_names())));
+}
+
+// within(points, place from 1, group)
+int within(lua_State* L)
+{
+    const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
+    lua_pushboolean(L, group_of(points_at(L, 1), text_at(L, 3))[place] != 0);
+    return 1;
+}
+
+// place_of(points, id): from 1; nil where no point has the id.
+int place_of(lua_State* L)
+{
+    TestedPoints& points = points_at(L, 1);
+    if (points.places.empty())
+        for (std::size_t i = 0; i < points.set.size(); ++i) points.places.emplace(points.set.id()[i], i);
+    const auto found = points.places.find(static_cast<std::int64_t>(luaL_checknumber(L, 2)));
+    if (found == points.places.end()) return 0;
+    lua_pushinteger(L, static_cast<lua_Integer>(found->second) + 1);
+    return 1;
+}
+
+int group(lua_State* L)
+{
+    const TestedPoints& points = points_at(L, 1);
+    const std::string name = text_at(L, 2);
+    const Column<std::uint8_t>& members = group_of(points, name);
+    std::vector<std::uint8_t> mask(points.set.size());
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = members[i];
+    PointSet subset = points.set;
+    subset.keep(mask);
+    push_points(L, std::move(subset), fmt::format("{}, group {}", points.source, name));
+    return 1;
+}
+
+// A NaN among them makes the result NaN: no comparison with it holds, so no test overlooks it.
+double folded(const std::string& what, double so_far, double x)
+{
+    if (std::isnan(x) || std::isnan(so_far)) return std::numeric_limits<double>::quiet_NaN();
+    return what == "min" ? std::min(so_far, x) : what == "max" ? std::max(so_far, x) : so_far + x;
+}
+
+// reduce(points, name, "min" | "max" | "mean"), for each number of the values. Without points: inf, -inf and NaN.
+int reduce(lua_State* L)
+{
+    const std::string what = text_at(L, 3);
+    const double start = what == "min"   ? std::numeric_limits<double>::infinity()
+                         : what == "max" ? -std::numeric_limits<double>::infinity()
+                                         : 0;
+    return std::visit(
+        [&](const auto& column) {
+            Numbers result = numbers_of(std::decay_t<decltype(column)>::zero());
+            std::fill_n(result.x, result.count, start);
+            for (std::size_t i = 0; i < column.size(); ++i) {
+                const Numbers numbers = numbers_of(column[i]);
+                for (int k = 0; k < result.count; ++k) result.x[k] = folded(what, result.x[k], numbers.x[k]);
+            }
+            if (what == "mean")
+                for (int k = 0; k < result.count; ++k) result.x[k] /= static_cast<double>(column.size());
+            return push(L, result);
+        },
+        column_of(points_at(L, 1), text_at(L, 2)));
+}
+
+int push_fault(lua_State* L, const std::optional<std::string>& fault)
+{
+    if (!fault) return 0;
+    lua_pushstring(L, fault->c_str());
+    return 1;
+}
+
+// not_finite(points): the first value that is not finite, or nil.
+int not_finite(lua_State* L) { return push_fault(L, first_not_finite(points_at(L, 1))); }
+
+// difference(a, b): the first difference in their bits, or nil.
+int difference(lua_State* L) { return push_fault(L, first_difference(points_at(L, 1), points_at(L, 2))); }
+
+int collect(lua_State* L)
+{
+    delete &points_at(L, 1);
+    return 0;
+}
+
+}  // namespace
+
+void push_points(lua_State* L, PointSet points, std::string source)
+{
+    auto* place = static_cast<TestedPoints**>(lua_newuserdata(L, sizeof(TestedPoints*)));
+    *place = new TestedPoints{std::move(points), std::move(source), {}};
+    luaL_getmetatable(L, metatable);
+    lua_setmetatable(L, -2);
+}
+
+void register_points(lua_State* L)
+{
+    const luaL_Reg functions[] = {{"size", guarded<size>},
+                                  {"source", guarded<source>},
+                                  {"names", guarded<names>},
+                                  {"group_names", guarded<group_names>},
+                                  {"value", guarded<value>},
+                                  {"within", guarded<within>},
+                                  {"place_of", guarded<place_of>},
+                                  {"group", guarded<group>},
+                                  {"reduce", guarded<reduce>},
+                                  {"not_finite", guarded<not_finite>},
+                                  {"difference", guarded<difference>}};
+    for (const luaL_Reg& function : functions) {
+        lua_pushcfunction(L, function.func);
+        lua_setfield(L, -2, function.name);
+    }
+    luaL_newmetatable(L, metatable);
+    lua_pushcfunction(L, collect);
+    lua_setfield(L, -2, "__gc");
+    lua_pushcfunction(L, guarded<size>);
+    lua_setfield(L, -2, "__len");
+    lua_setfield(L, -2, "points_metatable");
+}
+
+}  // namespace rapid

@@ -1,0 +1,71 @@
+#include "bindings/host/watchdog.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+
+namespace rapid {
+namespace {
+
+// At most what a clock can hold, which is longer than any run.
+std::chrono::steady_clock::duration duration_of(double seconds)
+{
+    return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+        std::chrono::duration<double>(std::min(seconds, 1e7)));
+}
+
+}  // namespace
+
+Watchdog::Watchdog(double limit, std::function<void(const std::string& message)> on_timeout)
+    : limit_(limit), on_timeout_(std::move(on_timeout)), thread_([this] { watch(); })
+{
+}
+
+Watchdog::~Watchdog()
+{
+    {
+        const std::lock_guard lock(mutex_);
+        stop_ = true;
+    }
+    wake_.notify_all();
+    thread_.join();
+}
+
+// The watchdog is not woken: it never sleeps for longer than a section may take.
+Watchdog::Section::Section(Watchdog& watchdog, std::string what) : watchdog_(watchdog)
+{
+    const std::lock_guard lock(watchdog.mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    const auto limit = duration_of(watchdog.limit_);
+    const auto others = now + limit * static_cast<int>(watchdog.running_.size());
+    watchdog.deadline_ = std::clamp(watchdog.deadline_, now, others) + limit;
+    watchdog.running_.push_back(std::move(what));
+}
+
+Watchdog::Section::~Section()
+{
+    const std::lock_guard lock(watchdog_.mutex_);
+    watchdog_.running_.pop_back();  // sections end in the reverse order; whose name is taken off does not matter
+}
+
+void Watchdog::watch()
+{
+    std::unique_lock lock(mutex_);
+    while (!stop_) {
+        const auto now = std::chrono::steady_clock::now();
+        if (running_.empty() || now < deadline_) {
+            wake_.wait_until(lock, running_.empty() ? now + duration_of(limit_) : deadline_);
+            continue;
+        }
+        const std::string message =
+            fmt::format("{}: the script runs for more than {:g} s; --script-timeout sets the limit",
+                        fmt::join(running_, ", "), limit_);
+        if (on_timeout_) on_timeout_(message);
+        std::fprintf(stderr, "%s\n", message.c_str());
+        std::_Exit(1);
+    }
+}
+
+}  // namespace rapid

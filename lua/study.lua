@@ -92,7 +92,7 @@ local function make(native, vector)
     return study
   end
 
-  -- The description that the command needs before it runs a scene.
+  -- The description that the command needs before it runs a scene. Fields that are not given have the host's defaults.
   local function describe_study(definition)
     local own = type(definition.error) == "function"
     local lines = definition.lines
@@ -102,9 +102,9 @@ local function make(native, vector)
       lines = type(lines) == "string" and { lines } or lines or {},
       frames = { definition.frames[1], definition.frames[2] },
       reference = type(definition.reference) == "table" and definition.reference or nil,
-      error = own and "own" or definition.error or "rms",
-      error_frames = definition.error_frames or "all",
-      repeat_runs = definition.repeat_runs or 5,
+      error = own and "own" or definition.error,
+      error_frames = definition.error_frames,
+      repeat_runs = definition.repeat_runs,
     }
   end
 

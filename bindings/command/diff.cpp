@@ -28,7 +28,8 @@ public:
         app.add_option("B", b_, "the other")->type_name("")->required();
         app.add_option_function<std::string>(
                "--tolerance", [this](const std::string& text) { tolerance_ = read_tolerance(text); },
-               "of P: times the diagonal of the bounds; of the rest: relative [default 1e-6]")
+               fmt::format("of P: times the diagonal of the bounds; of the rest: relative [default {}]",
+                           default_tolerance))
             ->type_name("X");
         app.add_flag("--json", json_, "as JSON");
     }
@@ -46,6 +47,8 @@ public:
     }
 
 private:
+    static constexpr const char* default_tolerance = "1e-6";
+
     static double read_tolerance(const std::string& text)
     {
         double value = 0;
@@ -98,7 +101,7 @@ private:
     }
 
     std::string a_, b_;
-    double tolerance_ = 1e-6;
+    double tolerance_ = read_tolerance(default_tolerance);
     bool json_ = false;
 };
 RAPID_COMMAND(Diff);

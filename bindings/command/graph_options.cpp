@@ -26,12 +26,13 @@ void GraphOptions::declare(CLI::App& app)
     app.add_option_function<std::string>(
            "--script-timeout",
            [this](const std::string& text) { session_.script_timeout = read_positive("--script-timeout", text); },
-           "time that scripts may take, a frame [default 600]")
+           fmt::format("time that scripts may take, a frame [default {:g}]", session_.script_timeout))
         ->type_name("SECONDS");
     app.add_option_function<std::string>(
            "--script-memory",
            [this](const std::string& text) { session_.script_memory = read_bytes("--script-memory", text); },
-           "memory that a script's state may take: bytes, or 512M, 1G [default 1G]")
+           fmt::format("memory that a script's state may take: bytes, or 512M, 1G [default {}G]",
+                       session_.script_memory >> 30))
         ->type_name("BYTES");
 }
 

@@ -28,8 +28,9 @@ public:
         graph_.declare(app);
         app.add_option_function<std::string>(
                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-               "the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too [default: "
-               "48 from the first]")
+               fmt::format("the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too "
+                           "[default: {} from the first]",
+                           default_frames))
             ->type_name("FRAMES");
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");

@@ -143,9 +143,13 @@ public:
         list("--lines", lines_, "NODE.PARAM", "of a graph: a swept parameter that tells the lines of the plot apart");
         app.add_option_function<std::string>(
                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-               "of a graph: the first frame and the last: 1-48 [default: 48 from the first]")
+               fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]",
+                           default_frames))
             ->type_name("FRAMES");
-        app.add_option("--error", error_, "of a graph: rms, max or p95; or residual, of its constraints [default rms]")
+        const Study defaults;
+        app.add_option(
+               "--error", error_,
+               fmt::format("of a graph: rms, max or p95; or residual, of its constraints [default {}]", defaults.error))
             ->check(CLI::IsMember({"rms", "max", "p95", "residual"}))
             ->type_name("NORM");
         app.add_option("--error-frames", error_frames_, "of a graph: all but the first, or the last [default all]")
@@ -154,7 +158,8 @@ public:
         app.add_option_function<std::string>(
                "--repeat",
                [this](const std::string& text) { repeat_ = static_cast<int>(read_whole("--repeat", text, 1)); },
-               "timed runs of each row, of which the median is shown [default 5, or what the study says]")
+               fmt::format("timed runs of each row, of which the median is shown [default {}, or what the study says]",
+                           defaults.repeat_runs))
             ->type_name("N");
         app.add_option("-o,--output", folder_, "where study.json and study.svg are written [default: here]")
             ->type_name("DIR");
@@ -201,7 +206,7 @@ private:
             for (const std::string& value : values)
                 study.sweep[knob].push_back(read_value_of("--sweep " + knob, value));
         }
-        study.error = error_.value_or("rms");
+        if (error_) study.error = *error_;
         if (!study.compares() && !reference_.empty())
             throw Error("--reference: a residual is compared with nothing; leave it out");
         if (study.compares() && reference_.empty())

@@ -69,10 +69,11 @@ Study study_of(const Table& asked)
     for (const Value& line : table("lines")->list) study.lines.push_back(knob_text(line));
     study.first = number(table("frames")->list[0]);
     study.last = number(table("frames")->list[1]);
-    study.error = *asked.named.at("error").get<std::string>();
-    study.last_frame_only = *asked.named.at("error_frames").get<std::string>() == "last";
+    if (asked.named.count("error")) study.error = *asked.named.at("error").get<std::string>();
+    if (asked.named.count("error_frames"))
+        study.last_frame_only = *asked.named.at("error_frames").get<std::string>() == "last";
     if (asked.named.count("reference")) study.reference = table("reference")->named;
-    study.repeat_runs = static_cast<int>(number(asked.named.at("repeat_runs")));
+    if (asked.named.count("repeat_runs")) study.repeat_runs = static_cast<int>(number(asked.named.at("repeat_runs")));
     study.complete();
     return study;
 }

@@ -1,4 +1,4 @@
--- What is stiff: told by `rapid check` and in the summary of a run, with numbers computed from the points.
+-- Stiff nodes, reported by `rapid check` and in the summary of a run with figures computed from the points.
 local command = require "testing.command"
 local json = require "dkjson"
 
@@ -20,7 +20,7 @@ local function rapid(arguments, text)
   return command.rapid(arguments, { cwd = folder.path }), folder
 end
 
--- The lines on what is stiff.
+-- The lines about stiff nodes.
 local function advice(arguments, text)
   local result = rapid(arguments, text)
   assert.equal(0, result.status, result.stderr)

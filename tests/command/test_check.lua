@@ -1,4 +1,4 @@
--- rapid check: what can be known without a frame. Its errors are those of `run` (test_run_failures.lua).
+-- rapid check: errors that can be found without a frame. They are those of `run` (test_run_failures.lua).
 local command = require "testing.command"
 
 local function check(text, arguments)

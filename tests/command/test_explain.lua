@@ -1,4 +1,4 @@
--- rapid explain: what the plan keeps and leaves out, with its reasons, in words and as JSON.
+-- rapid explain: the kept and omitted parts of the plan, with reasons, as text and as JSON.
 local command = require "testing.command"
 local json = require "dkjson"
 

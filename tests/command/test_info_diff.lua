@@ -1,4 +1,4 @@
--- rapid info and rapid diff: what files of points hold, and how they differ.
+-- rapid info and rapid diff: the contents of point files, and their differences.
 local command = require "testing.command"
 local json = require "dkjson"
 

@@ -1,4 +1,4 @@
--- What is left out changes no bit of what is asked for: each run is compared with one that leaves nothing out.
+-- Omissions change no bit of the outputs: each run is compared with one that omits nothing.
 local command = require "testing.command"
 
 local function same_files(folder, scene, arguments, outputs)

@@ -1,4 +1,4 @@
--- rapid new: what it makes runs, passes and is well-formed, and nothing is ever overwritten.
+-- rapid new: its files run, pass and are well-formed, and it never overwrites a file.
 local command = require "testing.command"
 
 describe("rapid new", function()

@@ -1,4 +1,4 @@
--- rapid nodes: the nodes that there are, from their own declarations.
+-- rapid nodes: the node types, from their own declarations.
 local command = require "testing.command"
 local json = require "dkjson"
 

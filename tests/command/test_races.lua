@@ -1,4 +1,4 @@
--- rapid check --races: what a kernel keeps from point to point where its bytecode does not betray it.
+-- rapid check --races: state that a kernel keeps from point to point, and that its bytecode does not show.
 local scene = require "testing.scene"
 
 -- A table in a table of the kernel's own is not followed.

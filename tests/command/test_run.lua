@@ -1,4 +1,4 @@
--- rapid run: which frames are computed, what is written, and what is told.
+-- rapid run: the frames that it computes, its files and its messages.
 local command = require "testing.command"
 local json = require "dkjson"
 

@@ -1,4 +1,4 @@
--- How a run ends that can't go on: what is said, what is left behind, and the exit status.
+-- Failures of a run: its message, its files and its exit status.
 local command = require "testing.command"
 local json = require "dkjson"
 

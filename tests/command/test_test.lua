@@ -1,4 +1,4 @@
--- rapid test: how script-level tests are found, run and counted, and what they can ask of a scene.
+-- rapid test: how script-level tests are found, run and counted, and their access to scenes.
 local command = require "testing.command"
 
 local scene = [[

@@ -1,4 +1,4 @@
--- rapid run --untrusted: the walls that the system puts around a run.
+-- rapid run --untrusted: the sandbox of the system around a run.
 local command = require "testing.command"
 
 local triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"

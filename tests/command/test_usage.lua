@@ -1,4 +1,4 @@
--- What the command says about itself, and how it reads its arguments.
+-- The command's help, and how it reads its arguments.
 local command = require "testing.command"
 local rapid = command.rapid
 

@@ -1,4 +1,4 @@
--- rapid run --watch: what makes it run again, what it says, and how it ends.
+-- rapid run --watch: when it runs again, its messages, and how it ends.
 local command = require "testing.command"
 
 local scene = [[

@@ -1,4 +1,4 @@
--- Every constructor of the graph language: what it makes, measured from outside, and what it refuses.
+-- Every constructor of the graph language: its result, measured from outside, and its errors.
 local scene = require "testing.scene"
 
 -- Points born on or in a source.

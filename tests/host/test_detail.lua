@@ -1,4 +1,4 @@
--- :detail: a function over the whole set, and the values that it leaves for kernels.
+-- :detail: a function over the whole set, and its values for kernels.
 local scene = require "testing.scene"
 
 local function run(body, frames, after)

@@ -1,6 +1,6 @@
--- Ways out that have been tried: each ends in an error that names the file and the line, and leaves nothing behind.
+-- Attempts to escape the sandbox: each ends in an error that names the file and the line, and has no effect.
 --
--- An attempt is a piece of graph code that would go through if it worked. It is made wherever graph code runs.
+-- An attempt is a piece of graph code that raises no error if it works. It is made wherever graph code runs.
 local scene = require "testing.scene"
 
 local bytecode = ("%q"):format(string.dump(function() return 1 end)):gsub("\n", "n")

@@ -1,4 +1,4 @@
--- The graph language: nodes as values, names, groups, several outputs, what is fed back, and what happens when.
+-- The graph language: nodes as values, names, groups, several outputs, feedback, and the order of events.
 local scene = require "testing.scene"
 
 local function values(points, name)

@@ -1,4 +1,4 @@
--- Kernels: what p reads and writes, groups, deaths, and what each refuses.
+-- Kernels: reads and writes of p, groups, deaths, and the errors of each.
 local scene = require "testing.scene"
 
 local function values(points, name)

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "runtime/graph/plan.h"
-#include "runtime/picture/picture.h"
+#include "runtime/picture/scene.h"
 
 namespace rapid {
 

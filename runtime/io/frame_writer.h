@@ -17,7 +17,7 @@
 
 #include "runtime/io/format.h"
 #include "runtime/io/frame_pattern.h"
-#include "runtime/picture/picture.h"
+#include "runtime/picture/picture_fit.h"
 
 namespace rapid {
 

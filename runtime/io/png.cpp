@@ -8,6 +8,7 @@
 #include "runtime/io/file.h"
 #include "runtime/io/format.h"
 #include "runtime/picture/picture.h"
+#include "runtime/picture/picture_fit.h"
 
 namespace rapid {
 namespace {

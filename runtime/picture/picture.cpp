@@ -1,255 +1,21 @@
-// Points are sorted into tiles; each tile sorts its own by depth and lays them on from the nearest, until a pixel is
-// covered. Nothing depends on the order in which threads work: a tile's points come in the order of their depth, and
-// of their place in the set where depths are equal.
 #include "runtime/picture/picture.h"
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 
-#include "runtime/parallel.h"
-#include "runtime/picture/surfaces.h"
+#include "runtime/picture/discs.h"
 
 namespace rapid {
 namespace {
 
-constexpr int tile_size = 32;  // pixels
-
-// Dark blue over teal to light yellow: lightness grows evenly with speed, and stands out on the background all along.
-// sRGB, at even steps.
-constexpr std::array<std::array<float, 3>, 6> speed_ramp = {{{0.17f, 0.25f, 0.62f},
-                                                             {0.16f, 0.42f, 0.80f},
-                                                             {0.18f, 0.62f, 0.82f},
-                                                             {0.38f, 0.79f, 0.75f},
-                                                             {0.72f, 0.91f, 0.66f},
-                                                             {1.00f, 0.97f, 0.74f}}};
-
-float linear(float srgb) { return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f); }
 float srgb(float light) { return light <= 0.0031308f ? 12.92f * light : 1.055f * std::pow(light, 1 / 2.4f) - 0.055f; }
 
-// The ramp in linear light, finer than 8 bits can show.
-const std::vector<Vec3f>& speed_colours()
-{
-    static const std::vector<Vec3f> colours = [] {
-        std::vector<Vec3f> table(1024);
-        for (std::size_t i = 0; i < table.size(); ++i) {
-            const float at = static_cast<float>(i) / static_cast<float>(table.size() - 1) * (speed_ramp.size() - 1);
-            const std::size_t step = std::min<std::size_t>(static_cast<std::size_t>(at), speed_ramp.size() - 2);
-            const float t = at - static_cast<float>(step);
-            for (int c = 0; c < 3; ++c)
-                table[i][c] = linear((1 - t) * speed_ramp[step][c] + t * speed_ramp[step + 1][c]);
-        }
-        return table;
-    }();
-    return colours;
-}
-
-// A point in the picture.
-struct Disc {
-    float x, y, depth;
-    float radius;  // pixels
-    float metres;  // radius in the scene
-    Vec3f colour;
-};
-
-struct Look {
-    const PointSet& points;
-    const PictureView& view;
-    const Light& light;
-    Lens lens;
-    int width, height;
-    float far;  // m, the depth at which colours have faded halfway to the background
-
-    Vec3f colour(std::size_t i) const
-    {
-        if (const Column<Vec3f>* Cd = points.find<Vec3f>("Cd")) {
-            const Vec3f c = (*Cd)[i].cwiseMax(0.0f).cwiseMin(1e4f);
-            if (c.allFinite()) return c;
-        }
-        const float speed = points.v()[i].norm() / static_cast<float>(view.full_speed);
-        const std::vector<Vec3f>& table = speed_colours();
-        // A square root: most points are slow, and differences among them show.
-        const float at = std::isfinite(speed) ? std::sqrt(std::clamp(speed, 0.0f, 1.0f)) : 1;
-        return table[static_cast<std::size_t>(at * static_cast<float>(table.size() - 1))];
-    }
-
-    // A radius of 0: not seen.
-    Disc disc(std::size_t i) const
-    {
-        Disc d{};
-        const Vec3f P = points.P()[i];
-        const Vec3f s = lens.project(P);
-        if (!s.allFinite() || s.z() < 1e-3f * far) return d;
-        const Column<float>* pscale = points.find<float>("pscale");
-        d.metres = pscale && (*pscale)[i] > 0 ? (*pscale)[i] : 0;
-        const float least = static_cast<float>(view.least_radius);
-        const float radius =
-            std::min(std::max(least, d.metres * lens.focal / s.z()), 0.5f * static_cast<float>(height));
-        const float reach = radius + 0.5f;
-        if (!(s.x() + reach > 0 && s.y() + reach > 0 && s.x() - reach < static_cast<float>(width) &&
-              s.y() - reach < static_cast<float>(height)))
-            return d;
-        d.x = s.x();
-        d.y = s.y();
-        d.depth = s.z();
-        d.radius = radius;
-        const float lamp = light.past_meshes(P, Vec3f::Zero()) * light.past_points(P);
-        const float fog = std::exp(-0.35f * std::max(0.0f, s.z() / far - 1));
-        const Vec3f own = colour(i);
-        // What is brighter than white shines by itself, and no shadow dims it.
-        const float shines = std::clamp(own.maxCoeff() - 1, 0.0f, 1.0f);
-        const float lit = 0.30f + 0.80f * lamp;
-        d.colour = own * ((lit + shines * (1 - lit)) * fog);
-        return d;
-    }
-};
-
-struct Tiles {
-    int across, down;
-    std::vector<Disc> discs;            // all, by point
-    std::vector<std::uint32_t> first;   // of each tile's points in `points`, and the end
-    std::vector<std::uint32_t> points;  // a tile's points in the order of the set
-
-    template <class F>
-    void for_each_tile_of(const Disc& d, const F& f) const
-    {
-        const float reach = d.radius + 0.5f;
-        const auto tile = [](float at, int count) {
-            return std::clamp(static_cast<int>(std::floor(at / tile_size)), 0, count - 1);
-        };
-        for (int j = tile(d.y - reach, down); j <= tile(d.y + reach, down); ++j)
-            for (int i = tile(d.x - reach, across); i <= tile(d.x + reach, across); ++i) f(j * across + i);
-    }
-};
-
-// A counting sort in two passes over blocks of points: each block knows where its points of a tile go.
-Tiles sort_into_tiles(const Look& look)
-{
-    Tiles tiles{(look.width + tile_size - 1) / tile_size, (look.height + tile_size - 1) / tile_size, {}, {}, {}};
-    const std::size_t n = look.points.size(), count = static_cast<std::size_t>(tiles.across * tiles.down);
-    tiles.discs.resize(n);
-    constexpr std::size_t block = 16 * chunk_size;
-    const std::size_t blocks = (n + block - 1) / block;
-    std::vector<std::vector<std::uint32_t>> place(blocks, std::vector<std::uint32_t>(count, 0));
-    const auto for_each_block = [&](const auto& f) {
-        tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t b) {
-            for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i) f(i, place[b]);
-        });
-    };
-    for_each_block([&](std::size_t i, std::vector<std::uint32_t>& counts) {
-        tiles.discs[i] = look.disc(i);
-        if (tiles.discs[i].radius > 0) tiles.for_each_tile_of(tiles.discs[i], [&](int t) { ++counts[t]; });
-    });
-    std::uint32_t total = 0;
-    for (std::size_t t = 0; t < count; ++t) {
-        tiles.first.push_back(total);
-        for (std::size_t b = 0; b < blocks; ++b) total += std::exchange(place[b][t], total);
-    }
-    tiles.first.push_back(total);
-    tiles.points.resize(total);
-    for_each_block([&](std::size_t i, std::vector<std::uint32_t>& next) {
-        if (tiles.discs[i].radius > 0)
-            tiles.for_each_tile_of(tiles.discs[i],
-                                   [&](int t) { tiles.points[next[t]++] = static_cast<std::uint32_t>(i); });
-    });
-    return tiles;
-}
-
-// Light of one pixel while points are laid on from the nearest.
-struct Pixel {
-    Vec3f colour = Vec3f::Zero();
-    float open = 1;  // what still shows from behind
-};
-
-class TilePainter {
-public:
-    TilePainter(const Look& look, const Tiles& tiles, const Surfaces& surfaces, std::vector<Vec3f>& picture)
-        : look_(look), tiles_(tiles), surfaces_(surfaces), picture_(picture)
-    {
-    }
-
-    void paint(int tile) const
-    {
-        const int x0 = tile % tiles_.across * tile_size, y0 = tile / tiles_.across * tile_size;
-        const int x1 = std::min(x0 + tile_size, look_.width), y1 = std::min(y0 + tile_size, look_.height);
-        std::vector<std::uint32_t> order(tiles_.points.begin() + tiles_.first[tile],
-                                         tiles_.points.begin() + tiles_.first[tile + 1]);
-        std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-            const float da = tiles_.discs[a].depth, db = tiles_.discs[b].depth;
-            return da != db ? da < db : a < b;
-        });
-        std::array<Pixel, tile_size * tile_size> pixels;
-        for (const std::uint32_t point : order) lay_on(tiles_.discs[point], x0, y0, x1, y1, pixels);
-        for (int y = y0; y < y1; ++y)
-            for (int x = x0; x < x1; ++x) {
-                const Pixel& pixel = pixels[static_cast<std::size_t>((y - y0) * tile_size + x - x0)];
-                Vec3f& out = picture_[static_cast<std::size_t>(y) * look_.width + x];
-                out = pixel.colour + pixel.open * out;
-            }
-    }
-
-private:
-    // The part of the pixel's samples that a surface nearer than `depth` does not hide.
-    float past_surfaces(int x, int y, float depth) const
-    {
-        int past = 0;
-        for (int j = 0; j < surface_samples; ++j)
-            for (int i = 0; i < surface_samples; ++i) {
-                const std::size_t sample =
-                    static_cast<std::size_t>(y * surface_samples + j) * surfaces_.width + x * surface_samples + i;
-                past += surfaces_.depth[sample] > depth;
-            }
-        return static_cast<float>(past) / (surface_samples * surface_samples);
-    }
-
-    void lay_on(const Disc& d, int x0, int y0, int x1, int y1, std::array<Pixel, tile_size * tile_size>& pixels) const
-    {
-        const float reach = d.radius + 0.5f;
-        const int left = std::max(x0, static_cast<int>(std::floor(d.x - reach)));
-        const int right = std::min(x1, static_cast<int>(std::ceil(d.x + reach)));
-        const int top = std::max(y0, static_cast<int>(std::floor(d.y - reach)));
-        const int bottom = std::min(y1, static_cast<int>(std::ceil(d.y + reach)));
-        // Only discs of a few pixels show that they are balls.
-        const float roundness = std::clamp((d.radius - 1.2f) / 2.5f, 0.0f, 1.0f);
-        for (int y = top; y < bottom; ++y)
-            for (int x = left; x < right; ++x) {
-                Pixel& pixel = pixels[static_cast<std::size_t>((y - y0) * tile_size + x - x0)];
-                if (pixel.open < 1.0f / 512) continue;
-                const float dx = static_cast<float>(x) + 0.5f - d.x, dy = static_cast<float>(y) + 0.5f - d.y;
-                const float away = std::sqrt(dx * dx + dy * dy);
-                float cover = std::clamp(reach - away, 0.0f, 1.0f);
-                if (cover == 0) continue;
-                // The ball's surface is nearer than its centre.
-                const float edge = std::min(1.0f, away / d.radius);
-                const float bulge = std::sqrt(1 - edge * edge);
-                cover *= past_surfaces(x, y, d.depth - bulge * d.metres);
-                const Vec3f lit = d.colour * (0.85f + roundness * (shade(dx / d.radius, dy / d.radius, bulge) - 0.85f));
-                pixel.colour += pixel.open * cover * lit;
-                pixel.open *= 1 - cover;
-            }
-    }
-
-    // Of a ball, where its normal in the view is (nx right, ny down, nz to the viewer).
-    float shade(float nx, float ny, float nz) const
-    {
-        const Vec3f n = look_.lens.right * nx - look_.lens.up * ny - look_.lens.forward * nz;
-        const float lamp = 0.5f + 0.5f * n.dot(look_.light.direction());
-        return 0.25f + 0.95f * lamp * lamp;
-    }
-
-    const Look& look_;
-    const Tiles& tiles_;
-    const Surfaces& surfaces_;
-    std::vector<Vec3f>& picture_;
-};
-
-// As it is up to 0.8; brighter light is pressed together below 1 instead of being cut off.
+// Unchanged up to 0.8; brighter light is compressed below 1 instead of being cut off.
 float tone(float light) { return light < 0.8f ? light : 1 - 0.2f * std::exp(-(light - 0.8f) / 0.2f); }
 
-// Thresholds that hide the steps between 8-bit values in dark gradients: Bayer's, from 0 to 63.
+// Bayer's dither thresholds, 0 to 63, against banding in dark gradients.
 int bayer(int x, int y)
 {
     int threshold = 0;
@@ -267,21 +33,10 @@ std::uint8_t quantize(float light, int x, int y)
         std::clamp(std::floor(wanted + (static_cast<float>(bayer(x, y)) + 0.5f) / 64), 0.0f, 255.0f));
 }
 
-}  // namespace
-
-Vec3d Camera::project(const Vec3d& P, int width, int height) const
+// Averages the samples of each pixel.
+std::vector<Vec3f> resolve(const Surfaces& surfaces, int width, int height)
 {
-    return Lens::of_camera(*this, width, height).project(P.cast<float>()).cast<double>();
-}
-
-Picture render(const PointSet& points, const PictureOptions& options, const PictureScene& scene,
-               const PictureView& view)
-{
-    const Light light(points, options, scene, view);
-    const Surfaces surfaces = draw_surfaces(points, options, scene, view, light);
-
-    const int width = options.width, height = options.height;
-    std::vector<Vec3f> light_of(static_cast<std::size_t>(width) * height);
+    std::vector<Vec3f> colours(static_cast<std::size_t>(width) * height);
     tbb::parallel_for(0, height, [&](int y) {
         for (int x = 0; x < width; ++x) {
             Vec3f sum = Vec3f::Zero();
@@ -289,21 +44,28 @@ Picture render(const PointSet& points, const PictureOptions& options, const Pict
                 for (int i = 0; i < surface_samples; ++i)
                     sum += surfaces.colour[static_cast<std::size_t>(y * surface_samples + j) * surfaces.width +
                                            x * surface_samples + i];
-            light_of[static_cast<std::size_t>(y) * width + x] = sum / (surface_samples * surface_samples);
+            colours[static_cast<std::size_t>(y) * width + x] = sum / (surface_samples * surface_samples);
         }
     });
+    return colours;
+}
 
-    const float far = static_cast<float>((view.camera.target - view.camera.position).norm());
-    const Look look{points, view, light, Lens::of_camera(view.camera, width, height), width, height, far};
-    const Tiles tiles = sort_into_tiles(look);
-    const TilePainter painter(look, tiles, surfaces, light_of);
-    tbb::parallel_for(0, tiles.across * tiles.down, [&](int tile) { painter.paint(tile); });
+}  // namespace
 
-    Picture picture{width, height, std::vector<std::uint8_t>(3 * light_of.size())};
+Picture render(const PointSet& points, const PictureOptions& options, const PictureScene& scene,
+               const PictureView& view)
+{
+    const Light light(points, options, scene, view);
+    const Surfaces surfaces = draw_surfaces(points, options, scene, view, light);
+    const int width = options.width, height = options.height;
+    std::vector<Vec3f> colours = resolve(surfaces, width, height);
+    draw_points(points, options, view, light, surfaces, colours);
+
+    Picture picture{width, height, std::vector<std::uint8_t>(3 * colours.size())};
     tbb::parallel_for(0, height, [&](int y) {
         for (int x = 0; x < width; ++x) {
             const std::size_t here = static_cast<std::size_t>(y) * width + x;
-            for (int c = 0; c < 3; ++c) picture.rgb[3 * here + c] = quantize(light_of[here][c], x, y);
+            for (int c = 0; c < 3; ++c) picture.rgb[3 * here + c] = quantize(colours[here][c], x, y);
         }
     });
     return picture;

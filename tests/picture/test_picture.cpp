@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "runtime/picture/picture_fit.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
 
@@ -53,7 +54,7 @@ PictureScene::Body quad(float z, PictureScene::Body::Role role = PictureScene::B
 
 }  // namespace
 
-TEST_CASE("the camera projects a place to the pixel that trigonometry says", "[io][picture]")
+TEST_CASE("the camera projects a point to the pixel that trigonometry gives", "[io][picture]")
 {
     const Camera camera = front_view().camera;
     CHECK_THAT(camera.project({0, 0, 0}, 320, 200), close_to(Vec3d(160, 100, 10), 1e-4));
@@ -122,7 +123,7 @@ TEST_CASE("a vessel does not hide the points in it", "[io][picture]")
     CHECK(is_red(render(points, small, scene, front_view()).pixel(160, 100)));
 }
 
-TEST_CASE("a plane of the scene hides what is under it", "[io][picture]")
+TEST_CASE("a plane of the scene hides the points under it", "[io][picture]")
 {
     PictureScene scene;
     scene.planes.push_back({Vec3d(0, 2, 0), -2});  // y = -1
@@ -139,7 +140,7 @@ TEST_CASE("a plane of the scene hides what is under it", "[io][picture]")
     CHECK_FALSE(is_green(at({2, -2, 0})));
 }
 
-TEST_CASE("a wall between the camera and the scene is looked through, and one behind it is seen", "[io][picture]")
+TEST_CASE("a wall between the camera and the scene is transparent, and one behind it is drawn", "[io][picture]")
 {
     const PointSet points = balls({{0, 0, 0}}, {red}, 0.3f);
     const auto seen = [&](const std::vector<PictureScene::Plane>& planes) {
@@ -187,7 +188,7 @@ TEST_CASE("a picture has the same bits on any number of threads", "[io][picture]
     }
 }
 
-TEST_CASE("points that no picture can show do not harm it", "[io][picture][extreme]")
+TEST_CASE("NaN, infinite and hidden points do not harm a picture", "[io][picture][extreme]")
 {
     const float huge = 1e30f, none = std::numeric_limits<float>::quiet_NaN();
     PointSet points = balls({{none, 0, 0}, {huge, -huge, huge}, {0, 0, 10}, {0, 0, 9.9999f}, {0, 0, 0}},
@@ -202,7 +203,7 @@ TEST_CASE("points that no picture can show do not harm it", "[io][picture][extre
     CHECK(std::isfinite(view.full_speed));
 }
 
-TEST_CASE("the fitted camera sees all points and shapes, and not from far away", "[io][picture]")
+TEST_CASE("the fitted camera sees all points and shapes, and no more than it needs", "[io][picture]")
 {
     const float scale = GENERATE(1e-3f, 1.0f, 1e5f);
     CAPTURE(scale);
@@ -224,7 +225,7 @@ TEST_CASE("the fitted camera sees all points and shapes, and not from far away",
     CHECK(widest > 0.6);
 }
 
-TEST_CASE("over a sequence the camera only glides back, and does not move while all is seen", "[io][picture]")
+TEST_CASE("over a sequence the camera only glides back, and is still while everything is in view", "[io][picture]")
 {
     PictureFit fit;
     PointSet points = random_points({.size = 500, .extent = 1});
@@ -243,7 +244,7 @@ TEST_CASE("over a sequence the camera only glides back, and does not move while 
     }
 }
 
-TEST_CASE("a picture's options say where the camera is and how large it is", "[io][picture]")
+TEST_CASE("a picture's options set its camera and its size", "[io][picture]")
 {
     PictureOptions options = small;
     options.position = Vec3d(0, 0, 10);
@@ -259,7 +260,7 @@ TEST_CASE("a picture's options say where the camera is and how large it is", "[i
     CHECK(is_red(picture.pixel(170, 80)));
 }
 
-TEST_CASE("a .png is one, of 1280 x 720 pixels", "[io][picture]")
+TEST_CASE("a .png file is 1280 x 720 pixels by default", "[io][picture]")
 {
     const TemporaryFolder folder;
     write_points(folder / "a.png", random_points({.size = 100}));

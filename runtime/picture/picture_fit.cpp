@@ -1,12 +1,9 @@
-// The camera of a sequence.
-//
-// What will come is not known when the first frame is drawn, and a camera that jumps makes a sequence useless. So the
-// first frame with points is framed with room for where they go, and later the camera only glides back.
+// Tests: tests/picture/test_picture.cpp.
+#include "runtime/picture/picture_fit.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "runtime/picture/picture.h"
 
 namespace rapid {
 namespace {

@@ -1,0 +1,70 @@
+// Tests: tests/picture/test_picture.cpp.
+#include "runtime/picture/ground.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rapid {
+namespace {
+
+const Vec3f ground_albedo(0.0285f, 0.0305f, 0.0345f);
+const Vec3f grid_colour(0.070f, 0.076f, 0.088f);
+
+}  // namespace
+
+Ground::Ground(const PictureScene::Plane& plane, const Box3d& bounds, bool is_solid)
+    : normal(plane.normal.normalized().cast<float>()),
+      offset(static_cast<float>(plane.offset / plane.normal.norm())),
+      solid(is_solid)
+{
+    u = std::abs(normal.y()) > 0.99f ? Vec3f::UnitX().eval() : any_tangent(normal);
+    v = u.cross(normal);
+    const double size = std::max(1e-6, bounds.diagonal().norm());
+    const double decade = std::pow(10.0, std::floor(std::log10(size / 8)));
+    const double rest = size / 8 / decade;
+    spacing = static_cast<float>(decade * (rest < 2 ? 1 : rest < 5 ? 2 : 5));
+    center = bounds.center().cast<float>();
+    extent = static_cast<float>(1.2 * size);
+}
+
+// The part of a pixel that a line covers; x: m from the origin, pixel: its width on the ground, m.
+float Ground::line(float x, float pixel) const
+{
+    const float away = std::abs(x - spacing * std::round(x / spacing));
+    const float width = std::max(0.004f * spacing, 0.5f * pixel);
+    const float seen = std::clamp((width + 0.5f * pixel - away) / pixel, 0.0f, 1.0f);
+    // Lines closer than a few pixels would shimmer.
+    return seen * std::clamp(1.5f - 4 * pixel / spacing, 0.0f, 1.0f);
+}
+
+float Ground::depth(const Vec3f& origin, const Vec3f& ray) const
+{
+    const float towards = normal.dot(ray);
+    const float t = (offset - normal.dot(origin)) / towards;
+    return towards != 0 && t > 0 && std::isfinite(t) ? t : std::numeric_limits<float>::infinity();
+}
+
+Vec3f Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,
+                    const Light& light) const
+{
+    const float slope = std::max(0.02f, std::abs(normal.dot(ray.normalized())));
+    const float pixel = t / focal;
+    const Vec3f along = P - normal * offset;
+    // A pixel is longer on the ground where it is seen at a flat angle; lines across it are then wider.
+    const Vec3f view_on_ground = (ray - normal * normal.dot(ray)).normalized();
+    const auto width = [&](const Vec3f& axis) {
+        const float across = std::abs(view_on_ground.dot(axis));
+        return pixel * (1 + across * (1 / slope - 1));
+    };
+    const float lines = std::max(line(along.dot(u), width(u)), line(along.dot(v), width(v)));
+    const float fade = std::exp(-(P - center).squaredNorm() / (extent * extent));
+    if (!solid) return behind + (grid_colour - behind) * (0.55f * lines * fade);
+
+    const float lamp = std::abs(light.direction().dot(normal)) * light.past_meshes(P, normal) * light.past_points(P);
+    const Vec3f lit = ground_albedo * (light_from_sky + (1 - light_from_sky) * lamp);
+    const Vec3f ground = lit + (grid_colour - lit) * (0.45f * lines);
+    return behind + (ground - behind) * fade;
+}
+
+}  // namespace rapid

@@ -1,0 +1,32 @@
+// The ground of a picture: the planes of the scene, or a grid of lines where there are none.
+#pragma once
+
+#include "runtime/picture/light.h"
+
+namespace rapid {
+
+// Lines on a ground plane, a round number of metres apart, that fade out far from the scene.
+struct Ground {
+    Vec3f normal, u, v;
+    float offset;
+    float spacing;  // m
+    Vec3f center;
+    float extent;  // m, where lines have faded to 1/e
+    bool solid;
+
+    Ground(const PictureScene::Plane& plane, const Box3d& bounds, bool is_solid);
+
+    // Where the ray meets the plane; infinite where it does not.
+    float depth(const Vec3f& origin, const Vec3f& ray) const;
+
+    // Whether it is a wall between the eye and the scene, seen from behind: then it is transparent.
+    bool stands_before(const Vec3f& eye) const { return normal.dot(eye) < offset && normal.dot(center) >= offset; }
+
+    // The colour at P, at depth t on the ray, over the colour `behind` it.
+    Vec3f shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind, const Light& light) const;
+
+private:
+    float line(float x, float pixel) const;
+};
+
+}  // namespace rapid

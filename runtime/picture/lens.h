@@ -1,0 +1,35 @@
+// The projection from the world to a raster.
+#pragma once
+
+#include "runtime/picture/scene.h"
+
+namespace rapid {
+
+// A unit vector perpendicular to a normal.
+Vec3f any_tangent(const Vec3f& n);
+
+// By perspective or along parallel rays.
+struct Lens {
+    Vec3f origin, right, up, forward;  // unit vectors
+    float focal;                       // samples at depth 1 m; of parallel rays: samples a metre
+    float center_x, center_y;          // samples
+    bool parallel = false;
+
+    static Lens of_camera(const Camera& camera, int width, int height);
+
+    // x, y and depth.
+    Vec3f project(const Vec3f& P) const
+    {
+        const Vec3f d = P - origin;
+        const float depth = d.dot(forward);
+        const float scale = parallel ? focal : focal / depth;
+        return {center_x + scale * d.dot(right), center_y - scale * d.dot(up), depth};
+    }
+    // Through the raster's point x, y; not normalised: a metre of depth long. Perspective alone.
+    Vec3f ray(float x, float y) const
+    {
+        return forward + right * ((x - center_x) / focal) + up * ((center_y - y) / focal);
+    }
+};
+
+}  // namespace rapid

@@ -1,0 +1,87 @@
+// Rasterises meshes: which samples their triangles cover, with depths and barycentric weights.
+#pragma once
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "runtime/picture/lens.h"
+
+namespace rapid {
+
+// Calls f(begin, end) for bands of [0, n), in parallel.
+template <class F>
+void for_each_band(int n, const F& f)
+{
+    constexpr int band = 16;
+    tbb::parallel_for(0, (n + band - 1) / band, [&](int i) { f(i * band, std::min(n, (i + 1) * band)); });
+}
+
+struct ScreenCorner {
+    Vec3f P, n;
+    Vec3f screen = Vec3f::Zero();  // x, y and 1 / depth (of parallel rays: depth)
+};
+
+struct ScreenTriangle {
+    ScreenCorner corners[3];
+    float low_y, high_y;
+};
+
+// The triangles of a mesh on the raster, clipped at the near plane. A corner has the normal of its vertex, unless the
+// face turns away from that by more than 40°: edges stay sharp, round shapes round.
+class ScreenMesh {
+public:
+    ScreenMesh(const Mesh& mesh, const Lens& lens, float near);
+
+    // Calls f(x, y, weights of the corners, depth, triangle) for every sample whose centre a triangle covers, in the
+    // order of the triangles; rows [begin, end).
+    template <class F>
+    void cover(int width, int begin, int end, const F& f) const
+    {
+        for (const ScreenTriangle& triangle : triangles_) {
+            if (triangle.high_y < static_cast<float>(begin) || triangle.low_y > static_cast<float>(end)) continue;
+            cover(triangle, width, begin, end, f);
+        }
+    }
+
+private:
+    void add(const ScreenCorner& a, const ScreenCorner& b, const ScreenCorner& c);
+    void add_clipped(const ScreenCorner (&corners)[3]);
+
+    template <class F>
+    void cover(const ScreenTriangle& triangle, int width, int begin, int end, const F& f) const
+    {
+        const Vec3f &a = triangle.corners[0].screen, &b = triangle.corners[1].screen, &c = triangle.corners[2].screen;
+        const auto edge = [](const Vec3f& p, const Vec3f& q, float x, float y) {
+            return (q.x() - p.x()) * (y - p.y()) - (q.y() - p.y()) * (x - p.x());
+        };
+        const float area = edge(a, b, c.x(), c.y());
+        if (area == 0) return;
+        const auto clamp_to = [](float value, int low, int high) {
+            return static_cast<int>(std::clamp(value, static_cast<float>(low), static_cast<float>(high)));
+        };
+        const int y0 = clamp_to(std::floor(triangle.low_y), begin, end);
+        const int y1 = clamp_to(std::ceil(triangle.high_y), begin, end);
+        const int x0 = clamp_to(std::floor(std::min({a.x(), b.x(), c.x()})), 0, width);
+        const int x1 = clamp_to(std::ceil(std::max({a.x(), b.x(), c.x()})), 0, width);
+        for (int y = y0; y < y1; ++y)
+            for (int x = x0; x < x1; ++x) {
+                const float at_x = static_cast<float>(x) + 0.5f, at_y = static_cast<float>(y) + 0.5f;
+                Vec3f weights(edge(b, c, at_x, at_y), edge(c, a, at_x, at_y), edge(a, b, at_x, at_y));
+                weights /= area;
+                if (weights.minCoeff() < 0) continue;
+                const float z = weights.dot(Vec3f(a.z(), b.z(), c.z()));
+                // Weights on the screen become weights on the triangle.
+                if (!lens_.parallel) weights = weights.cwiseProduct(Vec3f(a.z(), b.z(), c.z())) / z;
+                f(x, y, weights, lens_.parallel ? z : 1 / z, triangle);
+            }
+    }
+
+    const Lens& lens_;
+    float near_;
+    std::vector<ScreenTriangle> triangles_;
+};
+
+}  // namespace rapid

@@ -106,11 +106,8 @@ local function make(native, load_node, numeric, shapes, studies)
     read = maker("grid.read", "path"),
     from = grid_from,
   }
-  rapid.shape = {
-    plane = maker "shape.plane",
-    sphere = maker "shape.sphere",
-    box = maker "shape.box",
-  }
+  rapid.shape = {}
+  for _, name in ipairs(native.maker_names "shape") do rapid.shape[name] = maker("shape." .. name) end
   rapid.points = {
     read = maker("points.read", "path"),
     grid = maker "points.grid",

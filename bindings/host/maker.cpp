@@ -7,15 +7,28 @@
 namespace rapid {
 namespace {
 
-std::vector<Maker>& makers()
+using Declare = std::vector<Maker> (*)();
+
+std::vector<Declare>& declarations()
 {
-    static std::vector<Maker> all;
+    static std::vector<Declare> all;
+    return all;
+}
+
+const std::vector<Maker>& makers()
+{
+    static const std::vector<Maker> all = [] {
+        std::vector<Maker> declared;
+        for (const Declare declare : declarations())
+            for (Maker& maker : declare()) declared.push_back(std::move(maker));
+        return declared;
+    }();
     return all;
 }
 
 }  // namespace
 
-MakerRegistration::MakerRegistration(Maker (*declare)()) { makers().push_back(declare()); }
+MakerRegistration::MakerRegistration(Declare declare) { declarations().push_back(declare); }
 
 const Maker& find_maker(std::string_view name)
 {

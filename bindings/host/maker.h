@@ -82,9 +82,14 @@ const Maker& find_maker(std::string_view name);
 // All of them, in order of name.
 std::vector<const Maker*> all_makers();
 
+// Asked when a maker is first needed, after all registrations of the program.
 struct MakerRegistration {
-    explicit MakerRegistration(Maker (*declare)());
+    explicit MakerRegistration(std::vector<Maker> (*declare)());
 };
-#define RAPID_MAKER(Type) static const ::rapid::MakerRegistration maker_##Type([] { return Maker(Type::declare()); })
+#define RAPID_MAKER(Type)                                 \
+    static const ::rapid::MakerRegistration maker_##Type( \
+        []() -> std::vector<::rapid::Maker> { return {Type::declare()}; })
+// A function that returns several.
+#define RAPID_MAKERS(function) static const ::rapid::MakerRegistration makers_of_##function(function)
 
 }  // namespace rapid

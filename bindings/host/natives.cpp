@@ -10,6 +10,7 @@
 #include "bindings/host/graph_parameter.h"
 #include "bindings/host/kernel_functions.h"
 #include "bindings/host/lua_text.h"
+#include "bindings/host/maker.h"
 #include "bindings/host/script_error.h"
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
@@ -87,6 +88,17 @@ void push_names(lua_State* L, const std::vector<std::string>& names)
     }
 }
 
+// native.maker_names(family): the makers of a family by their names in it: "shape" gives box, plane, sphere.
+int maker_names(State& state)
+{
+    const std::string prefix = text_at(state.lua(), 1) + ".";
+    std::vector<std::string> names;
+    for (const Maker* maker : all_makers())
+        if (maker->name.rfind(prefix, 0) == 0) names.push_back(maker->name.substr(prefix.size()));
+    push_names(state.lua(), names);
+    return 1;
+}
+
 // native.point_names: { fields = { names }, methods = { names }, read_only = { NAME = true } }.
 void push_point_names(lua_State* L)
 {
@@ -116,6 +128,7 @@ void push_natives(State& state, const std::string& chunk_header)
 {
     lua_State* L = state.lua();
     constexpr luaL_Reg functions[] = {{"make", native<make_object>},
+                                      {"maker_names", native<maker_names>},
                                       {"attribute", native<make_attribute>},
                                       {"param", native<declare_parameter>},
                                       {"node", native<make_node>},

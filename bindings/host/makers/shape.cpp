@@ -1,59 +1,63 @@
-// rapid.shape: shapes given by a formula.
-#include "bindings/host/maker.h"
-#include "runtime/shapes/analytic/analytic.h"
-
+// rapid.shape: a maker for each analytic shape that the library declares.
 #include <fmt/format.h>
+
+#include "bindings/host/maker.h"
+#include "runtime/shapes/analytic/shape_type.h"
 
 namespace rapid {
 namespace {
 
-struct PlaneShape {
-    Vec3d normal;
-    double offset;
+using Values = std::vector<ShapeValue>;
 
-    static Maker declare()
-    {
-        return maker<PlaneShape>("shape.plane",
-                                 "The points with normal · x = offset; outside is where the normal points.")
-            .param(&PlaneShape::normal, "normal", Vec3d(0, 1, 0), any_number(), "",
-                   "out of the plane; any length but zero")
-            .param(&PlaneShape::offset, "offset", 0.0, any_number(), "m", "along the normal");
-    }
-    ObjectPtr make(MakeContext&) const { return make_plane(normal, offset); }
-};
-RAPID_MAKER(PlaneShape);
+Param param_of(const ShapeParam& declared, std::size_t place)
+{
+    Param param;
+    param.name = declared.name;
+    param.unit = declared.unit;
+    param.doc = declared.doc;
+    std::visit(
+        [&](const auto& fallback) {
+            using T = std::decay_t<decltype(fallback)>;
+            param.type = param_type<T>();
+            param.fallback = fallback;
+            if (std::is_same_v<T, double> && declared.positive) param.range = above(0);
+            param.assign = [place](const Param& self, void* values, const Value& value) {
+                read_value(self, value, (*static_cast<Values*>(values))[place].template emplace<T>());
+            };
+        },
+        declared.fallback);
+    return param;
+}
 
-struct SphereShape {
-    double radius;
-    Vec3d center;
+void require_positive_edges(const ShapeParam& param, const ShapeValue& value)
+{
+    const auto* edges = std::get_if<Vec3d>(&value);
+    if (edges && param.positive && !(edges->minCoeff() > 0))
+        throw Error(fmt::format("{} = {}: each edge must be above 0", param.name, describe(Value(*edges))));
+}
 
-    static Maker declare()
-    {
-        return maker<SphereShape>("shape.sphere", "A sphere.")
-            .param(&SphereShape::radius, "radius", 1.0, above(0), "m", "of the sphere")
-            .param(&SphereShape::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
-    }
-    ObjectPtr make(MakeContext&) const { return make_sphere_shape(radius, center); }
-};
-RAPID_MAKER(SphereShape);
+Maker maker_of(const ShapeType& type)
+{
+    Maker maker;
+    maker.name = "shape." + type.name;
+    maker.doc = type.doc;
+    for (const ShapeParam& param : type.params) maker.params.push_back(param_of(param, maker.params.size()));
+    maker.make = [type](const Maker& self, const Table& arguments, MakeContext&) -> ObjectPtr {
+        Values values(type.params.size());
+        assign_arguments(self.params, arguments.named, &values);
+        for (std::size_t i = 0; i < values.size(); ++i) require_positive_edges(type.params[i], values[i]);
+        return type.make(values);
+    };
+    return maker;
+}
 
-struct BoxShape {
-    Vec3d size, center;
-
-    static Maker declare()
-    {
-        return maker<BoxShape>("shape.box", "A box.")
-            .param(&BoxShape::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
-            .param(&BoxShape::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
-    }
-    ObjectPtr make(MakeContext&) const
-    {
-        if (!(size.minCoeff() > 0))
-            throw Error(fmt::format("size = {}: each edge must be above 0", describe(Value(size))));
-        return make_box_shape(size, center);
-    }
-};
-RAPID_MAKER(BoxShape);
+std::vector<Maker> shape_makers()
+{
+    std::vector<Maker> makers;
+    for (const ShapeType& type : shape_types()) makers.push_back(maker_of(type));
+    return makers;
+}
+RAPID_MAKERS(shape_makers);
 
 }  // namespace
 }  // namespace rapid

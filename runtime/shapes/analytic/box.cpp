@@ -1,10 +1,12 @@
 // A box with its edges along the axes.
+// Tests: tests/shapes/analytic/test_analytic.cpp.
 #include <fmt/format.h>
 
 #include <array>
 
 #include "runtime/error.h"
 #include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/scatter/scatter.h"
@@ -22,7 +24,8 @@ struct BoxSampler {
         return most > 0 ? beyond.cwiseMax(0.0).norm() : most;
     }
 
-    // Outside, away from the nearest point of the box; inside, out of the nearest face, the first of equally near ones.
+    // Outside, the gradient points away from the nearest point of the box; inside, out of the nearest face, the first
+    // of equally near ones.
     double distance(const Vec3d& P, Vec3d& gradient) const
     {
         const Vec3d d = P - center, beyond = d.cwiseAbs() - half;
@@ -102,4 +105,20 @@ ShapePtr make_box_shape(const Vec3d& size, const Vec3d& center)
     return std::make_shared<Box>(size, center);
 }
 
+namespace {
+
+struct BoxType {
+    Vec3d size, center;
+
+    static ShapeType declare()
+    {
+        return shape_type<BoxType>("box", "A box.")
+            .length(&BoxType::size, "size", Vec3d(1, 1, 1), "full edge lengths")
+            .param(&BoxType::center, "center", Vec3d(0, 0, 0), "m", "its middle");
+    }
+    ShapePtr make() const { return make_box_shape(size, center); }
+};
+RAPID_SHAPE(BoxType);
+
+}  // namespace
 }  // namespace rapid

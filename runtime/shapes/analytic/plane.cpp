@@ -1,8 +1,10 @@
 // The half space below a plane. Contacts are the roots of a quadratic: exact for a bouncing ball.
+// Tests: tests/shapes/analytic/test_analytic.cpp.
 #include <fmt/format.h>
 
 #include "runtime/error.h"
 #include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"
 
 namespace rapid {
@@ -54,7 +56,7 @@ public:
             double vn = sampler.n.dot(path.v);
             const double an = sampler.n.dot(path.a), T = path.duration;
             const double flush = flush_within(path.P, path.radius, rounding);
-            // Most points, by far: they end above the plane, and were above it on the way.
+            // By far the most points: above the plane all along.
             if (f > flush && f + T * (vn + 0.5 * T * an) > 0 && (an <= 0 || vn >= 0)) continue;
 
             if (f <= flush && is_along(vn, path.v)) vn = 0;
@@ -62,7 +64,7 @@ public:
                 contact.time = 0;
                 contact.depth = -f;
             } else if (f <= flush && (vn < 0 || (an < 0 && vn * vn <= -2 * an * flush))) {
-                contact.time = 0;  // moves inwards, or would be back before it is a rounding's height above
+                contact.time = 0;  // moves inwards, or would be back before it has risen by more than rounding
             } else {
                 const double s = first_fall_through(std::max(f, 0.0), vn, an);
                 if (!(s < T)) continue;
@@ -82,16 +84,34 @@ private:
 
 ShapePtr make_plane(const Vec3d& normal, double offset)
 {
-    // Scaled first: the squares of a normal's components may be beyond a double's range.
+    // Scaled first: the squares of the components may be beyond the range of a double.
     const double largest = normal.cwiseAbs().maxCoeff();
     if (!(largest > 0) || !std::isfinite(largest))
         throw Error(
             fmt::format("normal of a plane = {{{:g}, {:g}, {:g}}} has no direction; any length but zero is right",
                         normal.x(), normal.y(), normal.z()));
     if (!std::isfinite(offset)) throw Error(fmt::format("offset of a plane = {:g}; it must be finite", offset));
-    // An axis stays itself to the bit: the weight of a point that rests on it then has no part along it.
+    // An axis stays itself to the bit: the weight of a point at rest on the plane then has no tangential part.
     const Vec3d scaled = normal / largest;
     return std::make_shared<Plane>(scaled.normalized(), offset / largest / scaled.norm());
 }
 
+namespace {
+
+struct PlaneType {
+    Vec3d normal;
+    double offset;
+
+    static ShapeType declare()
+    {
+        return shape_type<PlaneType>("plane",
+                                     "The points with normal · x = offset; outside is where the normal points.")
+            .param(&PlaneType::normal, "normal", Vec3d(0, 1, 0), "", "out of the plane; any length but zero")
+            .param(&PlaneType::offset, "offset", 0.0, "m", "along the normal");
+    }
+    ShapePtr make() const { return make_plane(normal, offset); }
+};
+RAPID_SHAPE(PlaneType);
+
+}  // namespace
 }  // namespace rapid

@@ -1,10 +1,12 @@
-// A ball.
+// A solid sphere.
+// Tests: tests/shapes/analytic/test_analytic.cpp.
 #include <fmt/format.h>
 
 #include <numbers>
 
 #include "runtime/error.h"
 #include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/scatter/scatter.h"
@@ -21,7 +23,7 @@ struct SphereSampler {
     {
         const Vec3d d = P - center;
         const double size = d.norm();
-        gradient = size > 0 ? Vec3d(d / size) : Vec3d(Vec3d::Zero());  // at the centre every way out is as good
+        gradient = size > 0 ? Vec3d(d / size) : Vec3d(Vec3d::Zero());  // at the centre no direction is nearest
         return size - radius;
     }
     double slope_bound() const { return 1; }
@@ -88,4 +90,21 @@ ShapePtr make_sphere_shape(double radius, const Vec3d& center)
     return std::make_shared<Sphere>(radius, center);
 }
 
+namespace {
+
+struct SphereType {
+    double radius;
+    Vec3d center;
+
+    static ShapeType declare()
+    {
+        return shape_type<SphereType>("sphere", "A sphere.")
+            .length(&SphereType::radius, "radius", 1.0, "of the sphere")
+            .param(&SphereType::center, "center", Vec3d(0, 0, 0), "m", "its middle");
+    }
+    ShapePtr make() const { return make_sphere_shape(radius, center); }
+};
+RAPID_SHAPE(SphereType);
+
+}  // namespace
 }  // namespace rapid

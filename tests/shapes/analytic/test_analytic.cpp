@@ -57,7 +57,7 @@ TEST_CASE("a plane across an axis has that axis for its normal, to the bit", "[a
     CHECK(make_plane({0, -1, 0}, 2)->bounds().min().y() == -2);
 }
 
-TEST_CASE("a sphere is as far away as its centre, less its radius", "[analytic]")
+TEST_CASE("the distance of a sphere is that of its centre minus its radius", "[analytic]")
 {
     const ShapePtr sphere = make_sphere_shape(2, {1, 0, 0});
     CHECK(ask(sphere, {4, 0, 4}).phi == 3);
@@ -67,7 +67,7 @@ TEST_CASE("a sphere is as far away as its centre, less its radius", "[analytic]"
     CHECK(ask(sphere, {1, 0, 0}).gradient == Vec3d(0, 0, 0));  // the centre has no way out that is nearest
 }
 
-TEST_CASE("a box is as far away as its nearest face, edge or corner", "[analytic]")
+TEST_CASE("the distance of a box is that of its nearest face, edge or corner", "[analytic]")
 {
     const ShapePtr box = make_box_shape({2, 4, 6}, {10, 0, 0});
     CHECK(ask(box, {12, 1, 1}).phi == 1);
@@ -82,7 +82,7 @@ TEST_CASE("a box is as far away as its nearest face, edge or corner", "[analytic
     CHECK(ask(box, {11, 0, 0}).gradient == Vec3d(1, 0, 0));
 }
 
-TEST_CASE("shapes without a size are refused, with what was given", "[analytic]")
+TEST_CASE("shapes without a size are refused, with the value given", "[analytic]")
 {
     CHECK(error_of([] {
               make_plane({0, 0, 0}, 1);
@@ -132,7 +132,7 @@ TEST_CASE("half of the births in a ball are within 0.7937 of its radius", "[anal
     CHECK(double(inner) / n == Approx(0.5).margin(5 * 0.5 / std::sqrt(double(n))));
 }
 
-TEST_CASE("faces of a box bear in proportion to their areas", "[analytic]")
+TEST_CASE("births fall on the faces of a box in proportion to their areas", "[analytic]")
 {
     const std::size_t n = 20000;
     std::vector<Birthplace> on(n);
@@ -143,7 +143,7 @@ TEST_CASE("faces of a box bear in proportion to their areas", "[analytic]")
     CHECK_THAT(Vec3d(counts / n), close_to(Vec3d(Vec3d(6, 3, 2) / 11), 5 * 0.5 / std::sqrt(double(n))));
 }
 
-TEST_CASE("a plane bears no points, and says what does", "[analytic]")
+TEST_CASE("births on a plane are refused, with the shapes that allow them", "[analytic]")
 {
     CHECK_THAT(error_of([] {
                    scatter_on_surface(make_plane({0, 1, 0}, 0));

@@ -1,4 +1,4 @@
-// Copying a level set's tree into the flat table of a BakedGrid.
+// Copies the tree of a level set into the flat table of a BakedGrid.
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
@@ -48,9 +48,9 @@ void copy_block(const std::array<Source, 8>& sources, float* into)
                 *into++ = sources[(i >> 3) << 2 | (j >> 3) << 1 | k >> 3].at(i & 7, j & 7, k & 7);
 }
 
-// What the cells of one block tell of the whole field, in voxels and metres per voxel.
+// Figures of the field from the cells of some blocks.
 struct Survey {
-    Eigen::AlignedBox3i crossed;  // cells where the sign changes
+    Eigen::AlignedBox3i crossed;  // voxels: the cells where the sign changes
     std::uint64_t crossings = 0;
     float steepest = 0;  // squared slope, m² per voxel²
 
@@ -97,8 +97,8 @@ Survey survey_block(const float* values, const Eigen::Vector3i& first)
     return survey;
 }
 
-// Writes into the empty blocks of the index how many lie between them and the nearest with values: the chessboard
-// distance less one, by the two passes of Rosenfeld and Pfaltz (1966).
+// Writes into the empty blocks of the index how many blocks lie between them and the nearest with values: the
+// chessboard distance less one, by the two passes of Rosenfeld and Pfaltz (1966).
 void count_blocks_between(BakedGrid& baked)
 {
     const Eigen::Vector3i& n = baked.blocks;
@@ -114,7 +114,7 @@ void count_blocks_between(BakedGrid& baked)
                     std::int32_t& code = at(x, y, z);
                     if (code >= 0) continue;
                     int nearest = step > 0 ? n.maxCoeff() : BakedGrid::between(code) + 1;
-                    for (int neighbour = 0; neighbour < 13; ++neighbour) {  // those that the pass has been to
+                    for (int neighbour = 0; neighbour < 13; ++neighbour) {  // those already visited
                         const int i = x + step * (neighbour / 9 - 1), j = y + step * (neighbour / 3 % 3 - 1),
                                   k = z + step * (neighbour % 3 - 1);
                         if (!within(i, 0) || !within(j, 1) || !within(k, 2)) continue;
@@ -128,99 +128,136 @@ void count_blocks_between(BakedGrid& baked)
     pass(-1);
 }
 
-}  // namespace
+class Baker {
+public:
+    explicit Baker(const FloatGrid& grid) : grid_(grid), tree_(grid.tree())
+    {
+        baked_.voxel = grid.voxelSize()[0];
+        baked_.background = grid.background();
+    }
 
-BakedGrid bake(const FloatGrid& grid)
-{
-    const FloatTree& tree = grid.tree();
-    BakedGrid baked;
-    baked.voxel = grid.voxelSize()[0];
-    baked.background = grid.background();
+    BakedGrid bake()
+    {
+        openvdb::CoordBBox leaves;
+        if (!tree_.evalLeafBoundingBox(leaves)) return baked_;
+        cover(leaves);
+        find_leaves();
+        number_varying_blocks();
+        count_blocks_between(baked_);
+        const Survey survey = copy_values();
 
-    openvdb::CoordBBox leaves;
-    if (!tree.evalLeafBoundingBox(leaves)) return baked;
+        baked_.slope = std::max(1.0, std::sqrt(double(survey.steepest)) / baked_.voxel);
+        baked_.crossings = survey.crossings;
+        if (survey.crossings > 0)
+            baked_.surface = Box3d(baked_.origin + baked_.voxel * survey.crossed.min().cast<double>(),
+                                   baked_.origin + baked_.voxel * survey.crossed.max().cast<double>());
+        return std::move(baked_);
+    }
+
+private:
     // Blocks below the lowest leaves hold the cells between them and the constant beyond.
-    const Coord low = leaves.min().offsetBy(-block);
-    const auto blocks = [&](int axis) { return (leaves.max()[axis] + 1 - low[axis]) / block; };
-    baked.blocks = {blocks(0), blocks(1), blocks(2)};
-    const auto place = grid.indexToWorld(low);
-    baked.origin = {place[0], place[1], place[2]};
+    void cover(const openvdb::CoordBBox& leaves)
+    {
+        low_ = leaves.min().offsetBy(-block);
+        const auto blocks = [&](int axis) { return (leaves.max()[axis] + 1 - low_[axis]) / block; };
+        baked_.blocks = {blocks(0), blocks(1), blocks(2)};
+        const auto corner = grid_.indexToWorld(low_);
+        baked_.origin = {corner[0], corner[1], corner[2]};
+        in_slab_ = std::size_t(baked_.blocks.y()) * baked_.blocks.z();
+        baked_.index.resize(in_slab_ * baked_.blocks.x());
+        is_leaf_.resize(baked_.index.size());
+        varying_.assign(baked_.blocks.x() + 1, 0);
+    }
 
-    const std::size_t in_slab = std::size_t(baked.blocks.y()) * baked.blocks.z();
-    const auto block_origin = [&](std::size_t b) {
-        const auto in = b % in_slab;
-        return low.offsetBy(static_cast<int>(b / in_slab) * block,
-                            static_cast<int>(in / std::size_t(baked.blocks.z())) * block,
-                            static_cast<int>(in % std::size_t(baked.blocks.z())) * block);
-    };
-    baked.index.resize(in_slab * baked.blocks.x());
-    std::vector<std::uint8_t> is_leaf(baked.index.size());
-    tbb::parallel_for(0, baked.blocks.x(), [&](int x) {
-        const Accessor accessor(tree);
-        for (std::size_t b = x * in_slab; b < (x + 1) * in_slab; ++b) {
+    Eigen::Vector3i position(std::size_t b) const
+    {
+        const std::size_t in = b % in_slab_, n_z = std::size_t(baked_.blocks.z());
+        return {static_cast<int>(b / in_slab_), static_cast<int>(in / n_z), static_cast<int>(in % n_z)};
+    }
+    Coord block_origin(std::size_t b) const
+    {
+        const Eigen::Vector3i at = block * position(b);
+        return low_.offsetBy(at.x(), at.y(), at.z());
+    }
+
+    // Calls f(block, accessor) for all blocks, slabs of x in parallel.
+    template <class F>
+    void for_each_block(const F& f) const
+    {
+        tbb::parallel_for(0, baked_.blocks.x(), [&](int x) {
+            const Accessor accessor(tree_);
+            for (std::size_t b = x * in_slab_; b < (x + 1) * in_slab_; ++b) f(b, accessor);
+        });
+    }
+
+    void find_leaves()
+    {
+        for_each_block([&](std::size_t b, const Accessor& accessor) {
             const Source source = source_at(accessor, block_origin(b));
-            is_leaf[b] = source.values != nullptr;
-            baked.index[b] = source.at(0, 0, 0) < 0 ? BakedGrid::inside : BakedGrid::outside;
-        }
-    });
+            is_leaf_[b] = source.values != nullptr;
+            baked_.index[b] = source.at(0, 0, 0) < 0 ? BakedGrid::inside : BakedGrid::outside;
+        });
+    }
 
-    // Which blocks have values of their own: leaves, and their lower neighbours where the cells between vary. Each slab
-    // of x is numbered by itself, and moved up by those before it afterwards: the numbers depend on the grid alone.
-    const auto above_is_leaf = [&](std::size_t b) {
-        const int x = static_cast<int>(b / in_slab);
-        const int y = static_cast<int>(b % in_slab / std::size_t(baked.blocks.z()));
-        const int z = static_cast<int>(b % std::size_t(baked.blocks.z()));
-        for (int n = 1; n < 8; ++n) {
-            const int i = x + (n >> 2), j = y + (n >> 1 & 1), k = z + (n & 1);
-            if (i < baked.blocks.x() && j < baked.blocks.y() && k < baked.blocks.z() &&
-                is_leaf[(std::size_t(i) * baked.blocks.y() + j) * baked.blocks.z() + k])
-                return true;
+    bool has_leaf_above(std::size_t b) const
+    {
+        const Eigen::Vector3i at = position(b), &n = baked_.blocks;
+        for (int k = 1; k < 8; ++k) {
+            const int x = at.x() + (k >> 2), y = at.y() + (k >> 1 & 1), z = at.z() + (k & 1);
+            if (x < n.x() && y < n.y() && z < n.z() && is_leaf_[(std::size_t(x) * n.y() + y) * n.z() + z]) return true;
         }
         return false;
-    };
-    std::vector<std::int32_t> varying(baked.blocks.x() + 1, 0);
-    tbb::parallel_for(0, baked.blocks.x(), [&](int x) {
-        const Accessor accessor(tree);
-        std::array<float, BakedGrid::block_values> values;
-        for (std::size_t b = x * in_slab; b < (x + 1) * in_slab; ++b) {
-            bool varies = is_leaf[b];
-            if (!varies && above_is_leaf(b)) {
+    }
+
+    // The blocks with values of their own: leaves, and their lower neighbours where the cells between vary. Each slab
+    // of x is numbered by itself, and moved up by those before it later: the numbers depend on the grid alone.
+    void number_varying_blocks()
+    {
+        for_each_block([&](std::size_t b, const Accessor& accessor) {
+            bool varies = is_leaf_[b];
+            if (!varies && has_leaf_above(b)) {
+                std::array<float, BakedGrid::block_values> values;
                 copy_block(neighbourhood(accessor, block_origin(b)), values.data());
                 varies = std::any_of(values.begin(), values.end(), [&](float v) { return v != values[0]; });
             }
-            if (varies) baked.index[b] = varying[x + 1]++;
-        }
-    });
-    for (int x = 0; x < baked.blocks.x(); ++x) varying[x + 1] += varying[x];
-    count_blocks_between(baked);
-
-    baked.values.resize(std::size_t(varying.back()) * BakedGrid::block_values);
-    const Survey survey = tbb::parallel_deterministic_reduce(
-        tbb::blocked_range<int>(0, baked.blocks.x()), Survey(),
-        [&](const tbb::blocked_range<int>& slabs, Survey sum) {
-            const Accessor accessor(tree);
-            for (std::size_t b = slabs.begin() * in_slab; b < slabs.end() * in_slab; ++b) {
-                if (baked.index[b] < 0) continue;
-                baked.index[b] += varying[b / in_slab];
-                float* values = baked.values.data() + std::size_t(baked.index[b]) * BakedGrid::block_values;
-                const Coord origin = block_origin(b);
-                copy_block(neighbourhood(accessor, origin), values);
-                const Coord first = origin - low;
-                sum.join(survey_block(values, {first.x(), first.y(), first.z()}));
-            }
-            return sum;
-        },
-        [](Survey a, const Survey& b) {
-            a.join(b);
-            return a;
+            if (varies) baked_.index[b] = varying_[b / in_slab_ + 1]++;
         });
+        for (int x = 0; x < baked_.blocks.x(); ++x) varying_[x + 1] += varying_[x];
+    }
 
-    baked.slope = std::max(1.0, std::sqrt(double(survey.steepest)) / baked.voxel);
-    baked.crossings = survey.crossings;
-    if (survey.crossings > 0)
-        baked.surface = Box3d(baked.origin + baked.voxel * survey.crossed.min().cast<double>(),
-                              baked.origin + baked.voxel * survey.crossed.max().cast<double>());
-    return baked;
-}
+    Survey copy_values()
+    {
+        baked_.values.resize(std::size_t(varying_.back()) * BakedGrid::block_values);
+        return tbb::parallel_deterministic_reduce(
+            tbb::blocked_range<int>(0, baked_.blocks.x()), Survey(),
+            [&](const tbb::blocked_range<int>& slabs, Survey sum) {
+                const Accessor accessor(tree_);
+                for (std::size_t b = slabs.begin() * in_slab_; b < slabs.end() * in_slab_; ++b) {
+                    if (baked_.index[b] < 0) continue;
+                    baked_.index[b] += varying_[b / in_slab_];
+                    float* values = baked_.values.data() + std::size_t(baked_.index[b]) * BakedGrid::block_values;
+                    copy_block(neighbourhood(accessor, block_origin(b)), values);
+                    sum.join(survey_block(values, block * position(b)));
+                }
+                return sum;
+            },
+            [](Survey a, const Survey& b) {
+                a.join(b);
+                return a;
+            });
+    }
+
+    const FloatGrid& grid_;
+    const FloatTree& tree_;
+    BakedGrid baked_;
+    Coord low_;                          // the lowest voxel
+    std::size_t in_slab_ = 0;            // blocks of one x
+    std::vector<std::uint8_t> is_leaf_;  // by block
+    std::vector<std::int32_t> varying_;  // blocks with values in the slabs before x, shape [blocks x + 1]
+};
+
+}  // namespace
+
+BakedGrid bake(const FloatGrid& grid) { return Baker(grid).bake(); }
 
 }  // namespace rapid

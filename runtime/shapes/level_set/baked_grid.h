@@ -1,14 +1,15 @@
-// A narrow-band level set copied for asking: every leaf of the tree with its upper neighbours' first voxels, in one
-// flat table behind a coarse index. A cell's eight corners are then always in one block, found by two loads.
+// A narrow-band level set copied for queries: every leaf of the tree with its upper neighbours' first voxels, in one
+// flat table behind a coarse index. The eight corners of a cell are then always in one block, found by two loads.
 //
 // Between voxels the field is trilinear: the same as OpenVDB's BoxSampler everywhere in the band, to float rounding;
 // the gradient is the derivative of that interpolant. Beyond the band the distance is a bound of the right sign and the
-// gradient zero. In an empty block it is the half width of the band and the blocks that lie between it and the nearest
-// with values; beyond the index, the distance to the box around the surface: so a walk from far away takes few steps.
+// gradient zero. In an empty block the bound is the half width of the band plus the width of the blocks between it and
+// the nearest with values; beyond the index, the distance to the box around the surface: so a walk from far away takes
+// few steps.
 //
 // Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes a block, 1.4 times the leaf that
-// it copies (which stays, for building and for files). index, shape [blocks x, y, z], z fastest, covers the box around
-// the band: 4 bytes for each 8^3 voxels, empty or not.
+// it copies (which is kept, for building and for files). index, shape [blocks x, y, z], z fastest, covers the box
+// around the band: 4 bytes for each 8^3 voxels, empty or not.
 #pragma once
 
 #include <algorithm>
@@ -25,14 +26,14 @@ struct BakedGrid {
     static constexpr int edge = 9;   // values along it: the last is the upper neighbour's first
     static constexpr int block_values = edge * edge * edge;
 
-    // In `index`, a block that has one value and is beyond the band: outside - 2 k or inside - 2 k, where k blocks at
-    // least lie between it and the nearest with values.
+    // In `index`, a block of one value, beyond the band: outside - 2 k or inside - 2 k, with at least k blocks between
+    // it and the nearest with values.
     static constexpr std::int32_t outside = -1, inside = -2;
     static bool is_outside(std::int32_t code) { return code & 1; }
     static int sign(std::int32_t code) { return 2 * (code & 1) - 1; }
     static int between(std::int32_t code) { return (-code - 1) >> 1; }
 
-    Vec3d origin = Vec3d::Zero();  // the place of the box's lowest voxel, m
+    Vec3d origin = Vec3d::Zero();  // position of the box's lowest voxel, m
     double voxel = 0;              // m
     double background = 0;         // the half width of the band, m
     Eigen::Vector3i blocks = Eigen::Vector3i::Zero();
@@ -46,7 +47,7 @@ struct BakedGrid {
     std::size_t bytes() const { return index.size() * sizeof(std::int32_t) + values.size() * sizeof(float); }
 };
 
-// Asks a BakedGrid, which must outlive it. Made once for a batch of points, so that what it needs is in registers.
+// Samples a BakedGrid, which must outlive it. Made once for a batch of points, so that its members are in registers.
 class BakedSampler {
 public:
     explicit BakedSampler(const BakedGrid& grid)
@@ -107,7 +108,7 @@ public:
     {
         sample(n, X, Y, Z, phi, [](int, float, float, float) {});
     }
-    // And the slopes of the field along v, m/s: of its gradient, which is zero beyond the band.
+    // And the slopes of the field along v, m/s: by its gradient, which is zero beyond the band.
     void distances_along(int n, const double* X, const double* Y, const double* Z, const double* vx, const double* vy,
                          const double* vz, double* phi, double* slope) const
     {
@@ -124,7 +125,7 @@ public:
     // The half width of the band, m. Within √3 voxels of its edge a cell has corners beyond the band, and the field
     // flattens: for a radius r ask for a band of r + 2 voxels.
     double band() const { return background_; }
-    // What single precision leaves of a distance, m: seven interpolations of values up to the half width.
+    // The error of a distance in single precision, m: seven interpolations of values up to the half width.
     double rounding() const { return 0x1p-21 * background_; }
     // Outside it the distance is above 0, and not below the distance to it.
     Box3d bounds() const
@@ -142,8 +143,8 @@ private:
 
     struct Cell {
         const float* corner;  // the value at the cell's lowest corner; null beyond the band
-        float x, y, z;        // place in the cell, 0 to 1
-        double bound;         // beyond the band: what is known of the distance, m
+        float x, y, z;        // position in the cell, 0 to 1
+        double bound;         // of the distance beyond the band, m
     };
 
     Cell find(const Vec3d& P) const
@@ -160,8 +161,8 @@ private:
                 static_cast<float>(x - i), static_cast<float>(y - j), static_cast<float>(z - k), 0};
     }
 
-    // All of the surface is in its box, so it is at least as far away as the box. The voxel taken off is for the level
-    // r > 0 of the field, which interpolation can put a little farther out than r.
+    // The surface is in its box, and so at least as far away. The voxel taken off is for the level r > 0 of the field,
+    // which interpolation can put a little farther out than r.
     double far_outside(const Vec3d& P) const
     {
         const Vec3d beyond = (surface_.min() - P).cwiseMax(P - surface_.max()).cwiseMax(0.0);
@@ -173,7 +174,7 @@ private:
         return BakedGrid::sign(code) * (background_ + BakedGrid::between(code) * block_width_);
     }
 
-    Vec3d origin_, extent_, last_;  // of the box's voxels: how many, and the last
+    Vec3d origin_, extent_, last_;  // the number of voxels in the box, and the last of them
     double per_voxel_, voxel_, block_width_, background_, slope_;
     std::int64_t blocks_y_, blocks_z_;
     const std::int32_t* index_;
@@ -181,12 +182,12 @@ private:
     Box3d surface_;
 };
 
-// differences(i, dx, dy, dz): those of the interpolant across its cell along the axes, m.
+// differences(i, dx, dy, dz): of the interpolant across its cell along the axes, m.
 template <class Differences>
 void BakedSampler::sample(int n, const double* X, const double* Y, const double* Z, double* phi,
                           const Differences& differences) const
 {
-    float x[many], y[many], z[many];       // place in the cell
+    float x[many], y[many], z[many];       // position in the cell
     std::int64_t block[many], cell[many];  // of the index; within its values
     std::uint8_t within[many];
     int beyond = 0;
@@ -216,7 +217,7 @@ void BakedSampler::sample(int n, const double* X, const double* Y, const double*
             corner[2 * k + 1][i] = rows[k][1];
         }
     }
-    // Copies, which what is written can't change.
+    // Copies, which no store below can alias.
     const double background = background_, width = block_width_;
     for (int i = 0; i < n; ++i) {
         const float d00 = corner[1][i] - corner[0][i], d01 = corner[3][i] - corner[2][i];

@@ -1,4 +1,4 @@
-// What readers of .vdb files share: how the grids in a file are named and chosen.
+// For readers of .vdb files: how the grids in a file are named and chosen.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -10,7 +10,7 @@ namespace rapid {
 // `"density" (float), "surface" (level set of float)`.
 std::string grids_of(const openvdb::GridPtrVec& grids);
 
-// Error: there is none; which there are, and the nearest name.
+// Error: no such grid; lists those that there are, and the nearest name.
 openvdb::GridBase::Ptr grid_of_name(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids);
 
 }  // namespace rapid

@@ -39,7 +39,7 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     const double indexed = (across / BakedGrid::block + Vec3d::Constant(2)).prod();
     const double bytes = voxels * bytes_a_voxel + indexed * sizeof(std::int32_t);
 
-    // How much larger the voxel must be for the band (which grows with its square) and the index (its cube) to fit.
+    // The larger voxel for which the band (which shrinks with its square) and the index (with its cube) fit.
     const auto larger = [&](double band_excess, double index_excess) {
         return 1.02 * options.voxel * std::max({1.0, std::sqrt(band_excess), std::cbrt(index_excess)});
     };
@@ -58,7 +58,7 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
 
 openvdb::math::Transform::Ptr make_transform(double voxel, const Box3d& bounds)
 {
-    // Beyond this a mesh's corners, in single precision, would be off by more than 1/2048 of a voxel.
+    // Beyond this the corners of a mesh, in single precision, would be off by more than 1/2048 of a voxel.
     constexpr double far = 16384;  // voxels
     auto transform = openvdb::math::Transform::createLinearTransform(voxel);
     const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff() / voxel;

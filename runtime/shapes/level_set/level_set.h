@@ -1,7 +1,7 @@
 // A narrow-band level set: the general shape that particles collide with (paper §4).
 //
-// The grid is OpenVDB's, for building and for files; queries run on a baked copy of its leaves behind a coarse index,
-// because a shared grid's tree costs several times more a sample (see level_set.cpp). OpenVDB stays out of this header.
+// The grid is OpenVDB's, for building and for files; queries run on a flat copy of its leaves behind a coarse index
+// (baked_grid.h), because a sample of the tree costs several times more. OpenVDB stays out of this header.
 #pragma once
 
 #include <filesystem>
@@ -35,15 +35,15 @@ public:
 
 using LevelSetPtr = std::shared_ptr<const LevelSet>;
 
-// Inside is where the mesh's faces wind around a place: pieces may overlap, and one that is turned inwards inside
-// another is a cavity. A mesh with holes keeps those smaller than a voxel closed (see level_set_grid.h).
+// Inside is where the winding number of the mesh is not 0: pieces may overlap, and one that faces inwards inside
+// another is a cavity. Holes smaller than a voxel are closed (see level_set_grid.h).
 //
-// Warnings are collected in `warnings` where something is doubtful but usable (a mesh with holes, faces turned inside
-// out), with the numbers. Errors: a voxel that would make over 2^31 voxels, or that is larger than the mesh (nothing
-// would be left of it), an empty mesh.
+// `warnings` collects what is doubtful but usable (a mesh with holes, faces turned inside out), with the numbers.
+// Errors: a voxel size that would take over 2^31 voxels, or that is larger than the mesh (which would vanish), an empty
+// mesh.
 RAPID_DEFERRED(level_set_from_mesh,
                LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings));
-// Another shape of a mesh of which that has been made before: its faces and what holds of them, `open`, are known.
+// Of a mesh with the faces of an earlier one, whose openness is known; without its checks and warnings.
 RAPID_DEFERRED(level_set_of_same_faces,
                LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open));
 RAPID_DEFERRED(level_set_sphere, LevelSetPtr(double radius, const Vec3d& center, const LevelSetOptions& options));
@@ -51,8 +51,8 @@ RAPID_DEFERRED(level_set_box, LevelSetPtr(const Vec3d& size, const Vec3d& center
 RAPID_DEFERRED(level_set_torus,
                LevelSetPtr(double radius, double tube, const Vec3d& center, const LevelSetOptions& options));
 
-// `grid` empty: the only level set in the file. Error: no such file, not a .vdb, no such grid (with the names there
-// are), not a float level set, an empty grid, a map that is not uniform scale and translation.
+// grid: empty for the only level set in the file. Error: no such file, not a .vdb, no such grid (with the names that
+// there are), not a float level set, an empty grid, a map that is not uniform scale and translation.
 RAPID_DEFERRED(read_level_set, LevelSetPtr(const std::filesystem::path& path, const std::string& grid));
 
 }  // namespace rapid

@@ -84,7 +84,7 @@ const bool defined = read_level_set.define(read);
 void GridLevelSet::write(const std::filesystem::path& path, const std::string& name) const
 {
     if (name.empty()) throw Error(fmt::format("cannot write \"{}\": the grid needs a name", path.string()));
-    // The tree is shared, only the name is another. The file gets its own name when it is complete.
+    // The tree is shared, and only the name differs. The file appears under its name when it is complete.
     openvdb::MetaMap metadata(*grid_);
     metadata.removeMeta(openvdb::GridBase::META_GRID_NAME);
     metadata.insertMeta(openvdb::GridBase::META_GRID_NAME, openvdb::StringMetadata(name));

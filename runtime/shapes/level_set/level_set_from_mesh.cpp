@@ -1,4 +1,5 @@
-// Level sets from meshes, and what is wrong with meshes as level sets.
+// Level sets from meshes, and the warnings about meshes that make doubtful ones.
+// Tests: tests/shapes/level_set/test_level_set.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,7 +23,7 @@ FloatGrid::Ptr build(const Mesh& mesh, bool balanced, const LevelSetOptions& opt
     return grid;
 }
 
-// The bounds of the parts of a mesh that hang together.
+// The bounds of the connected parts of a mesh.
 std::vector<Box3f> pieces_of(const Mesh& mesh)
 {
     std::vector<std::int32_t> parent(mesh.positions.size());
@@ -42,7 +43,7 @@ std::vector<Box3f> pieces_of(const Mesh& mesh)
     return bounds;
 }
 
-// What is doubtful but usable.
+// Warns of a mesh that is doubtful but usable.
 void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& options,
           std::vector<std::string>& warnings)
 {

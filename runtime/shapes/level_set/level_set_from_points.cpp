@@ -1,4 +1,5 @@
 // Level sets around points: the union of their balls, exact outside of them.
+// Tests: tests/shapes/level_set/test_level_set_tools.cpp.
 #include <fmt/format.h>
 #include <openvdb/tools/ParticlesToLevelSet.h>
 
@@ -13,7 +14,7 @@ namespace {
 
 using openvdb::FloatGrid;
 
-// What OpenVDB asks points for.
+// A list of points, as OpenVDB takes it.
 struct Balls {
     using PosType = openvdb::Vec3R;
 
@@ -22,10 +23,10 @@ struct Balls {
 
     float radius_of(std::size_t i) const { return radius[radius.size() == 1 ? 0 : i]; }
     std::size_t size() const { return P.size(); }
-    void getPos(std::size_t i, PosType& place) const { place = PosType(P[i].x(), P[i].y(), P[i].z()); }
-    void getPosRad(std::size_t i, PosType& place, openvdb::Real& r) const
+    void getPos(std::size_t i, PosType& X) const { X = PosType(P[i].x(), P[i].y(), P[i].z()); }
+    void getPosRad(std::size_t i, PosType& X, openvdb::Real& r) const
     {
-        getPos(i, place);
+        getPos(i, X);
         r = radius_of(i);
     }
 };

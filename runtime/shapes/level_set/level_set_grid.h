@@ -1,5 +1,4 @@
-// What the sources of level_set_*.cpp share: an OpenVDB grid made into a LevelSet. Brings OpenVDB with it; whoever only
-// asks level sets includes level_set.h.
+// A level set on an OpenVDB grid, and the functions that build it. Includes OpenVDB; level_set.h is enough for queries.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -12,19 +11,19 @@
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/level_set/baked_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
-#include "runtime/shapes/scatter/scatter.h"
+#include "runtime/shapes/level_set/scatter_level_set.h"
 
 namespace rapid {
 
-// Copies the band of a level set for asking. The grid's map must be a uniform scale and a translation.
+// Copies the band of a level set for queries. The grid's map must be a uniform scale and a translation.
 BakedGrid bake(const openvdb::FloatGrid& grid);
 
 class GridLevelSet final : public ShapeOf<GridLevelSet, LevelSet>, public std::enable_shared_from_this<GridLevelSet> {
 public:
-    // Makes the same surface with another half width, in metres: from what the grid was made from where that is known.
+    // Builds the same surface with another half width, in metres: from the grid's own source if that is known.
     using Rebuild = std::function<openvdb::FloatGrid::Ptr(double half_width)>;
 
-    // The grid is shared, and not to be changed any more.
+    // The grid is shared from here on, and must not change.
     GridLevelSet(openvdb::FloatGrid::ConstPtr grid, Rebuild rebuild);
 
     BakedSampler sampler() const { return BakedSampler(*baked_); }
@@ -55,18 +54,18 @@ private:
     mutable MeshPtr surface_;
 };
 
-// The signed distance from a mesh, m, in a band of `half_width` metres on each side. The sign rule: inside is where the
-// faces wind around a place (their winding number is not 0), so pieces may overlap, all faces may look inwards, and a
-// piece that is turned inwards inside another is a cavity. A mesh that is not balanced (Openness::unbalanced_edges) has
-// no winding number: then outside is what can be reached from far away without crossing a face, in steps of a voxel.
+// The signed distance from a mesh, m, in a band of `half_width` metres on each side. Inside is where the winding number
+// is not 0, so pieces may overlap, all faces may look inwards, and a piece that faces inwards inside another is a
+// cavity. A mesh that is not balanced (Openness::unbalanced_edges) has no winding number: then outside is the region
+// that is connected to infinity in steps of a voxel that cross no face.
 openvdb::FloatGrid::Ptr signed_distance(const Mesh& mesh, bool balanced, const openvdb::math::Transform& transform,
                                         double half_width);
 
-// A grid without a known origin, widened from its own surface: new voxels get their distance to it as a mesh, and those
-// that there are keep their values to the bit.
+// A grid without a known source, widened from its own surface: new voxels get their distance to it as a mesh, and the
+// existing ones keep their values to the bit.
 openvdb::FloatGrid::Ptr widened(const openvdb::FloatGrid& grid, double half_width);
 
-// The surface of any level set on other voxels, from it as a mesh.
+// The surface of any level set on other voxels, by its mesh.
 openvdb::FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Transform& transform,
                                      double half_width);
 
@@ -77,11 +76,11 @@ void initialize_openvdb();
 void require_legal(const LevelSetOptions& options);
 
 // Error, before anything is built, when a level set of a surface of this area (m²) in these bounds would have over 2^31
-// voxels, too large an index, or more memory than the machine has. `what` names it: `mesh "bunny.obj"`.
+// voxels, too large an index, or more memory than the machine has. what: its name, `mesh "bunny.obj"`.
 void require_buildable(std::string_view what, double area, const Box3d& bounds, const LevelSetOptions& options);
 
 // Voxel centres at multiples of `voxel`, so that level sets of one voxel size combine without resampling. Far from the
-// origin it is moved by whole voxels, because OpenVDB's index coordinates are single precision in places.
+// origin it is shifted by whole voxels, because some of OpenVDB's index coordinates are in single precision.
 openvdb::math::Transform::Ptr make_transform(double voxel, const Box3d& bounds);
 
 }  // namespace rapid

@@ -1,4 +1,5 @@
-// Level sets on other voxels: from their surface as a mesh, so that distances are distances again.
+// Level sets on other voxels: by their surface as a mesh, which restores the distances.
+// Tests: tests/shapes/level_set/test_level_set_tools.cpp.
 #include <fmt/format.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/LevelSetRebuild.h>
@@ -21,7 +22,7 @@ double area_of(const FloatGrid& grid)
     return double(grid.activeVoxelCount()) * std::pow(grid.voxelSize()[0], 3) / (2 * grid.background());
 }
 
-// The level set's grid, turned with it where it is.
+// The grid of a level set, with its rotation if it has one.
 FloatGrid::ConstPtr grid_in_world(const LevelSetPtr& shape)
 {
     if (const auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid->shared_grid();
@@ -74,7 +75,7 @@ LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
             "the level set vanishes with voxel = {:g} m: its size is {:.3g} x {:.3g} x {:.3g} m; use a voxel "
             "of at most {:.3g} m",
             voxel, size.x(), size.y(), size.z(), size.minCoeff() / 3));
-    // Before OpenVDB refuses a voxel that it can't hold.
+    // Before OpenVDB refuses the voxel size.
     require_buildable("the resampled level set", area_of(*grid_in_world(shape)), shape->bounds(), {voxel, half_width});
     const auto transform = make_transform(voxel, shape->bounds());
     const auto build = [=](double metres) { return resampled_to(shape, *transform, metres); };

@@ -21,12 +21,12 @@ using openvdb::FloatGrid;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 using GridPtr = std::shared_ptr<const GridLevelSet>;
 
-// Voxel sizes that differ by less are the same but for rounding.
+// Voxel sizes that differ by a smaller part are equal but for rounding.
 constexpr double same_size = 1e-6;
-// Voxels that lie within this part of a voxel of each other's places lie there.
+// Voxels that are within this part of a voxel of each other coincide.
 constexpr double same_place = 1e-4;
 
-// On voxels along the axes: what is turned is resampled.
+// On voxels along the axes: a rotated level set is resampled.
 GridPtr on_axes(const LevelSetPtr& shape)
 {
     if (auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid;
@@ -49,7 +49,7 @@ FloatGrid::Ptr rebanded(const FloatGrid& grid, const openvdb::math::Transform& t
     std::vector<const Leaf*> leaves;
     grid.tree().getNodes(leaves);
     const auto width = static_cast<float>(half_width);
-    // Leaves of the copy begin at multiples of 8, so one of `grid` falls apart where the way is no such multiple.
+    // Leaves begin at multiples of 8: one of `grid` is split over several if the shift is no such multiple.
     auto result = FloatGrid::create(width);
     result->setTransform(transform.copy());
     result->setGridClass(openvdb::GRID_LEVEL_SET);

@@ -1,9 +1,10 @@
 // The signed distance from a mesh, on a grid.
 //
-// OpenVDB finds the voxels near a mesh and their distances. What it leaves is put right here, because points are seen
-// to sink into it: its own signs are wrong at some voxels next to the surface (dents of up to a third of a voxel, 2 to
-// 3 % of a thin body's volume at ten voxels across), and beyond two voxels it can take a triangle for the nearest that
-// is not (up to 0.7 of a voxel).
+// OpenVDB finds the voxels near a mesh and their distances. Two errors that make points visibly sink into the surface
+// are corrected here: the signs are wrong at some voxels next to the surface (dents of up to a third of a voxel, 2 to 3
+// % of a thin body's volume at ten voxels across), and beyond two voxels the nearest triangle may be wrong (up to 0.7
+// of a voxel).
+// Tests: tests/shapes/level_set/test_level_set.cpp.
 #include <openvdb/math/Proximity.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/SignedFloodFill.h>
@@ -29,8 +30,8 @@ using Leaf = FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with the tree*/ false>;
 using NearestAccessor = openvdb::tree::ValueAccessor<const openvdb::Int32Tree, /*registered with the tree*/ false>;
 
-// The plane of a triangle and those through its edges that are upright on it: a bound of the distance in a few
-// multiplications. Along an edge it is the distance, past a corner less.
+// The plane of a triangle and those through its edges perpendicular to it: a bound of the distance in a few
+// multiplications. Beside an edge it is the distance, past a corner less.
 class Prism {
 public:
     Prism(const openvdb::Vec3d& a, const openvdb::Vec3d& b, const openvdb::Vec3d& c)
@@ -43,7 +44,7 @@ public:
         }
     }
 
-    // The triangle is no nearer to P than the root of this.
+    // The square of a lower bound on the distance.
     double square_at_least(const openvdb::Vec3d& P) const
     {
         const double h = up_.dot(P) - height_;
@@ -57,7 +58,7 @@ private:
     double height_, edge_[3];
 };
 
-// The mesh in voxels, as OpenVDB takes it and as ours.
+// The mesh in voxels, in OpenVDB's form and ours.
 struct InVoxels {
     std::shared_ptr<Mesh> mesh = std::make_shared<Mesh>();
     std::vector<openvdb::Vec3s> points;
@@ -105,7 +106,7 @@ struct InVoxels {
     }
 };
 
-// A narrow band while it is put right: the distance of each voxel, and the triangle that it is to.
+// A narrow band under correction: the distance of each voxel, and its nearest triangle.
 struct Band {
     FloatGrid::Ptr distance;
     Int32Grid::Ptr nearest;
@@ -119,14 +120,14 @@ struct Band {
     }
 };
 
-// A voxel's better distance (m) and the triangle that it is to.
+// A better distance (m) of a voxel, and its triangle.
 struct Update {
     Coord voxel;
     float distance;
     openvdb::Int32 nearest;
 };
 
-// The 26 neighbours of a voxel, or the six across its faces alone, and how far they are, in voxels.
+// The 26 neighbours of a voxel, or the six across its faces alone, and their distances, in voxels.
 template <class F>
 void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
 {
@@ -139,9 +140,9 @@ void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
             }
 }
 
-// Asks `improve(voxel, phi, accessor, nearest, updates)` of all active voxels at once, takes what they found, and asks
-// again around those that have changed, until nothing is found: what a voxel becomes depends on the round before alone,
-// never on an order. Distances only shrink.
+// Jacobi iteration: calls `improve(voxel, phi, accessor, nearest, updates)` for all active voxels, applies the updates,
+// and repeats it around the voxels that have changed, until there are none. A voxel depends on the previous round
+// alone, never on an order. Distances only shrink.
 template <class Improve>
 void improve_until_done(Band& band, const Improve& improve)
 {
@@ -183,13 +184,14 @@ void improve_until_done(Band& band, const Improve& improve)
     band.find_leaves();
 }
 
-// A voxel takes the triangle of a neighbour that is nearer to the mesh where that is nearer to it too, and a voxel that
-// the band lacks comes into it.
+// A voxel takes the triangle of a neighbour nearer to the mesh if that is nearer to it too, and voxels missing from the
+// band are added to it.
 void shorten_distances(Band& band, const InVoxels& mesh)
 {
-    // m: what is worth a round. Half of it ends the rounds, and single precision leaves 1e-6 of a voxel.
+    // m: the least improvement. Half of it would end the rounds, and the rounding to single precision is 1e-6 of a
+    // voxel.
     const double worth = 1e-3 * band.voxel;
-    // m: OpenVDB asks each triangle about the voxels within √3/2 of it and all their neighbours, so nearer ones are
+    // m: OpenVDB tests each triangle against the voxels within √3/2 of it and all their neighbours, so nearer ones are
     // right.
     const double exact = 1.5 * band.voxel;
     const double half_width = band.distance->background();
@@ -220,8 +222,8 @@ void shorten_distances(Band& band, const InVoxels& mesh)
     });
 }
 
-// Negative where the faces wind around the voxel, found on whole rows of voxels along x. Returns whether any faces lie
-// inside: with the mesh wound around both their sides.
+// Negative where the winding number is not 0, by whole rows of voxels along x. Returns whether any faces lie inside:
+// with a winding number other than 0 on both their sides.
 bool sign_by_windings(Band& band, const RayCrossings& faces)
 {
     std::atomic<bool> overlaps = false;
@@ -250,17 +252,17 @@ bool sign_by_windings(Band& band, const RayCrossings& faces)
     return overlaps;
 }
 
-// Where pieces of a mesh overlap, the faces inside are no surface: voxels whose nearest face is one of those take the
-// nearest that is not, from their neighbours, or lie deeper than the band.
+// Where pieces of a mesh overlap, the faces inside are no surface: voxels with such a nearest face take the nearest
+// other one, from their neighbours, or lie deeper than the band.
 void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& faces)
 {
-    // Seen from inside, there is surface at the nearest place of a face when it is outside just behind it; for a voxel
-    // that is on the face, on either side of it.
+    // Seen from inside, the nearest point of a face is on the surface if it is outside just behind it; for a voxel on
+    // the face, on either side of it.
     const auto is_surface = [&](openvdb::Int32 triangle, const Coord& voxel) {
         constexpr double behind = 1e-3;  // voxels; the positions have about 1e-4
         const auto outside = [&](const openvdb::Vec3d& P) { return faces.from({P.x(), P.y(), P.z()}).windings == 0; };
-        const openvdb::Vec3d there = mesh.nearest_on(triangle, voxel), way = there - voxel.asVec3d();
-        if (way.length() > behind) return outside(there + way * (behind / way.length()));
+        const openvdb::Vec3d there = mesh.nearest_on(triangle, voxel), to_face = there - voxel.asVec3d();
+        if (to_face.length() > behind) return outside(there + to_face * (behind / to_face.length()));
         const openvdb::Vec3d step = mesh.normal(triangle) * behind;
         return outside(there + step) || outside(there - step);
     };

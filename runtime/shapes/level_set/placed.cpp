@@ -1,3 +1,4 @@
+// Tests: tests/shapes/motion/test_motion.cpp.
 #include "runtime/shapes/level_set/placed.h"
 
 #include <algorithm>
@@ -51,7 +52,7 @@ Box3d PlacedOf<Base>::bounds() const
 template <class Base>
 void PlacedOf<Base>::distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const
 {
-    // Kernels ask point by point: no memory is taken for that.
+    // Kernels query point by point, which must not allocate.
     std::array<Vec3d, 64> X;
     for (std::size_t begin = 0; begin < P.size(); begin += X.size()) {
         const std::size_t n = std::min(X.size(), P.size() - begin);

@@ -1,4 +1,4 @@
-// Shapes asked in their own frame: what is turned, or of a kind that can't be made elsewhere, is never built again.
+// Shapes with a pose, queried in their rest frame: a rotated shape is not rebuilt.
 //
 // A pose keeps angles, so paths stay parabolas and contacts are those of the rest shape.
 #pragma once
@@ -39,7 +39,7 @@ private:
     Pose pose_, to_rest_;
 };
 
-// A level set that is turned.
+// A rotated level set.
 class PlacedLevelSet final : public PlacedOf<LevelSet> {
 public:
     using PlacedOf::PlacedOf;
@@ -50,10 +50,10 @@ public:
     void write(const std::filesystem::path& path, const std::string& grid) const override;
 };
 
-// The box around a box that is moved. An infinite one that is turned is infinite every way.
+// The box around a moved box. An infinite one is infinite along all axes once it is rotated.
 Box3d moved(const Pose& pose, const Box3d& box);
 
-// A shape that is no level set (see level_set_tools.h) moved to where the pose has it.
+// A shape, other than a level set (see level_set_tools.h), moved by a pose.
 ShapePtr placed(const ShapePtr& rest, const Pose& pose);
 
 }  // namespace rapid

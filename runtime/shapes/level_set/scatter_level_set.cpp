@@ -1,4 +1,6 @@
-// Births on and in a level set.
+// Tests: tests/shapes/scatter/test_scatter.cpp.
+#include "runtime/shapes/level_set/scatter_level_set.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,8 +10,8 @@
 namespace rapid {
 namespace {
 
-// The extracted mesh's places, moved along the gradient to where the field is zero: the mesh is flat between its
-// vertices, up to voxel² / (8 radius) off.
+// Positions on the extracted mesh, moved along the gradient to where the field is zero: the mesh is flat between its
+// vertices, and up to voxel² / (8 radius) off.
 class ScatterOnLevelSet final : public Scatter {
 public:
     ScatterOnLevelSet(std::shared_ptr<const BakedGrid> grid, const MeshPtr& surface)
@@ -27,9 +29,9 @@ public:
         for (Birthplace& birth : out) {
             Vec3d P = birth.P.cast<double>(), gradient;
             double phi = sampler.distance(P, gradient);
-            for (int step = 0; step < most_steps && std::abs(phi) > near && gradient.squaredNorm() > 0; ++step) {
-                const Vec3d way = phi / gradient.squaredNorm() * gradient;
-                P -= way * std::min(1.0, grid_->voxel / way.norm());  // no farther than a voxel
+            for (int i = 0; i < most_steps && std::abs(phi) > near && gradient.squaredNorm() > 0; ++i) {
+                const Vec3d step = phi / gradient.squaredNorm() * gradient;
+                P -= step * std::min(1.0, grid_->voxel / step.norm());  // no farther than a voxel
                 phi = sampler.distance(P, gradient);
             }
             birth.P = P.cast<float>();

@@ -33,7 +33,7 @@ private:
         openvdb::tree::ValueAccessor<const openvdb::Vec3STree, /*IsSafe=*/false> accessor(grid_->tree());
         for (std::size_t i = 0; i < P.size(); ++i) {
             const openvdb::Vec3d at = grid_->transform().worldToIndex({P[i].x(), P[i].y(), P[i].z()});
-            // Voxels have numbers of 32 bits; farther out than those there is nothing.
+            // Voxels have 32-bit coordinates; there are none farther out.
             constexpr double farthest = 1 << 30;
             openvdb::Vec3s value = grid_->background();
             if (std::abs(at.x()) < farthest && std::abs(at.y()) < farthest && std::abs(at.z()) < farthest)

@@ -1,8 +1,8 @@
-// A field of vectors in space: an OpenVDB grid, read from a file or made of values at the nodes of a lattice.
+// A vector field: an OpenVDB grid, read from a file or built from values at the nodes of a lattice.
 //
 // Trilinear between voxels, of second order in their size; where the grid has no values it is its background, {0, 0, 0}
-// unless the file says otherwise. Values are those of the world's axes: what the grid's map turns, it turns in place.
-// A staggered grid (of a fluid solver: each component on its own faces of the voxel) is asked as one.
+// unless the file says otherwise. Values are in the world's axes: a rotation in the grid's map moves the voxels, and
+// not the values. A staggered grid (of a fluid solver: each component on its own faces of the voxel) is sampled as one.
 #pragma once
 
 #include <filesystem>
@@ -27,8 +27,8 @@ public:
 
 using VectorGridPtr = std::shared_ptr<const VectorGrid>;
 
-// The grid of that name in a .vdb file; the only grid of three floats, where the name is empty. Error: what is wrong
-// with the file, and which grids it has.
+// The grid of that name in a .vdb file; an empty name is the only grid of three floats. Error: what is wrong with the
+// file, and which grids it has.
 RAPID_DEFERRED(read_vector_grid, VectorGridPtr(const std::filesystem::path& path, const std::string& name));
 
 // A lattice of nodes `voxel` metres apart, from `origin` on along each axis. values: shape [nodes x, y, z], z fastest.

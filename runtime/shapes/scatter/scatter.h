@@ -1,7 +1,7 @@
 // Where particles are born on or in a shape.
 //
-// The place of a birth depends on the random key and the birth's number alone, so births can be placed in parallel and
-// in any order.
+// The position of a birth depends on the random key and the birth's number alone, so births can be placed in parallel
+// and in any order.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +21,12 @@ struct Birthplace {
     float b1 = 0, b2 = 0;       // barycentric weights of the triangle's second and third corner
 };
 
-struct BakedGrid;
-
 class Scatter {
 public:
     virtual ~Scatter() = default;
 
-    // Birth number first + i goes to out[i]. Takes the uses 0 to 15 of the key's numbers for that birth, and those
-    // whose low 32 bits are 0 to 15: the trials of a rejection are counted in the high bits.
+    // Birth number first + i goes to out[i]. Of the key's numbers for that birth it takes the uses 0 to 15, and those
+    // whose low 32 bits are 0 to 15: rejection sampling counts its trials in the high bits.
     virtual void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const = 0;
 };
 
@@ -36,16 +34,12 @@ using ScatterPtr = std::shared_ptr<const Scatter>;
 
 // Uniform by area; N is the face's normal. Error: a mesh of no area.
 ScatterPtr scatter_on_surface(const MeshPtr& mesh);
-// Uniform by volume: the places around which the faces wind. Error: a mesh with edges of an odd number of faces, or of
-// no volume (with the numbers).
+// Uniform by volume, over the points around which the faces wind. Error: a mesh with edges of an odd number of faces,
+// or without volume (with the numbers).
 ScatterPtr scatter_in_volume(const MeshPtr& mesh);
-// The same of a level set or an analytic shape, which gives its own (Shape::surface_scatter, volume_scatter). Error: a
+// The same for a level set or an analytic shape, which gives its own (Shape::surface_scatter, volume_scatter). Error: a
 // plane, which has no finite surface or volume.
 ScatterPtr scatter_on_surface(const ShapePtr& shape);
 ScatterPtr scatter_in_volume(const ShapePtr& shape);
-
-// What a level set gives. Its surface is that of `surface`, the zero crossing as a mesh, moved onto it; element is -1.
-ScatterPtr scatter_on_surface(std::shared_ptr<const BakedGrid> grid, const MeshPtr& surface);
-ScatterPtr scatter_in_volume(std::shared_ptr<const BakedGrid> grid);
 
 }  // namespace rapid

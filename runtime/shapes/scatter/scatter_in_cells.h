@@ -1,7 +1,7 @@
-// Births in a region that can only be asked "is this place inside?", uniform by volume.
+// Births in a region given by an inside test, uniform by volume.
 //
-// Equal cells cover the region; a birth takes a cell, a place in it, and another of each until the place is inside.
-// Cells that are wholly inside are never asked, so the cost follows the region's surface, not its box.
+// Equal cells cover the region; a birth draws a cell and a position in it, by rejection, until the position is inside.
+// Cells that are wholly inside need no test, so the cost follows the region's surface, not its box.
 #pragma once
 
 #include <fmt/format.h>
@@ -34,7 +34,7 @@ struct ScatterCells {
 template <class Inside>
 class ScatterInCells final : public Scatter {
 public:
-    // `volume` is the region's, m³. Error: it is so small a part of its cells that births would take for ever.
+    // volume: of the region, m³. Error: it is so small a part of its cells that rejection would not end.
     ScatterInCells(ScatterCells cells, Inside inside, double volume, const std::string& what)
         : cells_(std::move(cells)), inside_(std::move(inside))
     {
@@ -55,7 +55,7 @@ public:
 
 private:
     static constexpr double least_part = 1e-5;
-    // The chance to need more is exp(-100) at the least part.
+    // At the least part the probability of needing more is exp(-100).
     static constexpr std::uint64_t most_trials = 10'000'000;
 
     Vec3f draw(RandomKey key, std::uint64_t birth) const

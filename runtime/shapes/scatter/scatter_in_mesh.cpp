@@ -1,4 +1,5 @@
-// Births in a mesh's volume.
+// Births in the volume of a mesh.
+// Tests: tests/shapes/scatter/test_scatter.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +12,7 @@
 namespace rapid {
 namespace {
 
-// Where the faces wind around a place, or, for faces that look different ways, where a ray leaves through an odd number
-// of them.
+// Inside is a winding number that is not 0 or, for faces of inconsistent orientation, an odd number of crossings.
 struct InMesh {
     RayCrossings crossings;
     bool by_winding;
@@ -24,7 +24,7 @@ struct InMesh {
     }
 };
 
-// The cells that a face touches are partly inside; each of the others is wholly inside or outside, as its middle is.
+// The cells that a face touches are partly inside; each of the others is wholly inside or outside, as its centre is.
 ScatterCells cells_of(const Mesh& mesh, const InMesh& inside)
 {
     constexpr double about = 32768;  // cells in the box of a compact mesh
@@ -80,7 +80,7 @@ ScatterPtr scatter_in_volume(const MeshPtr& mesh)
             open.odd_edges));
     InMesh inside{RayCrossings(mesh), open.unbalanced_edges == 0};
     ScatterCells cells = cells_of(*mesh, inside);
-    // Pieces that are turned the other way take from the sum; the cells that are wholly inside don't.
+    // Pieces of opposite orientation reduce the sum, but not the cells that are wholly inside.
     const double volume = std::max(std::abs(mesh->signed_volume()), double(cells.whole) * cells.edge.prod());
     if (!(volume > 0))
         throw Error(fmt::format("{} has {} faces and no volume; use its surface", what, mesh->triangles.size()));

@@ -1,4 +1,5 @@
-// Births on a mesh's surface, uniform by area.
+// Births on the surface of a mesh, uniform by area.
+// Tests: tests/shapes/scatter/test_scatter.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +13,7 @@ namespace rapid {
 namespace {
 
 // Draws an item with a probability in proportion to its weight, in constant time: each of n equal columns holds the
-// weight of its own item up to `keep`, and of one other above (Walker 1977, built as by Vose 1991).
+// weight of its own item up to `keep`, and of one other above it (Walker 1977, built as in Vose 1991).
 class AliasTable {
 public:
     AliasTable(const std::vector<double>& weights, double sum) : columns_(weights.size())
@@ -33,7 +34,7 @@ public:
                 large.pop_back();
             }
         }
-        // What is left is full but for rounding. An item of weight 0 is never left: a giver would be, too.
+        // The columns left are full but for rounding. None has weight 0, as then a giver would be left, too.
         for (const std::int32_t i : large) columns_[i].keep = 1;
         for (const std::int32_t i : small)
             if (columns_[i].keep > 0) columns_[i].keep = 1;
@@ -54,7 +55,7 @@ private:
     std::vector<Column> columns_;
 };
 
-// A triangle as a birth needs it.
+// A triangle, prepared for births.
 struct Face {
     Vec3d corner, to_second, to_third;
     Vec3f N;

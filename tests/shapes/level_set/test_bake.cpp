@@ -10,7 +10,7 @@ using namespace rapid;
 
 namespace {
 
-// A field that is no distance: random values in a block of voxels, and constants around it.
+// A field that is not a distance: random values in a block of voxels, and constants around it.
 openvdb::FloatGrid::Ptr noise(float background)
 {
     openvdb::initialize();
@@ -27,7 +27,7 @@ openvdb::FloatGrid::Ptr noise(float background)
 
 }  // namespace
 
-TEST_CASE("a baked grid gives what OpenVDB's own sampler gives, across blocks and at the band's edge", "[level set]")
+TEST_CASE("a baked grid agrees with OpenVDB's own sampler, across blocks and at the edge of the band", "[level set]")
 {
     const auto grid = noise(1.0f);
     const BakedGrid baked = bake(*grid);
@@ -122,7 +122,7 @@ TEST_CASE("distances of many points are to the bit those of each", "[level set]"
     }
 }
 
-TEST_CASE("beyond the band the distance is a bound of the right sign, and no mere half width", "[level set]")
+TEST_CASE("beyond the band the distance is a bound of the right sign, larger than the half width", "[level set]")
 {
     const double radius = 2, voxel = 0.05, half_width = 3 * voxel;
     const Vec3d center{0.3, -0.2, 5};

@@ -130,7 +130,7 @@ TEST_CASE("a level set box is exact to rounding along its faces, and round outsi
     CHECK(ask(*box, {1.03, 5.54, 0}).phi == Approx(0.05).margin(1e-3));  // 3-4-5
 }
 
-TEST_CASE("a level set torus is the distance to its circle less its tube", "[level set]")
+TEST_CASE("a level set torus is the distance to its circle minus its tube", "[level set]")
 {
     const auto torus = level_set_torus(0.5, 0.2, Vec3d::Zero(), {0.01, 4});
     int asked = 0;
@@ -174,7 +174,7 @@ TEST_CASE("outside a level set's bounds the distance is above 0, and at least th
     }
 }
 
-TEST_CASE("asking for distances alone gives the same bits as asking for gradients too", "[level set]")
+TEST_CASE("distances alone have the same bits as distances with gradients", "[level set]")
 {
     const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.1, 3});
     const auto points = random_points(5000, cube(1.6));
@@ -185,7 +185,7 @@ TEST_CASE("asking for distances alone gives the same bits as asking for gradient
     CHECK(alone == together);
 }
 
-TEST_CASE("a level set is built and asked with the same bits on any number of threads", "[level set]")
+TEST_CASE("a level set is built and queried with the same bits on any number of threads", "[level set]")
 {
     std::vector<double> phi[2];
     const auto points = random_points(20'000, cube(1.3));
@@ -273,7 +273,7 @@ TEST_CASE("a piece turned inwards beside the others is solid, and pieces that ov
         CHECK(ask(*overlap, {x, 0, 0}).phi == Approx(-0.15));
 }
 
-TEST_CASE("a hole smaller than a voxel is closed, and said", "[level set]")
+TEST_CASE("a hole smaller than a voxel is closed, with a warning", "[level set]")
 {
     auto holed = std::make_shared<Mesh>(*make_sphere(1, 200, Vec3d::Zero()));
     holed->triangles.erase(holed->triangles.begin() + 10'000);
@@ -287,7 +287,7 @@ TEST_CASE("a hole smaller than a voxel is closed, and said", "[level set]")
                       "counts as outside"));
 }
 
-TEST_CASE("pieces thinner than a voxel are named before they are missed", "[level set]")
+TEST_CASE("pieces thinner than a voxel are named in a warning", "[level set]")
 {
     std::vector<std::string> warnings;
     level_set_from_mesh(both(make_sphere(1, 48, Vec3d::Zero()), make_box({1, 1, 0.01}, {3, 0, 0.02})), {0.1, 3},
@@ -298,7 +298,7 @@ TEST_CASE("pieces thinner than a voxel are named before they are missed", "[leve
                       "a smaller voxel keeps them"));
 }
 
-TEST_CASE("what can't become a level set is refused with the numbers, before it is built", "[level set]")
+TEST_CASE("meshes that can't become a level set are refused with the numbers, before it is built", "[level set]")
 {
     const Vec3d o = Vec3d::Zero();
     std::vector<std::string> w;

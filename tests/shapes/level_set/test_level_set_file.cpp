@@ -104,7 +104,7 @@ TEST_CASE("a file's other grids are left alone, and a grid is found by its name"
         Equals("grid \"density\" of \"both.vdb\" is float of class \"fog volume\"; it must be a float level set"));
 }
 
-TEST_CASE("what holds no level set is refused by name", "[level set][file]")
+TEST_CASE("files without a level set are refused by name", "[level set][file]")
 {
     const Folder folder;
     const auto refusal = [&](const char* name, const char* grid) {

@@ -33,7 +33,7 @@ double distance(const Shape& shape, const Vec3d& P)
     return phi;
 }
 
-// Of two balls of radius r whose middles are d apart.
+// Of two balls of radius r with centres d apart.
 double lens_volume(double r, double d) { return pi / 12 * (4 * r + d) * (2 * r - d) * (2 * r - d); }
 
 template <class F>
@@ -75,7 +75,7 @@ TEST_CASE("a combination has the distances of its parts where only one of them i
     CHECK(distance(*wide, {-1.4, 0, 0}) == Approx(0.4).margin(2e-3));
 }
 
-TEST_CASE("voxels that lie elsewhere are resampled; other sizes are, and it is said", "[level_set]")
+TEST_CASE("shifted voxels are resampled, and other sizes are with a warning", "[level_set]")
 {
     const LevelSetPtr a = ball(1, {0, 0, 0}, 0.05);
     const LevelSetPtr shifted = move_level_set(ball(1, {0, 0, 0}, 0.05), {{0.913, 0, 0}});
@@ -99,7 +99,7 @@ TEST_CASE("voxels far from the origin, moved by whole voxels, combine without re
           Approx(lens_volume(1, 0.9)).epsilon(0.006));
 }
 
-TEST_CASE("an offset ball is a ball of that much more or less", "[level_set]")
+TEST_CASE("an offset ball is a ball with a radius larger or smaller by the offset", "[level_set]")
 {
     const double by = GENERATE(-0.5, -0.1, 0.02, 0.3, 1.0);
     CAPTURE(by);
@@ -136,7 +136,7 @@ TEST_CASE("a resampled level set is the same surface on other voxels", "[level_s
     CHECK(volume_of(other) == Approx(volume_of(ball(1, {0, 0.2, 0}, voxel))).epsilon(1.2 * 0.04 * 0.04));
 }
 
-TEST_CASE("a level set that is moved and grown has its voxels moved and grown, and keeps its values", "[level_set]")
+TEST_CASE("moving and scaling a level set moves and scales its voxels, and keeps its values", "[level_set]")
 {
     const LevelSetPtr moved = move_level_set(ball(1, {0, 0, 0}), {{5, -2, 1}, Eigen::Quaterniond::Identity(), 2});
     CHECK(moved->voxel() == Approx(0.08));
@@ -145,7 +145,7 @@ TEST_CASE("a level set that is moved and grown has its voxels moved and grown, a
     CHECK(distance(*moved->with_band(1), {5, 0.9, 1}) == Approx(0.9).margin(1e-3));
 }
 
-TEST_CASE("a level set that is turned is asked in its own frame, and combines like any other", "[level_set]")
+TEST_CASE("a rotated level set is queried in its own frame, and combines like any other", "[level_set]")
 {
     const Eigen::Quaterniond eighth(Eigen::AngleAxisd(pi / 4, Vec3d::UnitZ()));
     const LevelSetPtr box = level_set_box({1, 1, 1}, {0, 0, 0}, {0.02, 3});
@@ -175,7 +175,7 @@ TEST_CASE("a level set of points is the union of their balls", "[level_set]")
     CHECK(distance(*level_set_from_points(P, radii, {0.03, 3}), {5, 1.05, 0}) == Approx(0.05).margin(interpolated));
 }
 
-TEST_CASE("a moved level set is written and read where it is", "[level_set]")
+TEST_CASE("a moved level set is written and read at its new position", "[level_set]")
 {
     const auto path =
         std::filesystem::temp_directory_path() / ("rapid_tools_" + std::to_string(std::random_device()()) + ".vdb");
@@ -188,7 +188,7 @@ TEST_CASE("a moved level set is written and read where it is", "[level_set]")
     CHECK(distance(*back, Vec3d(3, 2, 1) + turn * Vec3d(0.55, 0, 0)) == Approx(0.05).margin(2e-3));
 }
 
-TEST_CASE("what leaves nothing, or can't be built, is refused with the numbers", "[level_set][extreme]")
+TEST_CASE("an operation that leaves nothing, or can't be built, is refused with the numbers", "[level_set][extreme]")
 {
     const LevelSetPtr a = ball(1, {0, 0, 0});
     CHECK_THAT(message_of([&] {

@@ -39,7 +39,7 @@ Vec3d sample(const VectorGrid& grid, const Vec3d& P)
     return value;
 }
 
-// Linear in the place, so that trilinear interpolation gives it exactly.
+// Linear in the position, so that trilinear interpolation gives it exactly.
 Vec3d linear(const Vec3d& P) { return {1 + 2 * P.x(), -3 * P.y() + P.z(), 0.5 * P.x() * 1.0}; }
 
 openvdb::Vec3SGrid::Ptr linear_grid(const char* name, const openvdb::math::Transform::Ptr& transform, bool staggered)
@@ -113,7 +113,7 @@ TEST_CASE("a lattice has the values of its nodes, and its background is zero", "
     CHECK(sample(*grid, {1, 4, 1}).isZero(0));
 }
 
-TEST_CASE("a file without the grid that is asked for says which it has", "[vector_grid]")
+TEST_CASE("a file without the requested grid is refused with the grids that it has", "[vector_grid]")
 {
     const Folder folder;
     auto density = openvdb::FloatGrid::create();

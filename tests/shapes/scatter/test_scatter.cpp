@@ -34,8 +34,8 @@ double chi_square(const std::vector<double>& found, const std::vector<double>& e
     return sum;
 }
 
-// What a chi-square of so many degrees of freedom stays below 999 times in 1000 (Wilson and Hilferty 1931). The keys
-// are fixed, so a test that passes passes always.
+// The 99.9th percentile of chi-square with so many degrees of freedom (Wilson and Hilferty 1931). The keys
+// are fixed, so a test that passes always passes.
 double rarely_above(double degrees)
 {
     const double z = 3.0902, k = 2 / (9 * degrees);
@@ -122,7 +122,7 @@ TEST_CASE("faces without area are never born on", "[scatter]")
     for (const Birthplace& birth : births(scatter, 10'000)) REQUIRE(birth.element == 1000);
 }
 
-TEST_CASE("the place of a birth depends on the key and its number alone", "[scatter]")
+TEST_CASE("the position of a birth depends on the key and its number alone", "[scatter]")
 {
     const auto same = [](const Birthplace& a, const Birthplace& b) { return a.P == b.P && a.element == b.element; };
     for (const ScatterPtr& scatter : {scatter_on_surface(make_torus(1, 0.3, 20, Vec3d::Zero())),
@@ -178,7 +178,7 @@ TEST_CASE("births in a torus mesh are uniform across its tube and around its axi
     CHECK(mean_ring == Approx(1 + 0.3 * 0.3 / 4).margin(4 * 0.15 / std::sqrt(n)));
 }
 
-TEST_CASE("births in a mesh are where its faces wind around them", "[scatter]")
+TEST_CASE("births in a mesh are where its winding number is not 0", "[scatter]")
 {
     // Turned so that no face is along an axis.
     const Eigen::Affine3d turn(Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()));
@@ -211,7 +211,7 @@ TEST_CASE("births in a scanned mesh are inside it", "[scatter]")
     for (const Birthplace& birth : births(scatter_in_volume(spot), 1000)) REQUIRE(winding(*spot, birth.P) > 0.4);
 }
 
-TEST_CASE("births on a level set sphere are on it, uniform, and look out of it", "[scatter]")
+TEST_CASE("births on a level set sphere are on it, uniform, and have outward normals", "[scatter]")
 {
     const Vec3f center(1, 2, 3);
     const ShapePtr sphere = level_set_sphere(0.5, center.cast<double>(), {0.05, 3});
@@ -226,7 +226,7 @@ TEST_CASE("births on a level set sphere are on it, uniform, and look out of it",
         octants[(from_center.x() > 0) * 4 + (from_center.y() > 0) * 2 + (from_center.z() > 0)] += 1;
     }
     CHECK(chi_square(octants, std::vector<double>(8, n / 8.0)) < rarely_above(7));
-    // The surface is made of quads of a voxel, whose area differs from the sphere's by up to 1 % from place to place.
+    // The surface is made of quads of a voxel, whose area differs from the sphere's by up to 1 % locally.
     for (const double found : bands) CHECK(found == Approx(n / 20.0).epsilon(0.07));
 }
 
@@ -254,7 +254,7 @@ TEST_CASE("births in a level set are inside it, and uniform by volume", "[scatte
     CHECK(chi_square(shells, std::vector<double>(10, n / 10.0)) < rarely_above(9));
 }
 
-TEST_CASE("what nothing can be born on or in is refused with the numbers", "[scatter]")
+TEST_CASE("sources without area or volume are refused with the numbers", "[scatter]")
 {
     const Vec3d o = Vec3d::Zero();
     CHECK_THAT(message_of([&] {

@@ -1,4 +1,5 @@
-// Level sets made from the formula of their distance: exact at every voxel of the band.
+// Built-in level sets, from formulas of their distance: exact at every voxel of the band.
+// Tests: tests/shapes/level_set/test_level_set.cpp.
 #include <fmt/format.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
@@ -20,7 +21,7 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double pi = std::numbers::pi;
 
-// A surface with a distance that is exact, or at least grows no faster than the way from it.
+// A surface with a distance that is exact, or at least has a slope of 1 at most.
 struct Formula {
     std::string what;  // `a level set sphere of radius 2`
     std::function<double(const Vec3d& P)> distance;
@@ -29,8 +30,8 @@ struct Formula {
     double thickness;  // m, of its thinnest part
 };
 
-// The leaves that the band may touch: cubes are halved down to a leaf's size, and left out as soon as their centre is
-// farther from the surface than the band and their half diagonal.
+// The leaves that the band may touch: an octree down to the size of a leaf, without the cubes whose centre is farther
+// from the surface than the band and their half diagonal.
 void find_leaves(const Formula& formula, const openvdb::math::Transform& transform, double half_width,
                  const Coord& origin, int size, std::vector<Coord>& found)
 {

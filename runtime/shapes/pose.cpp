@@ -1,3 +1,4 @@
+// Tests: tests/shapes/motion/test_motion.cpp.
 #include "runtime/shapes/pose.h"
 
 namespace rapid {

@@ -1,11 +1,11 @@
-// Where a body is and how it moves there, at one time.
+// The pose of a body, and its velocities there.
 #pragma once
 
 #include "runtime/vec.h"
 
 namespace rapid {
 
-// Where a body is: its place X, in its rest frame, is at translation + scale rotation X.
+// The point X of a body, in its rest frame, is at translation + scale rotation X.
 struct Pose {
     Vec3d translation = Vec3d::Zero();  // m
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
@@ -21,10 +21,10 @@ struct Pose {
     Eigen::Affine3d affine() const { return Eigen::Translation3d(translation) * rotation * Eigen::Scaling(scale); }
 };
 
-// Translation linear, rotation on the sphere (the shorter way round), scale linear; t from 0 (a) to 1 (b).
+// Linear in translation and scale, spherical (slerp, the shorter way round) in rotation; t from 0 (a) to 1 (b).
 Pose interpolate(const Pose& a, const Pose& b, double t);
 
-// The velocity of each place of a body that moves, turns and grows: v(x) = linear + angular × r + growth r with
+// The velocity at each point of a body that moves, turns and grows: v(x) = linear + angular × r + growth r with
 // r = x - about, m/s.
 struct VelocityField {
     Vec3d linear = Vec3d::Zero();   // m/s

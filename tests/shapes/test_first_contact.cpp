@@ -40,7 +40,7 @@ private:
     std::mt19937_64 engine_;
 };
 
-// From around a shape of this size, more or less towards it, bent by an acceleration.
+// From around a shape of this size, roughly towards it, curved by an acceleration.
 Path path_to(const Vec3d& center, Random& random, double radius)
 {
     const Vec3d P = center + random.in(1, 3) * random.direction();
@@ -99,13 +99,13 @@ TEST_CASE("a straight path meets a sphere at the root of its quadratic", "[first
         const double root = c / (-b + std::sqrt(discriminant));
         CHECK(contact.time == Approx(root).epsilon(1e-9));
         CHECK_THAT(contact.n, close_to(Vec3d((P + root * v - center).normalized()), 1e-7));
-        // Of the surface that keeps points of this radius out; by a difference over a millionth of the sphere.
+        // Of the offset surface by this radius; by a difference over a millionth of the sphere.
         CHECK(contact.curvature == Approx(1 / (R + r)).epsilon(1e-4));
     }
     CHECK(met > 500);
 }
 
-// The contact is on the surface, and the path was outside until then: looked at in small steps.
+// The contact is on the surface, and the path was outside until then: in small steps.
 void require_first(const ShapePtr& shape, const Path& path, const Contact& contact, double tolerance)
 {
     const double until = std::min(contact.time, path.duration);
@@ -142,7 +142,7 @@ TEST_CASE("a point flush with a surface is outside it", "[first_contact]")
 {
     const ShapePtr shape = GENERATE(make_plane({0, 1, 0}, 1), make_sphere_shape(1, {0, 0, 0}),
                                     make_box_shape({2, 2, 2}, {0, 0, 0}), level_set_sphere(1, {0, 0, 0}, {0.05, 3}));
-    const double off = GENERATE(-1e-7, 0.0, 1e-7);  // what single precision does to a position
+    const double off = GENERATE(-1e-7, 0.0, 1e-7);  // the rounding of a position to single precision
     CAPTURE(shape->kind(), off);
     Vec3d P(0, 1, 0);
     P.y() += off - distance(shape, P);  // on the field's own surface, where that is not exactly at 1
@@ -167,7 +167,7 @@ TEST_CASE("a fast point that is pressed to a ball leaves it tangentially", "[fir
     CHECK(meet(ball, {top, {3.3, 0, 0}, pull, 1, 0}).time == Contact::none);  // v² > g R
 }
 
-TEST_CASE("a path that starts inside says how deep and which way is out", "[first_contact]")
+TEST_CASE("a path that starts inside has the depth and the direction out of the shape", "[first_contact]")
 {
     const Path path{{0.5, 0.2, 0}, {0, 0, 3}, {0, 0, 0}, 1, 0.1};
     const Contact in_box = meet(make_box_shape({2, 2, 2}, {0, 0, 0}), path);
@@ -179,7 +179,7 @@ TEST_CASE("a path that starts inside says how deep and which way is out", "[firs
     CHECK(in_plane.n == Vec3d(0, 1, 0));
 }
 
-TEST_CASE("deep in a level set the way out is the way in", "[first_contact]")
+TEST_CASE("deep in a level set a path goes back the way it came", "[first_contact]")
 {
     const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});
     const Contact contact = meet(ball, {{0, 0, 0.2}, {0, 0, -4}, {0, 0, 0}, 1, 0});
@@ -215,7 +215,7 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
     CHECK(met > 40);
 }
 
-TEST_CASE("a path that has left a surface meets one only where it comes up to it, if within the same voxel",
+TEST_CASE("a path that leaves a surface meets the next one where it reaches it, even within the same voxel",
           "[first_contact]")
 {
     // Around the inside of the tube the surface turns towards what leaves it, and from cell to cell in kinks.
@@ -251,7 +251,8 @@ TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_con
         const Vec3d from(-random.in(0.5, 3), random.in(-1, 1), random.in(-1, 1)),
             to(3, random.in(-1, 1), random.in(-1, 1));
         const Vec3d v = speed * (to - from).normalized();
-        const Vec3d a = random.in(0, 0.1) * speed * speed * random.direction();  // it bends, by up to 0.05 of its way²
+        const Vec3d a =
+            random.in(0, 0.1) * speed * speed * random.direction();  // it bends, by up to 0.05 of its length²
         const Path path{from, v, a, (to - from).norm() / speed, 0};
         if (on_path(path, path.duration).x() < 0.3) continue;  // bent back, or not through yet
         const Contact contact = meet(wall, path);
@@ -261,8 +262,7 @@ TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_con
     }
 }
 
-TEST_CASE("a path that is at rest at first meets what it falls to, or comes to its end, at any acceleration",
-          "[first_contact][extreme]")
+TEST_CASE("a path that starts at rest meets what it falls to, or ends, at any acceleration", "[first_contact][extreme]")
 {
     const ShapePtr ball = level_set_sphere(0.7, {0, 0, 0}, {0.05, 5});
     const double a = std::pow(10.0, GENERATE(range(-1, 35)));
@@ -292,7 +292,7 @@ TEST_CASE("a path that is at rest just above a surface meets it, at any accelera
     if (time > 1.1 * duration) CHECK(contact.time == Contact::none);
 }
 
-TEST_CASE("a surface is not looked for beyond its bounds, and found from any distance", "[first_contact]")
+TEST_CASE("no contact is found outside the bounds, and one inside is found from any distance", "[first_contact]")
 {
     const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});
     CHECK(meet(ball, {{1e6, 0, 0}, {-1e6, 0, 0}, {0, 0, 0}, 2, 0}).time == Approx(1 - 1e-6).epsilon(1e-9));
@@ -301,7 +301,7 @@ TEST_CASE("a surface is not looked for beyond its bounds, and found from any dis
     CHECK(meet(ball, {{5, 0, 0}, {1e6, 0, 0}, {0, 1e6, 0}, 10, 0}).time == Contact::none);
 }
 
-TEST_CASE("an answer does not depend on what else is asked", "[first_contact]")
+TEST_CASE("a contact does not depend on the other paths of the query", "[first_contact]")
 {
     const ShapePtr shape = GENERATE(make_plane({0.2, 1, 0}, 0), make_sphere_shape(1, {0, 0, 0}),
                                     level_set_torus(0.8, 0.25, {0, 0, 0}, {0.05, 3}));

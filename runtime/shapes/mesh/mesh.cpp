@@ -23,8 +23,8 @@ double Mesh::area() const
 }
 
 // The sum over the faces of the tetrahedra (origin, a, b, c), by the divergence theorem. For a closed mesh any origin
-// gives the same; the middle of the bounds loses the fewest digits far from the world's origin, and makes the figure of
-// an open mesh independent of where it stands.
+// gives the same; the centre of the bounds loses the fewest digits far from the world's origin, and makes the result
+// for an open mesh independent of its position.
 double Mesh::signed_volume() const
 {
     if (positions.empty()) return 0;
@@ -41,7 +41,7 @@ double Mesh::signed_volume() const
 
 Mesh::Openness Mesh::openness() const
 {
-    // An edge is its two vertices, lower first; the lowest bit tells which way its face goes along it.
+    // An edge is its two vertices, lower first; the lowest bit is the direction of its face along it.
     struct Side {
         std::uint64_t edge;
         bool forward;

@@ -1,4 +1,4 @@
-// A polygon mesh: positions and faces, and values at its vertices (Cd, any float) where its file has them.
+// A triangle mesh: positions and faces, and the values at its vertices (Cd, any float) that its file has.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ public:
     double area() const;           // m²
     double signed_volume() const;  // m³; negative when the faces point inwards
 
-    // How far the mesh is from bounding a volume: counts of edges that do not have exactly two faces of opposite sense.
+    // Edges that keep the mesh from bounding a volume: those without exactly two faces of opposite sense.
     struct Openness {
         std::size_t boundary_edges = 0;      // one face
         std::size_t non_manifold_edges = 0;  // three or more, or two of the same sense
@@ -44,11 +44,11 @@ public:
 
 using MeshPtr = std::shared_ptr<const Mesh>;
 
-// OBJ, PLY, STL, glTF. Vertices at one place are joined (STL has no shared ones). Error: no such file, what the reader
-// could not understand, no triangles, a coordinate that is not finite.
+// OBJ, PLY, STL, glTF. Coincident vertices are merged (STL has no shared ones). Error: no such file, the reader's own,
+// no triangles, a coordinate that is not finite.
 MeshPtr read_mesh(const std::filesystem::path& path);
 
-// Made meshes, about `center`. Each argument in metres and above 0; divisions at least 3 (sphere, torus) or 1 (grid).
+// Built-in meshes, about `center`. Lengths in metres and above 0; divisions at least 3 (sphere, torus) or 1 (grid).
 MeshPtr make_sphere(double radius, int divisions, const Vec3d& center);
 MeshPtr make_box(const Vec3d& size, const Vec3d& center);
 MeshPtr make_grid(double size_x, double size_z, int divisions, const Vec3d& center);  // in the plane y = center.y
@@ -56,7 +56,7 @@ MeshPtr make_torus(double radius, double tube, int divisions, const Vec3d& cente
 // Faces are lists of vertex indices from 0, split into fans. Error: an index out of range, a face of fewer than three.
 MeshPtr make_mesh(std::vector<Vec3f> points, const std::vector<std::vector<std::int32_t>>& faces);
 
-// The mesh moved by an affine map; faces are turned when the map mirrors.
+// The mesh transformed by an affine map; faces are flipped if the map mirrors.
 MeshPtr transformed(const MeshPtr& mesh, const Eigen::Affine3d& map);
 
 }  // namespace rapid

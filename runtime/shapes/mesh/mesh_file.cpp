@@ -1,7 +1,8 @@
 // Meshes from files, by Assimp.
 //
-// A mesh is its surface: normals and texture coordinates are left behind, because at a seam a vertex has several and
-// every point born on the mesh would carry them. Vertex colours become Cd, and Alpha where any is not 1.
+// A mesh is its surface: normals and texture coordinates are dropped, because at a seam a vertex has several and every
+// point born on the mesh would carry them. Vertex colours become Cd, and Alpha if any is not 1.
+// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -67,8 +68,8 @@ std::string lower_case(std::string text)
 }
 
 // Assimp takes a byte at the beginning of a binary file's data that could end a line for a part of the header, reads
-// all that follows from one byte too late, and falls over the faces. Such a file comes back with one more element in
-// front of its own, an edge, whose bytes cannot be mistaken; nothing where the file is none of these.
+// everything after it from one byte too late, and fails at the faces. This returns such a file with one more element in
+// front of its own, an edge, whose bytes are unambiguous; nothing for any other file.
 std::optional<std::string> with_safe_beginning(const std::filesystem::path& path)
 {
     std::ifstream file(path, std::ios::binary);

@@ -1,4 +1,4 @@
-// What a mesh file says, before its corners are joined to vertices. For the sources that read meshes.
+// The contents of a mesh file, before its corners are merged to vertices. For the sources that read meshes.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 namespace rapid {
 
 // Importers split vertices at seams of normals and texture coordinates, and STL never shares any. A deforming sequence
-// has the same corners in each file, and so can be joined as its first is.
+// has the same corners in each file, and is merged as its first file is.
 struct MeshFile {
     std::vector<Vec3f> positions;
     std::vector<Vec3f> colours;  // empty, or shape [positions]
@@ -18,10 +18,10 @@ struct MeshFile {
     std::vector<Mesh::Triangle> triangles;
 };
 
-// Error: no such file, what the reader could not understand, a coordinate that is not finite.
+// Error: no such file, the reader's own, a coordinate that is not finite.
 RAPID_DEFERRED(read_mesh_file, MeshFile(const std::filesystem::path& path));
 
-// For each corner the vertex that it becomes: corners at one place are one vertex, numbered in the order of the file.
+// The vertex of each corner: coincident corners are one vertex, numbered in the order of the file.
 std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions);
 
 // Error: no triangles.

@@ -10,10 +10,10 @@
 namespace rapid {
 namespace {
 
-// A frame's spline and the jumps around it need six; two more go on to the next frame.
+// The spline of a frame and the jumps around it need six; two more carry over to the next frame.
 constexpr std::size_t most_kept = 8;
 
-// Corners of one vertex may differ by this much of the mesh's size: what an exporter's rounding makes of them.
+// Corners of one vertex may differ by this part of the mesh's size, by the rounding of an exporter.
 constexpr double same_place = 1e-6;
 
 }  // namespace

@@ -1,7 +1,7 @@
 // A mesh that deforms: a file for each frame, all with the same faces between the same vertices.
 //
-// Before its first frame the first file holds, after its last the last. A file is read when its frame is first asked
-// for, and the few that were asked for last are kept.
+// Before the first frame the first file holds, after the last the last. A file is read when its frame is first needed,
+// and the few most recent ones are kept.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +28,8 @@ public:
     int last() const { return files_.rbegin()->first; }
     const MeshPtr& rest() const { return rest_; }  // the first file's
 
-    // The mesh of the file that holds at this frame, with the first one's faces; its values are its own. From any
-    // thread. Error: another number of vertices or faces than the first file has (naming the frame and both counts).
+    // The mesh of the file that holds at this frame, with the faces of the first one; its values are its own. From any
+    // thread. Error: another number of vertices or faces than in the first file (with the frame and both counts).
     MeshPtr at(std::int64_t frame) const;
 
 private:
@@ -42,7 +42,7 @@ private:
     MeshPtr rest_;
 
     mutable std::mutex mutex_;
-    mutable std::deque<std::pair<int, MeshPtr>> kept_;  // the last one asked for in front
+    mutable std::deque<std::pair<int, MeshPtr>> kept_;  // most recent first
 };
 
 using MeshSequencePtr = std::shared_ptr<const MeshSequence>;

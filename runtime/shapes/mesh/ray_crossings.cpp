@@ -1,3 +1,4 @@
+// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include "runtime/shapes/mesh/ray_crossings.h"
 
 #include <algorithm>
@@ -6,9 +7,9 @@
 namespace rapid {
 namespace {
 
-// Whether a line along x at (y, z) meets the triangle: when, in that plane, a line from there along +y crosses an odd
-// number of its sides. A side's crossing is computed from its lower end to its upper one, so that both its faces find
-// the same to the bit.
+// Whether a line along x at (y, z) meets the triangle: if, in that plane, a ray from there along +y crosses an odd
+// number of its sides. The crossing of a side is computed from its lower end to its upper one, so that both its faces
+// find the same to the bit.
 bool meets(const Vec3d (&corners)[3], double y, double z)
 {
     bool within = false;
@@ -25,11 +26,11 @@ bool meets(const Vec3d (&corners)[3], double y, double z)
 
 RayCrossings::RayCrossings(MeshPtr mesh) : mesh_(std::move(mesh)), bounds_(mesh_->bounds().cast<double>())
 {
-    // About one triangle a bin where they are spread evenly.
+    // About one triangle a bin if they are spread evenly.
     bins_ = std::clamp(static_cast<int>(std::sqrt(double(mesh_->triangles.size()))), 1, 2048);
     per_metre_ = Vec3d::Constant(bins_).cwiseQuotient(bounds_.sizes().cwiseMax(1e-30));
 
-    // Twice over the triangles: count, then fill.
+    // Two passes over the triangles: count, then fill.
     first_.assign(std::size_t(bins_) * bins_ + 1, 0);
     for_each_bin([&](std::size_t bin, std::int32_t) { ++first_[bin + 1]; });
     for (std::size_t bin = 1; bin < first_.size(); ++bin) first_[bin] += first_[bin - 1];
@@ -63,7 +64,7 @@ RayCrossings::Count RayCrossings::from(const Vec3d& P) const
         const Vec3d corners[3] = {corner(triangles_[i], 0), corner(triangles_[i], 1), corner(triangles_[i], 2)};
         const auto& [a, b, c] = corners;
         if (P.x() >= std::max({a.x(), b.x(), c.x()}) || !meets(corners, P.y(), P.z())) continue;
-        // Where the triangle's box does not tell whether it is ahead, the side of its plane does.
+        // If the triangle's box does not decide whether it is ahead, the side of its plane does.
         const Vec3d normal = (b - a).cross(c - a);
         const bool ahead = P.x() < std::min({a.x(), b.x(), c.x()}) || (normal.dot(P - a) < 0) == (normal.x() > 0);
         if (!ahead) continue;
@@ -84,7 +85,7 @@ void RayCrossings::along_x(double y, double z, std::vector<Crossing>& crossings)
         const auto& [a, b, c] = corners;
         const Vec3d normal = (b - a).cross(c - a);
         const double x = a.x() - (normal.y() * (y - a.y()) + normal.z() * (z - a.z())) / normal.x();
-        // A triangle seen from its edge leaves x to rounding; it is at least between its corners.
+        // For a triangle seen edge-on, x is decided by rounding; it is at least between its corners.
         const double lowest = std::min({a.x(), b.x(), c.x()}), highest = std::max({a.x(), b.x(), c.x()});
         crossings.push_back({x >= lowest ? std::min(x, highest) : lowest, normal.x() > 0 ? 1 : -1, triangles_[i]});
     }

@@ -1,7 +1,7 @@
-// How a mesh's faces lie around a place, by the faces that a ray from it along +x crosses.
+// Winding numbers in a mesh, by the faces that a ray along +x crosses.
 //
-// A vertex or an edge that the ray meets belongs to exactly one of the faces around it, so that none is counted twice
-// or missed, wherever the place is.
+// A vertex or an edge on the ray belongs to exactly one of the faces around it, so that none is counted twice or
+// missed, whatever the origin.
 #pragma once
 
 #include <vector>
@@ -15,13 +15,13 @@ public:
     explicit RayCrossings(MeshPtr mesh);
 
     struct Count {
-        int faces = 0;     // crossed: odd inside, where each edge of the mesh has an even number of faces
-        int windings = 0;  // how often the faces go around the place: 0 outside, where each edge is balanced
+        int faces = 0;     // crossed: odd inside, if each edge of the mesh has an even number of faces
+        int windings = 0;  // the winding number: 0 outside, if each edge is balanced
     };
     Count from(const Vec3d& P) const;
 
-    // Of a whole line along x: where it crosses faces, and by how much that changes the windings of what is before
-    // (at lower x), in ascending order of x.
+    // Of a whole line along x: the faces that it crosses, and by how much each changes the winding number towards lower
+    // x, in ascending order of x.
     struct Crossing {
         double x;
         int turn;  // 1 out of a face, -1 into it

@@ -1,4 +1,5 @@
-// Meshes of what files hold: vertices by place, faces that have a surface.
+// Meshes from the contents of files: merges vertices by position, drops faces without area.
+// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -40,7 +41,7 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
     std::vector<Vec3f> colours;
     std::vector<float> alphas;
     for (std::size_t i = 0; i < file.positions.size(); ++i) {
-        if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its place
+        if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its vertex
         mesh->positions.push_back(file.positions[i]);
         if (!file.colours.empty()) {
             colours.push_back(file.colours[i]);
@@ -49,7 +50,7 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
     }
     for (const Mesh::Triangle& t : file.triangles) {
         const Mesh::Triangle joined(vertex_of[t[0]], vertex_of[t[1]], vertex_of[t[2]]);
-        // A face whose corners fell together is a line, and its edges cancel: what it bounded is closed without it.
+        // A face with merged corners is a line, and its edges cancel: the mesh is as closed without it.
         if (joined[0] != joined[1] && joined[1] != joined[2] && joined[2] != joined[0])
             mesh->triangles.push_back(joined);
     }

@@ -1,3 +1,4 @@
+// Tests: tests/shapes/motion/test_body_path.cpp.
 #include "runtime/shapes/motion/animated.h"
 
 namespace rapid {

@@ -1,5 +1,5 @@
-// Meshes and shapes that are another at each time: what `:transform` with a motion, and a sequence of files, give. They
-// have no place of their own; who uses one asks where it is at the frames that it needs.
+// Meshes and shapes that change with time: the results of `:transform` with a motion, and sequences of files. They have
+// no pose of their own; users ask for it at the frames that they need.
 #pragma once
 
 #include "runtime/shapes/mesh/mesh_sequence.h"
@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-// A mesh that moves as a whole, or deforms, or both. Its faces stay the same.
+// A mesh that moves rigidly, deforms, or both. Its topology stays the same.
 class AnimatedMesh : public Object {
 public:
     static constexpr std::string_view param_type = "moving mesh";
@@ -23,14 +23,14 @@ public:
     bool varies() const override { return true; }
 
     bool deforms() const { return sequence_ != nullptr; }
-    const MeshPtr& rest() const { return rest_; }  // of a sequence its first file, without the motion
+    const MeshPtr& rest() const { return rest_; }  // the first file of a sequence, without the motion
     const MotionPtr& motion() const { return motion_; }
     FrameRange range() const;
 
-    // Moved further.
+    // With another motion after its own.
     std::shared_ptr<const AnimatedMesh> transformed(const MotionPtr& motion) const;
 
-    // Where it is at a whole frame. On one thread: the motion may be a script's.
+    // The mesh at a whole frame. On one thread: the motion may be a script.
     MeshPtr at(const FrameClock& clock, std::int64_t frame) const;
 
 private:

@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// A jump: this many times the way of the frames around, and this part of the body's size.
+// A jump: this many times the travel in the frames around, and this part of the body's size.
 constexpr double jump_factor = 8, jump_size = 0.5;
 
 using Map = Eigen::Matrix<double, 3, 4>;
@@ -21,7 +21,7 @@ Map map_at(const Motion& motion, const FrameClock& clock, std::int64_t frame)
     return motion.at(clock.at_step(frame)).affine().matrix().topRows<3>();
 }
 
-// The normal of a surface after a linear map: by its cofactors, as a normal turns otherwise than the surface.
+// The normal of a surface after a linear map: by the cofactors of the map, as normals transform.
 Vec3f mapped_normal(const Eigen::Matrix3d& map, const Vec3f& normal)
 {
     const Vec3d n = normal.cast<double>();
@@ -33,16 +33,16 @@ class RigidPath final : public BodyPath {
 public:
     explicit RigidPath(const Cubic<Map>& map) : map_(map) {}
 
-    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
                std::span<Vec3d> velocity) const override
     {
-        for (std::size_t i = 0; i < places.size(); ++i) {
-            const Eigen::Vector4d X = places[i].P.cast<double>().homogeneous();
-            const Cubic<Vec3d> way{map_.c0 * X, map_.c1 * X, map_.c2 * X, map_.c3 * X};
-            places[i].P = way.at(t[i]).cast<float>();
-            velocity[i] = way.derivative(t[i]);
-            if (normals && !places[i].N.isZero(0))
-                places[i].N = mapped_normal(map_.at(t[i]).leftCols<3>(), places[i].N);
+        for (std::size_t i = 0; i < births.size(); ++i) {
+            const Eigen::Vector4d X = births[i].P.cast<double>().homogeneous();
+            const Cubic<Vec3d> curve{map_.c0 * X, map_.c1 * X, map_.c2 * X, map_.c3 * X};
+            births[i].P = curve.at(t[i]).cast<float>();
+            velocity[i] = curve.derivative(t[i]);
+            if (normals && !births[i].N.isZero(0))
+                births[i].N = mapped_normal(map_.at(t[i]).leftCols<3>(), births[i].N);
         }
     }
 
@@ -50,31 +50,31 @@ private:
     Cubic<Map> map_;
 };
 
-// The ways of all vertices of a mesh.
+// Along the curves of all vertices of a mesh.
 class DeformingPath final : public BodyPath {
 public:
-    DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> ways, PlacesOn on)
-        : mesh_(std::move(mesh)), on_(on), ways_(std::move(ways))
+    DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> curves, PlacesOn on)
+        : mesh_(std::move(mesh)), on_(on), curves_(std::move(curves))
     {
         if (on == PlacesOn::Volume) crossings_.emplace(mesh_);
     }
 
-    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
                std::span<Vec3d> velocity) const override
     {
         std::vector<RayCrossings::Crossing> crossings;
-        for (std::size_t i = 0; i < places.size(); ++i) {
-            Birthplace& place = places[i];
+        for (std::size_t i = 0; i < births.size(); ++i) {
+            Birthplace& birth = births[i];
             if (on_ == PlacesOn::Volume) {
-                const Cubic<Vec3d> way = way_inside(place.P, crossings);
-                place.P = way.at(t[i]).cast<float>();
-                velocity[i] = way.derivative(t[i]);
+                const Cubic<Vec3d> curve = curve_inside(birth.P, crossings);
+                birth.P = curve.at(t[i]).cast<float>();
+                velocity[i] = curve.derivative(t[i]);
             } else if (on_ == PlacesOn::Vertices) {
-                const Cubic<Vec3d>& way = ways_[static_cast<std::size_t>(place.element)];
-                place.P = way.at(t[i]).cast<float>();
-                velocity[i] = way.derivative(t[i]);
+                const Cubic<Vec3d>& curve = curves_[static_cast<std::size_t>(birth.element)];
+                birth.P = curve.at(t[i]).cast<float>();
+                velocity[i] = curve.derivative(t[i]);
             } else {
-                carry_on_face(t[i], normals, place, velocity[i]);
+                carry_on_face(t[i], normals, birth, velocity[i]);
             }
         }
     }
@@ -82,23 +82,23 @@ public:
 private:
     const Cubic<Vec3d>& corner(const Mesh::Triangle& triangle, int k) const
     {
-        return ways_[static_cast<std::size_t>(triangle[k])];
+        return curves_[static_cast<std::size_t>(triangle[k])];
     }
 
-    void carry_on_face(double t, bool normals, Birthplace& place, Vec3d& velocity) const
+    void carry_on_face(double t, bool normals, Birthplace& birth, Vec3d& velocity) const
     {
-        const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(place.element)];
+        const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(birth.element)];
         const Cubic<Vec3d>&a = corner(triangle, 0), &b = corner(triangle, 1), &c = corner(triangle, 2);
         const Vec3d A = a.at(t), B = b.at(t), C = c.at(t);
-        const double u = place.b1, w = place.b2;
+        const double u = birth.b1, w = birth.b2;
         const Vec3d va = a.derivative(t);
-        place.P = (A + u * (B - A) + w * (C - A)).cast<float>();
+        birth.P = (A + u * (B - A) + w * (C - A)).cast<float>();
         velocity = va + u * (b.derivative(t) - va) + w * (c.derivative(t) - va);
-        if (normals) place.N = (B - A).cross(C - A).normalized().cast<float>();
+        if (normals) birth.N = (B - A).cross(C - A).normalized().cast<float>();
     }
 
-    // Of the point of a triangle at (y, z), in the mesh at the frame.
-    Cubic<Vec3d> way_on(std::int32_t t, const Vec3d& P) const
+    // Of the point at (y, z) of a triangle of the mesh at the frame.
+    Cubic<Vec3d> curve_on(std::int32_t t, const Vec3d& P) const
     {
         const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(t)];
         const auto yz = [&](int k) -> Eigen::Vector2d {
@@ -117,38 +117,36 @@ private:
         return {part(a.c0, b.c0), part(a.c1, b.c1), part(a.c2, b.c2), part(a.c3, b.c3)};
     }
 
-    Cubic<Vec3d> way_inside(const Vec3f& place, std::vector<RayCrossings::Crossing>& crossings) const
+    Cubic<Vec3d> curve_inside(const Vec3f& position, std::vector<RayCrossings::Crossing>& crossings) const
     {
-        const Vec3d P = place.cast<double>();
+        const Vec3d P = position.cast<double>();
         crossings_->along_x(P.y(), P.z(), crossings);
         const auto behind = std::find_if(crossings.begin(), crossings.end(),
                                          [&](const RayCrossings::Crossing& crossing) { return crossing.x > P.x(); });
-        // Rounding of the place to single precision may have put it on the last face of its line, or a little out of
-        // it.
-        if (crossings.empty()) return mesh_still(P);
+        // Rounded to single precision it may be on the last face of its line, or a little beyond it.
+        if (crossings.empty()) return curve_nearest(P);
         const auto& high = behind == crossings.end() ? crossings.back() : *behind;
         const auto& low = behind == crossings.begin() ? crossings.front() : *std::prev(behind);
         const double across = high.x - low.x;
         const double t = across > 0 ? std::clamp((P.x() - low.x) / across, 0.0, 1.0) : 0;
-        Cubic<Vec3d> way = mix(way_on(low.triangle, P), way_on(high.triangle, P), t);
-        return way;
+        return mix(curve_on(low.triangle, P), curve_on(high.triangle, P), t);
     }
 
-    // The way of the vertex that is nearest, from P.
-    Cubic<Vec3d> mesh_still(const Vec3d& P) const
+    // That of the nearest vertex, from P.
+    Cubic<Vec3d> curve_nearest(const Vec3d& P) const
     {
         const auto nearest =
             std::min_element(mesh_->positions.begin(), mesh_->positions.end(), [&](const Vec3f& a, const Vec3f& b) {
                 return (a.cast<double>() - P).squaredNorm() < (b.cast<double>() - P).squaredNorm();
             });
-        Cubic<Vec3d> way = ways_[static_cast<std::size_t>(nearest - mesh_->positions.begin())];
-        way.c0 += P - nearest->cast<double>();
-        return way;
+        Cubic<Vec3d> curve = curves_[static_cast<std::size_t>(nearest - mesh_->positions.begin())];
+        curve.c0 += P - nearest->cast<double>();
+        return curve;
     }
 
     MeshPtr mesh_;  // at the frame
     PlacesOn on_;
-    std::vector<Cubic<Vec3d>> ways_;  // by vertex
+    std::vector<Cubic<Vec3d>> curves_;  // by vertex
     std::optional<RayCrossings> crossings_;
 };
 
@@ -158,13 +156,13 @@ public:
     {
     }
 
-    void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+    void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
                std::span<Vec3d> velocity) const override
     {
         std::vector<double> of_whole(t.size());
         for (std::size_t i = 0; i < t.size(); ++i) of_whole[i] = begin_ + length_ * t[i];
-        path_->carry(of_whole, normals, places, velocity);
-        for (Vec3d& v : velocity.first(places.size())) v *= length_;
+        path_->carry(of_whole, normals, births, velocity);
+        for (Vec3d& v : velocity.first(births.size())) v *= length_;
     }
 
 private:
@@ -172,7 +170,7 @@ private:
     double begin_, length_;
 };
 
-// The same in steps. A script's motion has none before the first.
+// The same in steps of the clock. A script's motion has none before the first.
 FrameRange in_steps(FrameRange range, const FrameClock& clock)
 {
     const auto start = static_cast<double>(clock.start);
@@ -181,7 +179,7 @@ FrameRange in_steps(FrameRange range, const FrameClock& clock)
     return range;
 }
 
-// Cuts are those of frames: what jumps to a frame does so in its last step.
+// Cuts are given for frames: a jump to a frame happens in its last step.
 PathOptions in_steps(PathOptions options, const FrameClock& clock)
 {
     if (!options.cuts) return options;
@@ -194,7 +192,7 @@ PathOptions in_steps(PathOptions options, const FrameClock& clock)
 FramePath path_of_rigid(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
                         const PathOptions& options)
 {
-    const auto way = [&](std::int64_t i) {
+    const auto travel = [&](std::int64_t i) {
         const Map step = map_at(motion, clock, i) - map_at(motion, clock, i - 1);
         double sum = 0;
         for (int k = 0; k < 8; ++k)
@@ -203,7 +201,7 @@ FramePath path_of_rigid(const Motion& motion, const Box3d& rest, const FrameCloc
     };
     const double scale = motion.at(clock.at_step(frame)).scale;
     return FramePath::find(frame, in_steps(motion.range(), clock), in_steps(options, clock),
-                           scale * rest.diagonal().norm(), way);
+                           scale * rest.diagonal().norm(), travel);
 }
 
 double root_mean_square(const Mesh& a, const Mesh& b)
@@ -218,14 +216,14 @@ double root_mean_square(const Mesh& a, const Mesh& b)
 
 std::string describe(const Jump& jump, std::int64_t frame)
 {
-    return fmt::format("jumps by {:.3g} m to frame {}, {}", jump.way, frame,
+    return fmt::format("jumps by {:.3g} m to frame {}, {}", jump.distance, frame,
                        jump.usual > 0
-                           ? fmt::format("{:.3g} times as far as in the frames around", jump.way / jump.usual)
+                           ? fmt::format("{:.3g} times as far as in the frames around", jump.distance / jump.usual)
                            : std::string("and is at rest in the frames around"));
 }
 
 FramePath FramePath::find(std::int64_t frame, const FrameRange& range, const PathOptions& options, double size,
-                          const std::function<double(std::int64_t)>& way)
+                          const std::function<double(std::int64_t)>& travel)
 {
     FramePath path;
     path.alpha = options.kind == PathOptions::Spline ? options.alpha : 0.5;
@@ -234,9 +232,9 @@ FramePath FramePath::find(std::int64_t frame, const FrameRange& range, const Pat
 
     const auto jump_at = [&](std::int64_t i) -> std::optional<Jump> {
         if (!moves(i) || !(moves(i - 1) || moves(i + 1))) return std::nullopt;
-        const double here = way(i);
+        const double here = travel(i);
         if (!(here > jump_size * size)) return std::nullopt;
-        const double usual = std::max(moves(i - 1) ? way(i - 1) : 0, moves(i + 1) ? way(i + 1) : 0);
+        const double usual = std::max(moves(i - 1) ? travel(i - 1) : 0, moves(i + 1) ? travel(i + 1) : 0);
         return here > jump_factor * usual ? std::optional(Jump{here, usual}) : std::nullopt;
     };
     const auto is_cut = [&](std::int64_t i) {
@@ -261,22 +259,22 @@ BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
                            PlacesOn on)
 {
-    return std::make_shared<DeformingPath>(mesh.at(clock, frame), vertex_ways(mesh, clock, frame, path), on);
+    return std::make_shared<DeformingPath>(mesh.at(clock, frame), vertex_curves(mesh, clock, frame, path), on);
 }
 
-std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
-                                      const FramePath& path)
+std::vector<Cubic<Vec3d>> vertex_curves(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
+                                        const FramePath& path)
 {
     const MeshPtr now = mesh.at(clock, frame);
     const MeshPtr at[] = {path.before ? mesh.at(clock, frame - 2) : now,
                           path.kind == FramePath::Still ? now : mesh.at(clock, frame - 1), now,
                           path.after ? mesh.at(clock, frame + 1) : now};
-    const auto place = [&](int k, std::size_t i) -> Vec3d { return at[k]->positions[i].cast<double>(); };
-    std::vector<Cubic<Vec3d>> ways;
-    ways.reserve(now->positions.size());
+    const auto position = [&](int k, std::size_t i) -> Vec3d { return at[k]->positions[i].cast<double>(); };
+    std::vector<Cubic<Vec3d>> curves;
+    curves.reserve(now->positions.size());
     for (std::size_t i = 0; i < now->positions.size(); ++i)
-        ways.push_back(path.through<Vec3d>(place(0, i), place(1, i), place(2, i), place(3, i)));
-    return ways;
+        curves.push_back(path.through<Vec3d>(position(0, i), position(1, i), position(2, i), position(3, i)));
+    return curves;
 }
 
 BodyPathPtr part_of(BodyPathPtr path, double begin, double length)
@@ -288,9 +286,9 @@ FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_
 {
     const Box3d rest = mesh.rest()->bounds().cast<double>();
     if (!mesh.deforms()) return path_of_rigid(*mesh.motion(), rest, clock, frame, options);
-    const auto way = [&](std::int64_t i) { return root_mean_square(*mesh.at(clock, i - 1), *mesh.at(clock, i)); };
+    const auto travel = [&](std::int64_t i) { return root_mean_square(*mesh.at(clock, i - 1), *mesh.at(clock, i)); };
     return FramePath::find(frame, in_steps(mesh.range(), clock), in_steps(options, clock),
-                           mesh.at(clock, frame)->bounds().diagonal().norm(), way);
+                           mesh.at(clock, frame)->bounds().diagonal().norm(), travel);
 }
 
 FramePath path_of(const AnimatedShape& shape, const FrameClock& clock, std::int64_t frame, const PathOptions& options)

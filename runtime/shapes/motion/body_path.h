@@ -1,5 +1,5 @@
-// The ways that the places of a moving body go in one frame (paper §3.2): cubic Hermite splines through where they are
-// at the frames around it, and their derivatives.
+// The curves along which the points of a moving body travel in one frame (paper §3.2): cubic Hermite splines through
+// their positions at the frames around it, and the derivatives of these.
 //
 //   p(t) = (1+2t)(1-t)² p_{f-1} + t(1-t)² m0 + t²(3-2t) p_f + t²(t-1) m1,   m0 = α (p_f - p_{f-2}), m1 = α (p_{f+1} -
 //   p_{f-1})
@@ -8,8 +8,9 @@
 // m0 = α (-3 p_{f-1} + 4 p_f - p_{f+1}), and mirrored; beyond its ends the body is at rest.
 // Frames are the steps of the clock that is given.
 //
-// The paper prints the first term of the derivative as 6t³, the last pair of indices as t+1 and t-1, and leaves out
-// that the derivative is per frame. A body at rest has the velocity 0 to the bit: all is made of differences of places.
+// The paper prints the first term of the derivative as 6t³, the last pair of indices as t+1 and t-1, and omits that the
+// derivative is per frame. A body at rest has the velocity 0 to the bit: everything is built from differences of
+// positions.
 #pragma once
 
 #include <cstdint>
@@ -27,19 +28,19 @@
 namespace rapid {
 
 struct PathOptions {
-    enum Kind { Spline, Linear, None };  // None: where it is at the frame's end, at rest
+    enum Kind { Spline, Linear, None };  // None: at rest where it is at the end of the frame
     Kind kind = Spline;
     double alpha = 0.5;
-    // Frames f between which and f-1 the motion jumps; where not given, jumps are found (see FramePath::find).
+    // The motion jumps between f-1 and f for each frame f of these; if not given, jumps are detected (FramePath::find).
     std::optional<std::set<std::int64_t>> cuts;
 };
 
-// The body jumps between two frames, and goes `way` metres where it goes at most `usual` in the frames around.
+// The body travels `distance` metres between two frames, and at most `usual` in the frames around.
 struct Jump {
-    double way, usual;
+    double distance, usual;
 };
 
-// As a message has it: "jumps by 3 m to frame 12, 40 times as far as in the frames around".
+// For a message: "jumps by 3 m to frame 12, 40 times as far as in the frames around".
 std::string describe(const Jump& jump, std::int64_t frame);
 
 // A cubic in t.
@@ -51,27 +52,28 @@ struct Cubic {
     T derivative(double t) const { return c1 + t * (2 * c2 + 3 * t * c3); }
 };
 
-// How the places of a body go from frame f-1 to frame f.
+// How the points of a body travel from frame f-1 to frame f.
 struct FramePath {
     enum Kind {
         Still,     // as at f
-        AfterCut,  // straight, to where they are at f, as they go on from there: nothing is born along a jump
+        AfterCut,  // straight to the positions at f, with the velocity after f: nothing is born along a jump
         Straight,
         Curved,
     };
     Kind kind = Still;
     double alpha = 0.5;
     bool before = false, after = false;  // whether f-2, and f+1, belong to the same motion
-    std::optional<Jump> jump = {};       // that was found between f-1 and f
+    std::optional<Jump> jump = {};       // detected between f-1 and f
 
-    // way(i): how far the body goes between frame i-1 and i (root mean square), m. size: its diagonal, m.
+    // travel(i): how far the body travels between frame i-1 and i (root mean square), m. size: its diagonal, m.
     //
-    // A jump is found where a body goes more than 8 times as far as in both frames around (in one, where the motion
+    // A jump is detected if a body travels more than 8 times as far as in both frames around (in one, where the motion
     // begins or ends), and more than half its size.
     static FramePath find(std::int64_t frame, const FrameRange& range, const PathOptions& options, double size,
-                          const std::function<double(std::int64_t)>& way);
+                          const std::function<double(std::int64_t)>& travel);
 
-    // Through the places at f-2, f-1, f, f+1. T: a vector or a matrix; a map's cubic is that of all places it moves.
+    // Through the positions at f-2, f-1, f, f+1. T: a vector, or an affine map, whose cubic moves every point along its
+    // own.
     template <class T>
     Cubic<T> through(const T& p0, const T& p1, const T& p2, const T& p3) const
     {
@@ -95,39 +97,39 @@ struct FramePath {
     }
 };
 
-// What carries births along: from where a scatter placed them to where their place is at the time of birth.
+// Carries births along with a body: from where a scatter placed them to where they are at the time of birth.
 class BodyPath {
 public:
     virtual ~BodyPath() = default;
 
-    // At t[i] of the frame's interval. Moves the places, with their normals where `normals` says so, and gives the
-    // velocities, in metres a frame. All of shape [n]. From any thread.
-    virtual void carry(std::span<const double> t, bool normals, std::span<Birthplace> places,
+    // To t[i] of the frame's interval: moves the births, and their normals if `normals`, and gives the velocities, in
+    // metres a frame. All of shape [n]. From any thread.
+    virtual void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
                        std::span<Vec3d> velocity) const = 0;
 };
 
 using BodyPathPtr = std::shared_ptr<const BodyPath>;
 
-// Of what moves as a whole: places are those of the rest body.
+// For a rigid motion; births are given on the rest body.
 BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64_t frame, const FramePath& path);
 
-// Of a mesh that deforms: places are those of the mesh at the frame.
+// For a mesh that deforms; births are given on the mesh at the frame.
 enum class PlacesOn {
     Faces,     // element: a triangle, with barycentric weights
     Vertices,  // element: a vertex
-    Volume,    // P alone: its part of the way between the faces before and behind it along x is kept
+    Volume,    // P alone: it keeps its ratio between the faces before and behind it along x
 };
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
                            PlacesOn on);
 
-// Of each vertex of a mesh that deforms.
-std::vector<Cubic<Vec3d>> vertex_ways(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
-                                      const FramePath& path);
+// The curves of the vertices of a mesh that deforms.
+std::vector<Cubic<Vec3d>> vertex_curves(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
+                                        const FramePath& path);
 
-// A part of a way as one of its own, from t = begin on and `length` of it long.
+// A part of a path as one of its own: from t = begin on, of this length in t.
 BodyPathPtr part_of(BodyPathPtr path, double begin, double length);
 
-// How a body goes in a frame's interval. On one thread, as the motions are asked.
+// How a body travels in the interval of a frame. On one thread, as it evaluates the motions.
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options);
 FramePath path_of(const AnimatedShape& shape, const FrameClock& clock, std::int64_t frame, const PathOptions& options);
 

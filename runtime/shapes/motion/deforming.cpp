@@ -9,19 +9,19 @@ namespace rapid {
 namespace {
 
 // A cubic between two of its times, as one from 0 to 1.
-Cubic<Vec3d> part(const Cubic<Vec3d>& way, double from, double to)
+Cubic<Vec3d> part(const Cubic<Vec3d>& curve, double from, double to)
 {
     const double d = to - from;
-    return {way.at(from), d * way.derivative(from), d * d * (way.c2 + 3 * from * way.c3), d * d * d * way.c3};
+    return {curve.at(from), d * curve.derivative(from), d * d * (curve.c2 + 3 * from * curve.c3), d * d * d * curve.c3};
 }
 
-MeshPtr mesh_of(const Mesh& rest, std::span<const Cubic<Vec3d>> ways, double t)
+MeshPtr mesh_of(const Mesh& rest, std::span<const Cubic<Vec3d>> curves, double t)
 {
     auto mesh = std::make_shared<Mesh>();
     mesh->name = rest.name;
     mesh->triangles = rest.triangles;
-    mesh->positions.reserve(ways.size());
-    for (const Cubic<Vec3d>& way : ways) mesh->positions.push_back(way.at(t).cast<float>());
+    mesh->positions.reserve(curves.size());
+    for (const Cubic<Vec3d>& curve : curves) mesh->positions.push_back(curve.at(t).cast<float>());
     return mesh;
 }
 
@@ -61,21 +61,21 @@ Deformation::Interval Deformation::over(const FrameClock& clock, double from, do
         return {at_end_, path.jump};
     }
 
-    std::vector<Cubic<Vec3d>> ways = vertex_ways(mesh, clock, frame, path);
+    std::vector<Cubic<Vec3d>> curves = vertex_curves(mesh, clock, frame, path);
     const double whole = static_cast<double>(frame) - 1;
-    for (Cubic<Vec3d>& way : ways) way = part(way, from - whole, to - whole);
+    for (Cubic<Vec3d>& curve : curves) curve = part(curve, from - whole, to - whole);
     const bool jumped = path.kind == FramePath::AfterCut && from == whole;
     LevelSetPtr begin;
     if (!jumped) {
         if (at_end_ && end_ == from && at_end_->band() >= band)
             begin = at_end_;
         else
-            begin = body_->build(mesh_of(*mesh.rest(), ways, 0), band);
+            begin = body_->build(mesh_of(*mesh.rest(), curves, 0), band);
     }
     at_end_ =
-        body_->build(to == static_cast<double>(frame) ? mesh.at(clock, frame) : mesh_of(*mesh.rest(), ways, 1), band);
+        body_->build(to == static_cast<double>(frame) ? mesh.at(clock, frame) : mesh_of(*mesh.rest(), curves, 1), band);
     end_ = to;
-    return {deforming_shape(begin, at_end_, body_->tree(), std::move(ways), (to - from) / clock.fps), path.jump};
+    return {deforming_shape(begin, at_end_, body_->tree(), std::move(curves), (to - from) / clock.fps), path.jump};
 }
 
 }  // namespace rapid

@@ -1,9 +1,9 @@
 // Level sets of a mesh that deforms: colliders from a sequence of files (paper §4.4).
 //
-// One level set is built a frame. Between two of them the surface goes the way of its faces, each vertex along the
-// cubic Hermite path that births on it go by: a place is seen from the nearest face, and asked of the level sets at
-// both ends where that face is then. So sub-steps need no level sets of their own, parts that are thinner than their
-// way in a frame pass through nothing, and at the ends the shape is that of the level set, to the bit.
+// One level set is built a frame. Between two of them the surface moves with its faces, each vertex along the cubic
+// Hermite curve that births on it follow: a position is taken into the frame of its nearest face, and the level sets at
+// both ends are sampled where that face is then. So sub-steps need no level sets of their own, points cannot pass
+// through parts that are thinner than their travel in a frame, and at the ends the shape is the level set, to the bit.
 #pragma once
 
 #include <limits>
@@ -22,7 +22,7 @@ class DeformingLevelSet : public Object {
 public:
     static constexpr std::string_view param_type = "deforming level set";
 
-    // Builds the first frame's, for the errors and warnings of level_set_from_mesh.
+    // Builds the level set of the first frame, for the errors and warnings of level_set_from_mesh.
     DeformingLevelSet(std::shared_ptr<const AnimatedMesh> mesh, const LevelSetOptions& options,
                       std::vector<std::string>& warnings);
 
@@ -34,7 +34,7 @@ public:
     const Box3d& bounds() const { return bounds_; }  // of the first frame's surface
     std::shared_ptr<const DeformingLevelSet> transformed(const MotionPtr& motion) const;
 
-    // Of the mesh, in another of its shapes; its band is at least so wide, m.
+    // The level set of the mesh with other positions. Its band is at least so wide, m.
     LevelSetPtr build(const MeshPtr& mesh, double band) const;
     const std::shared_ptr<const TriangleTree>& tree() const { return tree_; }
 
@@ -42,23 +42,23 @@ private:
     std::shared_ptr<const AnimatedMesh> mesh_;
     LevelSetOptions options_;
     Box3d bounds_;
-    Mesh::Openness open_;  // the same in all frames
+    Mesh::Openness open_;  // of all frames
     std::shared_ptr<const TriangleTree> tree_;
 };
 
 using DeformingLevelSetPtr = std::shared_ptr<const DeformingLevelSet>;
 
-// One deforming level set on its way through the frames: keeps what the next interval needs.
+// Advances a deforming level set through the frames, and keeps what the next interval needs.
 class Deformation {
 public:
     explicit Deformation(DeformingLevelSetPtr body) : body_(std::move(body)) {}
 
     struct Interval {
         ShapePtr shape;            // times are in seconds since its beginning
-        std::optional<Jump> jump;  // that was found in its frame
+        std::optional<Jump> jump;  // detected in its frame
     };
-    // Between two moments of one frame (`to` in it, or its end), as numbers of frames; moved by `motion` besides, where
-    // there is one. The level sets' band is at least so wide, m. On one thread, as the motion may be a script's.
+    // Between two times in one frame (`to` may be its end), in frames; with `motion` after its own unless that is null.
+    // The band of the level sets is at least so wide, m. On one thread, as the motion may be a script.
     Interval over(const FrameClock& clock, double from, double to, const MotionPtr& motion, const PathOptions& options,
                   double band);
 

@@ -1,4 +1,4 @@
-// The surface of a mesh on its way from one level set to the next (see deforming.h).
+// The surface of a mesh between one level set and the next (see deforming.h).
 #pragma once
 
 #include <memory>
@@ -12,13 +12,13 @@ namespace rapid {
 
 struct TriangleTree;
 
-// The faces, for a place to be seen from the nearest; the same for all shapes of a mesh.
+// The hierarchy of faces, for nearest-face queries; the same for all frames of a mesh.
 RAPID_DEFERRED(triangle_tree, std::shared_ptr<const TriangleTree>(const MeshPtr& mesh));
 
-// begin, end: level sets of the mesh; begin is null where the interval begins with a jump: then the end's goes back
-// along the ways. ways: of each vertex, m, with times from 0 to 1. duration: s.
+// begin, end: level sets of the mesh; begin is null if the interval begins with a jump: then the end's is carried back.
+// curves: of the vertices, m, with times from 0 to 1. duration: s.
 RAPID_DEFERRED(deforming_shape, ShapePtr(const LevelSetPtr& begin, const LevelSetPtr& end,
                                          const std::shared_ptr<const TriangleTree>& tree,
-                                         std::vector<Cubic<Vec3d>> ways, double duration));
+                                         std::vector<Cubic<Vec3d>> curves, double duration));
 
 }  // namespace rapid

@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// Of the way that the body goes in the interval, and of a whole turn.
+// Of the distance that the body travels in the interval, and in rad.
 constexpr double track_error = 1e-5;
 constexpr double least_piece = 1.0 / 64;  // of the interval
 
@@ -81,13 +81,13 @@ private:
     std::map<std::int64_t, Pose> keys_;
 };
 
-// The rotation vector of the shorter way from a to b, rad.
+// The rotation vector from a to b, the shorter way round, rad.
 Vec3d turn(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
 {
-    Eigen::Quaterniond way = b * a.conjugate();
-    if (way.w() < 0) way.coeffs() = -way.coeffs();
-    const double sine = way.vec().norm();
-    return sine > 0 ? Vec3d(2 * std::atan2(sine, way.w()) / sine * way.vec()) : Vec3d(Vec3d::Zero());
+    Eigen::Quaterniond q = b * a.conjugate();
+    if (q.w() < 0) q.coeffs() = -q.coeffs();
+    const double sine = q.vec().norm();
+    return sine > 0 ? Vec3d(2 * std::atan2(sine, q.w()) / sine * q.vec()) : Vec3d(Vec3d::Zero());
 }
 
 Eigen::Quaterniond turned_by(const Vec3d& rotation)
@@ -103,20 +103,20 @@ MotionTrack::Piece through(double begin, double end, const Pose& from, const Pos
     const double T = end - begin;
     MotionTrack::Piece piece{begin, end, from, Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), 0};
     if (!(T > 0)) return piece;
-    const Vec3d way = to.translation - from.translation;
+    const Vec3d chord = to.translation - from.translation;
     Vec3d sag = from.translation + to.translation - 2 * middle.translation;
-    // What rounding leaves of a straight way is no acceleration.
+    // The rounding of a straight translation is no acceleration.
     if (sag.cwiseAbs().maxCoeff() <=
         0x1p-49 * from.translation.cwiseAbs().cwiseMax(to.translation.cwiseAbs()).maxCoeff())
         sag.setZero();
     piece.a = 4 / (T * T) * sag;
-    piece.v = way / T - 0.5 * T * piece.a;
+    piece.v = chord / T - 0.5 * T * piece.a;
     piece.spin = turn(from.rotation, to.rotation) / T;
     piece.growth = (to.scale - from.scale) / T;
     return piece;
 }
 
-// Asks a motion, and halves an interval until its pieces are near enough.
+// Evaluates a motion, and bisects the interval until its pieces are near enough.
 class TrackBuilder {
 public:
     TrackBuilder(const Motion& motion, const FrameClock& clock, double from, double to)
@@ -129,41 +129,41 @@ public:
         const Pose first = at(0);
         if (!motion_.varies()) return {through(0, (to_ - from_) / clock_.fps, first, first, first)};
         const Pose middle = at(0.5), last = at(1);
-        way_ = (middle.translation - first.translation).norm() + (last.translation - middle.translation).norm();
-        halve(0, 1, first, middle, last);
+        travel_ = (middle.translation - first.translation).norm() + (last.translation - middle.translation).norm();
+        bisect(0, 1, first, middle, last);
         return std::move(pieces_);
     }
 
 private:
     Pose at(double u) const { return motion_.at(clock_.at(u == 1 ? to_ : from_ + u * (to_ - from_))); }
 
-    void halve(double begin, double end, const Pose& first, const Pose& middle, const Pose& last)
+    void bisect(double begin, double end, const Pose& first, const Pose& middle, const Pose& last)
     {
         const double seconds = (to_ - from_) / clock_.fps, half = 0.5 * (begin + end);
         const MotionTrack::Piece piece = through(begin * seconds, end * seconds, first, middle, last);
-        // Two places that no number of whole turns makes look alike.
+        // Two times between which no number of whole turns can hide.
         const double off = begin + 0.381966 * (end - begin);
         if (end - begin <= least_piece || (near(piece.at(half * seconds), middle, last.scale) &&
                                            near(piece.at(off * seconds), at(off), last.scale))) {
             pieces_.push_back(piece);
             return;
         }
-        halve(begin, half, first, at(0.5 * (begin + half)), middle);
-        halve(half, end, middle, at(0.5 * (half + end)), last);
+        bisect(begin, half, first, at(0.5 * (begin + half)), middle);
+        bisect(half, end, middle, at(0.5 * (half + end)), last);
     }
 
-    bool near(const Pose& guess, const Pose& asked, double scale) const
+    bool near(const Pose& guess, const Pose& exact, double scale) const
     {
-        const double rounding = 0x1p-45 * asked.translation.cwiseAbs().maxCoeff();
-        return (guess.translation - asked.translation).norm() <= track_error * way_ + rounding &&
-               turn(guess.rotation, asked.rotation).norm() <= track_error &&
-               std::abs(guess.scale - asked.scale) <= track_error * scale;
+        const double rounding = 0x1p-45 * exact.translation.cwiseAbs().maxCoeff();
+        return (guess.translation - exact.translation).norm() <= track_error * travel_ + rounding &&
+               turn(guess.rotation, exact.rotation).norm() <= track_error &&
+               std::abs(guess.scale - exact.scale) <= track_error * scale;
     }
 
     const Motion& motion_;
     FrameClock clock_;
     double from_, to_;
-    double way_ = 0;  // m
+    double travel_ = 0;  // m
     std::vector<MotionTrack::Piece> pieces_;
 };
 

@@ -1,6 +1,7 @@
-// Motions: where a body is at each time. A constant, a product, keys, or whatever a script says.
+// Motions: the pose of a body at each time. A constant, a product, keys, or a script's function.
 //
-// A motion is asked ahead, on one thread, because a script may answer; worker threads read the poses of a MotionTrack.
+// A motion is evaluated ahead, on one thread, because it may be a script; worker threads read the poses of a
+// MotionTrack.
 #pragma once
 
 #include <limits>
@@ -15,7 +16,7 @@
 
 namespace rapid {
 
-// The frames between which a motion moves. Beyond them it stands still, and what it does within says nothing of there.
+// The frames between which a motion moves. Beyond them it is at rest.
 struct FrameRange {
     double first = std::numeric_limits<double>::infinity(), last = -std::numeric_limits<double>::infinity();
 
@@ -32,9 +33,9 @@ public:
     static constexpr std::string_view param_type = "motion";
     std::string_view kind() const override { return "motion"; }
 
-    // On one thread. Error: what a script raised.
+    // On one thread. Error: that of a script.
     virtual Pose at(const Frame& frame) const = 0;
-    // Empty for a constant; without ends for a script.
+    // Empty for a constant; infinite for a script.
     virtual FrameRange range() const = 0;
     bool varies() const override { return !range().empty(); }
 };
@@ -44,15 +45,15 @@ using MotionPtr = std::shared_ptr<const Motion>;
 MotionPtr constant_motion(const Pose& pose);
 // First `second`, then `first`.
 MotionPtr product(const MotionPtr& first, const MotionPtr& second);
-// Up to a frame by way of what `motion` does after it, backwards: how a body comes that has jumped to there. At rest
-// there where it does not go on.
+// The motion up to a frame at which a body has arrived by a jump: what `motion` does after that frame, backwards. At
+// rest if it does not go on.
 MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on);
-// Interpolated between the frames given, and at rest outside of them. Error: no keys.
+// Interpolated between the given frames, and at rest outside them. Error: no keys.
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys);
 
 // A motion over an interval of time, as pieces in which the translation is a parabola, the angular velocity is constant
-// and the scale is linear. A constant, keys, a uniform acceleration and a uniform spin are one piece, and exact; others
-// are halved, up to 64 pieces, until they are within 1e-5 of the way that the body goes in the interval.
+// and the scale is linear. A constant, keys, a uniform acceleration and a uniform spin are one exact piece; others are
+// bisected, into up to 64 pieces, until the error is within 1e-5 of the distance that the body travels in the interval.
 class MotionTrack {
 public:
     struct Piece {

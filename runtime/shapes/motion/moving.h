@@ -1,5 +1,5 @@
-// A shape that moves during an interval of time (paper §4.4): the rest shape, asked in its own frame at each point's
-// own time, with the velocity of the surface where it is hit. It is never built again.
+// A rigid shape that moves during an interval of time (paper §4.4): the rest shape, queried in its own frame at each
+// point's own time, with the velocity of the surface at the contact. It is never rebuilt.
 #pragma once
 
 #include "runtime/shapes/motion/motion.h"
@@ -7,20 +7,20 @@
 
 namespace rapid {
 
-// A body whose every part moves with it.
+// A rigid body, which may also grow.
 class RigidBody : public Shape {
 public:
-    // The acceleration, m/s², of what moves at the velocity v (m/s) at a place, straight and evenly as the body sees
-    // it: what is accelerated otherwise is pressed to its surface, or drawn off it. time: s since its interval began.
+    // The acceleration, m/s², of a point at P with velocity v (m/s) that moves uniformly in the frame of the body: any
+    // other acceleration presses it to the surface, or draws it off. time: s since the interval began.
     virtual Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const = 0;
 };
 
 // Between two frames, whole or not; times (Path::begin, distance_at) are in seconds since `from`. distance() is that at
-// the end. On one thread, as the motion is asked here, ahead; the result is asked from any.
+// the end. On one thread, as the motion is evaluated here, ahead; the result may be queried from any.
 //
-// Contacts are those of the motion's track (MotionTrack) with the path: to rounding, at any speed. Where the shape only
-// moves along, the path is a parabola in its frame too, and the rest shape finds the contact; where it turns or grows,
-// a walk does that goes by a bound on the acceleration in that frame, and passes no wall of two features.
+// Contacts are those of the path with the track of the motion (MotionTrack): to rounding, at any speed. Where the shape
+// only translates, the path is a parabola in its frame too, and the rest shape finds the contact; where it turns or
+// grows, a walk by a bound on the acceleration in that frame does, and passes no wall of two features.
 ShapePtr moving(const ShapePtr& rest, const Motion& motion, const FrameClock& clock, double from, double to);
 
 }  // namespace rapid

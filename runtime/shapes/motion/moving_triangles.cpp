@@ -1,3 +1,4 @@
+// Tests: tests/shapes/motion/test_deforming.cpp.
 #include "runtime/shapes/motion/moving_triangles.h"
 
 #include <openvdb/math/Proximity.h>
@@ -29,7 +30,7 @@ struct Ordering {
         box.sizes().maxCoeff(&axis);
         const std::int32_t middle = first + (last - first) / 2;
         const auto at = [&](std::int32_t i) { return tree.order.begin() + i; };
-        // Places that are the same are ordered too, so that the tree depends on the mesh alone.
+        // Ties are ordered too, so that the tree depends on the mesh alone.
         std::nth_element(at(first), at(middle), at(last), [&](std::int32_t a, std::int32_t b) {
             const float x = middles[static_cast<std::size_t>(a)][axis], y = middles[static_cast<std::size_t>(b)][axis];
             return x < y || (x == y && a < b);
@@ -53,19 +54,19 @@ TriangleTree::TriangleTree(const MeshPtr& mesh) : triangles(mesh->triangles)
     ordering.split(0, static_cast<std::int32_t>(order.size()));
 }
 
-MovingTriangles::MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> ways)
-    : tree_(std::move(tree)), ways_(std::move(ways)), boxes_(tree_->nodes.size())
+MovingTriangles::MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> curves)
+    : tree_(std::move(tree)), curves_(std::move(curves)), boxes_(tree_->nodes.size())
 {
     std::vector<Box> of_vertex;
-    of_vertex.reserve(ways_.size());
-    for (const Cubic<Vec3d>& way : ways_) {
-        // Less its chord a cubic is -t(1-t) (c2 + c3 (1+t)).
-        const Vec3d off = 0.25 * (way.c2 + way.c3).cwiseAbs().cwiseMax((way.c2 + 2 * way.c3).cwiseAbs());
-        of_vertex.push_back({way.c0, way.c0, way.at(1), way.at(1), off});
-        // The derivative is between its Bézier points.
-        for (const Vec3d& v : {way.c1, Vec3d(way.c1 + way.c2), way.derivative(1)})
+    of_vertex.reserve(curves_.size());
+    for (const Cubic<Vec3d>& curve : curves_) {
+        // A cubic minus its chord is -t(1-t) (c2 + c3 (1+t)).
+        const Vec3d off = 0.25 * (curve.c2 + curve.c3).cwiseAbs().cwiseMax((curve.c2 + 2 * curve.c3).cwiseAbs());
+        of_vertex.push_back({curve.c0, curve.c0, curve.at(1), curve.at(1), off});
+        // The derivative is in the convex hull of its Bézier points.
+        for (const Vec3d& v : {curve.c1, Vec3d(curve.c1 + curve.c2), curve.derivative(1)})
             fastest_ = std::max(fastest_, v.norm());
-        curved_ = std::max({curved_, 2 * way.c2.norm(), (2 * way.c2 + 6 * way.c3).norm()});
+        curved_ = std::max({curved_, 2 * curve.c2.norm(), (2 * curve.c2 + 6 * curve.c3).norm()});
     }
     const auto join = [](Box& box, const Box& other) {
         box.low0 = box.low0.cwiseMin(other.low0), box.high0 = box.high0.cwiseMax(other.high0);
@@ -102,10 +103,10 @@ double MovingTriangles::Box::squared_distance(const Vec3d& P, double t) const
 std::array<Vec3d, 3> MovingTriangles::corners(std::int32_t triangle, double t) const
 {
     const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(triangle)];
-    return {ways_[face[0]].at(t), ways_[face[1]].at(t), ways_[face[2]].at(t)};
+    return {curves_[face[0]].at(t), curves_[face[1]].at(t), curves_[face[2]].at(t)};
 }
 
-void MovingTriangles::look(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const
+void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const
 {
     const std::array<Vec3d, 3> corner = corners(triangle, t);
     openvdb::Vec3d weights;
@@ -122,7 +123,7 @@ MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::i
 {
     Place place;
     double best = std::numeric_limits<double>::infinity();
-    if (hint >= 0) look(hint, P, t, best, place);
+    if (hint >= 0) test(hint, P, t, best, place);
 
     struct Open {
         std::int32_t node;
@@ -137,7 +138,7 @@ MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::i
         const TriangleTree::Node& node = tree_->nodes[static_cast<std::size_t>(now.node)];
         if (node.count > 0) {
             for (std::int32_t i = node.first; i < node.first + node.count; ++i)
-                look(tree_->order[static_cast<std::size_t>(i)], P, t, best, place);
+                test(tree_->order[static_cast<std::size_t>(i)], P, t, best, place);
             continue;
         }
         Open near{now.node + 1, boxes_[static_cast<std::size_t>(now.node) + 1].squared_distance(P, t)};
@@ -159,8 +160,8 @@ Vec3d MovingTriangles::at(const Place& place, double t) const
 Vec3d MovingTriangles::velocity(const Place& place, double t) const
 {
     const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(place.triangle)];
-    const Vec3d a = ways_[face[0]].derivative(t);
-    return a + place.b1 * (ways_[face[1]].derivative(t) - a) + place.b2 * (ways_[face[2]].derivative(t) - a);
+    const Vec3d a = curves_[face[0]].derivative(t);
+    return a + place.b1 * (curves_[face[1]].derivative(t) - a) + place.b2 * (curves_[face[2]].derivative(t) - a);
 }
 
 Eigen::Matrix3d MovingTriangles::frame(std::int32_t triangle, double t) const

@@ -1,8 +1,9 @@
-// The faces of a mesh that deforms in an interval of time, each vertex along a cubic: where the surface is nearest to a
-// place at any time of it, and how it moves there.
+// The faces of a mesh that deforms during an interval, each vertex along a cubic: the nearest point of the surface at
+// any time of it, and its velocity.
 //
-// The boxes around faces are ordered once for a mesh, as its faces stay the same, and fitted to each interval. A box
-// goes straight from where its faces begin to where they end, and is wider by what their ways are off straight lines.
+// A bounding box hierarchy, whose tree is built once for a mesh, as its topology stays the same, and refitted to each
+// interval. A box moves straight from where its faces begin to where they end, and is wider by what their curves are
+// off straight lines.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@
 
 namespace rapid {
 
-// The order of faces: a binary tree, of the parts of the mesh that lie together in its rest position.
+// The tree of faces: a binary tree of the parts of the mesh that lie together in its rest position.
 struct TriangleTree {
     explicit TriangleTree(const MeshPtr& mesh);
 
@@ -32,16 +33,16 @@ struct TriangleTree {
 
 class MovingTriangles {
 public:
-    // ways: of each vertex, with t from 0 to 1.
-    MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> ways);
+    // curves: of the vertices, with t from 0 to 1.
+    MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> curves);
 
     struct Place {
         std::int32_t triangle = -1;
         double b1 = 0, b2 = 0;    // barycentric weights of the second and third corner
         Vec3d P = Vec3d::Zero();  // m
-        double distance = 0;      // m, from what was asked
+        double distance = 0;      // m, from the query point
     };
-    // hint: a triangle that is near, where one is known; the search is shorter for it.
+    // hint: a triangle that is near, if one is known; it shortens the search.
     Place nearest(const Vec3d& P, double t, std::int32_t hint = -1) const;
 
     Vec3d at(const Place& place, double t) const;
@@ -60,10 +61,10 @@ private:
         double squared_distance(const Vec3d& P, double t) const;
     };
     std::array<Vec3d, 3> corners(std::int32_t triangle, double t) const;
-    void look(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const;
+    void test(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const;
 
     std::shared_ptr<const TriangleTree> tree_;
-    std::vector<Cubic<Vec3d>> ways_;
+    std::vector<Cubic<Vec3d>> curves_;
     std::vector<Box> boxes_;  // by node
     double fastest_ = 0, curved_ = 0;
 };

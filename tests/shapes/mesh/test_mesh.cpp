@@ -18,7 +18,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-// What an expression throws says.
+// The message of the error that an expression throws.
 template <class F>
 std::string message_of(const F& f)
 {
@@ -153,7 +153,7 @@ TEST_CASE("a torus mesh comes to the area and volume of Pappus with the square o
     CHECK(volume_error[0] / volume_error[1] == Approx(4).epsilon(0.02));
 }
 
-TEST_CASE("made meshes are closed and look outwards at their fewest divisions", "[mesh]")
+TEST_CASE("built-in meshes are closed and face outwards at their fewest divisions", "[mesh]")
 {
     for (const MeshPtr& mesh : {make_sphere(1, 3, Vec3d::Zero()), make_torus(1, 0.01, 3, Vec3d::Zero())}) {
         CAPTURE(mesh->name);
@@ -162,7 +162,7 @@ TEST_CASE("made meshes are closed and look outwards at their fewest divisions", 
     }
 }
 
-TEST_CASE("a grid mesh looks up and is open along its rim", "[mesh]")
+TEST_CASE("a grid mesh faces up and is open along its rim", "[mesh]")
 {
     const MeshPtr grid = make_grid(3, 2, 5, {0, 7, 0});
     CHECK(grid->area() == Approx(6).epsilon(1e-6));
@@ -211,7 +211,7 @@ TEST_CASE("faces of many points are split into fans", "[mesh]")
     CHECK(mesh->area() == 1.5);
 }
 
-TEST_CASE("wrong arguments of made meshes are refused with their value", "[mesh]")
+TEST_CASE("wrong arguments of built-in meshes are refused with their value", "[mesh]")
 {
     const Vec3d o = Vec3d::Zero();
     CHECK_THAT(message_of([&] { make_sphere(-1, 8, o); }),
@@ -240,7 +240,7 @@ TEST_CASE("wrong arguments of made meshes are refused with their value", "[mesh]
                Equals("point 0 of a mesh is at (0, 0, nan); coordinates must be finite"));
 }
 
-TEST_CASE("vertices that a file splits or repeats are joined by place", "[mesh][read]")
+TEST_CASE("vertices that a file splits or repeats are merged by position", "[mesh][read]")
 {
     const Folder folder;
     for (const auto& path :
@@ -330,10 +330,10 @@ TEST_CASE("a glTF mesh stands where its node puts it", "[mesh][read]")
     CHECK_THAT(mesh->positions[2], close_to(Vec3f{5, 2, 0}, 0));
 }
 
-TEST_CASE("what is no mesh is refused with its name and what is wrong", "[mesh][read]")
+TEST_CASE("files that are not meshes are refused with their name and the fault", "[mesh][read]")
 {
     const Folder folder;
-    // What reading a file of this name and content says; the folder's name is left out.
+    // The error of reading a file of this name and content, without the folder's name.
     const auto refusal = [&](const char* name, const char* content) {
         const auto path = content ? folder.file(name, content) : folder.path / name;
         std::string message = message_of([&] { read_mesh(path); });

@@ -74,7 +74,7 @@ TEST_CASE("a sequence has each frame's vertices, and holds its first and last fi
     CHECK(sequence.at(4)->triangles == sequence.rest()->triangles);
 }
 
-TEST_CASE("only the files that are asked for are read, and the last few are kept", "[mesh]")
+TEST_CASE("only the files that are needed are read, and the last few are kept", "[mesh]")
 {
     const Folder folder;
     for (int frame = 1; frame <= 20; ++frame) folder.tetrahedron(frame, frame);
@@ -97,7 +97,7 @@ TEST_CASE("a sequence whose topology changes is refused, with the frame and both
     CHECK_THAT(
         message_of([&] { sequence.at(2); }),
         Contains("changes at frame 2: it has 6 corners and 2 faces there, and 12 corners and 4 faces at frame 1"));
-    // Corners that are written in another order leave the vertices that they had.
+    // Corners in another order keep their vertices.
     CHECK_THAT(message_of([&] { sequence.at(3); }), Contains("at frame 3"));
 }
 

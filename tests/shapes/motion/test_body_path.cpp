@@ -15,7 +15,7 @@ constexpr double pi = std::numbers::pi;
 constexpr double everywhere = std::numeric_limits<double>::infinity();
 const FrameClock clock_24{24, 1};
 
-// The way of one place through four frames.
+// The curve of one point through four frames.
 Cubic<Vec3d> through(const FramePath& path, const std::function<Vec3d(double)>& place, double frame)
 {
     return path.through<Vec3d>(place(frame - 2), place(frame - 1), place(frame), place(frame + 1));
@@ -77,7 +77,7 @@ TEST_CASE(
     CHECK(coarse[0] < 0.2 * 0.2 * 0.2 / 20);
 }
 
-TEST_CASE("the derivative is that of the way", "[path]")
+TEST_CASE("the derivative is that of the curve", "[path]")
 {
     rc::prop("by differences", [] {
         const auto coordinate = [] { return *rc::gen::inRange(-1000, 1000) / 100.0; };
@@ -88,7 +88,7 @@ TEST_CASE("the derivative is that of the way", "[path]")
     });
 }
 
-TEST_CASE("neighbouring frames have one place and one velocity where they meet", "[path]")
+TEST_CASE("neighbouring frames share position and velocity where they meet", "[path]")
 {
     const auto place = [](double f) { return Vec3d(std::sin(f), f * f * 0.1, std::cos(2 * f)); };
     const Cubic<Vec3d> one = through(curved(), place, 4), next = through(curved(), place, 5);
@@ -96,7 +96,7 @@ TEST_CASE("neighbouring frames have one place and one velocity where they meet",
     CHECK_THAT(one.derivative(1), close_to(next.derivative(0), 1e-14));
 }
 
-TEST_CASE("a place at rest has the velocity 0 to the bit, whatever the ends", "[path]")
+TEST_CASE("a point at rest has the velocity 0 to the bit, whatever the ends", "[path]")
 {
     const Vec3d P(0.1, 1e5 / 3, -7e-9);
     for (const FramePath& path :
@@ -126,7 +126,7 @@ TEST_CASE("a jump is a step of eight times those around it and of half the body'
     CHECK((after.kind == FramePath::Curved && !after.before && after.after && !after.jump));
 }
 
-TEST_CASE("where cuts are given, they are the jumps, and no others are looked for", "[path]")
+TEST_CASE("cuts that are given are the jumps, and no others are detected", "[path]")
 {
     PathOptions options;
     options.cuts = std::set<std::int64_t>{12};
@@ -147,7 +147,7 @@ TEST_CASE("beyond the ends of a motion the body rests, and its last interval has
     CHECK_FALSE(found(9, {}, 1, {}, range).after);
 }
 
-TEST_CASE("after a jump the body has come straight along the way that it goes on", "[path]")
+TEST_CASE("after a jump the body has arrived straight along the path on which it continues", "[path]")
 {
     const FramePath path{FramePath::AfterCut, 0.5, true, true, std::nullopt};
     const Vec3d v(0.5, 0, 0);

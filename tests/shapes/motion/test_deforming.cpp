@@ -57,7 +57,7 @@ struct Body {
     }
 };
 
-// A ball that goes 3 m a frame: six times its radius.
+// A ball that moves 3 m a frame: six times its radius.
 constexpr double ball_radius = 0.5, ball_step = 3, voxel = 0.05;
 Body fast_ball()
 {
@@ -81,7 +81,7 @@ Contact contact_of(const ShapePtr& shape, const Path& path)
 
 }  // namespace
 
-TEST_CASE("a ball whose files go farther than its size in a frame meets points when its formula says so", "[deforming]")
+TEST_CASE("a ball that moves by more than its size between files meets points when its formula says so", "[deforming]")
 {
     const Body ball = fast_ball();
     const ShapePtr shape = ball.over(3, 4, voxel).shape;
@@ -136,7 +136,7 @@ TEST_CASE("between frames a ball that grows has the radius and the velocity of i
         }
 }
 
-TEST_CASE("a point deep in a deforming body is shown the nearest way out", "[deforming]")
+TEST_CASE("a point deep in a deforming body has the nearest direction out", "[deforming]")
 {
     const Body box(*make_box({2, 2, 0.8}, {0, 0, 0}), 4,
                    [](const Vec3d& X, int frame) -> Vec3d { return X + Vec3d(0.1 * frame, 0, 0); });
@@ -149,7 +149,7 @@ TEST_CASE("a point deep in a deforming body is shown the nearest way out", "[def
     CHECK_THAT(contact.n, close_to(Vec3d(0, 0, 1), 1e-6));
 }
 
-TEST_CASE("a path that leaves a deforming body meets it only where it comes up to it, if within the same voxel",
+TEST_CASE("a path that leaves a deforming body meets it again where it reaches it, even within the same voxel",
           "[deforming]")
 {
     const Body torus(*make_torus(0.8, 0.25, 96, {0, 0, 0}), 4,
@@ -180,7 +180,7 @@ TEST_CASE("a path that leaves a deforming body meets it only where it comes up t
     CHECK(again > 100);
 }
 
-TEST_CASE("a paddle of files that turns 40 degrees a frame lets no point in its way through", "[deforming]")
+TEST_CASE("a paddle of files that turns 40 degrees a frame lets no point through", "[deforming]")
 {
     const double step = 40 * std::numbers::pi / 180;
     const auto turned = [&](const Vec3d& X, double frame) -> Vec3d {
@@ -192,7 +192,7 @@ TEST_CASE("a paddle of files that turns 40 degrees a frame lets no point in its 
     std::mt19937_64 random(4);
     std::uniform_real_distribution<double> u(0, 1);
     for (int i = 0; i < 300; ++i) {
-        // Between the two places of its face, well within its ends.
+        // Between the two positions of its face, well within its ends.
         const double r = 0.5 + 1.4 * u(random), part = 0.2 + 0.6 * u(random), z = 0.8 * (u(random) - 0.5);
         const Path path{turned({r, 0, z}, 3 + part), {0, 0, 0.1}, {0, -9.81, 0}, h, 0};
         CAPTURE(i, r, part, z);
@@ -217,7 +217,7 @@ TEST_CASE("a deforming body that jumps sweeps nothing along, and says so; cut = 
     REQUIRE(jump.jump);
     CHECK(jump.jump->way == Approx(10.01).epsilon(1e-3));
     CHECK(contact_of(jump.shape, between).time == Contact::none);
-    // It comes as it goes on.
+    // It arrives as it continues.
     CHECK_THAT(jump.shape->velocity_at({10.5, 0, 0}, 0.5 * h), close_to(Vec3d(0.01 / h, 0, 0), 1e-4));
 
     PathOptions no_cut;
@@ -238,7 +238,7 @@ TEST_CASE("before and after its files a body is at rest, and built once", "[defo
     CHECK_FALSE(deformation.over(clock_24, 20, 21, nullptr, {}, 0).shape->moves());
 }
 
-TEST_CASE("parts of a frame are parts of its way", "[deforming]")
+TEST_CASE("parts of a frame are parts of its curve", "[deforming]")
 {
     const Body ball = fast_ball();
     const ShapePtr whole = ball.over(3, 4, voxel).shape, half = ball.over(3.5, 4, voxel).shape;

@@ -23,7 +23,7 @@ Eigen::Quaterniond about(const Vec3d& axis, double angle)
     return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()));
 }
 
-// A motion that is whatever a function of the time says, as a script's is.
+// A motion by a function of the time, as a script's is.
 class Formula final : public Motion {
 public:
     explicit Formula(std::function<Pose(double time)> pose) : pose_(std::move(pose)) {}
@@ -51,8 +51,7 @@ TEST_CASE("a pose maps as its affine map does, and its inverse undoes it", "[mot
     CHECK_THAT((pose * other) * X, close_to(Vec3d(pose.affine() * other.affine() * X), 1e-14));
 }
 
-TEST_CASE("between keys translation and scale are linear, the rotation is even on the sphere, and outside they hold",
-          "[motion]")
+TEST_CASE("between keys translation and scale are linear and rotation is slerp; outside they are constant", "[motion]")
 {
     const Vec3d axis = Vec3d(1, 1, 0).normalized();
     const MotionPtr motion = keyed_motion({{5, {{0, 0, 0}, about(axis, 0), 1}}, {9, {{4, 8, -4}, about(axis, 2), 3}}});
@@ -86,7 +85,7 @@ TEST_CASE("a product of constants is a constant, and moves first by its right fa
     CHECK_THAT(moving->at(clock_24.at(1.5)).translation, close_to(Vec3d(1, 0.5, 0), 1e-15));
 }
 
-TEST_CASE("a track of a falling, spinning body is one piece, and exact between the times that were asked", "[motion]")
+TEST_CASE("a track of a falling, spinning body is one piece, and exact between its samples", "[motion]")
 {
     const Vec3d v(3, -1, 2), g(0, -9.81, 0), spin(1, 20, -3);
     const Formula motion([&](double t) {
@@ -109,8 +108,9 @@ TEST_CASE("a track of a falling, spinning body is one piece, and exact between t
     }
 }
 
-TEST_CASE("a track of an orbit is within a hundred-thousandth of its way, and its velocity field that of the orbit",
-          "[motion]")
+TEST_CASE(
+    "a track of an orbit is within a hundred-thousandth of its length, and its velocity field is that of the orbit",
+    "[motion]")
 {
     const double speed = GENERATE(0.1, 5.0, 40.0, 200.0);  // rad/s; the last is more than a turn in a frame
     CAPTURE(speed);
@@ -129,7 +129,7 @@ TEST_CASE("a track of an orbit is within a hundred-thousandth of its way, and it
     }
 }
 
-TEST_CASE("a motion that jumps is asked a bounded number of times", "[motion][extreme]")
+TEST_CASE("a motion that jumps is evaluated a bounded number of times", "[motion][extreme]")
 {
     const Formula jump([](double t) { return Pose{{t < 1.02 ? 0.0 : 1e6, 0, 0}}; });
     const MotionTrack track(jump, clock_24, 25, 26);
@@ -174,7 +174,7 @@ TEST_CASE("a placed shape has the distances and contacts of the shape built ther
     }
 }
 
-TEST_CASE("a placed plane is one of the half spaces that it can be", "[motion]")
+TEST_CASE("a placed plane is the half space that its pose gives", "[motion]")
 {
     const Pose pose{{0, 2, 0}, about({0, 0, 1}, pi / 2), 3};
     const ShapePtr moved = placed(make_plane({0, 1, 0}, 1), pose);  // y <= 1 becomes -x <= 3

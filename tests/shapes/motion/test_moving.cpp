@@ -75,7 +75,7 @@ TEST_CASE("a wall that moves at 100 m/s meets a falling point when their formula
 
 TEST_CASE("an accelerated ball meets a point at the root of their distance", "[moving]")
 {
-    // Its middle is at (0, 0, 0) + 40 s² x: in the ball's frame the point's path is a parabola of its own.
+    // Its centre is at (0, 0, 0) + 40 s² x: in the ball's frame the point's path is a parabola of its own.
     const MotionPtr accelerated = [] {
         struct Accelerated final : Motion {
             Pose at(const Frame& f) const override { return {{40 * f.time * f.time, 0, 0}}; }
@@ -178,7 +178,7 @@ TEST_CASE("nothing passes a moving wall, at any speed or turn", "[moving][extrem
     }
 }
 
-TEST_CASE("a path that leaves a turning body meets it only where it comes up to it, if within the same voxel",
+TEST_CASE("a path that leaves a turning body meets it again where it reaches it, even within the same voxel",
           "[moving]")
 {
     const MotionPtr turning =
@@ -205,14 +205,14 @@ TEST_CASE("a path that leaves a turning body meets it only where it comes up to 
     CHECK(again > 250);
 }
 
-TEST_CASE("paths that begin later meet the shape where it is then", "[moving]")
+TEST_CASE("paths that begin later meet the shape at its pose then", "[moving]")
 {
     const ShapePtr ball = moving_in_a_second(make_sphere_shape(1, {0, 0, 0}), along({100, 0, 0}));
     Path path{{55, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.2, 0};
     path.begin = 0.5;
     CHECK(contact_of(ball, path).time == Approx(0.04));  // the ball's front is at 51 then
     path.begin = 0.6;
-    const Contact within = contact_of(ball, path);  // its middle is at 60: 4 m behind its front, out of it again
+    const Contact within = contact_of(ball, path);  // its centre is at 60: 4 m behind its front, out of it again
     CHECK(within.time == Contact::none);
     path.begin = 0.545;
     const Contact inside = contact_of(ball, path);
@@ -221,7 +221,7 @@ TEST_CASE("paths that begin later meet the shape where it is then", "[moving]")
     CHECK_THAT(inside.vc, close_to(Vec3d(100, 0, 0), 1e-9));
 }
 
-TEST_CASE("a point that rests on a moving floor is on it, and one that it leaves behind is not", "[moving]")
+TEST_CASE("a point at rest on a moving floor is in contact, and one that it leaves behind is not", "[moving]")
 {
     const Path pressed{{0, 0, 0}, {0, 0, 0}, {0, -9.81, 0}, 1, 0};
     CHECK(contact_of(moving_in_a_second(make_plane({0, 1, 0}, 0), along({0, 2, 0})), pressed).time == 0);
@@ -253,7 +253,7 @@ TEST_CASE("a moving shape's distance and velocity are those of each point's own 
     CHECK(phi[0] == Approx(std::sqrt(34.0) - 1));
 }
 
-TEST_CASE("the bounds of a moving shape hold all of its way", "[moving]")
+TEST_CASE("the bounds of a moving shape contain its whole motion", "[moving]")
 {
     const double angle = GENERATE(0.3, 3.0);
     const Pose end{{2, -1, 5}, Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3d(1, 2, 3).normalized())), 1.7};

@@ -1,4 +1,5 @@
-// Meshes made from a formula or from the user's own points and faces.
+// Meshes from a formula, or from given points and faces.
+// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -20,7 +21,7 @@ void require_length(const char* mesh, const char* name, double value)
 
 void require_divisions(const char* mesh, int divisions, int least)
 {
-    // Two triangles a square of divisions: more would not fit the 32-bit vertex numbers.
+    // Two triangles a square of divisions: more would not fit 32-bit vertex numbers.
     constexpr int most = 32000;
     if (divisions < least || divisions > most)
         throw Error(fmt::format("divisions of a mesh {} = {} is out of range; it must be from {} to {}", mesh,

@@ -1,0 +1,117 @@
+// Tests: tests/shapes/motion/test_moving.cpp.
+#include "runtime/shapes/motion/rigid_contacts.h"
+
+#include <algorithm>
+
+namespace rapid {
+
+void RigidContacts::find()
+{
+    const std::size_t n = beginnings_.size();
+    std::vector<RelativePath::State> states;
+    std::vector<Vec3d> X, gradient(n);
+    std::vector<double> phi(n);
+    for (const Beginning& b : beginnings_) {
+        states.push_back(b.relative.at(b.from));
+        X.push_back(states.back().X);
+    }
+    rest_.shape->distance(X, phi, gradient);
+    for (std::size_t i = 0; i < n; ++i) begin(beginnings_[i], states[i], phi[i], gradient[i]);
+    if (piece_.only_translates())
+        fly_straight();
+    else
+        walk();
+}
+
+// A contact at once, or a walker.
+void RigidContacts::begin(const Beginning& b, const RelativePath::State& here, double phi, const Vec3d& gradient)
+{
+    const Path& path = paths_[b.path];
+    const double f = here.scale * phi - path.radius;
+    const double flush = flush_within(path.P, path.radius, here.scale * rest_.rounding);
+    if (b.from == 0 && f < -flush) {
+        contacts_[b.path] = inside(b, here);
+        return;
+    }
+    const RigidField field(rest_, b.relative, path.radius + std::min(f, 0.0));
+    ContactWalk walk(field, field.sample(here, phi, gradient), b.from, b.to);
+    if (!(f > flush)) walk.leave_surface(2 * flush / here.scale);
+    if (walk.is_over())
+        contacts_[b.path] = walk.contact();
+    else
+        walkers_.push_back({b.path, b.to, walk});
+}
+
+// The rest shape says how to get out, to a path that goes straight on.
+Contact RigidContacts::inside(const Beginning& b, const RelativePath::State& here) const
+{
+    const Path& path = paths_[b.path];
+    const Path now{here.X, here.velocity, Vec3d::Zero(), 0, path.radius / here.scale};
+    Contact contact;
+    rest_.shape->first_contact({&now, 1}, {&contact, 1});
+    // Flush with the surface in its own frame, where the shape rests farther from the origin than it is now.
+    if (contact.time == Contact::none) return contact_at(RigidField(rest_, b.relative, path.radius), 0, {});
+    contact.time = 0;
+    contact.n = here.rotation * contact.n;
+    contact.vc = b.relative.surface_velocity(0);
+    contact.depth *= here.scale;
+    contact.curvature /= here.scale;
+    return contact;
+}
+
+// A parabola in the world is one in a frame that only translates.
+void RigidContacts::fly_straight()
+{
+    std::vector<Path> relative;
+    const Pose back = piece_.pose.inverse();
+    for (const Walker& w : walkers_) {
+        const auto& here = w.walk.here();
+        const Vec3d a = back.scale * (back.rotation * Vec3d(paths_[w.path].a - piece_.a));
+        relative.push_back({here.X, here.velocity, a, w.end - w.walk.time(), w.walk.field().level() * back.scale});
+    }
+    std::vector<Contact> found(relative.size());
+    rest_.shape->first_contact(relative, found);
+    for (std::size_t i = 0; i < walkers_.size(); ++i) {
+        if (found[i].time == Contact::none) continue;
+        const Walker& w = walkers_[i];
+        Contact& contact = contacts_[w.path] = found[i];
+        contact.time += w.walk.time();
+        contact.n = piece_.pose.rotation * contact.n;
+        contact.vc = w.walk.field().path().surface_velocity(contact.time);
+        contact.curvature /= piece_.pose.scale;
+        // The beginning was found to be outside, to the rounding of positions in the world.
+        contact.depth = 0;
+        contact.back = Contact::none;
+    }
+}
+
+// A step of all walkers in turn, with one query of the rest shape.
+void RigidContacts::walk()
+{
+    std::vector<RelativePath::State> states;
+    std::vector<Vec3d> X, gradient;
+    std::vector<double> phi;
+    while (true) {
+        std::erase_if(walkers_, [&](Walker& w) {
+            if (w.walk.proceeds()) return false;
+            contacts_[w.path] = w.walk.contact();
+            return true;
+        });
+        if (walkers_.empty()) return;
+        states.clear();
+        X.clear();
+        for (const Walker& w : walkers_) {
+            states.push_back(w.walk.field().path().at(w.walk.next()));
+            X.push_back(states.back().X);
+        }
+        phi.resize(X.size());
+        gradient.resize(X.size());
+        rest_.shape->distance(X, phi, gradient);
+        for (std::size_t i = 0; i < walkers_.size(); ++i) {
+            ContactWalk<RigidField>& walk = walkers_[i].walk;
+            walk.advance(walk.field().sample(states[i], phi[i], gradient[i]));
+        }
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,98 @@
+// The path of a point through a step: a parabola, and the tolerances that its rounding calls for.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// x(s) = P + v s + a s²/2 for s in [0, duration], in seconds.
+struct Path {
+    Vec3d P, v, a;
+    double duration;
+    double radius;     // m; contact is where distance = radius
+    double begin = 0;  // s since the beginning of the frame, for shapes that move during it
+
+    Vec3d at(double s) const { return P + s * (v + 0.5 * s * a); }
+    Vec3d velocity(double s) const { return v + s * a; }
+};
+
+// How near to the surface a point is flush with it, m: the rounding of its position to single precision (ulp(x) is at
+// most 2^-23 |x|, and half of it an axis), and the field's own error. A point that a frame leaves on the surface must
+// be found on it by the next one: with a smaller tolerance resting points would now and then count as sunken.
+inline double flush_within(const Vec3d& P, double radius, double rounding)
+{
+    return 0x1p-22 * (P.cwiseAbs().maxCoeff() + radius) + rounding;
+}
+
+// How near to the surface a walk along the path ends, in units of `scale` m; `rounding` is in these units.
+inline double touching_within(const Path& path, double rounding, double scale = 1)
+{
+    return std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + path.radius) / scale, rounding / 16);
+}
+
+// Whether the component vn of a velocity along a unit normal is no more than rounding gives a tangential velocity.
+// Without this a sliding point could meet its own floor again and again, and get nowhere.
+inline bool is_along(double vn, const Vec3d& v) { return vn < 0 && vn * vn < 0x1p-96 * v.squaredNorm(); }
+
+// The normal of a gradient; where that is zero, against the velocity.
+inline Vec3d unit_normal(const Vec3d& gradient, const Vec3d& v)
+{
+    const double size = gradient.norm();
+    if (size > 0) return gradient / size;
+    const double speed = v.norm();
+    return speed > 0 ? Vec3d(-v / speed) : Vec3d(Vec3d::UnitY());
+}
+
+// The first s >= 0 at which f + vn s + an s²/2 goes from above 0 to below, for f >= 0; infinite where it does not. Of
+// the two forms of the root the one without cancellation.
+inline double first_fall_through(double f, double vn, double an)
+{
+    constexpr double never = std::numeric_limits<double>::infinity();
+    const double discriminant = vn * vn - 2 * an * f;
+    if (an >= 0) {
+        if (vn >= 0 || discriminant < 0) return never;
+        return 2 * f / (std::sqrt(discriminant) - vn);
+    }
+    const double root = std::sqrt(discriminant);
+    return vn > 0 ? (vn + root) / -an : 2 * f / (root - vn);
+}
+
+// The time in which a point of this speed and acceleration can travel a distance: the root of
+// distance = speed s + acceleration s²/2, without cancellation. Infinite for a point at rest.
+inline double time_to_travel(double distance, double speed, double acceleration)
+{
+    const double sum = speed + std::sqrt(speed * speed + 2 * acceleration * distance);
+    return sum > 0 ? 2 * distance / sum : std::numeric_limits<double>::infinity();
+}
+
+// Whether a path from P to `end` can come near a box, by the box around the path: a parabola is off its chord by
+// a T²/8 at most.
+inline bool may_reach(const Vec3d& P, const Vec3d& end, const Vec3d& a, double duration, double radius,
+                      const Box3d& bounds)
+{
+    const double sagging = duration * duration / 8;
+    bool may = true;
+    for (int k = 0; k < 3; ++k) {
+        // The factor keeps a point that is flush with the box from being rounded away from it.
+        const double margin = sagging * std::abs(a[k]) + radius + 0x1p-21 * (std::abs(P[k]) + radius);
+        may &= std::max(P[k], end[k]) >= bounds.min()[k] - margin;
+        may &= std::min(P[k], end[k]) <= bounds.max()[k] + margin;
+    }
+    return may;
+}
+inline bool may_reach(const Path& path, const Box3d& bounds)
+{
+    return may_reach(path.P, path.at(path.duration), path.a, path.duration, path.radius, bounds);
+}
+
+inline Vec3d place(const Path& path, double s) { return path.at(s); }
+namespace detail {
+using rapid::time_to_travel;
+using rapid::unit_normal;
+}  // namespace detail
+
+}  // namespace rapid

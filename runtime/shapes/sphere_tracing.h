@@ -1,0 +1,184 @@
+// Sphere tracing along many paths at once through a field at rest that is not convex: a step of each in turn. The
+// samples are independent, and the loops over them have no branches.
+//
+// From a place at height f >= 0 the path within D = f / L is free, behind as well as ahead. So the next sample is ahead
+// of D by as much as its own D will reach back to, going by the slope of the field along the path so far (auto-relaxed
+// sphere tracing, Bán and Valasek 2023); where it does not reach, the gap's near end is sampled. Steps are at least a
+// quarter of the smallest feature, so that a walk ends, by a change of sign that is then refined; no wall of two
+// features is stepped over.
+#pragma once
+
+#include <span>
+
+#include "runtime/shapes/static_field.h"
+
+namespace rapid {
+
+// Distances at many places: by the sampler's own loop where it has one.
+template <class Sampler>
+void sample_distances(const Sampler& sampler, int n, const double* X, const double* Y, const double* Z, double* phi)
+{
+    if constexpr (requires { sampler.distances(n, X, Y, Z, phi); })
+        sampler.distances(n, X, Y, Z, phi);
+    else
+        for (int k = 0; k < n; ++k) phi[k] = sampler.distance({X[k], Y[k], Z[k]});
+}
+
+// Layout: structure of arrays; coordinates are shape [3, most].
+template <class Sampler>
+class SphereTracing {
+public:
+    SphereTracing(const Sampler& sampler, std::span<const Path> paths, std::span<Contact> contacts)
+        : sampler_(sampler), paths_(paths), contacts_(contacts)
+    {
+    }
+
+    // Along path i, from time s on, where the field is f above `level`. slope: of f there, m/s.
+    void begin(std::size_t i, double s, double f, double slope, double level)
+    {
+        const Path& path = paths_[i];
+        const double T = path.duration;
+        if (!reach_speed(i, s, f, slope, level)) return;
+        // The speed is convex along the path.
+        const double fastest = std::sqrt(std::max(path.velocity(s).squaredNorm(), path.velocity(T).squaredNorm()));
+        const double per_f = 1 / (sampler_.slope_bound() * fastest);
+        if (!(fastest > 0) || s + f * per_f >= T) return;
+        const int k = n_++;
+        for (int axis = 0; axis < 3; ++axis) {
+            P_[axis][k] = path.P[axis];
+            v_[axis][k] = path.v[axis];
+            a_[axis][k] = path.a[axis];
+        }
+        T_[k] = T;
+        s_[k] = s;
+        f_[k] = f;
+        per_f_[k] = per_f;
+        least_[k] = 0.25 * sampler_.smallest_feature() / fastest;
+        slope_[k] = std::min(slope * per_f, flattest);
+        level_[k] = level;
+        path_[k] = i;
+        if (n_ == most) finish();
+    }
+
+    // Walks all to their ends, and writes the contacts that they find.
+    void finish()
+    {
+        while (n_ > 0) step();
+    }
+
+private:
+    static constexpr int most = 64;
+    static constexpr double much_faster = 64, a_world = 1e6;  // features
+    // A part of what the slope promises; the largest slope away from the surface, and the longest step in D, that are
+    // relied on.
+    static constexpr double cautious = 0.9, flattest = 0.9, farthest = 4;
+
+    // The walk goes by the largest speed ahead, and would take for ever where a path is at rest at first and a world
+    // away in the end. Until it is not much slower than there, each step is as long as its own speed and acceleration
+    // allow. False: it has come to its end, with a contact or without one.
+    bool reach_speed(std::size_t i, double& s, double& f, double& slope, double level)
+    {
+        const Path& path = paths_[i];
+        const double feature = sampler_.smallest_feature(), T = path.duration;
+        if (!(feature > 0) || !(0.5 * path.a.norm() * T * T > a_world * feature)) return true;
+        const StaticField<Sampler> field{sampler_, path, level};
+        typename StaticField<Sampler>::Sample start{};
+        start.height = f;
+        start.slope = slope;
+        start.velocity = path.velocity(s);
+        ContactWalk walk(field, start, s, T);
+        const double end = path.velocity(T).norm();
+        while (end > much_faster * walk.here().velocity.norm() && walk.proceeds() && walk.next() > walk.time()) {
+            walk.advance(field.at(walk.next(), {}, Exact::InStep));
+            if (!walk.is_over()) continue;
+            contacts_[i] = walk.contact();
+            return false;
+        }
+        s = walk.time();
+        f = walk.here().height;
+        slope = walk.here().slope;
+        return s < T;
+    }
+
+    void step()
+    {
+        double near[most], next[most], f[most];
+        for (int k = 0; k < n_; ++k) {
+            const double reach = f_[k] * per_f_[k], ahead = 2 * cautious / (1 - slope_[k]);
+            near[k] = s_[k] + std::max(reach, least_[k]);
+            const double far = s_[k] + reach * std::min(std::max(ahead, 1.0), farthest);
+            next[k] = std::min(std::max(near[k], far), T_[k]);
+        }
+        sample(next, f);
+        int gaps[most], gap_count = 0;
+        for (int k = 0; k < n_; ++k) {
+            gaps[gap_count] = k;
+            gap_count += (next[k] > near[k]) & ((f_[k] + f[k]) * per_f_[k] < next[k] - s_[k]);
+        }
+        for (int j = 0; j < gap_count; ++j) {
+            const int k = gaps[j];
+            next[k] = near[k];
+            f[k] = sampler_.distance(paths_[path_[k]].at(next[k])) - level_[k];
+        }
+
+        bool over[most];
+        for (int k = 0; k < n_; ++k) {
+            const double before = s_[k], slope = (f[k] - f_[k]) * per_f_[k] / (next[k] - before);
+            // The last: a step below the rounding of the time is the end.
+            over[k] = (f[k] < 0) | (next[k] + f[k] * per_f_[k] >= T_[k]) | !(next[k] > before);
+            slope_[k] = std::min(slope, flattest);
+        }
+        int still = 0;
+        for (int k = 0; k < n_; ++k) {
+            if (over[k]) {
+                if (f[k] < 0 && next[k] > s_[k]) cross(k, next[k], f[k]);
+                continue;
+            }
+            s_[k] = next[k];
+            f_[k] = f[k];
+            if (still != k) move(k, still);
+            ++still;
+        }
+        n_ = still;
+    }
+
+    void sample(const double* s, double* f)
+    {
+        double x[3][most];
+        for (int axis = 0; axis < 3; ++axis)
+            for (int k = 0; k < n_; ++k) x[axis][k] = P_[axis][k] + s[k] * (v_[axis][k] + 0.5 * s[k] * a_[axis][k]);
+        sample_distances(sampler_, n_, x[0], x[1], x[2], f);
+        for (int k = 0; k < n_; ++k) f[k] -= level_[k];
+    }
+
+    void cross(int k, double next, double f)
+    {
+        const StaticField<Sampler> field{sampler_, paths_[path_[k]], level_[k]};
+        const double s = crossing_time([&](double t) { return field.height(t, {}); }, {s_[k], f_[k], next, f},
+                                       field.fastest(s_[k], {}, next), field.close({}));
+        contacts_[path_[k]] = contact_at(field, s, {}, s + 0x1p-8 * least_[k]);
+    }
+
+    void move(int from, int to)
+    {
+        for (int axis = 0; axis < 3; ++axis)
+            for (auto* x : {P_[axis], v_[axis], a_[axis]}) x[to] = x[from];
+        for (double* x : {T_, s_, f_, per_f_, least_, slope_, level_}) x[to] = x[from];
+        path_[to] = path_[from];
+    }
+
+    const Sampler& sampler_;
+    std::span<const Path> paths_;
+    std::span<Contact> contacts_;
+
+    int n_ = 0;
+    std::size_t path_[most];
+    double P_[3][most], v_[3][most], a_[3][most], T_[most];
+    double s_[most], f_[most];  // time, s, and height above the level, m
+    double per_f_[most];        // s that are free, for each m of height
+    double least_[most];        // s, the shortest step
+    double slope_[most];        // of the field along the path, as a part of the steepest possible: -1 to 1
+    double level_[most];
+};
+
+}  // namespace rapid

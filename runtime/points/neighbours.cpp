@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// What OpenVDB asks of a list of points. Its maps refuse voxels below 1e-5 m: places are in radii.
+// A list of points, as OpenVDB takes it. Its maps refuse voxels below 1e-5 m: positions are in radii.
 struct PointList {
     using PosType = openvdb::Vec3d;
 
@@ -31,9 +31,9 @@ public:
     {
     }
 
-    void find(const Vec3d& X, std::vector<std::uint32_t>& places) const override
+    void find(const Vec3d& X, std::vector<std::uint32_t>& indices) const override
     {
-        places.clear();
+        indices.clear();
         auto accessor = index_->getConstAccessor();
         const double radius = points_.radius;
         const openvdb::Vec3d at = openvdb::Vec3d(X.x(), X.y(), X.z()) / radius;
@@ -43,8 +43,8 @@ public:
                                                                      transform.worldToIndexCellCentered(at + reach)),
                                                   accessor);
         for (; near; ++near)
-            if ((points_.P[*near].cast<double>() - X).squaredNorm() <= radius * radius) places.push_back(*near);
-        std::sort(places.begin(), places.end());
+            if ((points_.P[*near].cast<double>() - X).squaredNorm() <= radius * radius) indices.push_back(*near);
+        std::sort(indices.begin(), indices.end());
     }
 
 private:

@@ -1,4 +1,4 @@
-// The points within a radius of a place, by an OpenVDB point index grid.
+// The points within a radius of a position, by an OpenVDB point index grid.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ class Neighbours {
 public:
     virtual ~Neighbours() = default;
 
-    // The places in P of the points that are at most the radius from X, in order. From any number of threads.
-    virtual void find(const Vec3d& X, std::vector<std::uint32_t>& places) const = 0;
+    // The indices of the points at most the radius from X, ascending. From any number of threads.
+    virtual void find(const Vec3d& X, std::vector<std::uint32_t>& indices) const = 0;
 };
 
-// P: shape [n], m, kept as they are now. radius: of the queries, > 0, m. Error: so small that the grid would need more
-// than 2^31 voxels along an axis.
+// P: shape [n], m, copied. radius: of the queries, > 0, m. Error: so small that the grid would need more than 2^31
+// voxels along an axis.
 RAPID_DEFERRED(index_neighbours, std::unique_ptr<const Neighbours>(std::span<const Vec3f> P, double radius));
 
 }  // namespace rapid

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a folder's files may include besides their own folder's. The files in runtime itself (errors, vectors, random
+// The folders that a folder's files may include besides their own. The files in runtime itself (errors, vectors, random
 // numbers) are the bottom.
 const std::map<std::string, std::set<std::string>> below = {
     {"runtime", {}},

@@ -99,6 +99,16 @@ TEST_CASE("the example of a constraint holds what hangs from it, and leaves alon
     CHECK_THAT(points.P()[1], test::close_to(Vec3f(0, 0, 0), 1e-5));
 }
 
+TEST_CASE("the example of a shape bears a point at its end and on its side", "[docs]")
+{
+    const PointSet points =
+        run("rapid.create { points = rapid.points.from { P = {{0, 3, 0}, {3, 0.2, 0}}, v = {{0, -48, 0}, {-48, 0, 0}} } }"
+            ":collide { shape = rapid.shape.capsule { radius = 0.25, length = 2 }, response = \"stick\" } :solve {}",
+            2);
+    CHECK_THAT(points.P()[0], test::close_to(Vec3f(0, 1.25f, 0), 1e-5));
+    CHECK_THAT(points.P()[1], test::close_to(Vec3f(0.25f, 0.2f, 0), 1e-5));
+}
+
 TEST_CASE("the example of a format is read as it was written", "[docs]")
 {
     const Folder folder;

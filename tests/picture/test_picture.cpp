@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "runtime/io/format.h"
 #include "runtime/picture/picture_fit.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"

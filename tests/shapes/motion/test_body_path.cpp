@@ -114,7 +114,7 @@ TEST_CASE("a jump is a step of eight times those around it and of half the body'
 {
     CHECK(found(10, {{10, 8.5}}, 2).kind == FramePath::AfterCut);
     REQUIRE(found(10, {{10, 8.5}}, 2).jump);
-    CHECK(found(10, {{10, 8.5}}, 2).jump->way == 8.5);
+    CHECK(found(10, {{10, 8.5}}, 2).jump->distance == 8.5);
     CHECK(found(10, {{10, 8.5}}, 2).jump->usual == 1);
     CHECK(found(10, {{10, 7.5}}, 2).kind == FramePath::Curved);             // not far enough for a jump
     CHECK(found(10, {{10, 8.5}}, 20).kind == FramePath::Curved);            // the body hardly leaves its place

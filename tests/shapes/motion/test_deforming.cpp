@@ -215,7 +215,7 @@ TEST_CASE("a deforming body that jumps sweeps nothing along, and says so; cut = 
     const Path between{{5, 0, 0}, {0, 0, 0}, {0, 0, 0}, h, 0};
     const Deformation::Interval jump = ball.over(4, 5, voxel);
     REQUIRE(jump.jump);
-    CHECK(jump.jump->way == Approx(10.01).epsilon(1e-3));
+    CHECK(jump.jump->distance == Approx(10.01).epsilon(1e-3));
     CHECK(contact_of(jump.shape, between).time == Contact::none);
     // It arrives as it continues.
     CHECK_THAT(jump.shape->velocity_at({10.5, 0, 0}, 0.5 * h), close_to(Vec3d(0.01 / h, 0, 0), 1e-4));

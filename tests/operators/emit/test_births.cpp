@@ -1,4 +1,4 @@
-#include "runtime/operators/births.h"
+#include "runtime/operators/emit/births.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "runtime/operators/birth_source.h"
+#include "runtime/operators/emit/birth_source.h"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t pick_use = 17;
 
-// A mesh's vertices with their values, as points.
+// The vertices of a mesh with their attributes, as points.
 PointSet vertices_of(const Mesh& mesh)
 {
     PointSet vertices;
@@ -29,7 +29,7 @@ PointSet vertices_of(const Mesh& mesh)
     return vertices;
 }
 
-// The mean of the normals of the faces around each vertex, by area; not of length 1.
+// Area-weighted vertex normals; not of length 1.
 Column<Vec3f> vertex_normals(const Mesh& mesh)
 {
     std::vector<Vec3f> sum(mesh.positions.size(), Vec3f::Zero());
@@ -88,13 +88,13 @@ FramePath BirthSource::path_at(const FrameClock& clock, std::int64_t step, const
     return moving_mesh_ ? path_of(*moving_mesh_, clock, step, options) : path_of(*moving_shape_, clock, step, options);
 }
 
-BirthSource::Moved BirthSource::go_to(const FrameClock& simulation, std::int64_t step, const PathOptions& options)
+BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_t step, const PathOptions& options)
 {
     if (!moving_mesh_ && !moving_shape_) return {std::nullopt, false};
     const bool deforms = moving_mesh_ && moving_mesh_->deforms();
     FrameClock clock = simulation;
     if (deforms) clock.subframes = 1;
-    // At the start there is no interval yet: what happens there is the beginning of the next one, unless that jumps.
+    // At the start there is no interval yet: births take place at the beginning of the next one, unless that jumps.
     bool at_beginning = step <= clock.start;
     const std::int64_t last = at_beginning ? step + 1 : step, parts = deforms ? simulation.subframes : 1;
     std::int64_t end = clock.start + (last - clock.start + parts - 1) / parts;
@@ -145,7 +145,7 @@ void BirthSource::take_points(PointSet points)
     }
 }
 
-std::vector<std::string> BirthSource::carried() const
+std::vector<std::string> BirthSource::inherited() const
 {
     std::vector<std::string> names;
     for (const std::string& name : values_.column_names()) {

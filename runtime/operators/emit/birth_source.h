@@ -1,7 +1,7 @@
-// What an emitter bears points from: a mesh, a level set, an analytic shape, or points; at rest, moving or deforming.
+// The source of an emitter: a mesh, a level set, an analytic shape, or points; at rest, moving or deforming.
 //
-// It says where a birth takes place, which way the surface faces there, and which values the newborn take over from it.
-// All of that depends on the random key and the birth's number alone.
+// It gives the place of a birth, the normal there, and the attribute values that newborn points inherit. All of these
+// depend only on the random key and the birth's number.
 #pragma once
 
 #include <span>
@@ -19,38 +19,37 @@ namespace rapid {
 class BirthSource {
 public:
     BirthSource() = default;
-    // from: "surface", "volume", "points" (of a mesh its vertices), or empty for what the object suggests. Error: an
-    // object that can't be born from, or not so.
+    // from: "surface", "volume", "points" (a mesh's vertices), or empty for the object's default. Error: an object that
+    // is no source, or none of that kind.
     BirthSource(ObjectPtr object, std::string from);
 
     bool is(const ObjectPtr& object, const std::string& from) const { return object_ == object && from_ == from; }
 
-    // Makes it what it is in the interval that ends with a step; at the simulation's start, what it is there. Once a
-    // step, before births are placed, and on one thread. What deforms is known at frames: there it goes the same way
-    // whatever the steps.
-    struct Moved {
-        std::optional<Jump> jump;  // found in this interval
-        bool at_beginning;         // births are at t = 0 of an interval: of the one that begins at the start
+    // Moves it to the interval that ends with a step; at the simulation's start, to that instant. Once a step, before
+    // births are placed, on one thread. A deforming source is known at whole frames, and its path within a frame does
+    // not depend on the sub-frames.
+    struct Move {
+        std::optional<Jump> jump;  // detected in this interval
+        bool at_beginning;         // births take place at t = 0: of the interval that begins at the start
     };
-    Moved go_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
-    // Whether births have ways to go along: places are then to be carried.
+    Move move_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
+    // Whether birthplaces move: they are then to be carried along path().
     bool moves() const { return path_ != nullptr; }
     const BodyPath& path() const { return *path_; }
 
     bool empty() const { return !scatter_ && values_.empty(); }  // a set of no points
     bool has_normals() const { return has_normals_; }
 
-    // The source's own attributes, v included: of its points, or of a mesh's vertices, to be read through value().
+    // Attributes of its points, or of a mesh's vertices, v included; read through value().
     const PointSet& values() const { return values_; }
-    // Those that the newborn take over: all but what every point has of its own (P, v, id, age, ...).
-    std::vector<std::string> carried() const;
+    // The attributes that newborn points inherit: all but those that every point has of its own (P, v, id, age, ...).
+    std::vector<std::string> inherited() const;
 
-    // Birth number first + i goes to out[i]; N is of length 1, or 0 where there is no direction. Points are taken in
-    // their order, one a birth and from the beginning again, or at random. Takes the uses 0 to 15 and 17 of the key's
-    // numbers.
+    // Places birth number first + i at out[i]; N has the length 1, or 0 where there is no normal. Source points are
+    // taken in order, cyclically, or at random. Draws from the uses 0 to 15 and 17 of the key.
     void place(RandomKey key, std::uint64_t first, bool in_order, std::span<Birthplace> out) const;
 
-    // The value at a birthplace of a column of values(): the point's own, or on a mesh by barycentric weights.
+    // A column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
     template <class T>
     T value(const Strided<T>& column, const Birthplace& place) const
     {
@@ -73,10 +72,10 @@ private:
     ObjectPtr object_;
     std::string from_;
     std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, where it is one
-    std::shared_ptr<const AnimatedShape> moving_shape_;  // the same
+    std::shared_ptr<const AnimatedShape> moving_shape_;  // likewise
     BodyPathPtr path_;
     ScatterPtr scatter_;  // null: births are at the points of values_
-    MeshPtr mesh_;        // whose triangles the birthplaces name
+    MeshPtr mesh_;        // birthplaces refer to its triangles
     PointSet values_;
     Column<Vec3f> normals_;  // of the points
     bool has_normals_ = false;

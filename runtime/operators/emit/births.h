@@ -1,0 +1,46 @@
+// How many points an emitter emits in a frame, and when.
+//
+// By the time t = n / fps a constant rate r has emitted floor(r t) points, computed from the whole number n of frames
+// and never from a sum of steps: no birth is lost or doubled at the end of a frame, however long the run. When the rate
+// changes, the fraction of a birth that is due carries over to the new rate. A birth at the end of a frame belongs to
+// that frame.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace rapid {
+
+// The births of one frame, or of a part of it, numbered from 0 over the emitter's whole life.
+struct Births {
+    std::uint64_t first = 0;
+    std::size_t count = 0;
+
+    // Evenly spaced births: birth i of this frame, from 0, takes place when i + 1 births are due.
+    double due = 0;         // births due at the frame's end since its beginning; not whole
+    double per_second = 0;  // rate, 1/s
+    // Time from birth i to the frame's end, s, at least 0.
+    double even_age(std::size_t i) const;
+};
+
+class BirthClock {
+public:
+    // No births before the end of the frame `start`.
+    explicit BirthClock(std::int64_t start = 1) : anchor_(start) {}
+
+    // The births of `frame` at `rate` (1/s, finite, at least 0). Called for the frames in their order.
+    Births at_rate(double rate, std::int64_t frame, double fps);
+    // Of the `count` births of a frame, those of its part number `part`, from 0, of `parts`.
+    Births at_once(std::size_t count, double fps, int part = 0, int parts = 1);
+
+private:
+    double due_by(std::int64_t frame, double fps) const;
+
+    std::uint64_t total_ = 0;  // births so far
+    double rate_ = 0;          // 1/s
+    std::int64_t anchor_;      // frame at whose end this rate began
+    double carry_ = 0;         // fraction of a birth due at the anchor, in [0, 1)
+    std::uint64_t born_ = 0;   // births since the anchor
+};
+
+}  // namespace rapid

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "runtime/graph/node.h"
-#include "runtime/operators/aging.h"
+#include "runtime/operators/solve/aging.h"
 #include "runtime/parallel.h"
 #include "runtime/points/members.h"
 #include "runtime/shapes/level_set/level_set.h"

@@ -1,4 +1,4 @@
-#include "runtime/operators/aging.h"
+#include "runtime/operators/solve/aging.h"
 
 #include <cmath>
 

@@ -6,64 +6,11 @@
 #include <set>
 
 #include "runtime/at_node.h"
+#include "runtime/graph/arguments.h"
+#include "runtime/graph/attribute_uses.h"
 #include "runtime/graph/point_edit.h"
-#include "runtime/graph/registry.h"
-#include "runtime/points/point_names.h"
 
 namespace rapid {
-namespace {
-
-// An argument that is never a function, or the parameter's default.
-double constant_argument(const Node& node, std::string_view param)
-{
-    const auto given = node.arguments.find(std::string(param));
-    const Value& value = given == node.arguments.end() ? node.type->find(param)->fallback : given->second;
-    const double* number = value.get<double>();
-    return number ? *number : 0;
-}
-
-// Whether a value is another at each frame: a function, a motion, what is moved, or a table that holds one.
-bool varies(const Value& value)
-{
-    if (value.function()) return true;
-    if (const ObjectPtr* object = value.get<ObjectPtr>()) return *object && (*object)->varies();
-    const Table* table = value.table();
-    if (!table) return false;
-    const auto entry_varies = [](const auto& entry) { return varies(entry.second); };
-    return std::any_of(table->list.begin(), table->list.end(), [](const Value& entry) { return varies(entry); }) ||
-           std::any_of(table->numbered.begin(), table->numbered.end(), entry_varies) ||
-           std::any_of(table->named.begin(), table->named.end(), entry_varies);
-}
-
-// The name of one; empty where none is another at each frame.
-std::string varying_argument(const Node& node)
-{
-    const auto found = std::find_if(node.arguments.begin(), node.arguments.end(),
-                                    [](const auto& argument) { return varies(argument.second); });
-    return found == node.arguments.end() ? std::string() : found->first;
-}
-
-// Asks a function of the frame. An Error of it tells the frame.
-void assign_at(const Param& param, Operator& op, const FrameFunction& function, const Frame& frame)
-{
-    try {
-        const Value result = function.call(frame);
-        if (result.is_nil() && !param.may_be_nil) wrong_type(param, result);
-        if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
-        param.assign(param, op.fields(), result);
-    } catch (const Error& error) {
-        Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
-        placed.at(error.location()).with_trace(error.trace());
-        throw placed;
-    }
-}
-
-void add(std::vector<std::size_t>& places, std::size_t place)
-{
-    if (places.empty() || places.back() != place) places.push_back(place);
-}
-
-}  // namespace
 
 Uses uses_of(const PlannedNode& planned)
 {
@@ -89,41 +36,28 @@ const PlannedAttribute* PlannedSimulation::find(std::string_view name) const
     return found == attributes.end() ? nullptr : &*found;
 }
 
-void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions)
-{
-    for (const auto& [name, value] : node.arguments) {
-        const Param* param = node.type->find(name);
-        Param any;
-        if (!param) {
-            if (!node.type->rest)
-                throw Error(
-                    fmt::format("unknown parameter \"{}\"{}", name, did_you_mean(name, node.type->param_names())));
-            any = *node.type->rest;
-            any.name = name;
-            param = &any;
-        }
-        if (const FrameFunction* function = value.function(); function && !param->keeps_function) {
-            if (!param->of_the_frame)
-                throw Error(fmt::format("{} can't be a function of the frame; it must be a constant", name));
-            assign_at(*param, op, *function, frame);
-        } else if (!only_functions) {
-            param->assign(*param, op.fields(), value);
-        }
-    }
-    if (only_functions) return;
-    for (const Param& param : node.type->params) {
-        if (node.arguments.count(param.name)) continue;
-        if (param.required) throw Error(fmt::format("{} is missing: {}", param.name, param.doc));
-        if (!param.fallback.is_nil()) param.assign(param, op.fields(), param.fallback);
-    }
-}
-
-Plan::Plan(const Graph& graph, const PlanOptions& options)
+Plan::Plan(const Graph& graph, const PlanOptions& options) : keeps_all(options.keep_all)
 {
     if (graph.outputs.empty())
         throw Error("the graph returns no output; end the file with `return` and a node").at({graph.file, 0});
+    collect_nodes(graph);
+    find_simulations();
+    if (options.seed)
+        for (PlannedSimulation& simulation : simulations) simulation.seed = *options.seed;
+    bind_all();
+    find_changes();
+    for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, s);
+    for (std::size_t s = 0; s < simulations.size(); ++s) {
+        PlannedSimulation& simulation = simulations[s];
+        simulation.attributes = find_attributes(nodes, s, options);
+        for (const PlannedAttribute& attribute : simulation.attributes)
+            if (!attribute.kept && attribute.name != "dt") simulation.left_out.insert(attribute.name);
+    }
+}
 
-    // The nodes reached from the outputs, in the order in which they were made: inputs come first.
+// The nodes that are reached from the outputs, in the order in which they were made: inputs come first.
+void Plan::collect_nodes(const Graph& graph)
+{
     std::map<std::uint64_t, NodePtr> reached;
     std::vector<NodePtr> open;
     for (const auto& [name, node] : graph.outputs) open.push_back(node);
@@ -134,7 +68,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         open.insert(open.end(), node->inputs.begin(), node->inputs.end());
     }
 
-    std::map<std::uint64_t, std::size_t> place;
+    std::map<std::uint64_t, std::size_t> index;  // by serial
     std::map<std::string, const Node*> by_name;
     for (const auto& [serial, node] : reached) {
         name_errors(node->name, node->location, [&, &made = node] {
@@ -146,33 +80,93 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         planned.node = node;
         planned.op = node->type->make();
         for (const NodePtr& input : node->inputs) {
-            planned.inputs.push_back(place.at(input->serial));
+            planned.inputs.push_back(index.at(input->serial));
             ++nodes[planned.inputs.back()].consumers;
         }
-        place[serial] = nodes.size();
+        index[serial] = nodes.size();
         nodes.push_back(std::move(planned));
     }
     for (const auto& [name, node] : graph.outputs) {
-        outputs[name] = place.at(node->serial);
-        ++nodes[place.at(node->serial)].consumers;
-        nodes[place.at(node->serial)].reached_from.insert(name);
+        outputs[name] = index.at(node->serial);
+        ++nodes[index.at(node->serial)].consumers;
+        nodes[index.at(node->serial)].reached_from.insert(name);
     }
     for (std::size_t i = nodes.size(); i-- > 0;)
         for (const std::size_t input : nodes[i].inputs)
             nodes[input].reached_from.insert(nodes[i].reached_from.begin(), nodes[i].reached_from.end());
 
-    for (const NodePtr& node : graph.nodes)
-        if (!reached.count(node->serial)) left_out.push_back(node);
-    for (const NodePtr& node : left_out)
+    for (const NodePtr& node : graph.nodes) {
+        if (reached.count(node->serial)) continue;
+        left_out.push_back(node);
         if (node->type->name == "write")
             warnings.push_back(
                 fmt::format("{}:{}: node \"{}\": writes nothing: no output comes from it; return it, or go on from it",
                             node->location.file, node->location.line, node->name));
+    }
+}
 
-    find_simulations();
-    for (PlannedSimulation& simulation : simulations)
-        if (options.seed) simulation.seed = *options.seed;
+// A node belongs to the simulation of its first input, and carries the points of all its inputs.
+void Plan::find_simulations()
+{
+    for (PlannedNode& planned : nodes) {
+        if (planned.node->type->kind == NodeKind::Source) {
+            start_simulation(planned);
+            continue;
+        }
+        planned.simulation = nodes[planned.inputs.front()].simulation;
+        for (const std::size_t input : planned.inputs)
+            planned.carries.insert(nodes[input].carries.begin(), nodes[input].carries.end());
+        if (planned.node->type->kind == NodeKind::Solve) feed_back(planned);
+    }
 
+    std::set<std::size_t> upstream;  // of a Solve
+    for (std::size_t i = nodes.size(); i-- > 0;) {
+        const bool is_solve = nodes[i].node->type->kind == NodeKind::Solve;
+        if (!is_solve && !upstream.count(i)) continue;
+        nodes[i].in_loop = true;
+        upstream.insert(nodes[i].inputs.begin(), nodes[i].inputs.end());
+    }
+}
+
+void Plan::start_simulation(PlannedNode& create)
+{
+    const Node& node = *create.node;
+    PlannedSimulation simulation;
+    simulation.create = create.node;
+    name_errors(node.name, node.location, [&] { bind_arguments(node, *create.op, {}, false); });
+    simulation.fps = constant_argument(node, "fps");
+    simulation.start = static_cast<std::int64_t>(constant_argument(node, "start"));
+    simulation.subframes = static_cast<int>(constant_argument(node, "subframes"));
+    simulation.seed = static_cast<std::uint64_t>(constant_argument(node, "seed"));
+    if (!simulations.empty() && simulations.front().subframes != simulation.subframes)
+        throw Error(fmt::format("subframes = {}, and {} at \"{}\"; all simulations of a graph have the same",
+                                simulation.subframes, simulations.front().subframes, simulations.front().create->name))
+            .in_node(node.name)
+            .at(node.location);
+    create.simulation = simulations.size();
+    create.carries.insert(simulations.size());
+    simulations.push_back(simulation);
+}
+
+// A Solve feeds back every simulation whose points reach it.
+void Plan::feed_back(const PlannedNode& solve)
+{
+    for (const std::size_t s : solve.carries) {
+        if (simulations[s].solve) {
+            const Node& other = *simulations[s].solve;
+            throw Error(fmt::format("a second solve after \"{}\": \"{}\" at line {} feeds it back already; a create "
+                                    "has one solve",
+                                    simulations[s].create->name, other.name, other.location.line))
+                .in_node(solve.node->name)
+                .at(solve.node->location);
+        }
+        simulations[s].solve = solve.node;
+    }
+}
+
+// Gives every operator its arguments, as they are at the first frame, and checks them.
+void Plan::bind_all()
+{
     for (const PlannedNode& planned : nodes)
         name_errors(planned.node->name, planned.node->location, [&] {
             const PlannedSimulation& simulation = simulations[planned.simulation];
@@ -181,11 +175,6 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
             bind_arguments(*planned.node, *planned.op, start, false);
             planned.op->check();
         });
-
-    keeps_all = options.keep_all;
-    find_changes();
-    check_names();
-    for (std::size_t s = 0; s < simulations.size(); ++s) find_attributes(s, options);
 }
 
 void Plan::find_changes()
@@ -204,202 +193,6 @@ void Plan::find_changes()
                     planned.changes = fmt::format("\"{}\" before it is evaluated anew", nodes[input].node->name);
         if (keeps_all && planned.changes.empty()) planned.changes = "nothing is left out";
         planned.once = planned.changes.empty();
-    }
-}
-
-// A node belongs to the simulation of its first input. Each Create starts one; the Solve that it reaches feeds it back.
-void Plan::find_simulations()
-{
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-        PlannedNode& planned = nodes[i];
-        const Node& node = *planned.node;
-        if (node.type->kind == NodeKind::Source) {
-            PlannedSimulation simulation;
-            simulation.create = planned.node;
-            name_errors(node.name, node.location, [&] { bind_arguments(node, *planned.op, {}, false); });
-            simulation.fps = constant_argument(node, "fps");
-            simulation.start = static_cast<std::int64_t>(constant_argument(node, "start"));
-            simulation.subframes = static_cast<int>(constant_argument(node, "subframes"));
-            simulation.seed = static_cast<std::uint64_t>(constant_argument(node, "seed"));
-            if (!simulations.empty() && simulations.front().subframes != simulation.subframes)
-                throw Error(fmt::format("subframes = {}, and {} at \"{}\"; all simulations of a graph have the same",
-                                        simulation.subframes, simulations.front().subframes,
-                                        simulations.front().create->name))
-                    .in_node(node.name)
-                    .at(node.location);
-            planned.simulation = simulations.size();
-            planned.carries.insert(simulations.size());
-            simulations.push_back(simulation);
-            continue;
-        }
-        planned.simulation = nodes[planned.inputs.front()].simulation;
-        for (const std::size_t input : planned.inputs)
-            planned.carries.insert(nodes[input].carries.begin(), nodes[input].carries.end());
-        if (node.type->kind == NodeKind::Solve) {
-            for (const std::size_t s : planned.carries) {
-                if (simulations[s].solve) {
-                    const Node& other = *simulations[s].solve;
-                    throw Error(
-                        fmt::format("a second solve after \"{}\": \"{}\" at line {} feeds it back already; a create "
-                                    "has one solve",
-                                    simulations[s].create->name, other.name, other.location.line))
-                        .in_node(node.name)
-                        .at(node.location);
-                }
-                simulations[s].solve = planned.node;
-            }
-        }
-    }
-
-    // In the loop: downstream of a Create and upstream of its Solve.
-    std::set<std::size_t> upstream;
-    for (std::size_t i = nodes.size(); i-- > 0;) {
-        const bool is_solve = nodes[i].node->type->kind == NodeKind::Solve;
-        if (!is_solve && !upstream.count(i)) continue;
-        nodes[i].in_loop = true;
-        upstream.insert(nodes[i].inputs.begin(), nodes[i].inputs.end());
-    }
-}
-
-void Plan::check_names() const
-{
-    struct Maker {
-        AttributeSpec spec;
-        std::size_t node;
-    };
-    for (std::size_t s = 0; s < simulations.size(); ++s) {
-        std::map<std::string, Maker> makers;
-        std::set<std::string> groups;
-        for (std::size_t i = 0; i < nodes.size(); ++i) {
-            if (nodes[i].simulation != s) continue;
-            name_errors(nodes[i].node->name, nodes[i].node->location, [&] {
-                const Uses uses = uses_of(nodes[i]);
-                groups.insert(uses.makes_groups.begin(), uses.makes_groups.end());
-                for (const AttributeSpec& spec : uses.makes) {
-                    const auto [other, fresh] = makers.emplace(spec.name, Maker{spec, i});
-                    if (!fresh && type_of(other->second.spec.fallback) != type_of(spec.fallback))
-                        throw Error(fmt::format(
-                            "makes attribute \"{}\" as {}, but node \"{}\" at line {} makes it as {}", spec.name,
-                            type_name(type_of(spec.fallback)), nodes[other->second.node].node->name,
-                            nodes[other->second.node].node->location.line,
-                            type_name(type_of(other->second.spec.fallback))));
-                }
-            });
-        }
-
-        std::vector<std::string> names = point_names_of(PointName::OwnColumn);
-        for (const auto& [name, maker] : makers) names.push_back(name);
-        for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
-        const std::vector<std::string> group_names(groups.begin(), groups.end());
-
-        for (const PlannedNode& planned : nodes) {
-            // A merge's other inputs carry names of their own simulations: only the points of this one are checked
-            // here.
-            if (planned.simulation != s) continue;
-            const bool brings_others = planned.carries.size() > 1;
-            name_errors(planned.node->name, planned.node->location, [&] {
-                const Uses uses = uses_of(planned);
-                for (const auto* list : {&uses.reads, &uses.writes}) {
-                    for (const std::string& name : *list) {
-                        if (is_own_column(name) || makers.count(name) || known_attribute(name) || brings_others)
-                            continue;
-                        const std::string near = nearest_name(name, names);
-                        throw Error(
-                            near.empty()
-                                ? fmt::format("no attribute \"{0}\"; add :attribute{{ {0} = 0 }} before it", name)
-                                : fmt::format("no attribute \"{0}\"; did you mean \"{1}\"? (or add :attribute{{ "
-                                              "{0} = 0 }} before it)",
-                                              name, near));
-                    }
-                }
-                for (const std::string& name : uses.reads_groups)
-                    if (!groups.count(name) && !brings_others)
-                        throw Error(
-                            fmt::format("no node makes a group \"{}\"{}", name, did_you_mean(name, group_names)));
-            });
-        }
-    }
-}
-
-// Who makes, writes and reads each name that the points of a simulation may have; and, from that, what is kept. A node
-// that makes a name makes it for the points of its simulation, which take it along where they are merged into another;
-// a node reads it of all simulations whose points come by.
-void Plan::find_attributes(std::size_t s, const PlanOptions& options)
-{
-    std::set<std::size_t> sources = {s};
-    for (const PlannedNode& planned : nodes)
-        if (planned.simulation == s) sources.insert(planned.carries.begin(), planned.carries.end());
-
-    std::map<std::string, PlannedAttribute> found;
-    const auto entry = [&](const AttributeSpec& spec) -> PlannedAttribute& {
-        PlannedAttribute& attribute = found[spec.name];
-        if (attribute.name.empty()) attribute.name = spec.name, attribute.spec = spec;
-        return attribute;
-    };
-    const auto group_entry = [&](const std::string& name) -> PlannedAttribute& {
-        PlannedAttribute& attribute = found[group_prefix + name];
-        attribute.name = group_prefix + name;
-        attribute.group = true;
-        return attribute;
-    };
-    entry({"P", Vec3f(Vec3f::Zero())}).always = true;
-    entry({"v", Vec3f(Vec3f::Zero())}).always = true;
-    entry({"id", std::int64_t{0}}).always = true;
-    entry({"dt", 0.0f});
-    for (const AttributeSpec& known : known_attributes()) entry(known);
-
-    // Read where something else makes them; given where something else reads them.
-    std::map<std::string, std::vector<std::size_t>> takers, givers;
-    std::vector<std::size_t> readers_of_all;
-    std::vector<std::pair<std::size_t, Uses>> users;
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const PlannedNode& planned = nodes[i];
-        if (!planned.carries.count(s) && !sources.count(planned.simulation)) continue;
-        const Uses& uses = users.emplace_back(i, uses_of(planned)).second;
-        for (const AttributeSpec& spec : uses.makes) add(entry(spec).made_by, i);
-        for (const std::string& name : uses.makes_groups) add(group_entry(name).made_by, i);
-        for (const std::string& name : uses.joins_groups) add(group_entry(name).written_by, i);
-    }
-    for (const auto& [i, uses] : users) {
-        for (const std::string& name : uses.writes)
-            if (const auto at = found.find(name); at != found.end()) add(at->second.written_by, i);
-        for (const std::string& name : uses.gives) add(givers[name], i);
-        if (!nodes[i].carries.count(s)) continue;
-        for (const auto* list : {&uses.reads, &uses.may})
-            for (const std::string& name : *list)
-                if (const auto at = found.find(name); at != found.end()) add(at->second.read_by, i);
-        for (const auto* list : {&uses.reads_groups, &uses.takes_groups})
-            for (const std::string& name : *list) add(takers[group_prefix + name], i);
-        for (const std::string& name : uses.takes) add(takers[name], i);
-        if (uses.reads_all) readers_of_all.push_back(i);
-    }
-    for (auto& [name, attribute] : found) {
-        const bool given = givers.count(name) && takers.count(name);
-        if (given) attribute.written_by.insert(attribute.written_by.end(), givers[name].begin(), givers[name].end());
-        if (!attribute.is_of_scene()) continue;
-        for (const std::size_t taker : takers[name]) add(attribute.read_by, taker);
-        if (!attribute.made_by.empty())
-            attribute.read_by.insert(attribute.read_by.end(), readers_of_all.begin(), readers_of_all.end());
-    }
-    // Solve compares them, where somebody's life may end.
-    const PlannedAttribute& life = found.at("life");
-    if (!life.made_by.empty() || !life.written_by.empty())
-        for (const std::size_t reader : life.read_by) add(found.at("age").read_by, reader);
-
-    PlannedSimulation& simulation = simulations[s];
-    const std::set<std::string> asked(options.attributes.begin(), options.attributes.end());
-    for (auto& [name, attribute] : found) {
-        for (auto* places : {&attribute.made_by, &attribute.written_by, &attribute.read_by}) {
-            std::sort(places->begin(), places->end());
-            places->erase(std::unique(places->begin(), places->end()), places->end());
-        }
-        const std::string plain = attribute.group ? name.substr(group_prefix.size()) : name;
-        attribute.asked_by_name = asked.count(plain) > 0 && name != "dt";
-        attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
-        attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
-                         attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
-        if (!attribute.kept && name != "dt") simulation.left_out.insert(name);
-        simulation.attributes.push_back(attribute);
     }
 }
 
@@ -438,11 +231,11 @@ std::vector<std::vector<std::size_t>> Plan::passes() const
         for (const std::size_t last = last_together(i); i < last;) pass.insert(++i);
         if (kind == NodeKind::Solve) {
             std::vector<std::size_t> open = nodes[i].inputs;
-            std::set<std::size_t> seen;
+            std::set<std::size_t> visited;
             while (!open.empty()) {
                 const std::size_t at = open.back();
                 open.pop_back();
-                if (nodes[at].node->type->kind == NodeKind::Solve || !seen.insert(at).second) continue;
+                if (nodes[at].node->type->kind == NodeKind::Solve || !visited.insert(at).second) continue;
                 if (nodes[at].node->type->kind == NodeKind::Dynamic) pass.insert(at);
                 open.insert(open.end(), nodes[at].inputs.begin(), nodes[at].inputs.end());
             }
@@ -455,7 +248,7 @@ std::vector<std::vector<std::size_t>> Plan::passes() const
 std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
 {
     std::vector<AttributeSpec> columns;
-    std::map<std::string, AttributeValue> defaults;  // the first node that gives one decides
+    std::map<std::string, AttributeValue> defaults;  // that of the first node that gives one
     std::set<std::string> taken;
     for (const PlannedNode& planned : nodes) {
         if (planned.simulation != simulation) continue;

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "runtime/graph/arguments.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
 #include "runtime/shapes/motion/animated.h"

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <random>
 
+#include "runtime/graph/arguments.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
 #include "runtime/solver/estimate/shadow.h"

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/arguments.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/graph/registry.h"

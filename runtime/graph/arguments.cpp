@@ -1,0 +1,83 @@
+#include "runtime/graph/arguments.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace rapid {
+namespace {
+
+bool varies(const Value& value)
+{
+    if (value.function()) return true;
+    if (const ObjectPtr* object = value.get<ObjectPtr>()) return *object && (*object)->varies();
+    const Table* table = value.table();
+    if (!table) return false;
+    const auto entry_varies = [](const auto& entry) { return varies(entry.second); };
+    return std::any_of(table->list.begin(), table->list.end(), [](const Value& entry) { return varies(entry); }) ||
+           std::any_of(table->numbered.begin(), table->numbered.end(), entry_varies) ||
+           std::any_of(table->named.begin(), table->named.end(), entry_varies);
+}
+
+// Calls a function of the frame; its Errors name the frame.
+void assign_at(const Param& param, Operator& op, const FrameFunction& function, const Frame& frame)
+{
+    try {
+        const Value result = function.call(frame);
+        if (result.is_nil() && !param.may_be_nil) wrong_type(param, result);
+        if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
+        param.assign(param, op.fields(), result);
+    } catch (const Error& error) {
+        Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
+        placed.at(error.location()).with_trace(error.trace());
+        throw placed;
+    }
+}
+
+}  // namespace
+
+void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions)
+{
+    for (const auto& [name, value] : node.arguments) {
+        const Param* param = node.type->find(name);
+        Param any;
+        if (!param) {
+            if (!node.type->rest)
+                throw Error(
+                    fmt::format("unknown parameter \"{}\"{}", name, did_you_mean(name, node.type->param_names())));
+            any = *node.type->rest;
+            any.name = name;
+            param = &any;
+        }
+        if (const FrameFunction* function = value.function(); function && !param->keeps_function) {
+            if (!param->of_the_frame)
+                throw Error(fmt::format("{} can't be a function of the frame; it must be a constant", name));
+            assign_at(*param, op, *function, frame);
+        } else if (!only_functions) {
+            param->assign(*param, op.fields(), value);
+        }
+    }
+    if (only_functions) return;
+    for (const Param& param : node.type->params) {
+        if (node.arguments.count(param.name)) continue;
+        if (param.required) throw Error(fmt::format("{} is missing: {}", param.name, param.doc));
+        if (!param.fallback.is_nil()) param.assign(param, op.fields(), param.fallback);
+    }
+}
+
+double constant_argument(const Node& node, std::string_view param)
+{
+    const auto given = node.arguments.find(std::string(param));
+    const Value& value = given == node.arguments.end() ? node.type->find(param)->fallback : given->second;
+    const double* number = value.get<double>();
+    return number ? *number : 0;
+}
+
+std::string varying_argument(const Node& node)
+{
+    const auto found = std::find_if(node.arguments.begin(), node.arguments.end(),
+                                    [](const auto& argument) { return varies(argument.second); });
+    return found == node.arguments.end() ? std::string() : found->first;
+}
+
+}  // namespace rapid

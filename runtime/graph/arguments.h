@@ -1,0 +1,22 @@
+// The arguments of a node, and how they get into the fields of its operator.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "runtime/graph/node.h"
+
+namespace rapid {
+
+// Puts the arguments into the fields, with functions of the frame called at `frame`. A fresh operator gets all of them;
+// later calls only those that are functions. Error: an argument that is unknown, missing or illegal.
+void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions);
+
+// A number that is never a function: the argument, or the parameter's default.
+double constant_argument(const Node& node, std::string_view param);
+
+// The name of an argument whose value changes from frame to frame: a function, a motion, a moving object, or a table
+// that holds one. Empty where there is none.
+std::string varying_argument(const Node& node);
+
+}  // namespace rapid

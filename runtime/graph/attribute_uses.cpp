@@ -1,0 +1,217 @@
+#include "runtime/graph/attribute_uses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "runtime/graph/at_node.h"
+
+namespace rapid {
+namespace {
+
+// A column that every point has, or that Solve and the emitters share.
+bool is_own(std::string_view name) { return name == "P" || name == "v" || name == "id" || name == "dt"; }
+
+// What the nodes of one simulation make.
+struct MadeNames {
+    struct Maker {
+        AttributeSpec spec;
+        const Node* node;
+    };
+    std::map<std::string, Maker> attributes;
+    std::set<std::string> groups;
+
+    // Error: the node makes an attribute with another type than a node before it.
+    void add(const Uses& uses, const Node& node)
+    {
+        groups.insert(uses.makes_groups.begin(), uses.makes_groups.end());
+        for (const AttributeSpec& spec : uses.makes) {
+            const auto [other, fresh] = attributes.emplace(spec.name, Maker{spec, &node});
+            if (!fresh && type_of(other->second.spec.fallback) != type_of(spec.fallback))
+                throw Error(fmt::format("makes attribute \"{}\" as {}, but node \"{}\" at line {} makes it as {}",
+                                        spec.name, type_name(type_of(spec.fallback)), other->second.node->name,
+                                        other->second.node->location.line,
+                                        type_name(type_of(other->second.spec.fallback))));
+        }
+    }
+
+    void check_attribute(const std::string& name) const
+    {
+        if (is_own(name) || attributes.count(name) || known_attribute(name)) return;
+        std::vector<std::string> names = {"P", "v", "id", "dt"};
+        for (const auto& [made, maker] : attributes) names.push_back(made);
+        for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
+        const std::string near = nearest_name(name, names);
+        throw Error(near.empty() ? fmt::format("no attribute \"{0}\"; add :attribute{{ {0} = 0 }} before it", name)
+                                 : fmt::format("no attribute \"{0}\"; did you mean \"{1}\"? (or add :attribute{{ "
+                                               "{0} = 0 }} before it)",
+                                               name, near));
+    }
+
+    void check_group(const std::string& name) const
+    {
+        if (groups.count(name)) return;
+        throw Error(fmt::format("no node makes a group \"{}\"{}", name,
+                                did_you_mean(name, std::vector<std::string>(groups.begin(), groups.end()))));
+    }
+};
+
+void add_once(std::vector<std::size_t>& nodes, std::size_t node)
+{
+    if (nodes.empty() || nodes.back() != node) nodes.push_back(node);
+}
+
+void sort_unique(std::vector<std::size_t>& nodes)
+{
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+}
+
+// Collects the users of each name. A node that makes a name makes it for the points of its simulation, which keep it
+// where they are merged into another; a node reads it of all simulations whose points reach it.
+class UseCollector {
+public:
+    UseCollector(const std::vector<PlannedNode>& nodes, std::size_t simulation) : nodes_(nodes), simulation_(simulation)
+    {
+        for (const PlannedNode& planned : nodes)
+            if (planned.simulation == simulation) sources_.insert(planned.carries.begin(), planned.carries.end());
+
+        entry({"P", Vec3f(Vec3f::Zero())}).always = true;
+        entry({"v", Vec3f(Vec3f::Zero())}).always = true;
+        entry({"id", std::int64_t{0}}).always = true;
+        entry({"dt", 0.0f});
+        for (const AttributeSpec& known : known_attributes()) entry(known);
+    }
+
+    std::map<std::string, PlannedAttribute> collect()
+    {
+        std::vector<std::pair<std::size_t, Uses>> users;
+        for (std::size_t i = 0; i < nodes_.size(); ++i)
+            if (is_relevant(nodes_[i])) users.emplace_back(i, uses_of(nodes_[i]));
+        for (const auto& [i, uses] : users) add_maker(i, uses);
+        for (const auto& [i, uses] : users) {
+            add_writer(i, uses);
+            if (nodes_[i].carries.count(simulation_)) add_reader(i, uses);
+        }
+        resolve_conditional_uses();
+        add_readers_of_age();
+        for (auto& [name, attribute] : found_)
+            for (auto* list : {&attribute.made_by, &attribute.written_by, &attribute.read_by}) sort_unique(*list);
+        return std::move(found_);
+    }
+
+private:
+    PlannedAttribute& entry(const AttributeSpec& spec)
+    {
+        PlannedAttribute& attribute = found_[spec.name];
+        if (attribute.name.empty()) attribute.name = spec.name, attribute.spec = spec;
+        return attribute;
+    }
+
+    PlannedAttribute& group_entry(const std::string& name)
+    {
+        PlannedAttribute& attribute = found_[group_prefix + name];
+        attribute.name = group_prefix + name;
+        attribute.group = true;
+        return attribute;
+    }
+
+    bool is_relevant(const PlannedNode& planned) const
+    {
+        return planned.carries.count(simulation_) || sources_.count(planned.simulation);
+    }
+
+    void add_maker(std::size_t node, const Uses& uses)
+    {
+        for (const AttributeSpec& spec : uses.makes) add_once(entry(spec).made_by, node);
+        for (const std::string& name : uses.makes_groups) add_once(group_entry(name).made_by, node);
+        for (const std::string& name : uses.joins_groups) add_once(group_entry(name).written_by, node);
+    }
+
+    void add_writer(std::size_t node, const Uses& uses)
+    {
+        for (const std::string& name : uses.writes)
+            if (const auto at = found_.find(name); at != found_.end()) add_once(at->second.written_by, node);
+        for (const std::string& name : uses.gives) add_once(givers_[name], node);
+    }
+
+    void add_reader(std::size_t node, const Uses& uses)
+    {
+        for (const auto* list : {&uses.reads, &uses.may})
+            for (const std::string& name : *list)
+                if (const auto at = found_.find(name); at != found_.end()) add_once(at->second.read_by, node);
+        for (const auto* list : {&uses.reads_groups, &uses.takes_groups})
+            for (const std::string& name : *list) add_once(takers_[group_prefix + name], node);
+        for (const std::string& name : uses.takes) add_once(takers_[name], node);
+        if (uses.reads_all) readers_of_all_.push_back(node);
+    }
+
+    // What is written where something reads it, and read where something else makes it.
+    void resolve_conditional_uses()
+    {
+        for (auto& [name, attribute] : found_) {
+            const bool given = givers_.count(name) && takers_.count(name);
+            if (given)
+                attribute.written_by.insert(attribute.written_by.end(), givers_[name].begin(), givers_[name].end());
+            if (!attribute.is_of_scene()) continue;
+            for (const std::size_t taker : takers_[name]) add_once(attribute.read_by, taker);
+            if (!attribute.made_by.empty())
+                attribute.read_by.insert(attribute.read_by.end(), readers_of_all_.begin(), readers_of_all_.end());
+        }
+    }
+
+    // Solve compares age with life, where points are mortal.
+    void add_readers_of_age()
+    {
+        const PlannedAttribute& life = found_.at("life");
+        if (life.made_by.empty() && life.written_by.empty()) return;
+        for (const std::size_t reader : life.read_by) add_once(found_.at("age").read_by, reader);
+    }
+
+    const std::vector<PlannedNode>& nodes_;
+    const std::size_t simulation_;
+    std::set<std::size_t> sources_;  // simulations whose points come into this one
+    std::map<std::string, PlannedAttribute> found_;
+    std::map<std::string, std::vector<std::size_t>> takers_, givers_;  // nodes of Uses::takes and Uses::gives
+    std::vector<std::size_t> readers_of_all_;
+};
+
+}  // namespace
+
+void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
+{
+    MadeNames made;
+    for (const PlannedNode& planned : nodes)
+        if (planned.simulation == simulation)
+            at_node(planned.node->name, planned.node->location, [&] { made.add(uses_of(planned), *planned.node); });
+
+    for (const PlannedNode& planned : nodes) {
+        // Points of other simulations, which come through a merge, bring names of their own.
+        if (planned.simulation != simulation || planned.carries.size() > 1) continue;
+        at_node(planned.node->name, planned.node->location, [&] {
+            const Uses uses = uses_of(planned);
+            for (const auto* list : {&uses.reads, &uses.writes})
+                for (const std::string& name : *list) made.check_attribute(name);
+            for (const std::string& name : uses.reads_groups) made.check_group(name);
+        });
+    }
+}
+
+std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
+                                              const PlanOptions& options)
+{
+    const std::set<std::string> asked(options.attributes.begin(), options.attributes.end());
+    std::vector<PlannedAttribute> attributes;
+    for (auto& [name, attribute] : UseCollector(nodes, simulation).collect()) {
+        const std::string plain = attribute.group ? name.substr(group_prefix.size()) : name;
+        attribute.asked_by_name = asked.count(plain) > 0 && name != "dt";
+        attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
+        attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
+                         attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
+        attributes.push_back(std::move(attribute));
+    }
+    return attributes;
+}
+
+}  // namespace rapid

@@ -1,0 +1,24 @@
+// Which attributes and groups the points of a simulation need, and who makes, writes and reads them: a liveness
+// analysis over the nodes of a plan.
+//
+// An attribute is live where a node reads it, where an output asks for it, or where a node writes it and so needs a
+// column. An attribute that is only made is left out: no node makes it then.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "runtime/graph/plan.h"
+
+namespace rapid {
+
+// Error: two types for one name; an attribute or group that a node uses and nothing makes, with the nearest name. Each
+// names the node.
+void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation);
+
+// All attributes that are known or made, in order of name, with their users.
+std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
+                                              const PlanOptions& options);
+
+}  // namespace rapid

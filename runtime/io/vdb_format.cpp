@@ -1,4 +1,4 @@
-// .vdb among the formats; its reader and writer (vdb.cpp) are loaded when they are needed.
+// .vdb among the formats; its writer and reader (vdb_write.cpp, vdb_read.cpp) are loaded when they are needed.
 #include "runtime/io/vdb.h"
 
 namespace rapid {

@@ -1,0 +1,215 @@
+// Reads .vdb (vdb.h).
+#include <fmt/format.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/points/PointAttribute.h>
+#include <openvdb/points/PointDataGrid.h>
+#include <openvdb/points/PointGroup.h>
+#include <tbb/parallel_for.h>
+
+#include <cstring>
+#include <map>
+#include <numeric>
+
+#include "runtime/io/file.h"
+#include "runtime/io/id_order.h"
+#include "runtime/io/vdb.h"
+#include "runtime/io/vdb_types.h"
+
+namespace rapid {
+namespace {
+
+namespace vdb = openvdb;
+using vdb::points::AttributeArray;
+using vdb::points::PointDataGrid;
+using vdb::points::PointDataTree;
+using Leaf = PointDataTree::LeafNodeType;
+
+// A leaf with points, and the index of its first point in the set.
+struct LeafRange {
+    const Leaf* leaf;
+    std::size_t first;
+};
+
+std::vector<LeafRange> leaf_ranges(const PointDataGrid& grid, std::size_t first)
+{
+    std::vector<LeafRange> ranges;
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+        if (leaf->getLastValue() > 0) ranges.push_back({&*leaf, first});
+        first += leaf->getLastValue();
+    }
+    return ranges;
+}
+
+template <class F>
+void for_each_leaf(const std::vector<LeafRange>& ranges, const F& f)
+{
+    tbb::parallel_for(std::size_t{0}, ranges.size(), [&](std::size_t i) { f(*ranges[i].leaf, ranges[i].first); });
+}
+
+void read_positions(const PointDataGrid& grid, const std::vector<LeafRange>& ranges, std::span<Vec3f> P)
+{
+    const vdb::math::Transform& transform = grid.transform();
+    const bool scaled = transform.mapType() == vdb::math::UniformScaleMap::mapType();
+    const double voxel = transform.voxelSize()[0];
+    for_each_leaf(ranges, [&](const Leaf& leaf, std::size_t first) {
+        const vdb::points::AttributeHandle<vdb::Vec3f> offsets(leaf.constAttributeArray("P"));
+        vdb::Index k = 0;
+        for (vdb::Index voxel_of_leaf = 0; voxel_of_leaf < Leaf::SIZE; ++voxel_of_leaf) {
+            const vdb::Coord voxel_index = leaf.offsetToGlobalCoord(voxel_of_leaf);
+            for (; k < leaf.getValue(voxel_of_leaf); ++k) {
+                const vdb::Vec3f offset = offsets.get(k);
+                vdb::Vec3d index;
+                // At voxel 0 nothing is added, so that -0 is kept.
+                for (int axis = 0; axis < 3; ++axis)
+                    index[axis] = voxel_index[axis] == 0 ? static_cast<double>(offset[axis])
+                                                         : voxel_index[axis] + static_cast<double>(offset[axis]);
+                const vdb::Vec3d world = scaled ? index * voxel : transform.indexToWorld(index);
+                P[first + k] = Vec3d(world.x(), world.y(), world.z()).cast<float>();
+            }
+        }
+    });
+}
+
+// The column `name`, added where an earlier grid had none.
+template <class T>
+Column<T>& column_for(PointSet& points, const std::string& name)
+{
+    return std::get<Column<T>>(points.add({name, AttributeValue(Column<T>::zero())}));
+}
+
+template <class T, class Value>
+void read_attribute(PointSet& points, const std::vector<LeafRange>& ranges, const std::string& name,
+                    const std::string& column_name, vdb::Index component)
+{
+    Column<T>& column = column_for<T>(points, column_name);
+    if (ranges.empty()) return;
+    const auto handle = [&](const Leaf& leaf) {
+        return vdb::points::AttributeHandle<Value>(leaf.constAttributeArray(name));
+    };
+
+    std::size_t count = 0;
+    const T first = rapid_value<T>(handle(*ranges[0].leaf).get(0, component));
+    const bool uniform = std::all_of(ranges.begin(), ranges.end(), [&](const LeafRange& range) {
+        count += range.leaf->getLastValue();
+        const auto values = handle(*range.leaf);
+        const T here = rapid_value<T>(values.get(0, component));
+        return values.isUniform() && std::memcmp(&here, &first, sizeof(T)) == 0;
+    });
+    if (uniform && count == points.size()) {
+        column.fill(first);
+        return;
+    }
+    std::span<T> values = column.write();
+    for_each_leaf(ranges, [&](const Leaf& leaf, std::size_t at) {
+        const auto from = handle(leaf);
+        for (vdb::Index k = 0; k < leaf.getLastValue(); ++k) values[at + k] = rapid_value<T>(from.get(k, component));
+    });
+}
+
+using ReadAttribute = void (*)(PointSet&, const std::vector<LeafRange>&, const std::string&, const std::string&,
+                               vdb::Index);
+
+// By OpenVDB's name of the type; text and matrices are not read.
+const std::map<std::string, ReadAttribute>& readers()
+{
+    static const std::map<std::string, ReadAttribute> all = {
+        {"float", read_attribute<float, float>},
+        {"double", read_attribute<float, double>},
+        {"half", read_attribute<float, vdb::math::half>},
+        {"bool", read_attribute<std::int32_t, bool>},
+        {"int8", read_attribute<std::int32_t, std::int8_t>},
+        {"int16", read_attribute<std::int32_t, std::int16_t>},
+        {"int32", read_attribute<std::int32_t, std::int32_t>},
+        {"int64", read_attribute<std::int64_t, std::int64_t>},
+        {"vec3s", read_attribute<Vec3f, vdb::Vec3s>},
+        {"vec3d", read_attribute<Vec3f, vdb::Vec3d>},
+        {"vec3i", read_attribute<Vec3f, vdb::Vec3i>},
+        {"quats", read_attribute<Quatf, vdb::math::Quat<float>>},
+        {"quatd", read_attribute<Quatf, vdb::math::Quat<double>>},
+    };
+    return all;
+}
+
+void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, bool& has_id)
+{
+    const std::vector<LeafRange> ranges = leaf_ranges(grid, first);
+    const auto any = grid.tree().cbeginLeaf();
+    if (!any) return;
+    const Leaf& leaf = ranges.empty() ? *any : *ranges[0].leaf;
+    const auto& descriptor = leaf.attributeSet().descriptor();
+    if (descriptor.find("P") == vdb::points::AttributeSet::INVALID_POS)
+        throw Error(fmt::format("the points of the grid \"{}\" have no P", grid.getName()));
+    if (!ranges.empty()) read_positions(grid, ranges, points.P().write());
+
+    for (const auto& [name, position] : descriptor.map()) {
+        const AttributeArray& array = leaf.constAttributeArray(position);
+        if (name == "P" || vdb::points::isGroup(array)) continue;
+        const std::string type = descriptor.valueType(position);
+        if (name == "id" && array.stride() == 1 && (type == "int32" || type == "int64")) {
+            (type == "int32" ? read_attribute<std::int64_t, std::int32_t>
+                             : read_attribute<std::int64_t, std::int64_t>)(points, ranges, name, name, 0);
+            has_id = true;
+            continue;
+        }
+        const auto reader = readers().find(type);
+        if (reader == readers().end() || !array.hasConstantStride()) continue;
+        for (vdb::Index component = 0; component < array.stride(); ++component)
+            reader->second(points, ranges, name, array.stride() == 1 ? name : fmt::format("{}{}", name, component),
+                           component);
+    }
+    for (const auto& [name, offset] : descriptor.groupMap()) {
+        Column<std::uint8_t>& column = points.group(name);
+        if (ranges.empty()) continue;
+        std::span<std::uint8_t> members = column.write();
+        for_each_leaf(ranges, [&, group = name](const Leaf& part, std::size_t at) {
+            const auto handle = part.groupHandle(group);
+            for (vdb::Index k = 0; k < part.getLastValue(); ++k) members[at + k] = handle.get(k);
+        });
+    }
+}
+
+PointSet read_vdb(const std::filesystem::path& path)
+{
+    initialize_openvdb();
+    const InputFile exists(path);  // reports why a file can't be opened
+    try {
+        vdb::io::File file(path.string());
+        file.open(/*delayed loading=*/false);
+        std::vector<PointDataGrid::ConstPtr> grids;
+        std::string others;
+        std::size_t count = 0;
+        for (auto name = file.beginName(); name != file.endName(); ++name) {
+            const auto metadata = file.readGridMetadata(name.gridName());
+            if (!metadata->isType<PointDataGrid>()) {
+                others += fmt::format("{}\"{}\" ({})", others.empty() ? "" : ", ", name.gridName(), metadata->type());
+                continue;
+            }
+            grids.push_back(vdb::gridConstPtrCast<PointDataGrid>(file.readGrid(name.gridName())));
+            for (auto leaf = grids.back()->tree().cbeginLeaf(); leaf; ++leaf) count += leaf->getLastValue();
+        }
+        if (grids.empty())
+            throw Error(others.empty() ? std::string("the file holds no grids")
+                                       : fmt::format("the file holds no points; its grids are {}", others));
+
+        PointSet points;
+        points.append(count);
+        bool has_id = false;
+        std::size_t first = 0;
+        for (const PointDataGrid::ConstPtr& grid : grids) {
+            read_grid(*grid, first, points, has_id);
+            for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) first += leaf->getLastValue();
+        }
+        if (count == 0) return points;
+        if (has_id) return reordered(points, id_order(points.id()));
+        std::span<std::int64_t> ids = points.id().overwrite();
+        std::iota(ids.begin(), ids.end(), std::int64_t{0});
+        return points;
+    } catch (const vdb::Exception& error) {
+        throw Error(fmt::format("can't be read: {}", error.what()));
+    }
+}
+
+const bool defined = vdb_reader.define(read_vdb);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,49 @@
+// Rapid's attribute types and OpenVDB's.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <type_traits>
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// Before any other use of OpenVDB.
+inline void initialize_openvdb()
+{
+    static const bool done = (openvdb::initialize(), true);
+    (void)done;
+}
+
+// OpenVDB's type for a T of Rapid's, with the same layout.
+template <class T>
+struct VdbValue {
+    using Type = T;
+    static const T& from(const T& value) { return value; }
+};
+template <>
+struct VdbValue<Vec3f> {
+    using Type = openvdb::Vec3s;
+    static Type from(const Vec3f& value) { return {value.x(), value.y(), value.z()}; }
+};
+template <>
+struct VdbValue<Quatf> {
+    using Type = openvdb::math::Quat<float>;
+    static Type from(const Quatf& value) { return {value.x(), value.y(), value.z(), value.w()}; }
+};
+
+// Rapid's value of an OpenVDB value, of any precision.
+template <class T, class Value>
+T rapid_value(const Value& value)
+{
+    if constexpr (std::is_same_v<T, Vec3f>)
+        return Vec3f(static_cast<float>(value[0]), static_cast<float>(value[1]), static_cast<float>(value[2]));
+    else if constexpr (std::is_same_v<T, Quatf>)
+        return Quatf(static_cast<float>(value[3]), static_cast<float>(value[0]), static_cast<float>(value[1]),
+                     static_cast<float>(value[2]));
+    else
+        return static_cast<T>(value);
+}
+
+}  // namespace rapid

@@ -5,7 +5,7 @@
 
 namespace rapid {
 
-// Not getrusage: its ru_maxrss survives exec, so a command started by a large program would report that one's.
+// Not getrusage: its ru_maxrss survives exec, so that a command started by a large program would report that program's.
 std::uint64_t peak_memory()
 {
     std::ifstream status("/proc/self/status");

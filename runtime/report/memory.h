@@ -1,11 +1,11 @@
-// How much memory the process has needed.
+// Peak memory of the process.
 #pragma once
 
 #include <cstdint>
 
 namespace rapid {
 
-// The largest resident size so far, in bytes: VmHWM. 0 where the system does not tell.
+// The largest resident set size so far (VmHWM), bytes; 0 where the system does not report it.
 std::uint64_t peak_memory();
 
 }  // namespace rapid

@@ -9,12 +9,14 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/report/number_text.h"
+
 namespace rapid {
 namespace {
 
-// s between two drawings: fluent to the eye, and nothing beside frames that take a millisecond.
+// s between two drawings: smooth to the eye, and cheap beside frames of a millisecond.
 constexpr double redraw_interval = 0.05;
-// Share of the newest frame in the mean of late: scenes grow, and what the next frames cost is like the last ones.
+// Weight of the newest frame in the average: scenes grow, and the next frames cost about as much as the last ones.
 constexpr double newest_share = 0.2;
 
 int terminal_width(std::FILE* out)
@@ -23,7 +25,7 @@ int terminal_width(std::FILE* out)
     return ioctl(fileno(out), TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
 }
 
-// Not fmt::print, which throws where the reader of a pipe has gone: a run outlives who watches it.
+// Not fmt::print, which throws when the reader of a pipe has gone: the run must go on.
 void put(std::FILE* out, std::string_view text) { std::fwrite(text.data(), 1, text.size(), out); }
 
 }  // namespace

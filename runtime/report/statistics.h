@@ -1,4 +1,4 @@
-// What a run did and what it cost, frame by frame and in all: the summary, and the file that --stats writes.
+// The statistics of a run, by frame and in all: the summary, and the file that --stats writes.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace rapid {
 
-// Wall time by stage, s. Their sum is the frame's total; writing runs beside the computation of later frames, so the
-// totals of all frames may exceed the run's own time.
+// Wall time by stage, s; the total of a frame is their sum. Frames are written while later ones are computed, so that
+// the totals of all frames may exceed the time of the run.
 struct StageSeconds {
-    double graph = 0;   // nodes and parameters: all that is not below
+    double graph = 0;   // nodes and parameters: all except the following
     double script = 0;  // kernels
     double solve = 0;
     double write = 0;
@@ -26,16 +26,15 @@ struct FrameStatistics {
     std::int64_t frame = 0;
     std::uint64_t points = 0;  // of all outputs
     std::uint64_t born = 0, died = 0, collisions = 0;
-    std::uint64_t contact_limit = 0, trapped = 0;  // points that Solve warned of (FrameFigures)
+    std::uint64_t contact_limit = 0, trapped = 0;  // points of which Solve warns (FrameFigures)
     int substeps = 0;
-    // Estimated errors of the positions, m, accumulated since birth, of a sample of the points; nothing where none was
-    // solved.
+    // Estimated position errors of a sample of the points, m, accumulated since birth; nothing where none was solved.
     struct Error {
         double p50, p95, max;
     };
     std::optional<Error> error;
-    // By how much the integrator has changed the energies of motion of that sample since birth, J/kg: on average, and
-    // at most, whichever way. Nothing where such an energy is not defined (energy_drift.h).
+    // Change of the energy of motion of that sample by the integrator since birth, J/kg: the mean, and the largest
+    // magnitude. Nothing where the energy is not defined (energy_drift.h).
     struct EnergyDrift {
         double mean, max;
     };
@@ -45,14 +44,14 @@ struct FrameStatistics {
     ContactEnergy contact_energy;
     std::vector<BandFigures> bands;
     double constraint_residual_max = 0;   // m; 0 where nothing is constrained
-    std::uint64_t constraint_rows = 0;    // that were active at the frame's end
-    std::uint64_t loose_constraints = 0;  // of them, those that were off by more than a tenth of their size
-    std::uint64_t asleep = 0;             // points, at the frame's end
+    std::uint64_t constraint_rows = 0;    // active at the frame's end
+    std::uint64_t loose_constraints = 0;  // of these, with an error above a tenth of their size
+    std::uint64_t asleep = 0;             // sleeping points at the frame's end
     std::optional<Residual::Search> contact_search;
     StageSeconds seconds;
 };
 
-// The writing is not known yet: it has not happened.
+// Without the time of writing, which comes later.
 FrameStatistics statistics_of(const FrameResult& result);
 
 struct RunStatistics {
@@ -67,19 +66,14 @@ struct RunStatistics {
     std::uint64_t point_frames() const;  // the sum of all frames' points
 };
 
-// One frame a line. A run that ended early has the frames that it did.
+// A line for each frame. A run that ended early has the frames that it completed.
 std::string to_json(const RunStatistics& run);
 
-// Points, frames, seconds by stage, memory: a line each; and one for what is stiff and what Solve warned of.
+// A line each for points, frames, seconds by stage, memory, errors and other figures; and one for each stiff node and
+// each warning of Solve.
 std::string summary(const RunStatistics& run);
 
-// A line for each that is stiff.
+// A line for each stiff node.
 std::string advice(const std::vector<Stiffness>& stiff);
-
-// Numbers as people read them: "1,234,567", "3.21 million", "85.2 MiB", "0.042 s", "2 min 05 s".
-std::string with_separators(std::uint64_t count);
-std::string in_millions(double count);
-std::string memory_text(std::uint64_t bytes);
-std::string duration_text(double seconds);
 
 }  // namespace rapid

@@ -1,14 +1,14 @@
 // The picture of a study: error over run time, both axes logarithmic.
 //
-//   title, and what was measured
+//   title and subtitle
 //   +----------------------------+  line 1   order 2.00
 //   | o--o                       |  line 2   exact
 //   |     `-o--o                 |
 //   |~~~~~~~~~~~~ rounding ~~~~~~|
 //   +----------------------------+
 //
-// Surroundings may be light or dark: the page's colours follow them, a line keeps its own, which stands out on both.
-// Nothing is fetched: fonts are the reader's.
+// The colours of the page follow a light or dark theme; those of the lines stand out on both. Nothing is loaded from
+// elsewhere: fonts are the viewer's.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,8 +25,8 @@ constexpr double width = 860, height = 480;                       // px
 constexpr double left = 84, right = 600, top = 76, bottom = 416;  // of the plot
 constexpr double legend_x = right + 24, legend_step = 44, radius = 4;
 
-// Of middle lightness, so that each stands out on white and on black; neighbours differ in lightness as well as in hue,
-// for eyes that do not tell red from green.
+// Of medium lightness, for white and black backgrounds; neighbours differ in lightness as well as in hue, for the
+// colour-blind.
 constexpr std::array colours = {"#2b7fd4", "#e08214", "#159a74", "#c64a9a", "#7a68c9",
                                 "#c9a100", "#d1483f", "#46a3c4", "#7d8f2e", "#9c6b4e"};
 
@@ -68,7 +68,7 @@ std::string text_at(double x, double y, const std::string& text, const char* anc
                        kind ? fmt::format(" class=\"{}\"", kind) : "", escaped(text));
 }
 
-// "10 µs", "1 mm"; beyond the prefixes that everybody reads, "1e-12 m".
+// "10 µs", "1 mm"; beyond common prefixes, "1e-12 m".
 std::string decade_text(int power, const char* unit)
 {
     constexpr std::array prefixes = {"n", "µ", "m", ""};
@@ -91,7 +91,7 @@ public:
     bool empty() const { return !(least_ <= most_); }
     int first() const { return static_cast<int>(std::floor(std::log10(least_) + 1e-9)); }
     int last() const { return std::max(first() + 1, static_cast<int>(std::ceil(std::log10(most_) - 1e-9))); }
-    // Decades between labels, so that labels do not touch.
+    // Decades per label, so that labels do not touch.
     int stride(int most_labels) const { return std::max(1, (last() - first() + most_labels - 1) / most_labels); }
     double place(double value) const
     {
@@ -105,7 +105,7 @@ private:
 
 struct Axes {
     Axis time{left, right}, error{bottom, top};
-    double rounding = 0;  // the largest of the rows; 0: not known
+    double rounding = 0;  // the largest of the rows; 0 where not known
 
     explicit Axes(const StudyResult& result)
     {
@@ -120,7 +120,7 @@ struct Axes {
         if (time.empty()) time.include(1);
     }
 
-    // An error of 0 lies on the lower edge.
+    // An error of 0 is on the lower edge.
     double y(double value) const { return value > 0 ? std::min(bottom, error.place(value)) : bottom; }
 };
 
@@ -150,7 +150,7 @@ std::string grid(const Axes& axes, bool metres)
     return svg;
 }
 
-// Where the numbers of a line's rows stand. One that would lie on the last is left out; the row's title has it.
+// Placement of the numbers beside a line's markers: one that would cover the previous one is omitted.
 class Labels {
 public:
     bool fits(double x, double y)
@@ -165,7 +165,7 @@ private:
     double x_ = -width, y_ = -height;
 };
 
-// A row's place: full where no other row beats it, open elsewhere, with the step beside it.
+// The marker of a row, filled if no other row beats it, with its step beside it.
 std::string marker(const Axes& axes, const StudyRow& row, const std::string& step, bool best, const char* colour,
                    Labels& labels)
 {

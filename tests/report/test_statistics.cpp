@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "runtime/report/number_text.h"
 #include "runtime/report/statistics.h"
 #include "tests/test.h"
 

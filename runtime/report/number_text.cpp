@@ -1,0 +1,35 @@
+#include "runtime/report/number_text.h"
+
+#include <fmt/format.h>
+
+namespace rapid {
+
+std::string with_separators(std::uint64_t count)
+{
+    std::string text = std::to_string(count);
+    for (std::size_t i = text.size(); i > 3;) text.insert(i -= 3, 1, ',');
+    return text;
+}
+
+std::string in_millions(double count)
+{
+    if (count < 1e5) return with_separators(static_cast<std::uint64_t>(count));
+    return fmt::format("{:.{}f} million", count / 1e6, count < 1e7 ? 2 : 1);
+}
+
+std::string memory_text(std::uint64_t bytes)
+{
+    const double mebibytes = static_cast<double>(bytes) / (1 << 20);
+    return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes) : fmt::format("{:.2f} GiB", mebibytes / 1024);
+}
+
+std::string duration_text(double seconds)
+{
+    if (seconds < 1) return fmt::format("{:.3f} s", seconds);
+    if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+    const auto whole = static_cast<std::uint64_t>(seconds + 0.5);
+    if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace rapid

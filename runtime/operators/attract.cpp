@@ -1,8 +1,8 @@
-// attract: towards a point, or the surface of a shape.
+// attract: a force towards a point, or towards the surface of a shape.
 //
 //   a = strength d / (|d|² + core²)^((falloff + 1) / 2),   d = center - P        0 at d = 0
 //
-// falloff 2 is the inverse square, 0 a constant acceleration; a negative strength drives away.
+// A falloff of 2 is the inverse-square law, 0 a constant acceleration; a negative strength repels.
 #include <cmath>
 
 #include "runtime/graph/node.h"
@@ -49,7 +49,7 @@ struct Attract {
         }
     }
 
-    // Of a shape's surface it has one only where the field is an exact distance, which is not known.
+    // A shape's surface has one only if its field is an exact distance, which is not known.
     bool add_potential(const Chunk& chunk, std::span<double> energy) const
     {
         if (shape) return false;

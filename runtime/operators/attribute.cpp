@@ -1,8 +1,8 @@
-// attribute: brings attributes into being.
+// attribute: creates attributes, and gives points their default value.
 //
-// Points that have no value yet get the one given here: the initial ones, those born later without one of their own,
-// and those that a merge brings without one. Values that are there are never overwritten. A value that is a function of
-// the frame is the one that points get at that frame.
+// The value goes to the initial points, to points born later without one of their own, and to points that a merge
+// brings without one. Existing values are never overwritten. With a function of the frame, points get the value of the
+// frame in which they appear.
 #include "runtime/graph/point_edit.h"
 
 namespace rapid {
@@ -27,7 +27,7 @@ struct Attribute {
         }
     }
 
-    // No point is visited: one that is there has a value, or gets it with the column.
+    // No point is visited: those that exist have a value, or get it with the column.
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before&) const
     {
         for (const auto& [name, value] : values)

@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// record: false, true (every contact), or the least impact speed.
+// The parameter `record`: false, true (every contact), or the least speed of impact.
 struct LeastSpeed {
     static constexpr std::string_view param_type = "false or number";
 
@@ -28,7 +28,7 @@ void read_value(const Param& param, const Value& value, LeastSpeed& least)
         rapid::read_value(param, value, least.speed);
 }
 
-// A shape, one that moves already, or, at some frames, none.
+// A shape, which may have a motion or deform; at some frames there may be none.
 struct ColliderShape {
     static constexpr std::string_view param_type = "shape";
 

@@ -1,8 +1,8 @@
 // create: starts a simulation, and yields its points at the beginning of each frame.
 //
-// At the first frame these are the initial points, with ids from 0 in their order (whatever ids they brought: an id is
-// a birth's number in this simulation). At every later frame they are the points as Solve left them, handed on without
-// a copy. Every column and group that the plan knows is there from the first frame on, so that all frames have the
+// At the first frame these are the initial points, numbered from 0 in their order (an id counts births in this
+// simulation; ids that they had before are dropped). At every later frame they are the points as Solve left them,
+// passed on without a copy. Every planned column and group exists from the first frame on, so that all frames have the
 // same.
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
@@ -16,9 +16,8 @@ namespace rapid {
 namespace {
 
 struct Create {
-    double fps = 24;
-    int start_frame = 1;
-    int seed = 0, subframes = 1;
+    double fps;
+    int start_frame, seed, subframes;
     std::shared_ptr<const PointsObject> points;
 
     static NodeType declare()

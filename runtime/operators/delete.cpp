@@ -1,4 +1,4 @@
-// delete: removes the points of a group, or those for which `where` is true; with both, those for which both hold.
+// delete: removes the points of a group for which `where` is true; either may be left out.
 #include "runtime/graph/selection.h"
 
 namespace rapid {
@@ -6,7 +6,10 @@ namespace {
 
 class DeletePass : public EditPass {
 public:
-    DeletePass(const Evaluation& told, Selection selection) : EditPass(told), selection_(std::move(selection)) {}
+    DeletePass(const Evaluation& evaluation, Selection selection)
+        : EditPass(evaluation), selection_(std::move(selection))
+    {
+    }
 
     void begin() override { selection_.begin(); }
     std::size_t chunk() const override { return selection_.chunk(); }

@@ -1,7 +1,9 @@
-// drag: still air.
+// drag: the resistance of still air.
 //
-//   a = -linear v - quadratic |v| v        the first is exact at any step; the second never turns a velocity round, and
-//                                          keeps its terminal speed √(g/quadratic)
+//   a = -linear v - quadratic |v| v
+//
+// The linear part is exact at any step. The quadratic part never reverses a velocity, and keeps the terminal speed
+// √(g/quadratic).
 #include "runtime/graph/node.h"
 
 namespace rapid {

@@ -1,10 +1,9 @@
-// field: a grid of vectors moves points.
+// field: a vector grid that acts on points as a force, or as the velocity of a flow.
 //
-//   mode "force"       F = strength value                     N, at where the point is; with the mass of each point
-//   mode "velocity"    a = -drag (v - strength value)         the flow of a fluid: treated exactly, no drag is too
-//   stiff
+//   mode "force"       F = strength value                N; accelerates a point by its mass
+//   mode "velocity"    a = -drag (v - strength value)    exact at any step: no drag is too stiff
 //
-// The value is that of the middle of the step: of second order in how the field varies along the way.
+// The value is sampled at the middle of the step: of second order in the variation of the field along the path.
 #include "runtime/graph/node.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 
@@ -44,17 +43,16 @@ struct Field {
         grid->sample(chunk.P, values);
         const Strided<float> size = chunk.read(strength);
         if (mode == "velocity") {
-            const Strided<float> rate = drag ? chunk.read(*drag) : Strided<float>{&unit, 0};
+            const Strided<float> rate = drag ? chunk.read(*drag) : Strided<float>{&usual_drag, 0};
             for (std::size_t i = 0; i < chunk.size(); ++i) forces.add_drag(i, rate[i], size[i] * values[i]);
         } else {
-            const auto* masses = chunk.points.find<float>("mass");
-            const Strided<float> mass = masses ? masses->read() : Strided<float>{&unit, 0};
+            const Strided<float> mass = masses_of(chunk.points);
             for (std::size_t i = 0; i < chunk.size(); ++i) forces.add(i, size[i] / mass[chunk.first + i] * values[i]);
         }
     }
 
 private:
-    static constexpr float unit = 1;
+    static constexpr float usual_drag = 1;  // 1/s, where none is given
 };
 RAPID_NODE(Field);
 

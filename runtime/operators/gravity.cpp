@@ -1,6 +1,6 @@
 // gravity: one acceleration for all points, whatever their mass.
 //
-//   a = g        exact at any step: the integrator moves along the parabola
+//   a = g        exact at any step: the integrator follows the parabola
 #include "runtime/graph/node.h"
 
 namespace rapid {

@@ -1,7 +1,7 @@
-// group: says anew, at each frame, which points are in a group.
+// group: determines the members of a group at each frame.
 //
 // The members are the points for which `where` is true; with `group`, only those that are in that group too. A point
-// that no longer qualifies is out.
+// that no longer qualifies leaves the group.
 #include "runtime/graph/selection.h"
 
 #include <algorithm>
@@ -11,8 +11,8 @@ namespace {
 
 class GroupPass : public EditPass {
 public:
-    GroupPass(const Evaluation& told, Selection selection, Column<std::uint8_t>& members)
-        : EditPass(told), selection_(std::move(selection)), members_(members)
+    GroupPass(const Evaluation& evaluation, Selection selection, Column<std::uint8_t>& members)
+        : EditPass(evaluation), selection_(std::move(selection)), members_(members)
     {
         members_.write();
     }
@@ -20,21 +20,22 @@ public:
     void begin() override
     {
         selection_.begin();
-        to_ = members_.write();
+        written_ = members_.write();
     }
     std::size_t chunk() const override { return selection_.chunk(); }
     bool is_script() const override { return selection_.is_script(); }
-    // The group that limits it, or that `where` asks for, may be the one that is made: the answers are of before.
+    // The group that limits the selection, or that `where` reads, may be the one that is written: all points of the
+    // chunk are selected before any is written.
     void visit(const Stretch& stretch) override
     {
         const std::vector<std::uint8_t> selected = selection_.of(stretch);
-        std::copy(selected.begin(), selected.end(), to_.begin() + static_cast<std::ptrdiff_t>(stretch.begin));
+        std::copy(selected.begin(), selected.end(), written_.begin() + static_cast<std::ptrdiff_t>(stretch.begin));
     }
 
 private:
     Selection selection_;
     Column<std::uint8_t>& members_;
-    std::span<std::uint8_t> to_;
+    std::span<std::uint8_t> written_;
 };
 
 struct Group {

@@ -1,4 +1,4 @@
-// interact: neighbours keep apart, together, in step and calm (solver/interaction.h has the equations).
+// interact: separation, cohesion, alignment and drag between neighbours (equations: solver/interaction.h).
 #include "runtime/graph/node.h"
 #include "runtime/solver/interaction.h"
 

@@ -1,12 +1,14 @@
 // merge: the points of several chains as one set, in the order of the inputs.
 //
-// A point that comes by several inputs (the same simulation, the same id) is taken once, from the first of them. The
-// result belongs to the first input's simulation. Points of another simulation get ids of this one when they are first
-// seen and keep them from frame to frame. Between Create and Solve they are taken in as their own chain yields them:
-// its initial points at the first frame, its newborn at the frame of their birth; from then on this simulation's Solve
-// moves them. After a Solve both simulations go on by themselves, and the merge is of the output only.
+// The result belongs to the simulation of the first input. A point that several inputs have (of the same simulation,
+// with the same id) is taken from the first of these. A point of another simulation gets an id of this one when it
+// first appears, and keeps it from frame to frame.
 //
-// The result has the columns and groups of all inputs. Where a point's own chain had no such column it gets the value
+// Between Create and Solve, points of another simulation are adopted as their own chain yields them: its initial points
+// at the first frame, newborn points at the frame of their birth; from then on this simulation's Solve moves them.
+// After a Solve both simulations continue independently, and only the output is merged.
+//
+// The result has the columns and groups of all inputs. A point whose own chain lacks a column gets the column's value
 // for points without one.
 #include "runtime/graph/node.h"
 
@@ -18,7 +20,7 @@
 namespace rapid {
 namespace {
 
-// Adds the points of `from` to `into`, with all their columns and groups.
+// Appends the points of `from` to `into`, with all their columns and groups.
 void append_points(PointSet& into, PointSet from, const Evaluation& now)
 {
     for (const std::string& name : from.column_names())
@@ -53,20 +55,20 @@ void append_points(PointSet& into, PointSet from, const Evaluation& now)
     for (const auto& [name, members] : from.groups()) copy_values(into.group(name), members);
 }
 
-// Ids of points that are in the result already.
-class Taken {
+// The ids of the points in the result.
+class IdSet {
 public:
-    // False where it was in already.
+    // False if it was in the set already.
     bool insert(std::int64_t id)
     {
         const auto i = static_cast<std::size_t>(id);
-        if (i >= taken_.size()) taken_.resize(std::max(i + 1, taken_.size() * 2), false);
-        if (taken_[i]) return false;
-        return taken_[i] = true;
+        if (i >= has_.size()) has_.resize(std::max(i + 1, has_.size() * 2), false);
+        if (has_[i]) return false;
+        return has_[i] = true;
     }
 
 private:
-    std::vector<bool> taken_;  // ids are dense from 0
+    std::vector<bool> has_;  // ids are dense from 0
 };
 
 struct Merge {
@@ -83,12 +85,12 @@ struct Merge {
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) const
     {
         Flow result = std::move(inputs[0]);
-        Taken taken;
+        IdSet ids_in_result;
         const Strided<std::int64_t> ids = std::as_const(result.points).id().read();
-        for (std::size_t i = 0; i < result.points.size(); ++i) taken.insert(ids[i]);
+        for (std::size_t i = 0; i < result.points.size(); ++i) ids_in_result.insert(ids[i]);
         for (std::size_t i = 1; i < inputs.size(); ++i) {
             try {
-                take(result, taken, std::move(inputs[i]), now);
+                append_input(result, ids_in_result, std::move(inputs[i]), now);
             } catch (Error& error) {
                 throw Error(fmt::format("input {}: {}", i + 1, error.message()));
             }
@@ -97,7 +99,7 @@ struct Merge {
     }
 
 private:
-    static void take(Flow& result, Taken& taken, Flow input, const Evaluation& now)
+    static void append_input(Flow& result, IdSet& ids_in_result, Flow input, const Evaluation& now)
     {
         Simulation& here = *result.simulation;
         const Simulation& there = *input.simulation;
@@ -111,7 +113,7 @@ private:
         }
         std::vector<std::uint8_t> fresh(points.size());
         const Strided<std::int64_t> ids = std::as_const(points).id().read();
-        for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = taken.insert(ids[i]);
+        for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = ids_in_result.insert(ids[i]);
         points.keep(fresh);
         append_points(result.points, std::move(points), now);
 

@@ -1,8 +1,8 @@
-// spring: to a place, to each point's own, or to the surface of a shape.
+// spring: a damped spring to a position, to a position of each point's own, or to the surface of a shape.
 //
-//   F = -stiffness (P - target) - damping v        with the mass of each point; both parts exact at any step
+//   F = -stiffness (P - target) - damping v        accelerates a point by its mass; both parts are exact at any step
 //
-// A shape's nearest place is looked for in the middle of the step: of second order in where that is.
+// The nearest position on a shape is found at the middle of the step: of second order in its change.
 #include "runtime/graph/node.h"
 
 namespace rapid {
@@ -11,7 +11,7 @@ namespace {
 struct SpringTarget {
     static constexpr std::string_view param_type = "vec3, attribute or shape";
 
-    PerPoint<Vec3f> place;
+    PerPoint<Vec3f> position;
     ShapePtr shape;
 };
 
@@ -21,7 +21,7 @@ void read_value(const Param& param, const Value& value, SpringTarget& target)
     if (auto shape = value.object<Shape>())
         target.shape = std::move(shape);
     else
-        rapid::read_value(param, value, target.place);
+        rapid::read_value(param, value, target.position);
 }
 
 struct Spring {
@@ -41,23 +41,23 @@ struct Spring {
 
     void contribute(const Chunk& chunk, Forces& forces) const
     {
-        std::vector<Vec3d> place(chunk.size());
+        std::vector<Vec3d> rest(chunk.size());
         if (target.shape) {
             std::vector<double> phi(chunk.size());
-            target.shape->distance(chunk.P, phi, place);
+            target.shape->distance(chunk.P, phi, rest);
             for (std::size_t i = 0; i < chunk.size(); ++i) {
-                const double slope2 = place[i].squaredNorm();
-                place[i] = chunk.P[i] - (slope2 > 0 ? Vec3d(phi[i] / slope2 * place[i]) : Vec3d(Vec3d::Zero()));
+                const double slope2 = rest[i].squaredNorm();
+                rest[i] = chunk.P[i] - (slope2 > 0 ? Vec3d(phi[i] / slope2 * rest[i]) : Vec3d(Vec3d::Zero()));
             }
         } else {
-            const Strided<Vec3f> own = chunk.read(target.place);
-            for (std::size_t i = 0; i < chunk.size(); ++i) place[i] = own[i].cast<double>();
+            const Strided<Vec3f> own = chunk.read(target.position);
+            for (std::size_t i = 0; i < chunk.size(); ++i) rest[i] = own[i].cast<double>();
         }
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
-        const Strided<float> mass = masses_of(chunk);
+        const Strided<float> mass = masses_of(chunk.points);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             const double m = mass[chunk.first + i];
-            forces.add_spring(i, k[i] / m, place[i]);
+            forces.add_spring(i, k[i] / m, rest[i]);
             forces.add_drag(i, d[i] / m, Vec3d::Zero());
         }
     }
@@ -65,22 +65,14 @@ struct Spring {
     bool add_potential(const Chunk& chunk, std::span<double> energy) const
     {
         if (target.shape) return false;
-        const Strided<Vec3f> place = chunk.read(target.place);
+        const Strided<Vec3f> rest = chunk.read(target.position);
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
-        const Strided<float> mass = masses_of(chunk);
+        const Strided<float> mass = masses_of(chunk.points);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             if (d[i] > 0) return false;
-            energy[i] += 0.5 * k[i] / mass[chunk.first + i] * (chunk.P[i] - place[i].cast<double>()).squaredNorm();
+            energy[i] += 0.5 * k[i] / mass[chunk.first + i] * (chunk.P[i] - rest[i].cast<double>()).squaredNorm();
         }
         return true;
-    }
-
-private:
-    static Strided<float> masses_of(const Chunk& chunk)
-    {
-        static constexpr float unit = 1;
-        const auto* masses = chunk.points.find<float>("mass");
-        return masses ? masses->read() : Strided<float>{&unit, 0};
     }
 };
 RAPID_NODE(Spring);

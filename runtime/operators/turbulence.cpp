@@ -1,4 +1,4 @@
-// turbulence: an acceleration that swirls and neither gathers nor spreads points.
+// turbulence: a divergence-free random acceleration.
 //
 //   a = amplitude curl_noise(P / size, speed time)        (noise.h; Bridson et al. 2007)
 #include "runtime/graph/node.h"
@@ -10,23 +10,23 @@ namespace {
 class TurbulentForce : public Force {
 public:
     PerPoint<float> amplitude;
-    double size = 1, speed = 0;
+    double size, speed;
     NoiseOptions noise;
 
     void contribute(const Chunk& chunk, Forces& forces) const override
     {
         const Strided<float> strength = chunk.read(amplitude);
-        std::vector<Vec3d> places(chunk.size()), curl(chunk.size());
+        std::vector<Vec3d> scaled(chunk.size()), curl(chunk.size());
         const double* P = coordinates(chunk.P);
-        double* place = places.data()->data();
-        for (std::size_t l = 0; l < 3 * chunk.size(); ++l) place[l] = P[l] / size;
-        // Points of one age have one time, so they are asked for together; newborn ones have their own.
+        double* x = scaled.data()->data();
+        for (std::size_t l = 0; l < 3 * chunk.size(); ++l) x[l] = P[l] / size;
+        // All at once for points of the same time; newborn points have times of their own.
         for (std::size_t begin = 0; begin < chunk.size();) {
             std::size_t end = begin + 1;
             while (end < chunk.size() && chunk.time[end] == chunk.time[begin]) ++end;
             NoiseOptions now = noise;
             now.time = speed * chunk.time[begin];
-            curl_noise(std::span<const Vec3d>(places).subspan(begin, end - begin), now,
+            curl_noise(std::span<const Vec3d>(scaled).subspan(begin, end - begin), now,
                        std::span(curl).subspan(begin, end - begin));
             begin = end;
         }

@@ -1,6 +1,6 @@
-// vortex: around an axis.
+// vortex: a force around an axis.
 //
-//   a = strength (axis × r) / |r|        r: from the axis, square to it; 0 on the axis
+//   a = strength (axis × r) / |r|        r: from the axis, perpendicular to it; 0 on the axis
 #include "runtime/graph/node.h"
 
 namespace rapid {

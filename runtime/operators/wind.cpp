@@ -1,6 +1,6 @@
-// wind: air that moves, and takes points along.
+// wind: the drag of moving air.
 //
-//   a = -drag (v - velocity)        treated exactly, at any step: no drag is too stiff
+//   a = -drag (v - velocity)        exact at any step: no drag is too stiff
 #include "runtime/graph/node.h"
 
 namespace rapid {

@@ -1,6 +1,6 @@
-// write: hands the points, as they are here, to be written to a file of each frame; they go on unchanged.
+// write: writes the points to a file for each frame, and passes them on unchanged.
 //
-// At the first frame it writes too, wherever it stands in the chain: a sequence of files begins where the frames do.
+// It also writes the first frame, wherever it is in the chain, so that a sequence of files begins with the frames.
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
 

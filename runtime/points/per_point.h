@@ -30,7 +30,15 @@ struct PerPoint {
     }
 };
 
-// The radii of points, m: those that are given, else the attribute pscale where the points have it, else 0. Valid as
+// The masses of points, kg: the attribute mass where the points have it, else 1. Valid while that column stays.
+inline Strided<float> masses_of(const PointSet& points)
+{
+    static constexpr float unit = 1;
+    const auto* masses = points.find<float>("mass");
+    return masses ? masses->read() : Strided<float>{&unit, 0};
+}
+
+// The radii of points, m: those given, else the attribute pscale where the points have it, else 0. Valid as
 // PerPoint::read() is.
 inline Strided<float> radii_of(const std::optional<PerPoint<float>>& given, const PointSet& points)
 {

@@ -20,7 +20,7 @@ struct Table {
 
 Table& table()
 {
-    static Table all;  // before what is defined while the program starts
+    static Table all;  // function-local: used during static initialisation
     return all;
 }
 
@@ -35,7 +35,7 @@ std::filesystem::path library()
 {
     Dl_info here{};
     dladdr(reinterpret_cast<const void*>(&load_deferred), &here);
-    // What a link names, as the two lie side by side.
+    // The target of a symbolic link: the two libraries are in the same folder.
     std::error_code missing;
     const auto file = std::filesystem::canonical(here.dli_fname ? here.dli_fname : "", missing);
     return file.parent_path() / RAPID_DEFERRED_LIBRARY;

@@ -1,12 +1,12 @@
 // Functions of the deferred part of the library: all that needs OpenVDB or Assimp. It is a library of its own
-// (rapid_deferred), which is loaded when one of them is first called: to resolve OpenVDB's 60,000 symbols takes the
-// system 40 ms, at each start, and a scene without level sets, meshes from files and .vdb needs none of them.
+// (rapid_deferred), which is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols takes
+// 40 ms at each start, and a scene without level sets, meshes from files and .vdb needs none of them.
 //
-// Declared in the header of what it is about:
+// A function is declared in the header of its subject:
 //
 //   RAPID_DEFERRED(level_set_sphere, LevelSetPtr(double radius));
 //
-// and defined in a source that includes OpenVDB or Assimp, which by that is of the deferred part (RapidLayer.cmake):
+// and defined in a source that includes OpenVDB or Assimp, and so belongs to the deferred part (RapidLayer.cmake):
 //
 //   const bool defined = level_set_sphere.define([](double radius) -> LevelSetPtr { ... });
 #pragma once
@@ -16,16 +16,16 @@
 
 namespace rapid {
 
-// From any thread; does nothing when it is loaded. Error: the library is not beside this one, or can't be loaded.
+// Loads the deferred part, once; from any thread. Error: the library is not beside this one, or can't be loaded.
 void load_deferred();
 
-// By name, as a program and the libraries in it may each have a Deferred of it.
+// The deferred functions, by name: a program and its libraries may each have a Deferred object of the same function.
 class DeferredFunctions {
 public:
     using Any = void (*)();
 
-    static void define(const char* name, Any function);  // while the part is loaded
-    // Error: as of load_deferred(); a part of another Rapid, which has no such function.
+    static void define(const char* name, Any function);  // called while the deferred part is loaded
+    // Error: as load_deferred(); the part is of another version, without this function.
     static Any find(const char* name);
 };
 

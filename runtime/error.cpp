@@ -52,7 +52,8 @@ std::string lower_case(std::string_view text)
     return lower;
 }
 
-// Optimal string alignment: insert, delete, replace, swap neighbours ("linaer" is one step from "linear").
+// Optimal string alignment distance: insertions, deletions, replacements and transpositions ("linaer" is one step from
+// "linear").
 std::size_t edit_distance(std::string_view a, std::string_view b)
 {
     std::vector<std::size_t> before, above(b.size() + 1), row(b.size() + 1);

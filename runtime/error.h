@@ -1,9 +1,9 @@
-// What a user can cause: an exception that says what is wrong, where, and what would be right.
+// Errors that a user can cause: exceptions that say what is wrong, where, and what would be right.
 //
 //   FILE:LINE: node "NAME": what is wrong; what would be right
 //
-// It is thrown where the fault is known and given its node, file and line as it rises. What only a bug of Rapid can
-// cause is RAPID_ASSERT.
+// An Error is thrown where the fault is found, and gets its node, file and line as it propagates. Faults that only a
+// bug of Rapid can cause are for RAPID_ASSERT.
 #pragma once
 
 #include <exception>
@@ -22,11 +22,11 @@ class Error : public std::exception {
 public:
     explicit Error(std::string message) : message_(std::move(message)) { compose(); }
 
-    // Each fills in what is not known yet: the place nearest to the fault is the one that is kept.
+    // Each sets what is not set yet: the location nearest to the fault is kept.
     Error& at(const Location& location);
     Error& in_node(std::string_view name);
 
-    // For --verbose alone: the script's call stack.
+    // Only for --verbose: the call stack of the script.
     Error& with_trace(std::string trace);
 
     const char* what() const noexcept override { return text_.c_str(); }
@@ -42,18 +42,18 @@ private:
     Location location_;
 };
 
-// The name among `names` that `name` was most likely meant to be: the smallest edit distance, upper and lower case
-// alike, if that is at most a third of its length (at least 1) and leaves something of both. Empty when none is near.
+// The name among `names` that `name` was probably meant to be: the one with the smallest edit distance, regardless of
+// case, if that is at most a third of its length (at least 1) and less than the longer of both. Empty if none is near.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& names);
 
-// `; did you mean "NEAREST"?`, or nothing.
+// `; did you mean "NEAREST"?`, or an empty string.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& names);
 
 [[noreturn]] void assertion_failed(const char* condition, const char* file, int line);
 
 }  // namespace rapid
 
-// On in debug, sanitizer and RelWithDebInfo builds.
+// Active in debug, sanitizer and RelWithDebInfo builds.
 #ifdef RAPID_ASSERTIONS
 #define RAPID_ASSERT(condition) ((condition) ? void() : ::rapid::assertion_failed(#condition, __FILE__, __LINE__))
 #else

@@ -6,16 +6,16 @@
 
 namespace rapid {
 
-// The instant that a parameter, kernel, node or motion is asked for. time = (number - start) / fps, dt = 1 / fps (of a
-// sub-frame, its part), from the frame's number, never from a sum.
+// The instant at which a parameter, kernel, node or motion is evaluated. time = (number - start) / fps and dt = 1 / fps
+// (its part for a sub-frame) are computed from the frame's number, never from a sum.
 struct Frame {
-    double number = 1;  // whole except where a motion is asked between frames
+    double number = 1;  // whole, except for a motion between frames
     double time = 0;    // s
     double dt = 0;      // s
 };
 
-// Which time a simulation's frames have, and its steps: a frame has `subframes` of them, each of which evaluates the
-// whole graph. They are counted from `start` on, so that with one a frame a step is a frame.
+// The times of a simulation's frames and steps. A frame has `subframes` steps, each of which evaluates the whole graph.
+// Steps are counted from `start` on, so that with one per frame a step is a frame.
 struct FrameClock {
     double fps = 24;
     std::int64_t start = 1;  // the frame, and the step, at time 0
@@ -26,7 +26,7 @@ struct FrameClock {
     {
         return {number, (number - static_cast<double>(start)) / fps, 1 / steps_per_second()};
     }
-    // What ends with a step. Time is that of a whole number of steps.
+    // The end of a step. Its time is computed from the whole number of steps.
     Frame at_step(std::int64_t step) const
     {
         const auto passed = static_cast<double>(step - start);
@@ -36,7 +36,7 @@ struct FrameClock {
     {
         return start + std::llround((frame.number - static_cast<double>(start)) * subframes);
     }
-    // The step that ends with a frame.
+    // The step at the end of a frame.
     std::int64_t step_of(std::int64_t frame) const { return start + (frame - start) * subframes; }
     bool is_whole(std::int64_t step) const { return (step - start) % subframes == 0; }
 };

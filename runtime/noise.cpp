@@ -1,21 +1,21 @@
 #include "runtime/noise.h"
 
-#pragma GCC diagnostic ignored "-Wpsabi"  // vectors are passed within this file alone
+#pragma GCC diagnostic ignored "-Wpsabi"  // vectors are passed only within this file
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 
-// A cell's corners are one long piece of code without branches: by g++'s own order a third of it is spent on values
-// that no longer fit into registers.
+// The corners of a cell are a long piece of code without branches: in g++'s default order, a third of it spills
+// registers.
 #pragma GCC optimize("schedule-insns", "sched-pressure")
 
 namespace rapid {
 namespace {
 
-// The same text computes one point, or eight with the processor's vectors (types of g++ and clang; a machine without
-// vectors of that length gets several short ones).
+// The same code computes one point, or eight in SIMD vectors (types of g++ and clang; a machine without vectors of that
+// length gets several short ones).
 struct One {
     static constexpr std::size_t size = 1;
     using Real = double;
@@ -36,7 +36,7 @@ struct Eight {
     static Words wide(const Bits& bits) { return __builtin_convertvector(bits, Words); }
 };
 
-// Wellons' lowbias32: each bit of x changes each bit of the result in close to half of all cases.
+// Wellons' lowbias32: each bit of x changes each bit of the result in nearly half of all cases.
 template <class Bits>
 inline Bits mixed(Bits x)
 {
@@ -48,7 +48,7 @@ inline Bits mixed(Bits x)
     return x;
 }
 
-// One axis of a cell: the lattice number below x, how far x lies above it, and the weight of the corner above,
+// One axis of a cell: the lattice index below x, the fraction f of x above it, and the weight of the corner above,
 // s = f³ (f (6f - 15) + 10), whose first and second derivatives vanish at both corners.
 template <class Lane>
 struct Axis {
@@ -58,25 +58,25 @@ struct Axis {
     Axis() = default;
     explicit Axis(const typename Lane::Real& x)
     {
-        // Adding 1.5 · 2⁵² leaves the nearest whole number in the low bits; no conversion, so no x is out of range.
+        // Adding 1.5 · 2⁵² leaves the nearest integer in the low bits; without a conversion, no x is out of range.
         constexpr double whole = 0x1.8p52;
         typename Lane::Real below = (x + whole) - whole;
         below = below > x ? below - 1.0 : below;
         corner = Lane::low(std::bit_cast<typename Lane::Words>(below + whole));
         f = x - below;
-        f = f * f < 1.0 ? f : f - f;  // beyond 2⁵¹ numbers have no fractions left; NaN stays
+        f = f * f < 1.0 ? f : f - f;  // beyond 2⁵¹ numbers have no fractions; NaN stays
         s = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
         slope = f * f * (f * (f * 30.0 - 60.0) + 30.0);
     }
 };
 
-// A lattice corner's gradient in place and time: three of its four components are 1 or -1, one is 0. Six bits choose
-// it. (In a plane of time that leaves the middles of a cube's edges, as Perlin has them, and its corners.)
+// The gradient of a lattice corner in space and time: three of its four components are 1 or -1, one is 0, chosen by six
+// bits. (At a fixed time these are the midpoints of a cube's edges, as Perlin's, and its corners.)
 template <int axes>
 inline void gradient_of(const Eight::Words& bits, Eight::Real (&g)[4])
 {
 #if defined(__AVX512F__) && !defined(__clang__)
-    // Looked up in registers, by the two bits that choose the 0 and the axis' own.
+    // Looked up in registers, by the two bits that choose the 0 and the bit of the axis.
     constexpr Eight::Real minus = {-1, -1, -1, -1, 1, 1, 1, 1};
     const auto with_0_at = [&](int at) {
         Eight::Real values = minus;
@@ -99,7 +99,7 @@ inline void gradient_of(const Eight::Words& bits, Eight::Real (&g)[4])
 #endif
 }
 
-// The same; one point looks it up.
+// The same for one point, from a table.
 template <int axes>
 inline void gradient_of(One::Words bits, double (&g)[4])
 {
@@ -113,7 +113,7 @@ inline void gradient_of(One::Words bits, double (&g)[4])
     std::copy_n(table[bits & 63].begin(), axes, g);
 }
 
-constexpr double roughness = 0.5;  // strength of an octave, in that of the one before
+constexpr double roughness = 0.5;  // amplitude of an octave relative to the one before
 
 struct Octave {
     double amount, fineness, shift;
@@ -121,7 +121,7 @@ struct Octave {
     Axis<One> time;
 };
 
-// Value and gradient of a noise at x, w; added to what is there.
+// Adds the value and the gradient of an octave at x.
 inline void add_octave(const double (&x)[3], const Octave& octave, double& value, double (&gradient)[3])
 {
     const Axis<One>& time = octave.time;
@@ -149,8 +149,8 @@ inline void add_octave(const double (&x)[3], const Octave& octave, double& value
     }
 }
 
-// The curl at x, w of an octave of three noises on one lattice, summed over the corners of the cell: of each the curl
-// of its gradients, and how its weight changes across its values.
+// The curl at x of an octave of three noises on one lattice, summed over the corners of the cell: the curl of the
+// corner's gradients by its weight, and the gradient of the weight crossed with the corner's values.
 template <class Lane, bool moves>
 inline void curl_of_octave(const typename Lane::Real (&x)[3], const Octave& octave, typename Lane::Real (&curl)[3])
 {
@@ -158,7 +158,7 @@ inline void curl_of_octave(const typename Lane::Real (&x)[3], const Octave& octa
     using Real = typename Lane::Real;
     using Bits = typename Lane::Bits;
     const Axis<Lane> axes[3] = {Axis<Lane>(x[0]), Axis<Lane>(x[1]), Axis<Lane>(x[2])};
-    Real to[2][3];  // from the corner below, and from that above
+    Real to[2][3];  // offsets from the corner below, and from the one above
     for (int axis = 0; axis < 3; ++axis) to[0][axis] = axes[axis].f, to[1][axis] = axes[axis].f - 1.0;
 
     for (std::uint32_t dw = 0; dw < (moves ? 2u : 1u); ++dw) {
@@ -200,7 +200,7 @@ inline void curl_of_octave(const typename Lane::Real (&x)[3], const Octave& octa
     }
 }
 
-// What is the same at all places.
+// The octaves of a field.
 class Octaves {
 public:
     explicit Octaves(const NoiseOptions& options) : size_(options.octaves)
@@ -224,19 +224,19 @@ private:
     std::array<Octave, NoiseOptions::most_octaves> all_;
 };
 
-// Where a place is in an octave's lattice.
+// A position in the lattice of an octave.
 template <class Lane>
 inline void place_in(const Octave& octave, const typename Lane::Real (&P)[3], typename Lane::Real (&x)[3])
 {
     for (int axis = 0; axis < 3; ++axis) x[axis] = P[axis] * octave.fineness + (axis + 1) * octave.shift;
 }
 
-// 1 + r + r² + ... of n octaves.
+// 1 + r + r² + ..., n terms.
 double geometric(double r, int n) { return (1 - std::pow(r, n)) / (1 - r); }
 
-// Above what any choice of gradients gives at any place of a cell: 1.5366, found by climbing from 3,000 places.
+// An upper bound for any choice of gradients and any position in a cell: 1.5366 by hill climbing from 3,000 positions.
 constexpr double largest_value = 1.54;
-// Root mean square length of the curl of one octave at whole times, measured over 3 · 10⁶ places.
+// Root mean square length of the curl of one octave at whole times, measured at 3 · 10⁶ positions.
 constexpr double curl_length = 1.83;
 
 double curl_scale(const NoiseOptions& options)
@@ -244,7 +244,7 @@ double curl_scale(const NoiseOptions& options)
     return 1 / (curl_length * std::sqrt(geometric(roughness * roughness, options.octaves)));
 }
 
-// The curl of the octaves' potentials. Each octave's potential is as much weaker as it is finer, so that its curl is
+// The curl of the octaves' potentials. The potential of an octave weakens as it gets finer, so that its curl is
 // `roughness` times that of the one before.
 template <class Lane>
 inline void curl_of(const typename Lane::Real (&P)[3], const Octaves& octaves, double scale,
@@ -290,7 +290,7 @@ void curl_noise(std::span<const Vec3d> P, const NoiseOptions& options, std::span
 {
     const Octaves octaves(options);
     const double scale = curl_scale(options);
-    // Axis by axis for some vectors at a time: what has just been written one by one is slow to load as a vector.
+    // Transposed in blocks of several vectors: elements that were just stored one by one are slow to load as a vector.
     constexpr std::size_t block = 8 * Eight::size;
     Eight::Real x[3][8] = {}, result[3][8];
     for (std::size_t first = 0; first < P.size(); first += block) {

@@ -1,5 +1,5 @@
-// What a graph's parameters can hold besides numbers and text: shapes, meshes, point sets, motions, functions. Made
-// once, never changed, shared between nodes, states and threads.
+// Objects as values of parameters: shapes, meshes, point sets, motions, functions. Immutable, and shared between nodes,
+// states and threads.
 #pragma once
 
 #include <memory>
@@ -12,10 +12,10 @@ public:
     static constexpr std::string_view param_type = "object";
     virtual ~Object() = default;
 
-    // What it is called in messages: "mesh", "level set", "shape", "points", "motion", "function".
+    // Its name in messages: "mesh", "level set", "shape", "points", "motion", "function".
     virtual std::string_view kind() const = 0;
 
-    // Whether it is another at each time: a motion that is not constant, and what such a motion moves.
+    // Whether it changes with time: a motion that is not constant, and an object that it moves.
     virtual bool varies() const { return false; }
 };
 

@@ -1,4 +1,4 @@
-// Loops over points in chunks of a fixed size, so that what a chunk holds never depends on the number of threads.
+// Parallel loops over points in chunks of a fixed size, so that chunks do not depend on the number of threads.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -10,10 +10,10 @@
 
 namespace rapid {
 
-// Points a chunk: its columns (P, v in double, a few floats) stay in a 1 MiB second-level cache.
+// Points per chunk: its columns (P, v in double, a few floats) fit into a 1 MiB second-level cache.
 constexpr std::size_t chunk_size = 4096;
 
-// Calls f(begin, end) for each chunk of [0, n), in parallel, in no order. f may throw: the first exception is rethrown.
+// Calls f(begin, end) for each chunk of [0, n), in parallel and in any order. The first exception of f is rethrown.
 template <class F>
 void for_each_chunk(std::size_t n, const F& f, std::size_t size = chunk_size)
 {

@@ -4,7 +4,7 @@
 
 namespace rapid {
 
-// Philox's rounds, for several items side by side so that the compiler can use vectors: 4 times as fast as one by one.
+// Philox for several items side by side, which the compiler vectorises: 4 times as fast as one by one.
 void uniform4(RandomKey key, std::uint64_t first, std::uint64_t use, std::span<std::array<double, 4>> out)
 {
     constexpr std::size_t lanes = 16;

@@ -1,5 +1,5 @@
-// Counter-based random numbers (Philox4x32-10 of Salmon et al. 2011, Random123): a number depends on its key and
-// counter alone, never on what was drawn before it, by which thread, or on which machine.
+// Counter-based random numbers (Philox4x32-10, Salmon et al. 2011, Random123): a number depends only on its key and
+// counter, not on earlier draws, on the thread, or on the machine.
 #pragma once
 
 #include <Random123/philox.h>
@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// The stream of one node of a simulation: (seed, the node's name). Inserting a node changes no other node's stream.
+// The random stream of a node: of (seed, name), so that inserting a node changes no other stream.
 struct RandomKey {
     std::uint64_t value = 0;
 
@@ -27,8 +27,8 @@ struct RandomKey {
     }
 };
 
-// Four independent numbers, uniform in [0, 1) with 32 bits each, for the item (a point's id, a birth's number) and the
-// use (which question is asked of it).
+// Four independent numbers, uniform in [0, 1) with 32 bits each, for an item (the id of a point, the number of a birth)
+// and a use (what they decide about it).
 inline std::array<double, 4> uniform4(RandomKey key, std::uint64_t item, std::uint64_t use)
 {
     r123::Philox4x32 philox;

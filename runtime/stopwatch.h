@@ -1,4 +1,4 @@
-// How long something takes, for reports: never for a decision.
+// Wall time, for reports but never for decisions.
 #pragma once
 
 #include <chrono>

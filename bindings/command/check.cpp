@@ -68,7 +68,7 @@ private:
     static std::string advice_on(const Plan& plan)
     {
         try {
-            return advice(Evaluator(plan).try_out());
+            return advice(Evaluator(plan).examine_stiffness());
         } catch (const Error&) {
             return "";
         }

@@ -1,7 +1,7 @@
-// The ids that points of one simulation have in another, where a merge takes them in.
+// The ids of points of one simulation in another, which has adopted them by a merge.
 //
-// A point keeps the id that it was given when it was first seen, in every later frame and through every merge. Points
-// are born and seen in runs of neighbouring ids, so the table holds runs: a few words a frame, not eight bytes a point.
+// A point keeps its adopted id in every later frame and through every merge. Points are born in runs of consecutive
+// ids, so the table holds runs: a few words per frame, not eight bytes per point.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace rapid {
 
 class AdoptedIds {
 public:
-    // The id here of the point `id` there. `next` is the next free id here; one that is seen first takes it.
+    // The adopted id of the point `id` of the other simulation. A new point takes `next`, the next free id here.
     std::int64_t of(std::int64_t id, std::int64_t& next)
     {
         if (last_ < runs_.size() && runs_[last_].holds(id)) return runs_[last_].of(id);
@@ -35,15 +35,15 @@ public:
 
 private:
     struct Run {
-        std::int64_t first, size;  // there
-        std::int64_t adopted;      // here, of the first
+        std::int64_t first, size;  // in the other simulation
+        std::int64_t adopted;      // id here of the first
 
         bool holds(std::int64_t id) const { return id >= first && id < first + size; }
         std::int64_t of(std::int64_t id) const { return adopted + (id - first); }
     };
 
     std::vector<Run> runs_;  // in order of `first`
-    std::size_t last_ = 0;   // where the last question was answered: the next one is mostly beside it
+    std::size_t last_ = 0;   // run of the last query, which mostly holds the next one too
 };
 
 }  // namespace rapid

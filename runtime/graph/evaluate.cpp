@@ -6,35 +6,12 @@
 #include <utility>
 
 #include "runtime/at_node.h"
+#include "runtime/graph/arguments.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/undeclared_columns.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
-
-void FrameFigures::go_on(FrameFigures later)
-{
-    later.born += born;
-    later.died += died;
-    later.collisions += collisions;
-    later.contact_limit += contact_limit;
-    later.beyond_tolerance = std::max(later.beyond_tolerance, beyond_tolerance);
-    later.trapped = std::max(later.trapped, trapped);
-    later.substeps = std::max(later.substeps, substeps);
-    later.contact_energy += contact_energy;
-    for (const BandFigures& band : bands) {
-        const auto same = std::find_if(later.bands.begin(), later.bands.end(),
-                                       [&](const BandFigures& other) { return other.node == band.node; });
-        if (same == later.bands.end())
-            later.bands.push_back(band);
-        else
-            same->seconds += band.seconds;
-    }
-    later.stiff.insert(later.stiff.begin(), stiff.begin(), stiff.end());
-    later.script_seconds += script_seconds;
-    later.solve_seconds += solve_seconds;
-    *this = std::move(later);
-}
 
 Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
     : plan_(plan),
@@ -64,7 +41,7 @@ FrameResult Evaluator::advance()
     std::vector<std::size_t> readers;
     // The first frame has no interval before it.
     for (int left = next_ <= plan_.first_frame() ? 0 : subframes_ - 1; left >= 0; --left)
-        take(left, results, readers, result);
+        advance_subframe(left, results, readers, result);
 
     for (const auto& [name, i] : plan_.outputs) {
         const Simulation& simulation = *simulations_[plan_.nodes[i].simulation];
@@ -79,18 +56,19 @@ FrameResult Evaluator::advance()
     return result;
 }
 
-std::vector<Stiffness> Evaluator::try_out()
+std::vector<Stiffness> Evaluator::examine_stiffness()
 {
     for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->trial = true;
     advance();
     return advance().figures.stiff;
 }
 
-void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame)
+void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,
+                                 FrameResult& frame)
 {
     const auto takes_part = [&](const PlannedNode& planned) { return left == 0 || planned.in_loop; };
 
-    // Functions of the frame are asked first, on this thread; what a column's fallback is may depend on them.
+    // Functions of the frame are called first, on this thread; the fallbacks of columns may depend on them.
     for (const PlannedNode& planned : plan_.nodes) {
         if (!takes_part(planned) || (planned.once && next_ > plan_.first_frame())) continue;
         const Simulation& simulation = *simulations_[planned.simulation];
@@ -112,18 +90,18 @@ void Evaluator::take(int left, std::vector<Flow>& results, std::vector<std::size
     for (std::size_t first = 0, last = 0; first < plan_.nodes.size(); first = last + 1) {
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
-        // Whoever is told of each result is told of each node by itself.
+        // The result hook and checked declarations take one node after the other.
         if (!result_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);
     }
-    before.go_on(std::move(frame.figures));
+    before.append(std::move(frame.figures));
     frame.figures = std::move(before);
 }
 
-// What a node is told, with what that refers to.
-class Evaluator::Told {
+// A node's Evaluation, with the objects that it refers to.
+class Evaluator::Context {
 public:
-    Told(const Evaluator& evaluator, const PlannedNode& planned, int left, FrameResult& frame)
+    Context(const Evaluator& evaluator, const PlannedNode& planned, int left, FrameResult& frame)
         : simulation_(*evaluator.simulations_[planned.simulation]),
           step_(simulation_.clock().step_of(evaluator.next_) - left),
           now_(simulation_.frame(std::max(step_, simulation_.start)))
@@ -132,15 +110,15 @@ public:
             write_ = [&](const std::string& pattern, const PointSet& points) {
                 evaluator.write_(pattern, points, now_, simulation_.fps);
             };
-        // A simulation that begins at this frame's end, or later, has begun once.
+        // A simulation that begins at the end of this frame, or later, is counted once.
         const bool at_start = step_ <= simulation_.start;
         evaluation.emplace(Evaluation{now_, at_start, planned.node->name, planned.node->location,
                                       RandomKey(simulation_.seed, planned.node->name),
-                                      left > 0 && at_start ? again_ : frame.figures, frame.warnings, write_,
+                                      left > 0 && at_start ? repeated_ : frame.figures, frame.warnings, write_,
                                       &evaluator.plan_.simulations[planned.simulation].left_out});
     }
-    Told(const Told&) = delete;
-    Told& operator=(const Told&) = delete;
+    Context(const Context&) = delete;
+    Context& operator=(const Context&) = delete;
 
     std::optional<Evaluation> evaluation;
 
@@ -148,7 +126,7 @@ private:
     const Simulation& simulation_;
     const std::int64_t step_;
     const Frame now_;
-    FrameFigures again_;
+    FrameFigures repeated_;  // of a start that is evaluated more than once
     std::function<void(const std::string&, const PointSet&)> write_;
 };
 
@@ -164,8 +142,8 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
         inputs.push_back(--readers[input] == 0 ? std::move(results[input]) : results[input]);
     if (node.type->kind == NodeKind::Source) inputs.push_back({PointSet(), {}, simulations_[planned.simulation]});
 
-    const Told told(*this, planned, left, frame);
-    const Evaluation& evaluation = *told.evaluation;
+    const Context context(*this, planned, left, frame);
+    const Evaluation& evaluation = *context.evaluation;
     return at_node(node.name, node.location, [&] {
         const Stopwatch stopwatch;
         std::optional<UndeclaredColumns> undeclared;
@@ -205,11 +183,11 @@ std::vector<Uses> Evaluator::declared_for(std::size_t node) const
 
 void Evaluator::edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame)
 {
-    std::deque<Told> told;
+    std::deque<Context> contexts;
     std::vector<const Evaluation*> now;
     std::vector<const PointEdit*> edits;
     for (std::size_t i = first; i <= last; ++i) {
-        now.push_back(&*told.emplace_back(*this, plan_.nodes[i], left, frame).evaluation);
+        now.push_back(&*contexts.emplace_back(*this, plan_.nodes[i], left, frame).evaluation);
         edits.push_back(plan_.nodes[i].op->as_point_edit());
     }
     rapid::edit_together(edits, now, points);

@@ -1,9 +1,9 @@
 // Runs a plan, frame by frame.
 //
-// At each frame the nodes are evaluated in the order of the plan; a result goes to its last reader without a copy, and
-// what never changes is evaluated once; neighbouring edits go over the points together. At the first frame the nodes
-// between Create and Solve do not run. With sub-frames all that is upstream of a Solve is evaluated so many times a
-// frame, and what comes after it once, at the frame's end.
+// At each frame the nodes are evaluated in the order of the plan. A result goes to its last reader without a copy; a
+// result that never changes is computed once; neighbouring edits are fused into one pass. At the first frame the nodes
+// between Create and Solve do not run. With sub-frames, the nodes upstream of a Solve are evaluated once per sub-frame,
+// and those after it once, at the end of the frame.
 #pragma once
 
 #include <functional>
@@ -27,12 +27,12 @@ struct FrameResult {
 
 class Evaluator {
 public:
-    // Hands on what `:write` nodes write; empty where nothing may be written. `frame` is the frame of that node's
-    // simulation.
+    // Receives the sets that `:write` nodes write, with the frame of the node's simulation; empty where nothing may be
+    // written.
     using WriteHook =
         std::function<void(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)>;
 
-    // Told of each node's result.
+    // Receives the result of each node.
     using ResultHook = std::function<void(const Node& node, std::int64_t frame, const PointSet& points)>;
 
     explicit Evaluator(const Plan& plan, WriteHook write = {}, ResultHook result = {});
@@ -44,24 +44,25 @@ public:
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
 
-    // Computes the next frame. The result shares its columns with the state: let go of it before the next call, where a
-    // copy is to be avoided. Error: whatever a node throws, with its name and place; the evaluator is then at its end.
+    // Computes the next frame. The result shares its columns with the state: release it before the next call to avoid a
+    // copy. Error: of a node, with its name and location; the evaluator can't be used afterwards.
     FrameResult advance();
 
-    // What is stiff in the first frame after the start, of a few births and the initial points, which Solve leaves
-    // where they are. Nothing else is done with the evaluator then. Error: as advance().
-    std::vector<Stiffness> try_out();
+    // The stiffness in the first frame after the start, of a few newborn and the initial points, which Solve does not
+    // move. The evaluator can't be used afterwards. Error: as advance().
+    std::vector<Stiffness> examine_stiffness();
 
 private:
-    // A step of the next frame, `left` steps before its end. The results of the nodes, and who has not read them yet.
-    void take(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);
-    // The nodes from first to last: several where they go together (Plan::last_together). The result of the last.
+    // Evaluates a sub-frame of the next frame, `left` sub-frames before its end. results: by node; readers: of each
+    // result, those that have not taken it yet.
+    void advance_subframe(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);
+    // Evaluates the nodes from first to last: several if they are fused (Plan::last_together). Returns the last result.
     Flow evaluate(std::size_t first, std::size_t last, int left, std::vector<Flow>& results,
                   std::vector<std::size_t>& readers, FrameResult& frame);
     // What a node may use: for a Solve, also what the dynamics upstream of it do.
     std::vector<Uses> declared_for(std::size_t node) const;
     void edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame);
-    class Told;
+    class Context;
 
     const Plan& plan_;
     WriteHook write_;
@@ -70,7 +71,7 @@ private:
     int subframes_ = 1;  // of all simulations
     bool checks_declarations_ = false;
     std::vector<std::shared_ptr<Simulation>> simulations_;
-    std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once
+    std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once, by node
 };
 
 }  // namespace rapid

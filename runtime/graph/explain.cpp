@@ -12,7 +12,7 @@ namespace {
 struct StageWords {
     Stage stage;
     const char* name;
-    const char* absent;  // why a plan lacks it
+    const char* absent;  // the reason where a plan lacks it
 };
 
 constexpr StageWords stage_words[] = {
@@ -40,17 +40,17 @@ bool needs(const Node& node, Stage stage)
     return std::find(node.type->stages.begin(), node.type->stages.end(), stage) != node.type->stages.end();
 }
 
-std::string list_of(const Plan& plan, const std::vector<std::size_t>& places)
+std::string list_of(const Plan& plan, const std::vector<std::size_t>& nodes)
 {
     std::vector<std::string> names;
-    for (const std::size_t place : places) names.push_back(plan.nodes[place].node->name);
+    for (const std::size_t i : nodes) names.push_back(plan.nodes[i].node->name);
     return fmt::format("{}", fmt::join(names, ", "));
 }
 
 // "swirl reads it", "swirl, solve1 read it".
-std::string done_by(const Plan& plan, const std::vector<std::size_t>& places, std::string_view verb)
+std::string done_by(const Plan& plan, const std::vector<std::size_t>& nodes, std::string_view verb)
 {
-    return fmt::format("{} {}{} it", list_of(plan, places), verb, places.size() == 1 ? "s" : "");
+    return fmt::format("{} {}{} it", list_of(plan, nodes), verb, nodes.size() == 1 ? "s" : "");
 }
 
 std::string why_kept(const Plan& plan, const PlannedAttribute& attribute)
@@ -136,7 +136,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
 
     for (const std::vector<std::size_t>& pass : plan.passes()) {
         std::vector<std::string>& names = result.passes.emplace_back();
-        for (const std::size_t place : pass) names.push_back(plan.nodes[place].node->name);
+        for (const std::size_t i : pass) names.push_back(plan.nodes[i].node->name);
     }
     return result;
 }

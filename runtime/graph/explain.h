@@ -1,6 +1,5 @@
-// A plan in words: each node, attribute and stage, kept or left out, and why.
-//
-// The reasons are those that the plan has recorded; nothing is reckoned anew.
+// A plan in words: each node, attribute and stage, whether it is kept, and why. The reasons are those that the plan has
+// recorded.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +15,16 @@ struct Explanation {
         std::string name, type;
         bool kept;
         std::string evaluated;  // "once", "every frame", "4 times a frame", "never"
-        std::string why;        // it is kept or left out
-        std::string changes;    // why it is evaluated every frame; empty for the others
+        std::string why;        // why it is kept or left out
+        std::string changes;    // why it is evaluated every frame; empty otherwise
     };
     struct ExplainedAttribute {
-        std::string name;        // of a group as group:NAME
+        std::string name;        // a group's is group:NAME
         std::string simulation;  // its create's name
         bool kept;
-        std::size_t bytes_per_point;  // 0 where it is left out; where all points share one value it takes none
+        std::size_t bytes_per_point;  // 0 where left out; a uniform column needs none
         std::string why;
-        std::string brought_in_by;  // what would; empty for what is kept
+        std::string brought_in_by;  // what would keep it; empty where it is kept
     };
     struct ExplainedStage {
         std::string name;
@@ -33,21 +32,21 @@ struct Explanation {
         std::string why;
     };
 
-    // In the order in which they were made; kept ones first.
+    // In order of creation, kept ones first.
     std::vector<ExplainedNode> nodes;
-    // By simulation; kept ones first, then in order of name.
+    // Kept ones first, by simulation and in order of name.
     std::vector<ExplainedAttribute> attributes;
     std::vector<ExplainedStage> stages;
     std::vector<std::vector<std::string>> passes;  // names of nodes
 
-    // Of the points of all simulations together, a point of each.
+    // The sum over all simulations.
     std::size_t bytes_per_point() const;
 };
 
-// What brings in an attribute that is left out, of almost all of them.
+// What makes most attributes live that are left out.
 std::string usual_way_in(const std::string& attribute);
 
-// outputs: what the run writes besides its `:write` nodes, as the user named it.
+// outputs: the files that the run writes besides those of `:write` nodes, as the user named them.
 Explanation explain(const Plan& plan, const std::vector<std::string>& outputs);
 
 }  // namespace rapid

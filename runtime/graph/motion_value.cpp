@@ -1,4 +1,4 @@
-// Motions as graphs give them: objects, functions of the frame, keys.
+// Reads a motion from a graph's value: an object, a function of the frame, or keys.
 #include <fmt/format.h>
 
 #include "runtime/graph/param.h"

@@ -112,7 +112,7 @@ struct FrameFigures {
     double script_seconds = 0, solve_seconds = 0;
 
     // Those of a frame's next part: what happens adds up, the worst stays, what holds at the end is the later's.
-    void go_on(FrameFigures later);
+    void append(FrameFigures later);
 };
 
 // What a node is told when it is evaluated.

@@ -44,7 +44,7 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
     Graph result;
     result.file = graph.file;
     std::map<const Node*, NodePtr> replaced;
-    for (const NodePtr& node : graph.nodes) {  // inputs come before what they feed
+    for (const NodePtr& node : graph.nodes) {  // inputs come before their consumers
         auto copy = std::make_shared<Node>(*node);
         for (NodePtr& input : copy->inputs) input = replaced.at(input.get());
         if (const auto found = changes.find(node.get()); found != changes.end())

@@ -1,4 +1,4 @@
-// The same graph with other arguments: what `--sweep solve.substeps=1,2,4` varies.
+// A graph with some arguments replaced, as `--sweep solve.substeps=1,2,4` does.
 #pragma once
 
 #include <map>
@@ -8,9 +8,9 @@
 
 namespace rapid {
 
-// `values` by NODE.PARAM, where NODE is a node's name, or its type where only one node has it. Nodes are values: those
-// named, and all that come after them, are new ones. Whether a node has the parameter is the plan's to say. Error: no
-// such node (with the nearest name), several of the type, no dot.
+// values: by NODE.PARAM, where NODE is the name of a node, or its type if no other node has it. Nodes are immutable:
+// the result has copies. The plan checks whether the node has the parameter. Error: no such node (with the nearest
+// name), several nodes of the type, no dot.
 Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& values);
 
 }  // namespace rapid

@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// "a number", "an integer"; names of several things ("points") and sentences go without.
+// "a number", "an integer"; plurals ("points") have no article.
 std::string with_article(std::string_view type)
 {
     for (const std::string_view plain : {"points", "attributes", "numbers by frame", "names"})
@@ -63,7 +63,7 @@ Int to_int(const Param& param, double value)
                                   static_cast<double>(std::numeric_limits<Int>::max())));
 }
 
-// The N numbers of a plain list; nothing for anything else.
+// The N numbers of a list; nothing for any other value.
 template <std::size_t N>
 std::optional<std::array<double, N>> numbers(const Value& value)
 {
@@ -136,7 +136,7 @@ void wrong_type(const Param& param, const Value& value)
 void out_of_range(const Param& param, double value)
 {
     std::string right = param.range.bounded() ? param.range.text() : "finite";
-    if (std::isfinite(value) && param.range.contains(value))  // too large for what holds it
+    if (std::isfinite(value) && param.range.contains(value))  // too large for float
         right = fmt::format("within ±{:.3g}", std::numeric_limits<float>::max());
     throw Error(fmt::format("{} = {} is out of range; it must be {}", param.name, value, right));
 }
@@ -233,7 +233,7 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
     check_attribute_name(param.name);
     const AttributeSpec* known = known_attribute(param.name);
 
-    // Lua has one kind of number: an unknown name's is a float, so that 1 and 1.5 make the same column.
+    // Lua has one type of number: that of an unknown name is a float, so that 1 and 1.5 give the same column.
     if (const double* number = value.get<double>(); number && (!known || known->fallback.index() != 1)) {
         if (known && std::holds_alternative<std::int32_t>(known->fallback)) {
             field = to_int<std::int32_t>(param, *number);
@@ -241,7 +241,7 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
         }
         Param finite = param;
         const float* ordinary = known ? std::get_if<float>(&known->fallback) : nullptr;
-        finite.range.infinity = ordinary && std::isinf(*ordinary);  // life: for ever
+        finite.range.infinity = ordinary && std::isinf(*ordinary);  // life may be infinite
         field = to_float(finite, checked(finite, *number));
         return;
     }

@@ -1,5 +1,5 @@
-// Parameters of nodes: each is written once, in the node's declaration, and its type, range, default, unit and
-// documentation are used by validation, by `rapid nodes` and by the editor's annotations.
+// Parameters of nodes. Each is declared once, with its type, range, default, unit and documentation, from which come
+// validation, `rapid nodes` and the annotations for editors.
 #pragma once
 
 #include <cmath>
@@ -23,7 +23,7 @@ struct Range {
     double lo = -std::numeric_limits<double>::infinity();
     double hi = std::numeric_limits<double>::infinity();
     bool lo_excluded = false;  // above lo, not at it
-    bool infinity = false;     // takes math.huge too; NaN is never in range
+    bool infinity = false;     // accepts math.huge too; NaN is never in range
 
     bool contains(double x) const { return (lo_excluded ? x > lo : x >= lo) && x <= hi; }
     bool bounded() const { return std::isfinite(lo) || std::isfinite(hi); }
@@ -37,24 +37,24 @@ inline Range between(double lo, double hi) { return {lo, hi}; }
 inline Range or_infinity(Range range) { return range.infinity = true, range; }
 
 struct Param {
-    std::string name, type;  // type as a user reads it: "number", "vec3", "shape", "one of begin, end"
+    std::string name, type;  // type for users: "number", "vec3", "shape"
     std::string unit, doc;
-    Value fallback;  // nil: the node decides, or does without
+    Value fallback;  // the default; nil: the field stays empty
     Range range;
     std::vector<std::string> choices;
     bool required = false;
-    bool per_point = false;       // takes rapid.attr
-    bool of_the_frame = true;     // takes a function of the frame
-    bool may_be_nil = false;      // at some frames, where it is a function
-    bool keeps_function = false;  // a function is itself the value: a motion asks it between frames too
-    bool internal = false;        // given by the host of the scripting language, not by users; not shown
+    bool per_point = false;       // accepts rapid.attr
+    bool of_the_frame = true;     // accepts a function of the frame
+    bool may_be_nil = false;      // such a function may return nil
+    bool keeps_function = false;  // the function itself is the value: a motion is called between frames too
+    bool internal = false;        // given by the host of the scripting language, and not shown to users
 
-    // Puts a value, which is no function, into the node's field. Error: wrong type, out of range; says what was found.
+    // Stores a value, which is not a function, in the node's field. Error: wrong type, out of range; with the value.
     std::function<void(const Param& self, void* fields, const Value& value)> assign;
 };
 
-// Reads a value into a field of type T, or throws an Error that names the parameter, what was found and what is right.
-// A node may add an overload for a type of its own, in namespace rapid, before its declaration.
+// Reads a value into a field, or throws an Error with the name of the parameter, the value and what would be right. A
+// node may add an overload for a type of its own, in namespace rapid, before its declaration.
 void read_value(const Param& param, const Value& value, double& field);
 void read_value(const Param& param, const Value& value, float& field);
 void read_value(const Param& param, const Value& value, int& field);
@@ -65,10 +65,10 @@ void read_value(const Param& param, const Value& value, Vec3f& field);
 void read_value(const Param& param, const Value& value, PerPoint<float>& field);
 void read_value(const Param& param, const Value& value, PerPoint<Vec3f>& field);
 void read_value(const Param& param, const Value& value, ObjectPtr& field);
-// A motion: an object, a function of the frame that returns one, or keys {[1] = m1, [24] = m2}, which are constants.
+// A motion: an object, a function of the frame that returns one, or keys {[1] = m1, [24] = m2} of constant motions.
 void read_value(const Param& param, const Value& value, MotionPtr& field);
-// An attribute's value; the parameter's name is the attribute's. A known name has its own type, any other the value's:
-// a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion. Error: a name that is Rapid's own (P, v, id, dt).
+// The value of an attribute, which has the name of the parameter. A known attribute has its type, any other that of the
+// value: a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion. Error: a reserved name (P, v, id, dt, ...).
 void read_value(const Param& param, const Value& value, AttributeValue& field);
 // Attribute values by name: {heat = 1, Cd = {1, .5, 0}}.
 void read_value(const Param& param, const Value& value, std::map<std::string, AttributeValue>& field);
@@ -77,7 +77,7 @@ void read_value(const Param& param, const Value& value, std::map<std::int64_t, d
 // Names: {"heat", "Cd"}, or one name.
 void read_value(const Param& param, const Value& value, std::vector<std::string>& field);
 
-// A table with names only, its values as they are.
+// A table with names only; values of any type.
 void read_value(const Param& param, const Value& value, std::map<std::string, Value>& field);
 
 template <class T>
@@ -100,7 +100,7 @@ void read_value(const Param& param, const Value& value, std::shared_ptr<const T>
     if (!field) wrong_type(param, value);
 }
 
-// What a field's type is called to a user.
+// The name of a field's type for users.
 template <class T>
 constexpr std::string_view param_type()
 {
@@ -134,7 +134,7 @@ constexpr std::string_view param_type()
         return T::element_type::param_type;  // a pointer to an object
 }
 
-// A list, each of its values read as its own.
+// A list, read value by value.
 template <class T>
 void read_value(const Param& param, const Value& value, std::vector<T>& field)
 {
@@ -146,11 +146,11 @@ void read_value(const Param& param, const Value& value, std::vector<T>& field)
     for (std::size_t i = 0; i < field.size(); ++i) read_value(param, table->list[i], field[i]);
 }
 
-// Sets all fields from arguments by name, and those that are not given from their defaults. Error: an unknown or
-// missing name, and what read_value throws.
+// Sets all fields from arguments by name, or from their defaults. Error: an unknown or missing name, and those of
+// read_value.
 void assign_arguments(const std::vector<Param>& params, const std::map<std::string, Value>& arguments, void* fields);
 
-// A parameter kept in a field of T. fallback: its default, in the unit that users give; degrees ("deg") are kept as
+// A parameter in a field of T. fallback: the default, in the unit that users give; degrees ("deg") are stored as
 // radians.
 template <class T, class F>
 Param param_of(F T::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What RAPID_PLUGIN has left in a file; empty where it has not.
+// The mark of RAPID_PLUGIN in a file; empty where there is none.
 std::string mark_of(const std::string& file)
 {
     std::ifstream in(file, std::ios::binary);
@@ -42,7 +42,7 @@ void load_plugin(const std::string& file)
     if (built != RAPID_ABI)
         throw Error(fmt::format("{}: the plugin was built for Rapid {}; this is Rapid {}: build it again", file, built,
                                 RAPID_ABI));
-    // With its folder, or the loader would look for it where libraries are.
+    // As an absolute path, or the loader would search the library folders.
     if (!dlopen(fs::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL)) {
         const char* why = dlerror();
         throw Error(fmt::format("{}: the plugin can't be loaded: {}", file, why ? why : "no reason given"));

@@ -1,12 +1,12 @@
-// Nodes from outside: a shared library, built against the installed package, whose nodes register themselves as it is
-// loaded (`--plugin FILE`, RAPID_PLUGIN_PATH) and are then as good as the native ones.
+// Plugins: shared libraries, built against the installed package, whose nodes register themselves when the library is
+// loaded (`--plugin FILE`, RAPID_PLUGIN_PATH), and are then like native ones.
 //
 //   #include "runtime/graph/plugin.h"
 //   RAPID_PLUGIN;          once, in one of its sources
 //   RAPID_NODE(MyNode);
 //
-// C++ has no stable layout across versions: a library that was built with other headers would crash in its first call.
-// RAPID_PLUGIN leaves a mark in the file that says which they were, and the file is read before it is loaded.
+// C++ has no stable binary layout across versions: a library built with other headers would crash in its first call.
+// RAPID_PLUGIN embeds a mark with a hash of the headers in the file, which is checked before the file is loaded.
 #pragma once
 
 #include <memory>
@@ -24,14 +24,15 @@
 
 namespace rapid {
 
-// Before the first Registry is made. Error: the file can't be read or loaded, is no plugin, was built with other
-// headers, or has a node of a name that is taken.
+// To be called before the first Registry is made. Error: the file can't be read or loaded, is no plugin, was built with
+// other headers, or has a node of a name that is taken.
 void load_plugin(const std::string& file);
 
-// Of each part of a list that colons separate: a plugin, or a folder, of which all *.so are taken, in order of name.
+// path: a list separated by colons, of plugins and of folders, from which all *.so are loaded in order of name.
 void load_plugins(const std::string& path);
 
-// A constraint from a function of the points, asked before each frame, that gives its rows (solver/rows.h).
+// A constraint from a function of the points that returns its rows (solver/constraints/rows.h), called before each
+// frame.
 template <class F>
 std::shared_ptr<const Constraint> constrain(const Evaluation& now, const std::string& group, F rows_of)
 {
@@ -48,7 +49,7 @@ std::shared_ptr<const Constraint> constrain(const Evaluation& now, const std::st
     return dynamic_of<Made>(now, group, std::move(rows_of));
 }
 
-// An action from a function of a point's P (m) and v (m/s), called at every sub-step from any thread.
+// An action from a function of a point's P (m) and v (m/s), called in every sub-step from any thread.
 template <class F>
 std::shared_ptr<const Action> act(const Evaluation& now, F edit)
 {

@@ -1,5 +1,5 @@
-// Edits of the points, one by one: what a node does to each of them whatever the others are. Neighbours in a chain go
-// over the points together, as if one after the other: each chunk goes through all of them while it is in cache.
+// Edits of points one by one, independently of other points. Neighbouring edits in a chain are fused into one pass over
+// the points: each chunk goes through all of them while it is in cache, with the result of one pass after the other.
 #pragma once
 
 #include <memory>
@@ -12,56 +12,56 @@
 
 namespace rapid {
 
-// Some of the points, neighbours in the set.
+// A contiguous range of the points.
 struct Stretch {
     std::size_t begin, end;
-    // Shape [end - begin]: 0 for those that an edit of the pass has removed, which are no more for those that follow.
-    // Null where none of them removes points.
+    // Shape [end - begin]: 0 for points that an edit of the pass has removed, which later edits do not see. Null where
+    // no edit removes points.
     std::uint8_t* alive;
 
     std::size_t size() const { return end - begin; }
-    // 1 for those that are alive and members, of the whole set, else 0; shape [size].
+    // 1 for points that are alive and in the group, else 0; shape [size]. members: of the whole set.
     std::vector<std::uint8_t> choose(Strided<std::uint8_t> members) const;
-    // Removes those that are marked by 1; shape [size].
+    // Removes the points marked by 1; shape [size].
     void remove(std::span<const std::uint8_t> marks) const;
 };
 
-// What one edit does to one set. The set and `now` outlive it.
+// One edit of one set. The set and `now` outlive it.
 class EditPass {
 public:
-    explicit EditPass(const Evaluation& told) : now(told) {}
+    explicit EditPass(const Evaluation& evaluation) : now(evaluation) {}
     virtual ~EditPass() = default;
 
-    // When all that go together are prepared: columns stay where they are from here on.
+    // Called when all fused edits are prepared: the columns keep their addresses from here on.
     virtual void begin() = 0;
-    // Points a chunk: the whole set where a script must see them in an order of its own.
+    // Points per chunk: the whole set where a script must see the points in order.
     virtual std::size_t chunk() const { return chunk_size; }
-    // Whether its time is that of scripts.
+    // Whether its time counts as that of scripts.
     virtual bool is_script() const { return false; }
-    // Each chunk once, from any thread. Error: what a script raised.
+    // Called once for each chunk, from any thread. Error: of the script.
     virtual void visit(const Stretch& stretch) = 0;
 
     const Evaluation& now;
 };
 
-// Takes the points through the passes, in parallel, and removes those that are to go. Error: of the first pass that
-// fails, at its first point that does, with its node.
+// Applies the passes to the points, in parallel, and removes marked points. Error: of the first pass that fails, at the
+// first point at which it does, with its node.
 void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove);
 
-// What comes before an edit among those that go together.
+// The edits before one, among those fused with it.
 struct Before {
-    bool edits = false;     // any at all
-    bool removals = false;  // some that remove points
+    bool edits = false;     // there are some
+    bool removals = false;  // some of them remove points
 };
 
 class PointEdit : public Operator {
 public:
-    // Brings into being and makes writable what it will write. Null where there is nothing more to do. The edits before
-    // it are prepared and have not been over the points: names are as it will meet them, values are not.
+    // Creates the columns that it writes and makes them writable. Null where there is nothing more to do. The edits
+    // before it are prepared but not applied: the columns are final, their values are not.
     virtual std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const = 0;
 
     virtual bool removes_points() const = 0;
-    // Whether it may ask for places in the set (p.index). It does not go with one before it that removes points.
+    // Whether it may read indices in the set (p.index). It is not fused with an edit before it that removes points.
     virtual bool asks_places() const = 0;
 
     const PointEdit* as_point_edit() const override { return this; }
@@ -69,7 +69,7 @@ public:
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
 };
 
-// The operator of a node whose struct has prepare() and, where they are more than `false`, the questions.
+// The operator of a node whose struct has prepare(), and removes_points() and asks_places() where they may be true.
 template <class T>
 class PointEditOf : public PointEdit {
 public:
@@ -105,8 +105,8 @@ private:
     T fields_;
 };
 
-// All edits of the points, in their order; now: what each is told. The same as one after the other, to the bit. Error:
-// as go_over().
+// Applies fused edits in their order; now: the context of each. The same bits as one edit after the other. Error: as
+// go_over().
 void edit_together(std::span<const PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
 
 }  // namespace rapid

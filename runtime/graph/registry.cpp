@@ -7,8 +7,8 @@
 namespace rapid {
 namespace {
 
-// Filled while the program starts, in link order; a function's static, so that it is there before the first node's
-// registration, whichever file that is in.
+// Filled during static initialisation, in link order; a function-local static, so that it exists before the first
+// registration.
 std::vector<NodeType (*)()>& declarations()
 {
     static std::vector<NodeType (*)()> all;

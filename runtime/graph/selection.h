@@ -1,4 +1,4 @@
-// Which points a node acts on: those of its group for which its `where` is true.
+// The points on which a node acts: those of its group for which its `where` is true.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,17 @@ namespace rapid {
 
 class Selection {
 public:
-    // Of `group` (all when it is empty) those for which `where` is true (all when it is null): it is asked only about
+    // The points of `group` (all when empty) for which `where` is true (all when null), which is evaluated only for
     // points of the group. The set and `now` outlive it.
     Selection(const PointSet& points, std::string group, const PointFunction* where, const Evaluation& now,
               const Before& before);
 
-    void begin();  // see EditPass, also for the next two
+    // As those of EditPass.
+    void begin();
     std::size_t chunk() const { return test_ ? test_->chunk() : chunk_size; }
     bool is_script() const { return test_ != nullptr; }
 
-    // 1 for each selected point that is alive, else 0; shape [size].
+    // 1 for selected points that are alive, else 0; shape [size].
     std::vector<std::uint8_t> of(const Stretch& stretch) const;
 
 private:

@@ -5,7 +5,7 @@
 namespace rapid {
 namespace {
 
-// A message is one line: longer tables end in "...".
+// Messages are one line: longer tables end in "...".
 constexpr std::size_t entries_shown = 6;
 
 std::string describe_object(const ObjectPtr& object)

@@ -1,4 +1,4 @@
-// What a graph file can give a node's parameter: the host of the scripting language turns its values into these.
+// Values of a graph file for the parameters of nodes, converted by the host of the scripting language.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,23 @@ namespace rapid {
 
 struct Value;
 
-// `rapid.attr "bounce"`: each point's own.
+// `rapid.attr "bounce"`: the value of each point's attribute.
 struct AttributeRef {
     std::string name;
 };
 
-// A table: list part (1, 2, ...), other whole numbers, and names.
+// A table: list part (1, 2, ...), other integer keys, and names.
 struct Table {
     std::vector<Value> list;
     std::map<std::int64_t, Value> numbered;  // keys outside the list part
     std::map<std::string, Value> named;
 };
 
-// A parameter given as a function of the frame. Asked on one thread, before the pass that needs it.
+// A parameter given as a function of the frame. Called on one thread, before the frame is computed.
 class FrameFunction {
 public:
     virtual ~FrameFunction() = default;
-    // Error: what the script raised, at its place.
+    // Error: of the script, with its location.
     virtual Value call(const Frame& frame) const = 0;
 };
 
@@ -52,7 +52,7 @@ struct Value : std::variant<std::monostate, bool, double, std::string, Vec3d, At
         const auto* pointer = get<std::shared_ptr<const Table>>();
         return pointer ? pointer->get() : nullptr;
     }
-    // The object, where it is a T.
+    // The object, if it is a T.
     template <class T>
     std::shared_ptr<const T> object() const
     {
@@ -66,7 +66,7 @@ struct Value : std::variant<std::monostate, bool, double, std::string, Vec3d, At
     }
 };
 
-// As a message shows it: 1.4, "up", {0, 1, 0}, a mesh, a function, nil.
+// For messages: 1.4, "up", {0, 1, 0}, a mesh, a function, nil.
 std::string describe(const Value& value);
 
 }  // namespace rapid

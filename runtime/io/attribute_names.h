@@ -1,5 +1,5 @@
-// How attributes are named in files whose columns are single numbers (.csv, .ply): a vec3 is NAMEx NAMEy NAMEz, a
-// quaternion NAMEx NAMEy NAMEz NAMEw.
+// Names of attributes in files whose columns are scalars (.csv, .ply): a vec3 is NAMEx NAMEy NAMEz, a quaternion NAMEx
+// NAMEy NAMEz NAMEw.
 #pragma once
 
 #include <span>
@@ -11,21 +11,21 @@
 
 namespace rapid {
 
-// Numbers a value of the type has: 1, 3 or 4.
+// The number of components of the type: 1, 3 or 4.
 std::size_t component_count(AttributeType type);
 std::vector<std::string> component_names(std::string_view name, std::size_t count);
 
-// The columns of a file, joined to attributes: neighbours NAMEx NAMEy NAMEz (NAMEw) are one.
+// The columns of a file joined to attributes: consecutive NAMEx NAMEy NAMEz (NAMEw) are one.
 struct JoinedColumns {
     std::string name;
     std::vector<std::size_t> columns;
 };
 std::vector<JoinedColumns> join_components(std::span<const std::string> names);
 
-// Error: a name twice (attributes "P" and "Px" in one set), an empty one, or one with a character of `forbidden`.
+// Error: a duplicate name (attributes "P" and "Px" in one set), an empty one, or one with a `forbidden` character.
 void check_column_names(std::span<const std::string> names, std::string_view forbidden);
 
-// The points' columns but P, v and id, in the order of their names.
+// The columns of the points except P, v and id, in order of name.
 std::vector<std::string> further_attributes(const PointSet& points);
 
 }  // namespace rapid

@@ -5,11 +5,11 @@
 //   "Bgeo" 'V' | int32: 5, points, primitives 0, point groups, primitive groups 0, point attributes, 0, 0, 0
 //   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 4 text, 5 vector), size defaults
 //   for each point: float x y z 1, then the attributes
-//   for each group: int16 length, name, int32 points, and a bit a point in int32 words, from the lowest bit on
+//   for each group: int16 length, name, int32 points, and a bit for each point in int32 words, from the lowest bit on
 //   0x00 0xff: the (empty) extra section
 //
-// id and other int64 are int32; one that does not fit is refused. Partio reads no groups. Those of a file that holds
-// primitives are not read: they lie behind them, and their number of bytes is known to Houdini alone.
+// int64 (id) is written as int32, and refused where it does not fit. Partio reads no groups. The groups of a file with
+// primitives are not read: they come after the primitives, whose size only Houdini knows.
 #include <fmt/format.h>
 
 #include <bit>
@@ -22,7 +22,7 @@
 namespace rapid {
 namespace {
 
-// A first byte of 1, where the length of a group's name is expected, marks an ordered group.
+// Marks an ordered group, where the first byte of the length of a group's name is expected.
 constexpr unsigned char ordered_mark = 1;
 constexpr std::size_t longest_group_name = 255;
 
@@ -56,7 +56,7 @@ HoudiniType houdini_type(const std::string& name, AttributeType type)
         case AttributeType::Int32:
         case AttributeType::Int64:
             return IntType;
-        // Vectors turn with the geometry; colours do not.
+        // Vectors rotate with the geometry; colours do not.
         case AttributeType::Vec3:
             return name == "Cd" ? FloatType : VectorType;
         case AttributeType::Float:
@@ -66,7 +66,7 @@ HoudiniType houdini_type(const std::string& name, AttributeType type)
     return FloatType;
 }
 
-// The words that a new point has in the attribute.
+// The default value of the attribute, as words.
 std::vector<std::uint32_t> default_words(const AnyColumn& column)
 {
     return std::visit(
@@ -84,7 +84,7 @@ std::vector<std::uint32_t> default_words(const AnyColumn& column)
         column);
 }
 
-// All groups, as the file has them.
+// The section of all groups.
 std::string group_section(const PointSet& points)
 {
     BigEndianText section;
@@ -171,12 +171,13 @@ private:
     std::string_view section_ = "header";
 };
 
-// What the dictionary of attributes says of a record that begins with `before` bytes of its own.
+// The attribute dictionary: the layout of a record.
 struct Dictionary {
     std::vector<RecordAttribute> attributes;
     std::size_t stride;
 };
 
+// before: bytes of a record before its first attribute.
 Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::size_t before)
 {
     Dictionary dictionary{{}, before};
@@ -223,7 +224,7 @@ void read_group(BigEndianReader& reader, PointSet& points)
     }
     points.group(name) = std::move(column);
     if (!ordered) return;
-    // The members in their order; a negative one is followed by the number of a curve on it.
+    // The members in order; a negative one is followed by the number of a curve.
     for (std::uint32_t left = reader.integer(4); left > 0; --left)
         if (static_cast<std::int32_t>(reader.integer(4)) < 0) reader.take(4);
 }

@@ -25,7 +25,7 @@ double difference(double a, double b)
     return std::isfinite(d) ? d : infinite;
 }
 
-// Numbers of a value, so that vectors and scalars of any type are compared alike.
+// The components of a value, so that vectors and scalars of any type are compared in the same way.
 using Numbers = Eigen::Array<double, 4, 1>;
 
 template <class T>
@@ -43,7 +43,7 @@ Numbers numbers(const T& value)
 
 struct ValueDifference {
     double amount;
-    double scale;  // what a relative tolerance is relative to
+    double scale;  // the reference of a relative tolerance
 };
 
 template <class A, class B>
@@ -62,7 +62,7 @@ ValueDifference difference(const A& a, const B& b)
     }
 }
 
-// Fills in all but the names and types, from the difference of each matched pair.
+// Fills in all except names and types, from the differences of the matched pairs.
 void summarise(AttributeDifference& result, std::vector<double>& amounts, const IdMatch& match, const PointSet& a)
 {
     if (amounts.empty()) return;
@@ -152,17 +152,17 @@ AttributeDifference compare_group(const std::string& name, const PointSet& a, co
 
 }  // namespace
 
-// The sets in order of id walk side by side.
+// Merges the two sets in order of id.
 IdMatch match_by_id(const PointSet& a, const PointSet& b)
 {
     const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
-    const auto place = [](const std::vector<std::size_t>& order, std::size_t i) {
+    const auto index = [](const std::vector<std::size_t>& order, std::size_t i) {
         return order.empty() ? i : order[i];
     };
     IdMatch match;
     std::size_t i = 0, j = 0;
     while (i < a.size() || j < b.size()) {
-        const std::size_t at_a = place(order_a, i), at_b = place(order_b, j);
+        const std::size_t at_a = index(order_a, i), at_b = index(order_b, j);
         if (j == b.size() || (i < a.size() && a.id()[at_a] < b.id()[at_b])) {
             match.only_a.push_back(a.id()[at_a]);
             ++i;
@@ -243,7 +243,7 @@ std::string group_text(const AttributeDifference& d, std::size_t width)
     return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
 }
 
-// JSON has no infinity: null stands for a difference from or to what is not finite.
+// JSON has no infinity: null stands for a difference that is not finite.
 nlohmann::ordered_json json_number(double value)
 {
     return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);

@@ -1,4 +1,4 @@
-// How two point sets differ, point by point of the same id: what `rapid diff` prints.
+// The differences of two point sets, between points of the same id, as `rapid diff` prints them.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,21 @@
 
 namespace rapid {
 
-// Which points of two sets have the same id: places a[i] and b[i] belong together, in order of id. Ids that occur more
-// than once are matched in turn.
+// The points of two sets with the same id: a[i] and b[i] are the indices of a pair, in order of id. Repeated ids are
+// matched in turn.
 struct IdMatch {
     std::vector<std::size_t> a, b;
-    std::vector<std::int64_t> only_a, only_b;  // ids
+    std::vector<std::int64_t> only_a, only_b;  // ids without a match
 };
 IdMatch match_by_id(const PointSet& a, const PointSet& b);
 
-// Over the points that are in both sets. A value's difference is the length of the difference vector (of scalars: its
-// amount); NaN differs by 0 from NaN, and infinitely from everything else.
+// Over the points that are in both sets. A difference is the norm of the difference vector, or the absolute value of a
+// scalar difference; NaN differs by 0 from NaN, and infinitely from everything else.
 struct AttributeDifference {
     std::string name;
-    std::string type_a, type_b;  // empty: not in that set
+    std::string type_a, type_b;  // empty where the set lacks it
     double max = 0, rms = 0, p95 = 0;
-    std::int64_t worst_id = -1;  // the point with the largest difference; -1 where there is none
+    std::int64_t worst_id = -1;  // the point with the largest difference; -1 without differences
     std::size_t different = 0;   // points beyond the tolerance
     bool same = true;
 };
@@ -35,13 +35,13 @@ struct Comparison {
     double tolerance = 0;
     double tolerance_P = 0;                       // m
     std::vector<AttributeDifference> attributes;  // P, v and the others by name
-    std::vector<AttributeDifference> groups;      // `different` counts; a missing group is an empty one
+    std::vector<AttributeDifference> groups;      // `different` counts members; a missing group is empty
     bool same = true;
 };
 
-// P is the same within `tolerance` times the diagonal of the bounds of both sets, other floats within `tolerance` times
-// the larger of the two values (of vectors: of their lengths); integers and groups only when equal. An integer and a
-// float attribute are compared by value: .csv does not say which it holds. An attribute that one set alone has is a
+// P is the same within `tolerance` times the diagonal of the joint bounding box; other floats are within `tolerance`
+// times the larger of the two values (norms of vectors); integers and groups only if equal. An integer and a float
+// attribute are compared by value, because .csv does not distinguish them. An attribute of only one set is a
 // difference, unless there are no points.
 Comparison compare(const PointSet& a, const PointSet& b, double tolerance = 1e-6);
 std::string to_text(const Comparison& comparison);

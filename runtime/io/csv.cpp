@@ -1,10 +1,9 @@
-// .csv: a header line, then a point a line in order of id.
+// .csv: a header line, then a line for each point in order of id.
 //
-//   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then groups as group:NAME, 0 or
-//   1
+//   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then group:NAME, 0 or 1
 //
-// Floats have 9 significant digits, which give back the same float. Read back, every column but id is float, since the
-// file does not say more: but a column of whole numbers, of which float would round one, is int32, or int64 where
+// Floats have 9 significant digits, which identify the float. The file does not hold types: read back, every column
+// except id is float, unless it holds only integers and float would round one of them; then it is int32, or int64 where
 // that is too small.
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
@@ -24,7 +23,7 @@ namespace rapid {
 namespace {
 
 constexpr std::string_view group_prefix = "group:";
-constexpr std::size_t number_chars = 24;  // the longest: an int64 has 20, a float of 9 digits 15
+constexpr std::size_t number_chars = 24;  // the longest is an int64 of 20; a float of 9 digits has 15
 
 char* put(char* to, float value)
 {
@@ -58,7 +57,7 @@ struct CsvTable {
     std::vector<const AnyColumn*> columns;
     std::vector<const Column<std::uint8_t>*> groups;
     std::string header;
-    std::size_t numbers = 0;  // in a line
+    std::size_t numbers = 0;  // per line
 };
 
 CsvTable csv_table(const PointSet& points)
@@ -110,7 +109,7 @@ void write_csv(const std::filesystem::path& path, const PointSet& points, const 
     OutputFile file(path);
     file.append(table.header.data(), table.header.size());
 
-    // Lines are made in parallel and written in order; the tokens bound the memory.
+    // Lines are formatted in parallel and written in order; the number of tokens bounds the memory.
     constexpr std::size_t tokens = 16;
     std::size_t next = 0;
     tbb::parallel_pipeline(
@@ -126,7 +125,7 @@ void write_csv(const std::filesystem::path& path, const PointSet& points, const 
     file.close();
 }
 
-// Where each line begins, without the header and empty lines at the end.
+// The start of each line, without the header and trailing empty lines.
 std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
 {
     std::vector<std::size_t> starts;
@@ -141,8 +140,7 @@ std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
     return starts;
 }
 
-// A column of numbers as the file has them: as double, which holds every float and every int32; and as int64 as long as
-// all of them are whole.
+// A column of numbers: as double, which holds every float and int32; and as int64, where all of them are integers.
 struct CsvColumn {
     std::vector<double> numbers;
     std::vector<std::int64_t> whole;
@@ -151,7 +149,7 @@ struct CsvColumn {
     bool float_would_round() const
     {
         return std::any_of(whole.begin(), whole.end(), [](std::int64_t value) {
-            // 2^53: above it double is not exact either, and the cast back could overflow.
+            // Above 2^53 double is not exact either, and the cast back could overflow.
             return std::abs(value) > (std::int64_t{1} << 53) ||
                    static_cast<std::int64_t>(static_cast<float>(value)) != value;
         });
@@ -173,7 +171,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
         column.numbers.resize(starts.size());
         column.whole.resize(starts.size());
     }
-    std::vector<std::atomic<bool>> broken(names.size());  // a column that holds a number that is not whole
+    std::vector<std::atomic<bool>> broken(names.size());  // columns with a number that is not an integer
     for_each_chunk(starts.size(), [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const char* at = text.data() + starts[i];

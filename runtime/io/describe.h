@@ -1,4 +1,4 @@
-// What a point set holds, in numbers: what `rapid info` prints.
+// A summary of a point set, as `rapid info` prints it.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct AttributeSummary {
     std::string name;
     AttributeType type;
     bool uniform;                  // all points have the same bits
-    std::vector<double> min, max;  // for each number of a value; empty where no value is finite
+    std::vector<double> min, max;  // of each component; empty where no value is finite
     std::size_t not_finite = 0;    // points with a NaN or an infinity
 };
 

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Set once the process is about to end: nothing that is opened after it stays.
+// Set when the process is about to end: files that are opened later do not stay.
 std::atomic<bool> ending{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
@@ -56,7 +56,7 @@ void OutputFile::write_at(std::uint64_t offset, const void* data, std::size_t by
             if (errno == EINTR) continue;
             throw file_error("can't be written", errno);
         }
-        // A full device may take 0 bytes without an error.
+        // A full device may accept 0 bytes without an error.
         if (written == 0) throw file_error("can't be written", ENOSPC);
         from += written;
         offset += static_cast<std::uint64_t>(written);
@@ -99,7 +99,7 @@ InputFile::~InputFile()
     if (data_) ::munmap(const_cast<unsigned char*>(data_), size_);
 }
 
-// Entries are never freed, only used again: a signal handler may be walking the list.
+// Entries are reused but never freed: a signal handler may be traversing the list.
 struct UnfinishedFile::Entry {
     enum State { Free, Claimed, Named };
     std::atomic<int> state{Claimed};

@@ -1,8 +1,8 @@
-// Files as the formats need them: one that is written from several threads, one that is read as memory, and one that
-// has its name only when it is complete.
+// Files for the formats: one that several threads write, one that is mapped into memory, and one that gets its name
+// only when it is complete.
 //
-// Errors say the system's reason and not the file: who knows the final name adds it (Error::at), because a frame is
-// written under a hidden name first.
+// Errors have the system's reason but not the file name, because a frame is first written under a temporary name: the
+// caller adds the final one (Error::at).
 #pragma once
 
 #include <cstdint>
@@ -17,21 +17,21 @@ namespace rapid {
 // `can't be written: No space left on device`, and the like.
 Error file_error(const std::string& what, int system_error);
 
-// A file open for writing. Writes at given places may come from any thread; the file is as large as the furthest.
+// A file open for writing. write_at() may be called from any thread; the file ends where the furthest write does.
 class OutputFile {
 public:
-    // Makes or empties the file.
+    // Creates or truncates the file.
     explicit OutputFile(const std::filesystem::path& path);
     OutputFile(const OutputFile&) = delete;
     OutputFile& operator=(const OutputFile&) = delete;
     ~OutputFile();
 
     void write_at(std::uint64_t offset, const void* data, std::size_t bytes);
-    // Behind what append() has written so far; from one thread.
+    // Writes after the bytes appended so far; from one thread.
     void append(const void* data, std::size_t bytes);
     std::uint64_t appended() const { return appended_; }
 
-    // Reports what only closing can find (network file systems say there that a disk is full).
+    // Reports errors that only closing finds (on network file systems, a full disk).
     void close();
 
 private:
@@ -39,7 +39,7 @@ private:
     std::uint64_t appended_ = 0;
 };
 
-// A whole file as memory.
+// A whole file, mapped into memory.
 class InputFile {
 public:
     explicit InputFile(const std::filesystem::path& path);
@@ -55,8 +55,8 @@ private:
     std::size_t size_ = 0;
 };
 
-// A file that is written under a hidden name in the folder of its final one, and renamed when it is complete. Missing
-// folders are made. What is not finished is removed: by the destructor, or by remove_unfinished_files().
+// A file that is written under a hidden name in its final folder, and renamed when it is complete. Missing folders are
+// made. Unfinished files are removed by the destructor, or by remove_unfinished_files().
 class UnfinishedFile {
 public:
     explicit UnfinishedFile(const std::filesystem::path& final_path);
@@ -67,15 +67,15 @@ public:
     const std::filesystem::path& path() const { return path_; }
     void finish();
 
-    struct Entry;  // a place in the list that remove_unfinished_files() walks
+    struct Entry;  // of the list for remove_unfinished_files()
 
 private:
     std::filesystem::path final_path_, path_;
     Entry* entry_;
 };
 
-// Removes all unfinished files and lets no further one be made: for a signal handler or a watchdog that ends the
-// process next. Async-signal-safe.
+// Removes all unfinished files and prevents further ones: for a signal handler or a watchdog that ends the process
+// next. Async-signal-safe.
 void remove_unfinished_files() noexcept;
 
 }  // namespace rapid

@@ -14,12 +14,12 @@ namespace fs = std::filesystem;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-struct FramePlace {
+struct FrameNumber {
     std::size_t begin, end;  // in the text
     int digits;
 };
 
-// The digits of a width that begins at `at`, and where they end.
+// Reads the width that begins at `at`, and moves `at` to its end.
 int read_width(const std::string& text, std::size_t& at)
 {
     int width = 0;
@@ -27,25 +27,25 @@ int read_width(const std::string& text, std::size_t& at)
     return width;
 }
 
-std::optional<FramePlace> place_at(const std::string& text, std::size_t begin)
+std::optional<FrameNumber> frame_number_at(const std::string& text, std::size_t begin)
 {
     std::size_t end = begin;
     if (text[begin] == '#') {
         while (end < text.size() && text[end] == '#') ++end;
         const std::size_t count = end - begin;
-        return FramePlace{begin, end, count == 1 ? 4 : static_cast<int>(count)};
+        return FrameNumber{begin, end, count == 1 ? 4 : static_cast<int>(count)};
     }
     if (text[begin] == '$' && text.compare(begin, 2, "$F") == 0) {
         end = begin + 2;
         const int width = read_width(text, end);
-        return FramePlace{begin, end, std::max(1, width)};
+        return FrameNumber{begin, end, std::max(1, width)};
     }
     if (text[begin] == '%') {
         end = begin + 1;
         const int width = read_width(text, end);
         if (end == text.size() || text[end] != 'd')
             throw Error(fmt::format("\"{}\": the % must be a frame number such as %04d", text));
-        return FramePlace{begin, end + 1, std::max(1, width)};
+        return FrameNumber{begin, end + 1, std::max(1, width)};
     }
     return std::nullopt;
 }
@@ -55,13 +55,13 @@ std::optional<FramePlace> place_at(const std::string& text, std::size_t begin)
 FramePattern::FramePattern(std::string text) : text_(std::move(text)), before_(text_)
 {
     for (std::size_t at = 0; at < text_.size(); ++at) {
-        const std::optional<FramePlace> place = place_at(text_, at);
-        if (!place) continue;
+        const std::optional<FrameNumber> number = frame_number_at(text_, at);
+        if (!number) continue;
         if (digits_) throw Error(fmt::format("\"{}\" has two frame numbers; it must have one", text_));
-        before_ = text_.substr(0, place->begin);
-        after_ = text_.substr(place->end);
-        digits_ = place->digits;
-        at = place->end - 1;
+        before_ = text_.substr(0, number->begin);
+        after_ = text_.substr(number->end);
+        digits_ = number->digits;
+        at = number->end - 1;
     }
     if (digits_ && after_.find('/') != std::string::npos)
         throw Error(fmt::format("\"{}\": the frame number must be in the name of the file, not of its folder", text_));
@@ -71,9 +71,9 @@ namespace {
 
 std::string with_output(std::string text, std::string_view output)
 {
-    constexpr std::string_view place = "{output}";
-    for (std::size_t at = 0; (at = text.find(place, at)) != std::string::npos; at += output.size())
-        text.replace(at, place.size(), output);
+    constexpr std::string_view variable = "{output}";
+    for (std::size_t at = 0; (at = text.find(variable, at)) != std::string::npos; at += output.size())
+        text.replace(at, variable.size(), output);
     return text;
 }
 
@@ -82,7 +82,7 @@ std::string with_output(std::string text, std::string_view output)
 std::string FramePattern::expand(int frame, std::string_view output) const
 {
     if (!digits_) return with_output(text_, output);
-    // A minus sign does not count as a digit: -1 is -0001, as Houdini has it.
+    // A minus sign does not count as a digit: -1 is -0001, as in Houdini.
     const std::string number =
         fmt::format("{}{:0{}}", frame < 0 ? "-" : "", std::abs(static_cast<long long>(frame)), *digits_);
     return with_output(before_, output) + number + with_output(after_, output);
@@ -108,7 +108,7 @@ std::map<int, fs::path> FramePattern::existing(std::string_view output) const
         int frame = 0;
         const auto parsed = std::from_chars(number.data(), number.data() + number.size(), frame);
         if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size()) continue;
-        // Only the name that this pattern would write: 7 and 0007 are not the same file.
+        // Only the name that this pattern would give: 7 and 0007 are different files.
         if (fs::path(expand(frame, output)).filename() == name) found.emplace(frame, folder / name);
     }
     return found;
@@ -116,7 +116,7 @@ std::map<int, fs::path> FramePattern::existing(std::string_view output) const
 
 OutputTarget parse_output_target(const std::string& text)
 {
-    // The attributes follow the last colon of the file's name, behind its extension: C:/x.vdb and a:b.vdb have none.
+    // Attributes follow the last colon of the file's name, after the extension: C:/x.vdb and a:b.vdb have none.
     const std::size_t name = text.find_last_of('/') == std::string::npos ? 0 : text.find_last_of('/') + 1;
     const std::size_t colon = text.find_last_of(':');
     const bool has_attributes =

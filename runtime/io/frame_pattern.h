@@ -1,5 +1,5 @@
-// File names of a sequence of frames: `####` (one digit each; a lone # means four), $F4 or $F, %04d or %d, and
-// {output}, the name of a graph's output.
+// Patterns of file names for a sequence of frames: `####` (a digit each; a single # means four), $F4 or $F, %04d or %d;
+// and {output}, the name of a graph's output.
 #pragma once
 
 #include <filesystem>
@@ -15,34 +15,34 @@ namespace rapid {
 
 class FramePattern {
 public:
-    // Error: a `%` that is no frame (%s), more than one frame number in the file's name.
+    // Error: a `%` that is not a frame number (%s); more than one frame number in the file's name.
     explicit FramePattern(std::string text);
 
     const std::string& text() const { return text_; }
-    // Whether the names of two frames differ; of two outputs.
+    // Whether the name depends on the frame, and on the output.
     bool has_frame() const { return digits_.has_value(); }
     bool has_output() const { return text_.find("{output}") != std::string::npos; }
 
     std::string expand(int frame, std::string_view output = "main") const;
 
-    // The files that exist, by frame. A number with more digits than the pattern has is a frame too (10000 of ####).
+    // The existing files, by frame. A number may have more digits than the pattern (10000 for ####).
     std::map<int, std::filesystem::path> existing(std::string_view output = "main") const;
 
 private:
     std::string text_;
     std::string before_, after_;  // of the frame number
-    std::optional<int> digits_;   // its least width
+    std::optional<int> digits_;   // least width of the number
 };
 
-// What `-o FILE:ATTR,ATTR` says.
+// The target of `-o FILE:ATTR,ATTR`.
 struct OutputTarget {
     std::string pattern;
-    // P, v and id, and these attributes and groups alone; null: all.
+    // Only P, v, id and these attributes and groups; nothing: all.
     std::optional<std::vector<std::string>> attributes;
 };
 OutputTarget parse_output_target(const std::string& text);
 
-// The points with P, v, id and the named attributes and groups alone. Error: a name that is neither, with the nearest.
+// The points with only P, v, id and the named attributes and groups. Error: an unknown name, with the nearest.
 PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names);
 
 }  // namespace rapid

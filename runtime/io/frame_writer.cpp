@@ -83,7 +83,7 @@ void FrameWriter::run()
         } catch (...) {
             error = std::current_exception();
         }
-        job = {};  // its columns are released before a waiting submit() goes on
+        job = {};  // releases its columns before a blocked submit() continues
 
         lock.lock();
         busy_ = false;

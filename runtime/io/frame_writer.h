@@ -1,9 +1,8 @@
 // Writes frames while the next ones are computed.
 //
-// Frames are written one after another by a thread of the writer's own (a format spreads one file's work over all
-// threads). At most a few wait: then submit() does, so that memory stays bounded. A file has its name only when it is
-// complete, and what was written before an error stays. A waiting frame costs what changes after it: point sets share
-// columns until one side writes.
+// A thread of its own writes one frame after another (a format uses all threads for one file). When a few frames are
+// queued, submit() blocks, so that memory stays bounded. A file gets its name only when it is complete, and files
+// written before an error stay. A queued frame shares its columns with later ones, and costs only those that change.
 #pragma once
 
 #include <condition_variable>
@@ -30,14 +29,14 @@ public:
         std::uint64_t bytes;
     };
 
-    // Error: an unknown extension. `waiting` frames at most are queued besides the one that is being written.
+    // waiting: the most frames in the queue, besides the one that is being written. Error: an unknown extension.
     explicit FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting = 2);
-    // Completes the file that is being written and drops the frames that wait; finish() writes them.
+    // Completes the file that is being written, and drops the queue, which finish() would write.
     ~FrameWriter();
 
-    // Queues a frame of one output for all targets. Throws the first error of an earlier one.
+    // Queues a frame of one output for all targets. Throws the first error of an earlier frame.
     void submit(PointSet points, FrameInfo frame, std::string output = "main");
-    // Waits until all is written. Throws the first error.
+    // Waits until all frames are written. Throws the first error.
     void finish();
 
     // Wall time spent writing the frame so far, over all its files.
@@ -56,8 +55,8 @@ private:
         FrameInfo frame;
         std::string output;
     };
-    // Pictures of one output. Those before the first points wait for these, so that the camera knows where to stand:
-    // they hold no points, and cost nothing.
+    // Pictures of one output. Those before the first points wait for them, because the camera is fitted to points; they
+    // hold none, and cost nothing.
     struct Pictures {
         PictureFit fit;
         std::vector<std::pair<const Target*, Job>> waiting;
@@ -69,7 +68,7 @@ private:
 
     std::vector<Target> targets_;
     const std::size_t waiting_;
-    std::map<std::string, Pictures> pictures_;  // by output; the writer's thread, and finish() while that is idle
+    std::map<std::string, Pictures> pictures_;  // by output; used by the thread, and by finish() while that is idle
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;
@@ -77,7 +76,7 @@ private:
     bool busy_ = false, stopping_ = false;
     std::exception_ptr error_;
     std::vector<Written> written_;
-    std::thread thread_;  // the last member: it starts when the others are there
+    std::thread thread_;  // the last member: it starts when the others are initialised
 };
 
 }  // namespace rapid

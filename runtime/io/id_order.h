@@ -1,4 +1,4 @@
-// Points in order of their ids: the order that does not depend on a file format or on what was removed.
+// Points in order of id, which depends neither on a file format nor on removed points.
 #pragma once
 
 #include <cstddef>
@@ -8,11 +8,10 @@
 
 namespace rapid {
 
-// The place of each point in order of id (equal ids keep their order), shape [size]; empty where that is the order
-// already.
+// The indices of the points in order of id (stable), shape [size]; empty where they are in order already.
 std::vector<std::size_t> id_order(const Column<std::int64_t>& id);
 
-// The points at these places, shape [order]; all of them, as they are, where it is empty.
+// The points with these indices, shape [order]; the set itself where it is empty.
 PointSet reordered(const PointSet& points, const std::vector<std::size_t>& order);
 
 }  // namespace rapid

@@ -1,8 +1,9 @@
 // .ply: binary little-endian PLY, one element "vertex".
 //
-// P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), every other vec3 NAMEx NAMEy NAMEz,
-// a quaternion with NAMEw; integers are int (an int64 that needs more is refused); a group is uchar group_NAME.
-// Reads any PLY, ascii or binary of either byte order, whose vertices come before elements of other sizes;
+// P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), any other vec3 NAMEx NAMEy NAMEz, a
+// quaternion also NAMEw; integers are int (an int64 that does not fit is refused); a group is uchar group_NAME.
+//
+// Reads any PLY, ascii or binary of either byte order, unless elements of variable size come before the vertices;
 // red green blue become Cd.
 #include <fmt/format.h>
 
@@ -21,7 +22,7 @@ namespace {
 constexpr std::string_view group_prefix = "group_";
 constexpr std::string_view white_space = " \t\r\n";
 
-// The names of one attribute's numbers in the file.
+// The names of an attribute's components in the file.
 std::vector<std::string> ply_names(const std::string& name, const AnyColumn& column)
 {
     if (name == "P") return {"x", "y", "z"};
@@ -156,7 +157,7 @@ PlyHeader read_header(std::string_view text)
     return header;
 }
 
-// The name that Rapid has for a property; numbers of one attribute share a stem.
+// Rapid's name for a property; the components of an attribute share a stem.
 std::string rapid_name(const std::string& property)
 {
     static const std::map<std::string, std::string> known = {{"x", "Px"},    {"y", "Py"},      {"z", "Pz"},
@@ -200,7 +201,7 @@ std::vector<RecordAttribute> attributes_of(const PlyElement& vertex)
     return attributes;
 }
 
-// Ascii vertices as binary records of the declared types: one way to read both.
+// Converts ascii vertices to binary records of the declared types.
 std::vector<unsigned char> parse_ascii(std::string_view text, const PlyElement& vertex, std::size_t stride)
 {
     std::vector<unsigned char> records(vertex.count * stride);
@@ -255,7 +256,7 @@ PointSet read_ply(const std::filesystem::path& path)
     const InputFile file(path);
     const PlyHeader header = read_header(file.text());
 
-    // Elements before the vertices are passed over where their size is known.
+    // Elements of known size before the vertices are skipped.
     std::size_t skipped = header.bytes;
     const PlyElement* vertex = nullptr;
     for (const PlyElement& element : header.elements) {

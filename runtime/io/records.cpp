@@ -15,9 +15,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "records are swapped from little-endian memory");
 
-// Points woven at a time: with 32 to 128 bytes each they and their columns stay in the second-level cache.
-constexpr std::size_t woven_points = chunk_size;
-
 std::uint32_t load_word(const unsigned char* from)
 {
     std::uint32_t word;
@@ -32,16 +29,18 @@ void store_word(unsigned char* to, std::uint32_t word)
     std::memcpy(to, &word, sizeof word);
 }
 
-// `words` is a constant where it matters: the loop over it unrolls.
+// words: a template parameter, so that the loop over it unrolls.
 template <bool swapped, std::size_t words>
-void weave_words(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record, std::size_t n)
+void interleave_words(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record,
+                      std::size_t n)
 {
     for (std::size_t i = 0; i < n; ++i, from += stride, to += record)
         for (std::size_t w = 0; w < words; ++w) store_word<swapped>(to + 4 * w, load_word(from + 4 * w));
 }
 
 template <bool swapped>
-void weave_narrowed(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record, std::size_t n)
+void interleave_narrowed(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record,
+                         std::size_t n)
 {
     // The low word of a little-endian int64; the range was checked when the column was added.
     for (std::size_t i = 0; i < n; ++i, from += stride, to += record) store_word<swapped>(to, load_word(from));
@@ -70,7 +69,7 @@ Scalar load(const unsigned char* from, ByteOrder order)
     return std::bit_cast<Scalar>(bytes);
 }
 
-// Calls f with a reader of one number of that type.
+// Calls f with a function that loads a number of the type.
 template <class F>
 auto with_loader(ScalarType type, ByteOrder order, const F& f)
 {
@@ -139,9 +138,10 @@ std::size_t scalar_bytes(ScalarType type)
     return bytes[static_cast<std::size_t>(type)];
 }
 
-void RecordWriter::push(Part::Kind kind, const void* from, std::size_t stride, std::size_t words, std::size_t bytes)
+void RecordWriter::push(Part::Encoding encoding, const void* from, std::size_t stride, std::size_t words,
+                        std::size_t bytes)
 {
-    parts_.push_back({kind, static_cast<const unsigned char*>(from), stride, words, record_bytes_});
+    parts_.push_back({encoding, static_cast<const unsigned char*>(from), stride, words, record_bytes_});
     record_bytes_ += bytes;
 }
 
@@ -173,38 +173,38 @@ void RecordWriter::add_constant(float value)
     push(Part::Words, constants_.back().get(), 0, 1, 4);
 }
 
-void RecordWriter::weave(const Part& part, std::size_t begin, std::size_t end, unsigned char* records) const
+void RecordWriter::interleave(const Part& part, std::size_t begin, std::size_t end, unsigned char* records) const
 {
     const unsigned char* from = part.from + begin * part.stride;
     unsigned char* to = records + part.offset;
     const std::size_t n = end - begin;
-    const auto woven = [&]<bool swapped>() {
-        switch (part.kind) {
+    const auto interleaved = [&]<bool swapped>() {
+        switch (part.encoding) {
             case Part::Words:
-                if (part.words == 1) return weave_words<swapped, 1>(from, part.stride, to, record_bytes_, n);
-                if (part.words == 3) return weave_words<swapped, 3>(from, part.stride, to, record_bytes_, n);
-                return weave_words<swapped, 4>(from, part.stride, to, record_bytes_, n);
+                if (part.words == 1) return interleave_words<swapped, 1>(from, part.stride, to, record_bytes_, n);
+                if (part.words == 3) return interleave_words<swapped, 3>(from, part.stride, to, record_bytes_, n);
+                return interleave_words<swapped, 4>(from, part.stride, to, record_bytes_, n);
             case Part::Narrowed:
-                return weave_narrowed<swapped>(from, part.stride, to, record_bytes_, n);
+                return interleave_narrowed<swapped>(from, part.stride, to, record_bytes_, n);
             case Part::Byte:
                 break;
         }
         for (std::size_t i = 0; i < n; ++i) to[i * record_bytes_] = from[i * part.stride];
     };
     if (order_ == ByteOrder::Big)
-        woven.template operator()<true>();
+        interleaved.template operator()<true>();
     else
-        woven.template operator()<false>();
+        interleaved.template operator()<false>();
 }
 
 void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t points) const
 {
-    static_assert(woven_points == chunk_size, "a chunk is woven as a whole");
+    // The records of a chunk, 32 to 128 bytes each, and their columns stay in the second-level cache.
     for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
-        // One buffer a thread, kept: its pages are touched once.
+        // A buffer per thread that is kept, so that its pages are touched once.
         thread_local std::vector<unsigned char> records;
         records.resize((end - begin) * record_bytes_);
-        for (const Part& part : parts_) weave(part, begin, end, records.data());
+        for (const Part& part : parts_) interleave(part, begin, end, records.data());
         file.write_at(offset + begin * record_bytes_, records.data(), records.size());
     });
 }

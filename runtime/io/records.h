@@ -1,7 +1,7 @@
-// Records: one of the same size for each point, as .bgeo and .ply hold them.
+// Records of fixed size, one for each point, as in .bgeo and .ply.
 //
-// Columns are woven into records, and back, chunk by chunk in parallel; a chunk's records stay in cache until they are
-// handed to the system, so that writing costs little more than writing the same bytes from one array.
+// Columns are interleaved into records, and separated again, chunk by chunk in parallel. The records of a chunk stay in
+// cache until they are written, so that writing costs little more than writing the same bytes from an array.
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@ enum class ByteOrder { Little, Big };
 enum class ScalarType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
 std::size_t scalar_bytes(ScalarType type);
 
-// Builds records out of columns, in the order of the calls. The columns must outlive it.
+// Interleaves columns, in the order of the calls. The columns must outlive it.
 class RecordWriter {
 public:
     explicit RecordWriter(ByteOrder order) : order_(order) {}
 
-    // Floats and int32 as they are; int64 as int32. Error: one that does not fit, naming .vdb and .csv.
+    // Floats and int32 unchanged; int64 as int32. Error: a value that does not fit, naming .vdb and .csv.
     void add(const std::string& name, const AnyColumn& column);
     // Membership as a UInt8.
     void add_group(const Column<std::uint8_t>& members);
@@ -34,15 +34,16 @@ public:
     void write(OutputFile& file, std::uint64_t offset, std::size_t points) const;
 
 private:
+    // A column in the record.
     struct Part {
-        enum Kind { Words, Narrowed, Byte } kind;
+        enum Encoding { Words, Narrowed, Byte } encoding;
         const unsigned char* from;
-        std::size_t stride;  // bytes from point to point; 0 where all share a value
+        std::size_t stride;  // bytes from point to point; 0 for a uniform column
         std::size_t words;
         std::size_t offset;  // in the record
     };
-    void weave(const Part& part, std::size_t begin, std::size_t end, unsigned char* records) const;
-    void push(Part::Kind kind, const void* from, std::size_t stride, std::size_t words, std::size_t bytes);
+    void interleave(const Part& part, std::size_t begin, std::size_t end, unsigned char* records) const;
+    void push(Part::Encoding encoding, const void* from, std::size_t stride, std::size_t words, std::size_t bytes);
 
     ByteOrder order_;
     std::vector<Part> parts_;
@@ -50,17 +51,17 @@ private:
     std::vector<std::unique_ptr<std::uint32_t>> constants_;
 };
 
-// An attribute in a record: numbers of one type at these places.
+// An attribute in a record: numbers of one type.
 struct RecordAttribute {
     std::string name;
     ScalarType type;
-    std::vector<std::size_t> offsets;  // bytes
+    std::vector<std::size_t> offsets;  // of the numbers in the record, bytes
     bool group = false;
-    double scale = 1;  // floats are multiplied with it (colours held as bytes)
+    double scale = 1;  // factor, which makes integers floats (colours stored as bytes)
 };
 
-// The points of records of `stride` bytes. Three floats become a vec3, four a quaternion; integers become int32, or
-// int64 where they may be larger and for id. Without an id, points are numbered from 0.
+// Reads points from records of `stride` bytes. Three floats become a vec3, four a quaternion; integers become int32;
+// unsigned 32-bit integers and id become int64. Without an id, points are numbered from 0.
 PointSet read_records(std::span<const unsigned char> records, std::size_t points, std::size_t stride, ByteOrder order,
                       const std::vector<RecordAttribute>& attributes);
 

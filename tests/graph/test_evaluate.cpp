@@ -75,7 +75,7 @@ TEST_CASE("the figures of a frame's parts add up where they count what happens, 
     first.born = 3, first.collisions = 2, first.substeps = 4, first.trapped = 5, first.constraint_rows = 7;
     first.errors = {1, 2};
     second.born = 1, second.substeps = 2, second.trapped = 2, second.constraint_rows = 6, second.errors = {3};
-    first.go_on(second);
+    first.append(second);
     CHECK(first.born == 4);
     CHECK(first.collisions == 2);
     CHECK(first.substeps == 4);

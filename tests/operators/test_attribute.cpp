@@ -46,7 +46,7 @@ TEST_CASE("a whole number makes a float; a known name has its own type", "[attri
     CHECK(points.find<float>("life"));
 }
 
-TEST_CASE("what attribute makes is the value of all points without one, whoever else makes it", "[attribute]")
+TEST_CASE("the value of attribute goes to all points without one, whoever makes the attribute", "[attribute]")
 {
     const Uses uses = NodeTest("attribute", {{"heat", 2.0}}).uses();
     REQUIRE(uses.makes.size() == 1);
@@ -54,7 +54,7 @@ TEST_CASE("what attribute makes is the value of all points without one, whoever 
     CHECK(std::get<float>(uses.defaults[0].fallback) == 2);
 }
 
-TEST_CASE("all points have the value from their birth, but those that brought their own", "[attribute]")
+TEST_CASE("all points have the value from their birth, except those with a value of their own", "[attribute]")
 {
     GraphTest graph;
     const Value place = ObjectPtr(source_of(points_at({{0, 0, 0}})));
@@ -82,7 +82,7 @@ TEST_CASE("points that are given a life have an age", "[attribute]")
     CHECK(values_of<float>(points, "age") == std::vector<float>{0});
 }
 
-TEST_CASE("attribute refuses names and values that can't be", "[attribute]")
+TEST_CASE("attribute refuses illegal names and values", "[attribute]")
 {
     const auto refusal = [](const std::string& name, Value value) {
         return error_of([&] { NodeTest("attribute", {{name, value}}); });
@@ -98,7 +98,7 @@ TEST_CASE("attribute refuses names and values that can't be", "[attribute]")
     CHECK(refusal("hitnum", 0.5) == "hitnum = 0.5 is not whole; it must be an integer");
 }
 
-TEST_CASE("attribute makes none of what the plan leaves out", "[attribute]")
+TEST_CASE("attribute makes no attribute that the plan leaves out", "[attribute]")
 {
     NodeTest attribute("attribute", {{"heat", 2.0}, {"wet", 1.0}});
     attribute.left_out = {"heat"};

@@ -53,7 +53,7 @@ TEST_CASE("bounce, friction and radius may be attributes", "[collide]")
     CHECK(collider.group == "solid");
 }
 
-TEST_CASE("collide refuses what it can't do, with what was given", "[collide]")
+TEST_CASE("collide refuses illegal arguments, and quotes them", "[collide]")
 {
     CHECK_THAT(error_of([] { collided({}); }), Catch::StartsWith("shape is missing"));
     CHECK_THAT(error_of([] {

@@ -34,7 +34,7 @@ TEST_CASE("create yields what Solve left at every later frame, without a copy", 
     CHECK(create.simulation_state().state.empty());
 }
 
-TEST_CASE("every column and group that the plan knows is there from the first frame on", "[create]")
+TEST_CASE("every planned column and group exists from the first frame on", "[create]")
 {
     const std::int64_t frame = GENERATE(1, 2);
     NodeTest create("create", {{"points", initial(points_at({{0, 0, 0}}))}});
@@ -49,7 +49,7 @@ TEST_CASE("every column and group that the plan knows is there from the first fr
     CHECK((*points.find_group("hot"))[0] == 0);
 }
 
-TEST_CASE("a fallback that changes with the frame is that of later points, not of those there are", "[create]")
+TEST_CASE("a fallback that changes with the frame applies to later points, not to existing ones", "[create]")
 {
     NodeTest create("create", {});
     PointSet state = points_at({{0, 0, 0}});
@@ -62,7 +62,7 @@ TEST_CASE("a fallback that changes with the frame is that of later points, not o
     CHECK(values_of<float>(points, "heat") == std::vector<float>{2, 5});
 }
 
-TEST_CASE("initial points keep their attributes and groups, which create says it makes", "[create]")
+TEST_CASE("initial points keep their attributes and groups, which create declares", "[create]")
 {
     PointSet brought = points_at({{0, 0, 0}, {1, 0, 0}});
     brought.set("heat", Column<float>(std::span<const float>(std::vector<float>{5, 6})));
@@ -83,7 +83,7 @@ TEST_CASE("a simulation may begin with no points", "[create][extreme]")
     CHECK(create(2).empty());
 }
 
-TEST_CASE("create refuses frame rates that are none, and known attributes of another type", "[create]")
+TEST_CASE("create refuses illegal frame rates, and known attributes of another type", "[create]")
 {
     CHECK(error_of([] { NodeTest("create", {{"fps", 0.0}}); }) == "fps = 0 is out of range; it must be above 0");
     CHECK(error_of([] { NodeTest("create", {{"start", 1.5}}); }) == "start = 1.5 is not whole; it must be an integer");

@@ -33,7 +33,7 @@ TEST_CASE("a group that nobody joined deletes nothing", "[delete][extreme]")
     CHECK(NodeTest("delete", {{"group", "nobody"}})(2, {}).empty());
 }
 
-TEST_CASE("delete must be told which points", "[delete]")
+TEST_CASE("delete needs a group or where", "[delete]")
 {
     CHECK(error_of([] { NodeTest("delete", {}); }) == "nothing says which points to remove; give group, where or both");
 }

@@ -61,7 +61,7 @@ public:
 
 }  // namespace
 
-TEST_CASE("a rate bears floor(rate time) points, whose ids count all births from 0", "[emit]")
+TEST_CASE("a rate emits floor(rate time) points, whose ids count all births from 0", "[emit]")
 {
     NodeTest emit("emit", {{"source", one_point()}, {"rate", 29.0}});
     std::int64_t next = 0;
@@ -84,14 +84,14 @@ TEST_CASE("a rate may be a function of the frame", "[emit]")
     for (std::int64_t frame = 10; frame < 20; ++frame) CHECK(emit(frame).size() == 10);
 }
 
-TEST_CASE("count bears that many points in every frame but the first", "[emit]")
+TEST_CASE("count emits that many points in every frame but the first", "[emit]")
 {
     NodeTest emit("emit", {{"source", one_point()}, {"count", 7.0}});
     CHECK(emit.at_start().empty());
     for (std::int64_t frame = 2; frame < 10; ++frame) CHECK(emit(frame).size() == 7);
 }
 
-TEST_CASE("an impulse bears its points in its frames alone", "[emit]")
+TEST_CASE("an impulse emits its points only in its frames", "[emit]")
 {
     NodeTest emit("emit", {{"source", one_point()}, {"impulse", numbered({{3, 100.0}, {5, 20.0}})}});
     CHECK(emit.at_start().empty());
@@ -130,7 +130,7 @@ TEST_CASE("nothing is born at a rate, count or impulse of 0, but the columns are
     CHECK(born.has("life"));
 }
 
-TEST_CASE("ten million a second are borne, with the same place for each birth number", "[emit][extreme]")
+TEST_CASE("ten million points a second are emitted, with the same birthplace for each birth number", "[emit][extreme]")
 {
     NodeTest emit("emit", {{"source", ObjectPtr(make_sphere(1, 8, Vec3d::Zero()))}, {"rate", 1e7}});
     const PointSet born = emit(2);
@@ -140,7 +140,7 @@ TEST_CASE("ten million a second are borne, with the same place for each birth nu
     CHECK(farthest <= 1 + 1e-6);
 }
 
-TEST_CASE("an empty set of points bears nothing", "[emit][extreme]")
+TEST_CASE("an empty set of points emits nothing", "[emit][extreme]")
 {
     NodeTest emit("emit", {{"source", ObjectPtr(source_of({}))}, {"count", 5.0}});
     CHECK(emit(2).empty());
@@ -201,7 +201,7 @@ TEST_CASE("birth = \"random\": ages at the frame's end are uniform in [0, h), an
     CHECK(largest_error < 2e-7f);
 }
 
-TEST_CASE("an age given above the frame's length: born at its beginning, that much older already", "[emit]")
+TEST_CASE("a point with an age above the frame's length is born at its beginning, older by the difference", "[emit]")
 {
     PointSet columns;
     columns.add(*known_attribute("age"));
@@ -230,7 +230,7 @@ TEST_CASE("an age given as {min, max} is uniform between them", "[emit]")
     CHECK(none_above_a_frame);
 }
 
-TEST_CASE("the newborn of one emitter keep the older points' time whole", "[emit]")
+TEST_CASE("newborn points of one emitter leave the time step of older points whole", "[emit]")
 {
     NodeTest first("emit", {{"source", one_point()}, {"count", 1.0}, {"birth", "end"}});
     NodeTest second("emit", {{"source", one_point()}, {"count", 1.0}, {"birth", "begin"}});
@@ -238,7 +238,7 @@ TEST_CASE("the newborn of one emitter keep the older points' time whole", "[emit
     CHECK(values_of<float>(second(2, first(2, points_at({{0, 0, 0}}))), "dt") == std::vector<float>{whole, 0, whole});
 }
 
-TEST_CASE("life is one number for all, uniform between two, or without end", "[emit]")
+TEST_CASE("life is one number for all, uniform between two, or infinite", "[emit]")
 {
     const auto born = [](Value life) {
         return NodeTest("emit", {{"source", one_point()}, {"count", 20000.0}, {"life", life}})(2);
@@ -290,7 +290,7 @@ TEST_CASE("speed goes along the normal, and adds to velocity", "[emit]")
     for (const Vec3f& v : values_of<Vec3f>(emit(2), "v")) CHECK_THAT(v, close_to(Vec3f(1, 3, 0), 1e-6));
 }
 
-TEST_CASE("newborn take the given fraction of their source's velocity, which spread does not turn", "[emit]")
+TEST_CASE("newborn points inherit the given fraction of the source's velocity, which spread does not turn", "[emit]")
 {
     PointSet moving = points_at({{0, 0, 0}, {1, 0, 0}});
     moving.v() = Column<Vec3f>(std::span<const Vec3f>(std::vector<Vec3f>{{4, 0, 0}, {0, 0, 8}}));
@@ -304,7 +304,7 @@ TEST_CASE("newborn take the given fraction of their source's velocity, which spr
     CHECK_THAT(v[1], close_to(Vec3f(0, 1, 8 * f), 1e-6));
 }
 
-TEST_CASE("a parameter more changes no number that another parameter draws", "[emit]")
+TEST_CASE("a further parameter changes no random number of another one", "[emit]")
 {
     const Arguments base = {{"source", ObjectPtr(make_sphere(1, 8, Vec3d::Zero()))}, {"count", 1000.0}, {"speed", 1.0}};
     const auto born = [&](const Arguments& more) { return NodeTest("emit", with(base, more))(2); };
@@ -335,7 +335,7 @@ TEST_CASE("births depend on the seed and the node's name, not on the frame or on
     CHECK(in_ten == places(3, "a", 2));
 }
 
-TEST_CASE("the newborn are the same bits on any number of threads", "[emit]")
+TEST_CASE("newborn points have the same bits on any number of threads", "[emit]")
 {
     const auto born = [](int threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 7);
@@ -360,7 +360,7 @@ TEST_CASE("the newborn are the same bits on any number of threads", "[emit]")
     }
 }
 
-TEST_CASE("with a count, points are taken in their order: as many births as points take each once", "[emit]")
+TEST_CASE("with a count, source points are taken in order, each once for as many births", "[emit]")
 {
     NodeTest emit("emit",
                   {{"source", ObjectPtr(source_of(points_at({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}})))}, {"count", 3.0}});
@@ -368,7 +368,7 @@ TEST_CASE("with a count, points are taken in their order: as many births as poin
         CHECK(values_of<Vec3f>(emit(frame), "P") == std::vector<Vec3f>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
 }
 
-TEST_CASE("with a rate, each birth takes one of the points, all with the same chance", "[emit]")
+TEST_CASE("with a rate, each birth takes a source point at random, uniformly", "[emit]")
 {
     std::vector<Vec3f> places;
     for (int i = 0; i < 40; ++i) places.push_back(Vec3f(static_cast<float>(i), 0, 0));
@@ -378,7 +378,7 @@ TEST_CASE("with a rate, each birth takes one of the points, all with the same ch
     CHECK(is_uniform(fractions));
 }
 
-TEST_CASE("newborn have the given attributes and join the group; older points do not", "[emit]")
+TEST_CASE("newborn points have the given attributes and join the group; older points do not", "[emit]")
 {
     NodeTest emit("emit", {{"source", one_point()},
                            {"count", 2.0},
@@ -392,7 +392,7 @@ TEST_CASE("newborn have the given attributes and join the group; older points do
     CHECK((hot[0] == 0 && hot[1] == 1 && hot[2] == 1));
 }
 
-TEST_CASE("what all newborn share costs nothing a point", "[emit]")
+TEST_CASE("values that all newborn points share stay uniform columns", "[emit]")
 {
     NodeTest emit("emit", {{"source", one_point()},
                            {"count", 5.0},
@@ -411,7 +411,8 @@ TEST_CASE("what all newborn share costs nothing a point", "[emit]")
     CHECK((*points.find_group("hot"))[9] == 1);
 }
 
-TEST_CASE("newborn take over the attributes of their source's points, but not what each has of its own", "[emit]")
+TEST_CASE("newborn points inherit the attributes of the source's points, except those that every point has of its own",
+          "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
     from.set("heat", Column<float>(std::span<const float>(std::vector<float>{5, 6})));
@@ -425,7 +426,7 @@ TEST_CASE("newborn take over the attributes of their source's points, but not wh
     CHECK_FALSE(born.has("age"));
 }
 
-TEST_CASE("newborn take over a mesh's values by the weights of their triangle's corners", "[emit]")
+TEST_CASE("newborn points interpolate a mesh's attributes by barycentric weights", "[emit]")
 {
     auto mesh = std::make_shared<Mesh>(*make_torus(1, 0.4, 9, Vec3d(1, 2, 3)));
     const Vec3f slope(2, -1, 0.5f);
@@ -451,7 +452,7 @@ TEST_CASE("newborn take over a mesh's values by the weights of their triangle's 
     CHECK(largest_error < 5e-6f);
 }
 
-TEST_CASE("from = \"points\" of a mesh bears at its vertices, along their normals", "[emit]")
+TEST_CASE("from = \"points\" of a mesh emits at its vertices, along their normals", "[emit]")
 {
     const MeshPtr sphere = make_sphere(2, 16, Vec3d::Zero());
     NodeTest emit("emit", {{"source", ObjectPtr(sphere)},
@@ -466,7 +467,7 @@ TEST_CASE("from = \"points\" of a mesh bears at its vertices, along their normal
     CHECK(straightest > 0.99);  // of a sphere of 16 divisions
 }
 
-TEST_CASE("from = \"volume\" of a mesh bears inside it", "[emit]")
+TEST_CASE("from = \"volume\" of a mesh emits inside it", "[emit]")
 {
     NodeTest emit(
         "emit",
@@ -482,7 +483,7 @@ TEST_CASE("from = \"volume\" of a mesh bears inside it", "[emit]")
     CHECK(is_uniform(z));
 }
 
-TEST_CASE("a source that stays the same is prepared once; one that changes with the frame, when it changes", "[emit]")
+TEST_CASE("a source is prepared once, and again when it changes", "[emit]")
 {
     const auto first = std::make_shared<CountingSphere>(), second = std::make_shared<CountingSphere>();
     NodeTest emit("emit",
@@ -493,7 +494,7 @@ TEST_CASE("a source that stays the same is prepared once; one that changes with 
     CHECK(second->prepared == 1);
 }
 
-TEST_CASE("emit says what it makes, so that the columns exist from the first frame on", "[emit]")
+TEST_CASE("emit declares what it makes, so that the columns exist from the first frame on", "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}});
     from.set("N", Column<Vec3f>(1, Vec3f(0, 1, 0)));
@@ -513,7 +514,7 @@ TEST_CASE("emit says what it makes, so that the columns exist from the first fra
     CHECK(std::count(uses.gives.begin(), uses.gives.end(), "life") == 1);
 }
 
-TEST_CASE("emit makes none of what the plan leaves out, and bears the same points", "[emit]")
+TEST_CASE("emit makes no attribute that the plan leaves out, and emits the same points", "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
     const std::vector<Vec3f> normals = {{0, 1, 0}, {1, 0, 0}};
@@ -537,7 +538,7 @@ TEST_CASE("emit makes none of what the plan leaves out, and bears the same point
     CHECK(values_of<float>(some, "dt") == values_of<float>(all, "dt"));
 }
 
-TEST_CASE("a life without end needs neither life nor age, unless it is a function that may end it later", "[emit]")
+TEST_CASE("an infinite life needs neither life nor age, unless it is a function of the frame", "[emit]")
 {
     const double forever = std::numeric_limits<double>::infinity();
     const auto gives_life = [&](Value life, bool function) {
@@ -550,7 +551,7 @@ TEST_CASE("a life without end needs neither life nor age, unless it is a functio
     CHECK(gives_life(forever, true));
 }
 
-TEST_CASE("emit refuses what it can't do, and says what it can", "[emit]")
+TEST_CASE("emit refuses illegal arguments, and names legal ones", "[emit]")
 {
     const ObjectPtr mesh = make_sphere(1, 8, Vec3d::Zero());
     const auto refusal = [&](Arguments arguments, Value source) {

@@ -72,7 +72,7 @@ struct GrowingMesh {
 
 }  // namespace
 
-TEST_CASE("an emitter on a circle bears an even stream without a seam between frames", "[emit]")
+TEST_CASE("an emitter on a circle emits an even stream without a seam between frames", "[emit]")
 {
     const double radius = 2, turn = 0.3, rate = 977;  // rad a frame
     const auto circle = [=](double time) {
@@ -199,7 +199,7 @@ TEST_CASE("nothing is born along a jump, which is reported; cut says so, or that
     CHECK(widest < 2 * 3.9e-6 + speck_size);  // two places rounded at 51 m
 }
 
-TEST_CASE("a deforming mesh carries births along the ways of its faces, with their velocity and normals", "[emit]")
+TEST_CASE("a deforming mesh carries births along the paths of its faces, with their velocity and normals", "[emit]")
 {
     // Grows by a tenth of its size at frame 0 each frame.
     const MeshPtr ball = make_sphere(1, 12, Vec3d::Zero());
@@ -245,7 +245,7 @@ TEST_CASE("speed goes along the normal that a turning source has at the time of 
     }
 }
 
-TEST_CASE("a moving sphere bears points on it wherever it is", "[emit]")
+TEST_CASE("a moving sphere emits points on its surface, wherever it is", "[emit]")
 {
     const MotionPtr motion = keyed_motion({{1, {{0, 0, 0}}}, {11, {{20, 0, 0}}}});
     const ObjectPtr sphere = std::make_shared<AnimatedShape>(make_sphere_shape(0.5, {0, 1, 0}), motion);
@@ -258,7 +258,7 @@ TEST_CASE("a moving sphere bears points on it wherever it is", "[emit]")
     }
 }
 
-TEST_CASE("age can be the source's own attribute", "[emit]")
+TEST_CASE("age can be an attribute of the source", "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
     from.set("delay", Column<float>(std::span<const float>(std::vector<float>{0.01f, 0.5f})));

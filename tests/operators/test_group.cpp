@@ -27,7 +27,7 @@ TEST_CASE("group holds the points for which where is true", "[group]")
     CHECK(group.uses().reads == std::vector<std::string>{"P"});
 }
 
-TEST_CASE("membership is set anew: a point that no longer qualifies is out", "[group]")
+TEST_CASE("membership is determined at each frame: a point that no longer qualifies leaves", "[group]")
 {
     PointSet points = three_points();
     points.group("right").fill(1);
@@ -35,14 +35,14 @@ TEST_CASE("membership is set anew: a point that no longer qualifies is out", "[g
           Members{0, 0, 1});
 }
 
-TEST_CASE("without where all points are in", "[group]")
+TEST_CASE("without where all points are members", "[group]")
 {
     const PointSet points = NodeTest("group", {{"name", "all"}})(2, three_points());
     CHECK(members(points, "all") == Members{1, 1, 1});
     CHECK(points.find_group("all")->is_uniform());
 }
 
-TEST_CASE("with group, only that group's points are asked about and can be in", "[group]")
+TEST_CASE("with group, only points of that group are tested and can be members", "[group]")
 {
     PointSet points = points_at({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {100, 0, 0}});
     const auto left = points.group("left").write();
@@ -69,7 +69,7 @@ TEST_CASE("a group needs a name", "[group]")
           }) == "name = \"\" names no group; give it at least one letter");
 }
 
-TEST_CASE("a group that the plan leaves out is neither made nor asked for", "[group]")
+TEST_CASE("a group that the plan leaves out is neither made nor tested", "[group]")
 {
     NodeTest group("group", {{"name", "hot"}});
     group.left_out = {"group:hot"};

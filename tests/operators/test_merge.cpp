@@ -29,7 +29,7 @@ using Ids = std::vector<std::int64_t>;
 
 }  // namespace
 
-TEST_CASE("a point that comes by both inputs is taken once, from the first", "[merge]")
+TEST_CASE("a point of both inputs is taken once, from the first", "[merge]")
 {
     const auto one = simulation();
     PointSet first = with_ids({0, 2, 5}), second = with_ids({1, 2, 3, 5});
@@ -60,7 +60,7 @@ TEST_CASE("points of another simulation get new ids, and keep them from frame to
     CHECK(there->next_id == 0);
 }
 
-TEST_CASE("a point of another simulation that comes twice is taken once, through several merges too", "[merge]")
+TEST_CASE("a point of another simulation in both inputs is taken once, also through several merges", "[merge]")
 {
     const auto here = simulation(), there = simulation();
     NodeTest merge("merge", {});
@@ -108,7 +108,7 @@ TEST_CASE("uniform columns of one value stay uniform", "[merge]")
     CHECK((*merged.find_group("all"))[2] == 1);
 }
 
-TEST_CASE("forces of both inputs travel on, those that came by both once", "[merge]")
+TEST_CASE("forces of both inputs are merged, and common ones are kept once", "[merge]")
 {
     const auto one = simulation();
     const auto make = [] { return std::make_shared<Collider>(); };
@@ -125,7 +125,7 @@ TEST_CASE("the initial points of all inputs are there at the first frame", "[mer
     CHECK(merge.start({flow_of(here, with_ids({0}), 1), flow_of(there, with_ids({0, 1}), 2)}).points.size() == 3);
 }
 
-TEST_CASE("merged before Solve, each point of another create comes in once and is then fed back", "[merge]")
+TEST_CASE("merged before Solve, each point of another create is adopted once and then fed back", "[merge]")
 {
     GraphTest graph;
     const auto place = [](float x) { return ObjectPtr(source_of(points_at({{x, 0, 0}}))); };
@@ -141,7 +141,7 @@ TEST_CASE("merged before Solve, each point of another create comes in once and i
     CHECK(ids_of(third) == Ids{0, 1, 2, 3});
 }
 
-TEST_CASE("merged after Solve, both simulations go on by themselves", "[merge]")
+TEST_CASE("merged after Solve, both simulations continue independently", "[merge]")
 {
     GraphTest graph;
     const Value place = ObjectPtr(source_of(points_at({{0, 0, 0}})));
@@ -158,7 +158,7 @@ TEST_CASE("merged after Solve, both simulations go on by themselves", "[merge]")
     CHECK(ids_of(graph.next_frame()) == Ids{0, 2, 4, 1, 3, 5});
 }
 
-TEST_CASE("inputs may be empty, and there may be one alone", "[merge][extreme]")
+TEST_CASE("inputs may be empty, and there may be only one", "[merge][extreme]")
 {
     const auto here = simulation(), there = simulation();
     NodeTest merge("merge", {});
@@ -167,7 +167,7 @@ TEST_CASE("inputs may be empty, and there may be one alone", "[merge][extreme]")
     CHECK(merge.evaluate(2, {flow_of(here, with_ids({0}), 1)}).points.size() == 1);
 }
 
-TEST_CASE("merge refuses inputs that can't be one set, naming the input", "[merge]")
+TEST_CASE("merge refuses incompatible inputs, and names the input", "[merge]")
 {
     PointSet floats = with_ids({0}), vectors = with_ids({0});
     floats.add({"heat", 1.0f});
@@ -181,7 +181,7 @@ TEST_CASE("merge refuses inputs that can't be one set, naming the input", "[merg
           "input 2: it runs at 30 frames a second, input 1 at 24; give both the same fps");
 }
 
-TEST_CASE("adopted ids are one a point, whatever the order in which points are seen", "[merge]")
+TEST_CASE("adopted ids are unique per point, whatever the order in which points appear", "[merge]")
 {
     AdoptedIds adopted;
     std::map<std::int64_t, std::int64_t> known;
@@ -196,7 +196,7 @@ TEST_CASE("adopted ids are one a point, whatever the order in which points are s
     CHECK(all_right);
 }
 
-TEST_CASE("ids that are seen in runs take the memory of the runs", "[merge]")
+TEST_CASE("consecutive ids take the memory of their runs", "[merge]")
 {
     AdoptedIds adopted;
     std::int64_t next = 0;
@@ -207,7 +207,7 @@ TEST_CASE("ids that are seen in runs take the memory of the runs", "[merge]")
     CHECK(adopted.runs() == 2);
 }
 
-TEST_CASE("merge takes none of what the plan leaves out", "[merge]")
+TEST_CASE("merge drops what the plan leaves out", "[merge]")
 {
     const auto here = simulation(), there = simulation();
     here->next_id = 1;

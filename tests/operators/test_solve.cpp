@@ -18,7 +18,7 @@ Flow falling(PointSet points, const std::shared_ptr<Simulation>& simulation)
     return gravity.evaluate(2, {Flow{std::move(points), {}, simulation}});
 }
 
-TEST_CASE("solve advances the points by a frame, and posts them back to Create", "[solve]")
+TEST_CASE("solve advances the points by a frame, and feeds them back to Create", "[solve]")
 {
     const auto simulation = test::simulation();
     NodeTest solve("solve", {});
@@ -32,7 +32,7 @@ TEST_CASE("solve advances the points by a frame, and posts them back to Create",
     CHECK(solve.figures.substeps == 1);
 }
 
-TEST_CASE("at the first frame solve only hands the points on", "[solve]")
+TEST_CASE("at the first frame solve only passes the points on", "[solve]")
 {
     const auto simulation = test::simulation();
     NodeTest solve("solve", {});
@@ -60,7 +60,7 @@ TEST_CASE("points age by their own time, and die at their life", "[solve]")
     CHECK(solve.simulation_state().state.size() == 3);
 }
 
-TEST_CASE("a life of 0 ends with the first frame, one of infinity never", "[solve][extreme]")
+TEST_CASE("a life of 0 ends with the first frame, an infinite one never", "[solve][extreme]")
 {
     PointSet points = points_at({{0, 0, 0}, {1, 0, 0}});
     const std::vector<float> lives = {0, std::numeric_limits<float>::infinity()};
@@ -80,7 +80,7 @@ TEST_CASE("without life nothing dies, and without age nothing ages", "[solve]")
     CHECK(solve.figures.died == 0);
 }
 
-TEST_CASE("a group of solve is all that moves and ages", "[solve]")
+TEST_CASE("only points of the group of solve move and age", "[solve]")
 {
     PointSet points = points_at({{0, 0, 0}, {1, 0, 0}});
     points.add({"age", 0.0f});
@@ -93,7 +93,7 @@ TEST_CASE("a group of solve is all that moves and ages", "[solve]")
     CHECK(test::values_of<float>(after, "age") == std::vector<float>{0, float(h)});
 }
 
-TEST_CASE("frame after frame, nothing is copied that nobody else holds", "[solve]")
+TEST_CASE("columns that are not shared are not copied from frame to frame", "[solve]")
 {
     const auto simulation = test::simulation();
     NodeTest solve("solve", {});
@@ -112,7 +112,7 @@ TEST_CASE("frame after frame, nothing is copied that nobody else holds", "[solve
     }
 }
 
-TEST_CASE("a level set is as wide as the largest radius asks", "[solve]")
+TEST_CASE("the band of a level set is as wide as the largest radius needs", "[solve]")
 {
     // A band of 0.15 m, and points of 0.4 m.
     const LevelSetPtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});

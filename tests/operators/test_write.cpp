@@ -37,7 +37,7 @@ Written write(Arguments arguments, bool at_start = false)
 
 }  // namespace
 
-TEST_CASE("write hands on all attributes and groups, and passes the points unchanged", "[write]")
+TEST_CASE("write writes all attributes and groups, and passes the points on unchanged", "[write]")
 {
     const Written written = write({{"file", "a.####.vdb"}});
     CHECK(written.pattern == "a.####.vdb");
@@ -46,7 +46,7 @@ TEST_CASE("write hands on all attributes and groups, and passes the points uncha
     CHECK(written.sets[0].group_names() == std::vector<std::string>{"hot"});
 }
 
-TEST_CASE("write hands on P, v, id and the attributes that are named", "[write]")
+TEST_CASE("write writes P, v, id and the named attributes", "[write]")
 {
     CHECK(write({{"file", "a.csv"}, {"attributes", list({"heat"})}}).sets[0].column_names() ==
           std::vector<std::string>{"P", "heat", "id", "v"});
@@ -54,7 +54,7 @@ TEST_CASE("write hands on P, v, id and the attributes that are named", "[write]"
           std::vector<std::string>{"heat"});
 }
 
-TEST_CASE("write hands on the points of its group alone", "[write]")
+TEST_CASE("write writes only the points of its group", "[write]")
 {
     CHECK(ids_of(write({{"file", "a.csv"}, {"group", "hot"}}).sets[0]) == std::vector<std::int64_t>{1});
 }

@@ -15,7 +15,7 @@ struct Fraction {
 
 }  // namespace
 
-TEST_CASE("a constant rate has borne floor(rate time) points by the end of every frame", "[emit]")
+TEST_CASE("a constant rate has emitted floor(rate time) points by the end of every frame", "[emit]")
 {
     const Fraction rate = GENERATE(Fraction{20000, 1}, Fraction{29, 100}, Fraction{1, 3}, Fraction{1999, 100},
                                    Fraction{1000, 7}, Fraction{1, 10}, Fraction{10000000, 1}, Fraction{7, 1000000});
@@ -36,7 +36,7 @@ TEST_CASE("a constant rate has borne floor(rate time) points by the end of every
     CHECK(all_right);
 }
 
-TEST_CASE("a rate that changes each frame bears the floor of its integral", "[emit]")
+TEST_CASE("a rate that changes each frame emits the floor of its integral", "[emit]")
 {
     // Rates are multiples of 1/8 and a frame is 1/16 s, so the integral is a whole number of 128ths.
     BirthClock clock(1);
@@ -52,7 +52,7 @@ TEST_CASE("a rate that changes each frame bears the floor of its integral", "[em
     CHECK(all_right);
 }
 
-TEST_CASE("tenths of a birth a frame lose none over 100,000 changes of the rate", "[emit]")
+TEST_CASE("no birth is lost over 100,000 changes of a rate of tenths of a birth per frame", "[emit]")
 {
     // 0.1 and 0.2 of a birth a frame have no exact double; 0.3 a pair of frames.
     BirthClock clock(1);
@@ -104,7 +104,7 @@ TEST_CASE("births of a count are evenly spaced within their frame", "[emit]")
         CHECK(births.even_age(i) == Approx(0.04 * (1 - static_cast<double>(i + 1) / 4)).margin(1e-17));
 }
 
-TEST_CASE("births of a count are at the same times, in whatever parts the frame is taken", "[emit]")
+TEST_CASE("births of a count have the same times with any number of sub-frames", "[emit]")
 {
     const std::size_t count = GENERATE(0, 1, 4, 7, 1000);
     const int parts = GENERATE(1, 3, 4, 16);

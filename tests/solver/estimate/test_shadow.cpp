@@ -46,7 +46,7 @@ std::vector<double> exact_frame(Shadows& shadows, PointSet& points, float way, i
 
 }  // namespace
 
-TEST_CASE("what each frame is off by adds up from a point's birth on", "[shadow]")
+TEST_CASE("errors of frames accumulate from a point's birth on", "[shadow]")
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 10);
@@ -64,7 +64,7 @@ TEST_CASE("what each frame is off by adds up from a point's birth on", "[shadow]
     CHECK(errors[3] == 2.5);
 }
 
-TEST_CASE("what nodes do to a point between two frames is done to its shadow", "[shadow]")
+TEST_CASE("changes of a point by nodes between two frames are applied to its shadow", "[shadow]")
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 3);
@@ -73,7 +73,7 @@ TEST_CASE("what nodes do to a point between two frames is done to its shadow", "
     CHECK(frame(shadows, points, 1, 1).front() == 0.5);
 }
 
-TEST_CASE("of many points 1,000 to 1,250 have a shadow, the same ones however they come", "[shadow]")
+TEST_CASE("of many points 1,000 to 1,250 have a shadow, the same ones in any order of birth", "[shadow]")
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 900);
@@ -88,7 +88,7 @@ TEST_CASE("of many points 1,000 to 1,250 have a shadow, the same ones however th
     }
 }
 
-TEST_CASE("a point that dies takes its shadow along, and one that is moved in the set keeps it", "[shadow]")
+TEST_CASE("the shadow of a point dies with it, and stays with a point that moves within the set", "[shadow]")
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 100);
@@ -104,7 +104,7 @@ TEST_CASE("a point that dies takes its shadow along, and one that is moved in th
     CHECK(frame(shadows, points, 1, 1.5f) == std::vector<double>(left, 2.0));
 }
 
-TEST_CASE("frames that are exact are not solved again while no shadow is off its point", "[shadow]")
+TEST_CASE("exact frames are not solved again while no shadow differs from its point", "[shadow]")
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 20);

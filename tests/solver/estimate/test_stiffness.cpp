@@ -47,7 +47,7 @@ Scene pulled_by(double omega)
 
 }  // namespace
 
-TEST_CASE("a drag is told of by its k dt, a spring by its omega dt, and both as exact", "[stiffness]")
+TEST_CASE("a drag is reported by its k dt, a spring by its omega dt, and both as exact", "[stiffness]")
 {
     const int substeps = GENERATE(1, 4);
     const double dt = 1.0 / 24 / substeps;
@@ -63,7 +63,7 @@ TEST_CASE("a drag is told of by its k dt, a spring by its omega dt, and both as 
     CHECK(text_of(spring[0]) == "linear1: omega dt = 50; treated exactly");
 }
 
-TEST_CASE("what is slow beside a sub-step is not told of", "[stiffness]")
+TEST_CASE("slow forces are not reported", "[stiffness]")
 {
     CHECK(found_in(with(0.9 * 24, 0.8 * 24 * 24, 0.09 * 24)).empty());
     CHECK(found_in(pulled_by(0.49 * 24)).empty());
@@ -71,7 +71,7 @@ TEST_CASE("what is slow beside a sub-step is not told of", "[stiffness]")
     CHECK(found_in(Scene(points(std::vector<Vec3f>())).gravity()).empty());
 }
 
-TEST_CASE("a pull is told of by its omega dt, with the errors of a frame by the closed form", "[stiffness]")
+TEST_CASE("an attraction is reported by its omega dt, with the errors of a frame by the closed form", "[stiffness]")
 {
     const double omega = 1.9 * 24, h = 1.0 / 24;
     const auto found = found_in(pulled_by(omega));
@@ -93,7 +93,7 @@ TEST_CASE("a pull is told of by its omega dt, with the errors of a frame by the 
                                                      found[0].cure->error, found[0].cure->error_then)));
 }
 
-TEST_CASE("an orbit is told of by its angle a sub-step, of the nearest point", "[stiffness]")
+TEST_CASE("an orbit is reported by its angle per sub-step, of the nearest point", "[stiffness]")
 {
     const double strength = 1000;
     Scene scene(points({{0.3f, 0, 0}, {0, 0, 0.1f}, {2, 0, 0}}).v({{0, 1, 0}, {0, 1, 0}, {0, 1, 0}}));
@@ -105,7 +105,7 @@ TEST_CASE("an orbit is told of by its angle a sub-step, of the nearest point", "
     CHECK(found[0].step == Approx(std::sqrt(strength / 1e-3) / 24).epsilon(1e-4));
 }
 
-TEST_CASE("a force by the velocity is told of by its k dt where it slows and omega dt where it turns", "[stiffness]")
+TEST_CASE("a velocity-dependent force is reported by k dt where it damps and by omega dt where it turns", "[stiffness]")
 {
     Scene slowed(points({{1, 0, 0}}).v({{1, 2, 3}}));
     slowed.force([](const Chunk& chunk, std::size_t i) -> Vec3d { return -36 * chunk.v[i]; });
@@ -123,7 +123,7 @@ TEST_CASE("a force by the velocity is told of by its k dt where it slows and ome
     CHECK(turning[0].step == Approx(1.5));
 }
 
-TEST_CASE("quadratic drag is told of by its c v dt", "[stiffness]")
+TEST_CASE("quadratic drag is reported by its c v dt", "[stiffness]")
 {
     const auto found = found_in(with(0, 0, 48));  // at 5 m/s
     REQUIRE(found.size() == 1);
@@ -131,7 +131,7 @@ TEST_CASE("quadratic drag is told of by its c v dt", "[stiffness]")
     CHECK_THAT(text_of(found[0]), Catch::Matchers::StartsWith("linear1: c v dt = 10 at 1 sub-step; estimated error "));
 }
 
-TEST_CASE("only the points that a force acts on are asked, each for its own time", "[stiffness]")
+TEST_CASE("only the points that a force acts on are sampled, each with its own time step", "[stiffness]")
 {
     PointSet set = points({{1, 0, 0}, {1, 0, 0}, {1, 0, 0}})
                        .set<float>("dt", {0, 0.01f, 0.04f})  // the first is born at the frame's end
@@ -149,7 +149,7 @@ TEST_CASE("only the points that a force acts on are asked, each for its own time
     CHECK(found_in(scene).at(0).step == Approx(5));
 }
 
-TEST_CASE("to ask what is stiff changes no point", "[stiffness]")
+TEST_CASE("the examination of stiffness changes no point", "[stiffness]")
 {
     Scene scene = pulled_by(1000);
     const PointSet before = scene.points;
@@ -158,7 +158,7 @@ TEST_CASE("to ask what is stiff changes no point", "[stiffness]")
     CHECK(scene.points.v()[0] == before.v()[0]);
 }
 
-TEST_CASE("of all that was found of a node the worst is kept, exact and not apart", "[stiffness]")
+TEST_CASE("the worst result of a node is kept, separately for exact and inexact parts", "[stiffness]")
 {
     Stiffness drag, later, turning;
     drag.node = later.node = turning.node = "a";

@@ -1,0 +1,53 @@
+// The context in which a node is evaluated.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "runtime/error.h"
+#include "runtime/frame.h"
+#include "runtime/graph/figures.h"
+#include "runtime/points/point_set.h"
+#include "runtime/random.h"
+
+namespace rapid {
+
+// The prefix of a group's name where attributes and groups are listed together, as in the header of a .csv file.
+inline const std::string group_prefix = "group:";
+
+// The context of a node's evaluation.
+struct Evaluation {
+    Frame frame;
+    bool at_start = false;    // the first frame: the initial state, before any dynamics
+    const std::string& node;  // name
+    const Location& location;
+    RandomKey random;       // of (seed, name)
+    FrameFigures& figures;  // statistics of this frame
+    // Each text is reported once a run: it has no frame and no counts, which belong in the figures.
+    std::vector<std::string>& warnings;
+    // Writes a set to a file; empty where nothing may be written (check, explain, test).
+    const std::function<void(const std::string& pattern, const PointSet& points)>& write;
+    // Attributes and groups that the plan leaves out of this simulation (PlannedAttribute); null: none.
+    const std::set<std::string>* left_out = nullptr;
+
+    // Whether a node that makes this attribute or group is to make it.
+    bool keeps(const std::string& name) const { return !left_out || !left_out->count(name); }
+    bool keeps_group(const std::string& name) const { return keeps(group_prefix + name); }
+};
+
+// A force, action, collider, constraint or interaction D of the node that is evaluated.
+template <class D, class... Arguments>
+std::shared_ptr<D> dynamic_of(const Evaluation& now, const std::string& group, Arguments&&... arguments)
+{
+    auto made = std::make_shared<D>(std::forward<Arguments>(arguments)...);
+    made->node = now.node;
+    made->location = now.location;
+    made->group = group;
+    return made;
+}
+
+}  // namespace rapid

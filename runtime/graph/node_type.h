@@ -1,0 +1,102 @@
+// Node types and nodes: parameters, uses of attributes, and the operator that does the work.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/graph/evaluation.h"
+#include "runtime/graph/param.h"
+#include "runtime/graph/simulation.h"
+
+namespace rapid {
+
+// The attributes and groups that a node reads, writes or makes.
+struct Uses {
+    std::vector<std::string> reads, writes;
+    std::vector<std::string> may;  // names that may be attributes; known ones among them are read
+    std::vector<AttributeSpec> makes;
+    std::vector<AttributeSpec> defaults;  // values of points without one of their own, whoever makes the attribute
+    std::vector<std::string> takes;       // optional inputs: read where another node makes them
+    std::vector<std::string> gives;       // optional outputs: written where another node reads them
+    std::vector<std::string> reads_groups, takes_groups, makes_groups;
+    std::vector<std::string> joins_groups;  // those of makes_groups that the node writes point by point
+    bool reads_all = false;                 // may read every attribute that is made
+
+    // Input of Operator::uses: the parameters that are functions of the frame, whose values will change.
+    std::set<std::string> functions;
+};
+
+class PointEdit;
+
+// The behaviour of a node; one object per node and run.
+class Operator {
+public:
+    virtual ~Operator() = default;
+    virtual void* fields() = 0;
+    virtual Flow evaluate(std::span<Flow> inputs, const Evaluation& now) = 0;
+    virtual Flow start(std::span<Flow> inputs, const Evaluation& now) = 0;
+    virtual void uses(Uses& uses) const = 0;
+    virtual void check() const = 0;
+
+    // This, where it edits points one by one (point_edit.h), and so can go together with its neighbours.
+    virtual const PointEdit* as_point_edit() const { return nullptr; }
+};
+
+// Parts of a frame's work, which a scene may have or lack.
+enum class Stage {
+    Emission,
+    Script,  // implied by a Lua function among the arguments
+    Forces,
+    Integration,
+    Collision,
+    ContactGrid,
+    Constraints,
+    ErrorEstimate,
+    Writing,
+};
+
+enum class NodeKind {
+    Source,   // no input: create
+    Points,   // changes points; a pure function of its input and arguments unless `varies`
+    Dynamic,  // adds a force, collider or constraint
+    Merge,    // several inputs
+    Solve,    // advances the points, and feeds them back to its Create
+};
+
+struct NodeType {
+    std::string name, doc;
+    std::string defined_in;  // the file of a type written in Lua; empty for native types
+    NodeKind kind = NodeKind::Points;
+    std::vector<Param> params;
+    std::optional<Param> rest;  // for arguments of any other name; its `name` is then that name
+    Uses uses;                  // of every node of this type; Operator::uses adds those of a node
+    std::vector<Stage> stages;  // that nodes of this type need
+    bool varies = false;        // the result may change from frame to frame with the same inputs and arguments
+    std::function<std::unique_ptr<Operator>()> make;
+
+    // Null where there is no parameter of that name. (`name` is a parameter only where it is declared, as of :group;
+    // elsewhere it names the node.)
+    const Param* find(std::string_view param) const;
+    std::vector<std::string> param_names() const;  // without internal ones
+};
+
+// A node as the graph file wrote it. Immutable; its inputs were made before it.
+struct Node {
+    const NodeType* type;
+    std::string name;
+    Location location;
+    std::uint64_t serial;  // order of creation: every node comes after its inputs
+    std::vector<std::shared_ptr<const Node>> inputs;
+    std::map<std::string, Value> arguments;
+};
+
+using NodePtr = std::shared_ptr<const Node>;
+
+}  // namespace rapid

@@ -1,0 +1,160 @@
+#include "runtime/operators/solve/collider_shapes.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "runtime/shapes/motion/moving.h"
+#include "runtime/stopwatch.h"
+
+namespace rapid {
+namespace {
+
+// Voxels of a level set; and of one whose band is wider than the shape itself, which takes some 4 s to fill and 1.5 GiB
+// to hold: points that large are kept out without voxels that small.
+constexpr double most_voxels = 0x1p31, most_voxels_of_wide_band = 0x1p27;
+
+double largest_radius(const Collider& collider, const PointSet& points)
+{
+    const Strided<float> radius = radii_of(collider.radius, points);
+    float largest = 0;
+    for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i) largest = std::max(largest, radius[i]);
+    return largest;
+}
+
+// The distance from the surface at which a level set is sampled (§4.3), m: the largest radius and two voxels, for the
+// cells at the edge of the band; and the depth that a sub-step reaches, where points are put back after it.
+double needed_band(const Collider& collider, const PointSet& points, double voxel, const Box3d& bounds, double h,
+                   int substeps)
+{
+    // A grid keeps its half width in single precision.
+    const double needed = (largest_radius(collider, points) + 2 * voxel) * (1 - 0x1p-20);
+    if (collider.method == Method::Continuous) return needed;
+    float fastest2 = 0;
+    const Strided<Vec3f> v = points.v().read();
+    for (std::size_t i = 0; i < points.size(); ++i) fastest2 = std::max(fastest2, v[i].squaredNorm());
+    // By factors of two, so that points that gather speed do not have it rebuilt in every frame.
+    const double path = std::sqrt(fastest2) * h / substeps;
+    double deep = voxel;
+    while (deep < path) deep *= 2;
+    return needed + std::min(deep, 0.5 * bounds.sizes().minCoeff());
+}
+
+LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& collider)
+{
+    // The voxels of the shell around the bounding box.
+    const Eigen::Array3d size = shape->bounds().sizes().array() / shape->voxel();
+    const double band = needed / shape->voxel();
+    const double voxels = (size + 2 * band).prod() - (size - 2 * band).max(0).prod();
+    const double most = band > size.maxCoeff() ? most_voxels_of_wide_band : most_voxels;
+    if (voxels > most)
+        throw Error(fmt::format("points with a radius of {:.4g} m need a band of {:.0f} voxels of {:g} m around its "
+                                "level set, some {:.1e} in all; at most {:.1e} fit: give it a larger voxel",
+                                needed - 2 * shape->voxel(), band, shape->voxel(), voxels, most))
+            .in_node(collider.node)
+            .at(collider.location);
+    return shape->with_band(needed);
+}
+
+// The shape of a rigid collider along its path through a step.
+ShapePtr moving_shape(const Collider& collider, const FrameClock& clock, std::int64_t step, double from, double to,
+                      const PathOptions& options, std::optional<Jump>& jump)
+{
+    const FramePath path = path_of(AnimatedShape(collider.shape, collider.motion), clock, step, options);
+    jump = path.jump;
+    if (path.kind == FramePath::AfterCut)
+        return moving(collider.shape, *going_back(collider.motion, clock, to, path.after), clock, from, to);
+    return moving(collider.shape, *collider.motion, clock, from, to);
+}
+
+void warn_of_jump(const Collider& collider, const Jump& jump, double frame, const Evaluation& now)
+{
+    const auto number = static_cast<std::int64_t>(std::ceil(frame));
+    now.warnings.push_back(
+        fmt::format("{}:{}: node \"{}\": the shape {}; nothing is swept along on the way (cut = {{{}}} says so, cut = "
+                    "{{}} that it is no jump)",
+                    collider.location.file, collider.location.line, collider.node, describe(jump, number), number));
+}
+
+}  // namespace
+
+void ColliderShapes::prepare(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
+                             const Evaluation& now)
+{
+    widen(dynamics, points, substeps, now);
+    set_in_motion(dynamics, points, clock, substeps, now);
+}
+
+void ColliderShapes::widen(Dynamics& dynamics, const PointSet& points, int substeps, const Evaluation& now)
+{
+    std::map<ShapePtr, LevelSetPtr> widened;
+    for (std::size_t i = 0; i < dynamics.colliders().size(); ++i) {
+        const std::shared_ptr<const Collider> collider = dynamics.colliders()[i];
+        const auto level_set = std::dynamic_pointer_cast<const LevelSet>(collider->shape);
+        if (!level_set) continue;
+        const double needed =
+            needed_band(*collider, points, level_set->voxel(), level_set->bounds(), now.frame.dt, substeps);
+        const auto known = widened_.find(collider->shape);
+        LevelSetPtr shape = known == widened_.end() ? level_set : known->second;
+        const Stopwatch stopwatch;
+        if (const auto other = widened.find(collider->shape); other != widened.end() && other->second->band() >= needed)
+            shape = other->second;
+        const bool builds = shape->band() < needed;
+        if (builds) shape = widened_to(shape, needed, *collider);
+        widened[collider->shape] = shape;
+        now.figures.bands.push_back(
+            {collider->node, shape->band(), shape->active_voxels(), builds ? stopwatch.seconds() : 0});
+        if (shape == level_set) continue;
+        auto replacement = std::make_shared<Collider>(*collider);
+        replacement->shape = shape;
+        dynamics.replace_collider(i, std::move(replacement));
+    }
+    widened_ = std::move(widened);
+}
+
+void ColliderShapes::set_in_motion(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
+                                   const Evaluation& now)
+{
+    const std::int64_t step = clock.step_at(now.frame);
+    const double to = now.frame.number, from = clock.at_step(step - 1).number;
+    std::map<std::string, Deformation> deformations;
+    const auto deformed = [&](const Collider& collider, const PathOptions& options,
+                              std::optional<Jump>& jump) -> ShapePtr {
+        const auto known = deformations_.find(collider.node);
+        const bool same = known != deformations_.end() && known->second.body() == collider.deforming;
+        Deformation& body =
+            deformations.emplace(collider.node, same ? known->second : Deformation(collider.deforming)).first->second;
+        const double band = needed_band(collider, points, collider.deforming->voxel(), collider.deforming->bounds(),
+                                        now.frame.dt, substeps);
+        const Stopwatch stopwatch;
+        Deformation::Interval interval = body.over({clock.fps, clock.start}, from, to, collider.motion, options, band);
+        const LevelSet& built = *body.at_end();
+        now.figures.bands.push_back({collider.node, built.band(), built.active_voxels(), stopwatch.seconds()});
+        jump = interval.jump;
+        return interval.shape;
+    };
+
+    for (std::size_t i = 0; i < dynamics.colliders().size(); ++i) {
+        const std::shared_ptr<const Collider> collider = dynamics.colliders()[i];
+        if (!collider->motion && !collider->deforming) continue;
+        auto in_motion = std::make_shared<Collider>(*collider);
+        PathOptions options;
+        options.cuts = collider->cuts;
+        std::optional<Jump> jump;
+        try {
+            in_motion->shape = collider->deforming
+                                   ? deformed(*collider, options, jump)
+                                   : moving_shape(*collider, clock, step, from, to, options, jump);
+        } catch (Error& error) {
+            error.in_node(collider->node).at(collider->location);
+            throw;
+        }
+        if (jump) warn_of_jump(*collider, *jump, to, now);
+        in_motion->motion = nullptr;
+        in_motion->deforming = nullptr;
+        dynamics.replace_collider(i, std::move(in_motion));
+    }
+    deformations_ = std::move(deformations);
+}
+
+}  // namespace rapid

@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// J/kg; nothing where there is no such energy.
+// Kinetic and potential energies, J/kg; nothing where there is no potential.
 std::optional<std::vector<double>> energies_of(const PointSet& points, const Dynamics& dynamics)
 {
     std::vector<Vec3d> P(points.size()), v(points.size());
@@ -17,8 +17,8 @@ std::optional<std::vector<double>> energies_of(const PointSet& points, const Dyn
         P[i] = P_of_points[i].cast<double>();
         v[i] = v_of_points[i].cast<double>();
     }
-    const std::vector<double> none(points.size());
-    const Chunk chunk{points, 0, P, v, none, none, 0};
+    const std::vector<double> zeros(points.size());
+    const Chunk chunk{points, 0, P, v, zeros, zeros, 0};
     std::vector<double> energies(points.size()), potential;
     for (std::size_t i = 0; i < points.size(); ++i) energies[i] = 0.5 * v[i].squaredNorm();
     for (const std::shared_ptr<const Force>& force : dynamics.forces()) {
@@ -42,13 +42,13 @@ bool spend_energy(const Dynamics& dynamics)
 void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, const Dynamics& dynamics, SolveOptions& options)
 {
     before_.clear();
-    places_.clear();
-    meets_ = false;
+    indices_.clear();
+    collides_ = false;
     const auto* force = points.find<Vec3f>("force");
     const bool forced = force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero());
     defined_ = !forced && !spend_energy(dynamics);
     if (!defined_) return;
-    if (!shadows.idle()) places_.assign(shadows.places().begin(), shadows.places().end());
+    if (!shadows.idle()) indices_.assign(shadows.indices().begin(), shadows.indices().end());
     auto energies = energies_of(shadows.idle() ? points.select({}) : shadows.before(), dynamics);
     defined_ = energies.has_value();
     if (!defined_ || shadows.idle()) return;
@@ -65,11 +65,11 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, const Dy
     drift_ = std::move(drift);
     ids_.assign(shadows.ids().begin(), shadows.ids().end());
     if (dynamics.colliders().empty()) return;
-    // Nobody looks at the others'.
+    // The others are not read.
     met_.resize(points.size());
-    for (const std::uint32_t place : places_) met_[place] = 0;
+    for (const std::uint32_t i : indices_) met_[i] = 0;
     options.met = met_.data();
-    meets_ = true;
+    collides_ = true;
 }
 
 std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, const Shadows& shadows,
@@ -80,16 +80,15 @@ std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, cons
         return std::nullopt;
     }
     if (shadows.idle()) return std::vector<double>(solved.empty() ? 0 : 1, 0.0);  // in closed form
-    // They are far apart in memory: all of them at once, before they are looked at.
-    if (meets_)
-        for (const std::uint32_t place : places_) __builtin_prefetch(&met_[place]);
-    const auto after = energies_of(solved.select(shadows.places()), dynamics);
+    if (collides_)                                                                // far apart in memory
+        for (const std::uint32_t i : indices_) __builtin_prefetch(&met_[i]);
+    const auto after = energies_of(solved.select(shadows.indices()), dynamics);
     if (!after) return std::nullopt;
     std::size_t kept = 0;
     for (std::size_t k = 0; k < ids_.size() && kept < shadows.ids().size(); ++k) {
         if (ids_[k] != shadows.ids()[kept]) continue;  // it has died
         const double change = (*after)[kept] - before_[k];
-        const bool counts = std::isfinite(change) && !(meets_ && met_[places_[k]]);
+        const bool counts = std::isfinite(change) && !(collides_ && met_[indices_[k]]);
         ids_[kept] = ids_[k];
         drift_[kept++] = drift_[k] + (counts ? change : 0);
     }

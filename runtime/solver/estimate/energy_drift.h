@@ -1,10 +1,9 @@
-// What the integrator does to the energy of motion of points, kinetic and of the forces' potentials: 0 if it were
-// exact.
+// Energy drift: the change of the kinetic and potential energy of points by the integrator, 0 if it were exact.
 //
-// Of each point that has a shadow the change within each Solve is summed since its birth, but for the steps in which it
-// met a shape, of which the audit of contacts tells (ContactEnergy). What nodes between two Solves do to a point is not
-// in it, and neither is what a force does by changing from frame to frame. There is no such energy where a force is not
-// the slope of a potential, and with actions, couplings and the attribute `force`.
+// For each point that has a shadow, the change within each Solve is summed since its birth, without steps in which it
+// met a shape (those are in the audit of contacts, ContactEnergy). Changes by nodes between two Solves, and by forces
+// that vary from frame to frame, are not included. The energy is not defined with forces that are not conservative, and
+// with actions, couplings and the attribute `force`.
 #pragma once
 
 #include <optional>
@@ -18,24 +17,23 @@ namespace rapid {
 
 class EnergyDrift {
 public:
-    // Before Solve, when the shadows have begun. Where there is something to measure, `options` are told to note who
-    // meets a shape.
+    // Call before Solve, after Shadows::begin(). Sets options.met where contacts are to be recorded.
     void begin(const PointSet& points, const Shadows& shadows, const Dynamics& dynamics, SolveOptions& options);
 
-    // After Solve and the shadows' advance: of each point that has a shadow, in order of id, J/kg. Nothing where it is
-    // not defined.
+    // Call after Solve and Shadows::advance(). Returns the drift of each point with a shadow, in order of id, J/kg;
+    // nothing where it is not defined.
     std::optional<std::vector<double>> end(const PointSet& solved, const Shadows& shadows, const Dynamics& dynamics);
 
 private:
     std::vector<std::int64_t> ids_;  // ascending
-    std::vector<double> drift_;      // of these, J/kg
+    std::vector<double> drift_;      // J/kg
 
     // From begin() to end().
     bool defined_ = false;
-    std::vector<double> before_;         // energies, J/kg
-    std::vector<std::uint32_t> places_;  // before Solve
-    bool meets_ = false;                 // there are colliders
-    std::vector<std::uint8_t> met_;      // by place before Solve, of those that have a shadow
+    std::vector<double> before_;          // energies, J/kg
+    std::vector<std::uint32_t> indices_;  // before Solve
+    bool collides_ = false;               // there are colliders
+    std::vector<std::uint8_t> met_;       // by index before Solve; only those of points with a shadow are valid
 };
 
 }  // namespace rapid

@@ -1,19 +1,18 @@
-// Sub-steps by what error is asked for.
+// Adaptive sub-steps: each point takes as many as a given tolerance requires.
 //
-// A point's result depends on no other point's, so each takes its own number: n, twice as many and twice again. What
-// these runs tend to is better than the last of them: their errors are a series in powers of the step, and each further
-// run takes one more of these out (Romberg 1955): the even powers where forces alone act, from the first on where
-// actions do. (Drag beside forces of place has odd ones too, from the third on; they are then only made less.) That is
-// the result, position and velocity, until the last power has moved it by no more than the tolerance: the error of what
-// stood there before, so that the result is well within. By a velocity a point is moved in the next frame: it may be
-// off by the tolerance a frame.
+// No point depends on another, so each takes its own number of sub-steps: n, 2n, 4n, ... The runs are extrapolated to a
+// step of zero (extrapolation.h), and the extrapolation, in position and velocity, is the result as soon as the last
+// power of the step moves it by no more than the tolerance. That is an estimate of the error before this correction, so
+// that the result is well within. A velocity error displaces the point in the next frame: it may be as large as the
+// tolerance per frame. (With drag and position-dependent forces there are odd powers from the third on, which the
+// extrapolation reduces and does not eliminate.)
 //
-// A way that a shape has broken has no such series, and what would lie in a shape is not used either. Then the result
-// is the last run itself; how far that is from the run before is at least its error where halving the step halves it,
-// and three times it where that quarters it. A way in closed form is solved once.
+// A path with a contact cannot be extrapolated, and an extrapolation that lies inside a shape is not used. The result
+// is then the last run itself, and its difference from the run before at least its error, if halving the step halves
+// the error, or three times that, if it quarters it. A path in closed form is solved once.
 //
-// Layout: a block of points takes its runs while it is in cache, as long as most of it needs them; those that need more
-// are gathered from all blocks as a set of their own.
+// Layout: a block of points takes its runs while it is in cache, as long as most of it needs them. The remaining points
+// of all blocks are gathered into a set of their own.
 #pragma once
 
 #include <span>
@@ -24,12 +23,12 @@ namespace rapid {
 
 struct Tolerated {
     SolveResult result;
-    int substeps = 1;          // the most that a point took in one run
-    std::uint64_t beyond = 0;  // points whose estimate is above the tolerance at max_substeps
+    int substeps = 1;          // the most in a run of any point
+    std::uint64_t beyond = 0;  // points that miss the tolerance at max_substeps
 };
 
-// Solves with the sub-steps that each point needs by itself for an error of at most `tolerance` (m): a multiple of
-// options.substeps by a power of 2, up to max_substeps.
+// Solves with the sub-steps that each point needs for an error of at most `tolerance` (m): options.substeps times a
+// power of 2, up to max_substeps.
 Tolerated solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
                        int max_substeps);
 

@@ -1,16 +1,15 @@
-// How wrong the positions are, accumulated since each point's birth: a few points are carried along twice, and one of
-// the two takes twice the sub-steps.
+// Global error estimate by step halving: a sample of the points has shadows, which take twice the sub-steps, and the
+// difference of point and shadow accumulates since the point's birth.
 //
-// The sample is every point while there are up to 1,000, and from then on those whose ids come first in a fixed random
-// order: 1,000 to 1,250 of those alive when it is thinned out, whatever the threads. A shadow is born as its point is,
-// and goes through Solve by itself, with finer steps. What the nodes between two Solves do to a point is done to its
-// shadow as the same change of P and v: exact where they add, to first order where they depend on what they change.
-// All other attributes are the point's. In a frame that is exact, and while no shadow is off its point, nothing is
-// done.
+// The sample is every point while there are up to 1,000, and then the points whose ids come first in a fixed random
+// order: 1,000 to 1,250 of those alive when it is thinned out, whatever the threads. A shadow is born with its point,
+// and passes through Solve separately, with finer steps. Changes of P and v by nodes between two Solves are applied to
+// the shadow as increments: exact where nodes add, to first order where they depend on what they change. All other
+// attributes are the point's. A frame that is solved exactly needs no work while every shadow is where its point is.
 //
-// The estimate is twice the difference of the two: the error itself where halving the step halves it, 1.5 times it
-// where that quarters it. A path that splits from its shadow, by a contact that one of them misses, is counted with all
-// of its difference, and goes on being counted. Points that die in one of the two only are not.
+// The estimate is twice the difference: the error itself where halving the step halves it, 1.5 times the error where
+// that quarters it. A path that diverges from its shadow, by a contact that one of them misses, counts with its whole
+// difference from then on. Points that die only in one of the two do not count.
 #pragma once
 
 #include <span>
@@ -22,11 +21,11 @@ namespace rapid {
 
 class Shadows {
 public:
-    // The points as they are before Solve: of those that were born since the last call some get a shadow. None has to
-    // be advanced where finer steps would only repeat the frame and all shadows are where their points are.
+    // Call before Solve: some of the points born since the last call get a shadow. is_exact: finer steps would only
+    // repeat the frame.
     void begin(const PointSet& points, bool is_exact);
 
-    // Advances the shadows as `solve_finer` does points. Afterwards: the estimated errors of P, m, in order of id.
+    // Advances the shadows by `solve_finer`. Returns the estimated errors of P, m, in order of id.
     template <class F>
     std::vector<double> advance(const PointSet& solved, const F& solve_finer)
     {
@@ -36,26 +35,25 @@ public:
         return compare(solved);
     }
 
-    // Of the points that have a shadow, in order of id: after begin() in the set that it was given, after advance() in
-    // the one that it was given.
+    // The points with shadows, in order of id, and their indices in the set given last to begin() or advance().
     std::span<const std::int64_t> ids() const { return ids_; }
-    std::span<const std::uint32_t> places() const { return places_; }
-    // These points before Solve, from begin() to advance().
+    std::span<const std::uint32_t> indices() const { return indices_; }
+    // Those points before Solve, from begin() to advance().
     const PointSet& before() const { return before_; }
-    // Whether nothing has to be done in this frame.
+    // Whether no shadow has to be advanced in this frame.
     bool idle() const { return idle_; }
 
 private:
     std::vector<double> compare(const PointSet& solved);
 
-    std::uint64_t threshold_ = UINT64_MAX;  // ids that come below it in the random order
-    std::int64_t next_id_ = 0;              // ids below it have been looked at
-    std::vector<std::int64_t> ids_;         // of the points that have a shadow, ascending
-    std::vector<std::uint32_t> places_;     // where these points are, or were when they were looked for last
-    std::vector<Vec3d> dP_, dv_;            // the shadow less its point, after Solve
+    std::uint64_t threshold_ = UINT64_MAX;  // the sample is the ids with a lower rank in the random order
+    std::int64_t next_id_ = 0;              // ids below it have been considered
+    std::vector<std::int64_t> ids_;         // of the points with shadows, ascending
+    std::vector<std::uint32_t> indices_;    // of these points, when they were last found
+    std::vector<Vec3d> dP_, dv_;            // shadow minus point, after Solve
     PointSet before_, set_;                 // these points and their shadows, from begin() to advance()
-    bool off_ = false;                      // whether one of them is elsewhere than its point
-    bool idle_ = false;                     // whether none has to be advanced in this frame
+    bool off_ = false;                      // some shadow differs from its point
+    bool idle_ = false;
 };
 
 }  // namespace rapid

@@ -15,46 +15,46 @@
 namespace rapid {
 namespace {
 
-// From where a drag or spring that is solved exactly is told of: a sub-step in which it does 1 - 1/e of its work.
-constexpr double told_if_exact = 1;
-// And all else: at half a radian a sub-step the midpoint's phase is off by 1 % of it, (omega dt)² / 24, beyond 2 it
-// blows up. At a quarter a motion is followed well.
-constexpr double told_otherwise = 0.5, followed = 0.25;
-constexpr int most_proposed = 256;  // sub-steps: eight times as many of a few points take some 30 ms, by a script
-constexpr int reference = 8;        // times as many, for what is taken as right: its own error is 1/64 at order 2
+// Thresholds of what is reported. A drag or spring that is solved exactly: 1 - 1/e of its relaxation per sub-step.
+constexpr double reported_if_exact = 1;
+// Others: at half a radian per sub-step the phase error of the midpoint rule is 1 % of it, (omega dt)² / 24; beyond 2
+// it is unstable. At a quarter a motion is well resolved.
+constexpr double reported_otherwise = 0.5, resolved = 0.25;
+constexpr int most_proposed = 256;  // sub-steps: eight times as many for a few points take some 30 ms with a script
+constexpr int reference = 8;        // times as many sub-steps for the reference, whose error is 1/64 at order 2
 
-// Points whose derivatives are taken, and of them, the stiffest, those that are solved.
-constexpr std::size_t most_asked = 64, most_solved = 16;
+// Points whose Jacobians are taken; and the stiffest of these, which are solved.
+constexpr std::size_t most_sampled = 64, most_solved = 16;
 
-// Differences are taken over this part of a place's and a velocity's size, m and m/s: rounding in double and in the
-// single precision of fields both stay far below.
+// The finite difference, relative to the norm of a position and a velocity (at least least_size, m and m/s): rounding
+// in double and in the single precision of fields both stay far below.
 constexpr double difference = 1e-5, least_size = 1e-3;
-constexpr double rounding = 1e-6;  // of a step's number, by these differences: what is as bad stays as it was found
+constexpr double rounding = 1e-6;  // relative error of a step from these differences: equal results keep the first
 
-// Evenly from all that the step advances.
+// The indices of points evenly spread over those that the step advances.
 std::vector<std::uint32_t> sample_of(const PointSet& points, const std::string& group)
 {
     const Strided<std::uint8_t> members = members_of(points, group);
-    std::size_t count = 0, met = 0;
+    std::size_t count = 0, passed = 0;
     for (std::size_t i = 0; i < points.size(); ++i) count += members[i];
-    const std::size_t n = std::min(count, most_asked);
-    std::vector<std::uint32_t> places;
-    for (std::size_t i = 0; i < points.size() && places.size() < n; ++i)
-        if (members[i] && met++ == places.size() * count / n) places.push_back(static_cast<std::uint32_t>(i));
-    return places;
+    const std::size_t n = std::min(count, most_sampled);
+    std::vector<std::uint32_t> indices;
+    for (std::size_t i = 0; i < points.size() && indices.size() < n; ++i)
+        if (members[i] && passed++ == indices.size() * count / n) indices.push_back(static_cast<std::uint32_t>(i));
+    return indices;
 }
 
 using Accelerations = std::function<std::vector<Vec3d>(std::span<Vec3d> P, std::span<Vec3d> v)>;
 
-struct Derivatives {
-    Eigen::Matrix3d by_place, by_velocity;
+struct Jacobians {
+    Eigen::Matrix3d by_position, by_velocity;
 };
 
-// The sample in the middle of its first sub-step.
+// The sample points in the middle of their first sub-step.
 class Sample {
 public:
-    Sample(const PointSet& points, std::span<const std::uint32_t> places, const SolveOptions& options)
-        : set(points.select(places)), P(set.size()), v(set.size()), dt(set.size(), options.h / options.substeps)
+    Sample(const PointSet& points, std::span<const std::uint32_t> indices, const SolveOptions& options)
+        : set(points.select(indices)), P(set.size()), v(set.size()), dt(set.size(), options.h / options.substeps)
     {
         const Strided<Vec3f> at = std::as_const(set).P().read(), speed = std::as_const(set).v().read();
         if (const auto* own = std::as_const(set).find<float>("dt"))
@@ -70,7 +70,7 @@ public:
 
     bool is_member(const Dynamic& dynamic, std::size_t i) const { return members_of(set, dynamic.group)[i]; }
 
-    void ask(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed, Forces& forces) const
+    void evaluate(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed, Forces& forces) const
     {
         forces.reset(size());
         if (const std::optional<Uniform> uniform = force.uniform())
@@ -79,12 +79,12 @@ public:
             force.contribute({set, 0, at, speed, dt, time, 0}, forces);
     }
 
-    // What a linear part leaves: a drag's own -k v and a spring's -w2 x are solved exactly, what they are drawn to is
-    // not where that depends on the place.
-    std::vector<Vec3d> rest_of(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed) const
+    // Accelerations without the terms -k v of drags and -w2 x of springs, which are solved exactly; their targets may
+    // depend on the position.
+    std::vector<Vec3d> inexact_accelerations(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed) const
     {
         Forces forces;
-        ask(force, at, speed, forces);
+        evaluate(force, at, speed, forces);
         std::vector<Vec3d> a(size());
         for (std::size_t i = 0; i < size(); ++i) {
             a[i] = forces.acceleration(i);
@@ -93,8 +93,8 @@ public:
         return a;
     }
 
-    // Of a set of its own each time: an action may write what it reads.
-    std::vector<Vec3d> kicks_of(const Action& action, std::span<Vec3d> at, std::span<Vec3d> speed) const
+    // On a copy of the set, because an action may write what it reads.
+    std::vector<Vec3d> accelerations(const Action& action, std::span<Vec3d> at, std::span<Vec3d> speed) const
     {
         PointSet own = set;
         std::vector<Vec3d> a(size(), Vec3d::Zero()), force = a;
@@ -111,26 +111,26 @@ public:
     }
 
     // By central differences.
-    std::vector<Derivatives> derivatives(const Accelerations& accelerations) const
+    std::vector<Jacobians> jacobians(const Accelerations& accelerations_at) const
     {
-        std::vector<Derivatives> result(size());
-        const auto difference_along = [&](bool by_place, int axis) {
-            const std::span<const Vec3d> from = by_place ? P : v;
-            const auto asked = [&](double side) {
+        std::vector<Jacobians> result(size());
+        const auto difference_along = [&](bool by_position, int axis) {
+            const std::span<const Vec3d> from = by_position ? P : v;
+            const auto moved_by = [&](double side) {
                 std::vector<Vec3d> at = P, speed = v;
-                std::vector<Vec3d>& moved = by_place ? at : speed;
+                std::vector<Vec3d>& moved = by_position ? at : speed;
                 for (std::size_t i = 0; i < size(); ++i)
                     moved[i][axis] += side * difference * std::max(from[i].norm(), least_size);
-                return accelerations(at, speed);
+                return accelerations_at(at, speed);
             };
-            const std::vector<Vec3d> more = asked(1), less = asked(-1);
+            const std::vector<Vec3d> more = moved_by(1), less = moved_by(-1);
             for (std::size_t i = 0; i < size(); ++i) {
-                const double way = 2 * difference * std::max(from[i].norm(), least_size);
-                (by_place ? result[i].by_place : result[i].by_velocity).col(axis) = (more[i] - less[i]) / way;
+                const double width = 2 * difference * std::max(from[i].norm(), least_size);
+                (by_position ? result[i].by_position : result[i].by_velocity).col(axis) = (more[i] - less[i]) / width;
             }
         };
-        for (const bool by_place : {true, false})
-            for (int axis = 0; axis < 3; ++axis) difference_along(by_place, axis);
+        for (const bool by_position : {true, false})
+            for (int axis = 0; axis < 3; ++axis) difference_along(by_position, axis);
         return result;
     }
 
@@ -139,10 +139,10 @@ public:
     std::vector<double> dt, time;
 };
 
-// The stiffest points of each kind, for one force or action.
-class Found {
+// The largest steps of each kind, of one force or action.
+class StiffnessScan {
 public:
-    explicit Found(std::size_t size) : inexact_(size, 0) {}
+    explicit StiffnessScan(std::size_t size) : inexact_(size, 0) {}
 
     void add(Stiffness::Kind kind, std::size_t i, double step)
     {
@@ -152,30 +152,30 @@ public:
         if (kind > Stiffness::Spring) inexact_[i] = std::max(inexact_[i], step);
     }
 
-    // How fast x'' = J x + (K - k) x' turns, and how fast K alone takes a velocity away: that of k is exact.
-    void add(std::size_t i, const Derivatives& by, double k, double dt)
+    // The rate of oscillation of x'' = J x + (K - k) x', and the rate of decay by K alone: that of k is solved exactly.
+    void add(std::size_t i, const Jacobians& by, double k, double dt)
     {
-        const Eigen::Matrix3d &J = by.by_place, &K = by.by_velocity;
+        const Eigen::Matrix3d &J = by.by_position, &K = by.by_velocity;
         if (!J.allFinite() || !K.allFinite() || (J.isZero(0) && K.isZero(0))) return;
         Eigen::Matrix<double, 6, 6> both;
         both << Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Identity(), J, K - k * Eigen::Matrix3d::Identity();
-        const Eigen::EigenSolver<Eigen::Matrix<double, 6, 6>> turning(both, false);
-        add(Stiffness::Turning, i, dt * turning.eigenvalues().imag().cwiseAbs().maxCoeff());
+        const Eigen::EigenSolver<Eigen::Matrix<double, 6, 6>> oscillating(both, false);
+        add(Stiffness::Oscillation, i, dt * oscillating.eigenvalues().imag().cwiseAbs().maxCoeff());
         const Eigen::EigenSolver<Eigen::Matrix3d> decaying(K, false);
         add(Stiffness::Decay, i, -dt * decaying.eigenvalues().real().minCoeff());
     }
 
-    // The worst of what is exact and the worst of what is not, where they are worth a word.
-    std::vector<Stiffness> told() const
+    // The worst part that is solved exactly and the worst that is not, where they are above the threshold.
+    std::vector<Stiffness> result() const
     {
-        std::vector<Stiffness> told;
+        std::vector<Stiffness> result;
         for (const bool exact : {true, false}) {
             Stiffness worst;
             for (const auto& [kind, step] : worst_)
                 if ((kind <= Stiffness::Spring) == exact && step > worst.step) worst.kind = kind, worst.step = step;
-            if (worst.step >= (exact ? told_if_exact : told_otherwise)) told.push_back(worst);
+            if (worst.step >= (exact ? reported_if_exact : reported_otherwise)) result.push_back(worst);
         }
-        return told;
+        return result;
     }
 
     double inexact(std::size_t i) const { return inexact_[i]; }
@@ -185,15 +185,15 @@ private:
     std::vector<double> inexact_;  // by point
 };
 
-Found ask(const Force& force, const Sample& sample)
+StiffnessScan scan(const Force& force, const Sample& sample)
 {
-    Found found(sample.size());
+    StiffnessScan found(sample.size());
     if (const std::optional<Uniform> uniform = force.uniform(); uniform && uniform->linear.is_zero()) return found;
     std::vector<Vec3d> P = sample.P, v = sample.v;
     Forces forces;
-    sample.ask(force, P, v, forces);
-    const std::vector<Derivatives> derivatives = sample.derivatives(
-        [&](std::span<Vec3d> at, std::span<Vec3d> speed) { return sample.rest_of(force, at, speed); });
+    sample.evaluate(force, P, v, forces);
+    const std::vector<Jacobians> jacobians = sample.jacobians(
+        [&](std::span<Vec3d> at, std::span<Vec3d> speed) { return sample.inexact_accelerations(force, at, speed); });
     for (std::size_t i = 0; i < sample.size(); ++i) {
         if (!sample.is_member(force, i)) continue;
         const Linear linear = forces.has_linear() ? forces.linear(i) : Linear();
@@ -201,36 +201,36 @@ Found ask(const Force& force, const Sample& sample)
         found.add(Stiffness::Drag, i, linear.k * dt);
         found.add(Stiffness::Spring, i, std::sqrt(linear.w2) * dt);
         found.add(Stiffness::SquaredDrag, i, linear.c * sample.v[i].norm() * dt);
-        found.add(i, derivatives[i], linear.k, dt);
+        found.add(i, jacobians[i], linear.k, dt);
     }
     return found;
 }
 
-Found ask(const Action& action, const Sample& sample)
+StiffnessScan scan(const Action& action, const Sample& sample)
 {
-    Found found(sample.size());
-    const std::vector<Derivatives> derivatives = sample.derivatives(
-        [&](std::span<Vec3d> at, std::span<Vec3d> speed) { return sample.kicks_of(action, at, speed); });
-    for (std::size_t i = 0; i < sample.size(); ++i) found.add(i, derivatives[i], 0, sample.dt[i]);
+    StiffnessScan found(sample.size());
+    const std::vector<Jacobians> jacobians = sample.jacobians(
+        [&](std::span<Vec3d> at, std::span<Vec3d> speed) { return sample.accelerations(action, at, speed); });
+    for (std::size_t i = 0; i < sample.size(); ++i) found.add(i, jacobians[i], 0, sample.dt[i]);
     return found;
 }
 
-// The sub-steps at which the stiffest of what is not exact is followed.
+// The sub-steps that resolve the stiffest part that is not solved exactly.
 int proposed(const SolveOptions& options, double step)
 {
     int substeps = options.substeps;
-    for (double left = step; left > followed && 2 * substeps <= most_proposed; left /= 2) substeps *= 2;
+    for (double left = step; left > resolved && 2 * substeps <= most_proposed; left /= 2) substeps *= 2;
     return substeps;
 }
 
-// m, the largest distance of a point to itself.
-double apart(const PointSet& a, const PointSet& b)
+// The largest distance between points of the same id, m.
+double largest_distance(const PointSet& a, const PointSet& b)
 {
-    std::map<std::int64_t, Vec3d> place;
-    for (std::size_t i = 0; i < b.size(); ++i) place[b.id()[i]] = b.P()[i].cast<double>();
+    std::map<std::int64_t, Vec3d> position;
+    for (std::size_t i = 0; i < b.size(); ++i) position[b.id()[i]] = b.P()[i].cast<double>();
     double worst = 0;
     for (std::size_t i = 0; i < a.size(); ++i)
-        if (const auto found = place.find(a.id()[i]); found != place.end())
+        if (const auto found = position.find(a.id()[i]); found != position.end())
             worst = std::max(worst, (a.P()[i].cast<double>() - found->second).norm());
     return worst;
 }
@@ -244,8 +244,8 @@ Stiffness::Cure cure_of(const PointSet& points, const Dynamics& pulls, SolveOpti
         solve(set, pulls, options);
         return set;
     };
-    const PointSet as_it_is = solved(options.substeps), then = solved(substeps), right = solved(reference * substeps);
-    return {apart(as_it_is, right), substeps, apart(then, right)};
+    const PointSet now = solved(options.substeps), then = solved(substeps), exact = solved(reference * substeps);
+    return {largest_distance(now, exact), substeps, largest_distance(then, exact)};
 }
 
 Dynamics forces_and_actions_of(const Dynamics& dynamics)
@@ -262,23 +262,23 @@ Dynamics forces_and_actions_of(const Dynamics& dynamics)
 std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
     const Dynamics pulls = forces_and_actions_of(dynamics);
-    std::vector<std::uint32_t> places = sample_of(points, options.group);
+    std::vector<std::uint32_t> indices = sample_of(points, options.group);
     if (const auto* own = points.find<float>("dt"))  // those born at the frame's end take no step
-        std::erase_if(places, [&](std::uint32_t place) { return !((*own)[place] > 0); });
-    if (pulls.empty() || places.empty()) return {};
+        std::erase_if(indices, [&](std::uint32_t i) { return !((*own)[i] > 0); });
+    if (pulls.empty() || indices.empty()) return {};
 
-    const Sample sample(points, places, options);
+    const Sample sample(points, indices, options);
     std::vector<Stiffness> all;
     std::vector<double> inexact(sample.size(), 0);
     double worst = 0;
     const auto look_at = [&](const auto& pull, const std::string& name) {
-        std::optional<Found> found;
+        std::optional<StiffnessScan> found;
         try {
-            found = ask(pull, sample);
+            found = scan(pull, sample);
         } catch (const Error&) {
             return;  // the step itself reports it
         }
-        for (Stiffness& stiffness : found->told()) {
+        for (Stiffness& stiffness : found->result()) {
             stiffness.node = name;
             stiffness.substeps = options.substeps;
             stiffness.frame = options.frame;
@@ -304,7 +304,7 @@ std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynami
         const Stiffness::Cure cure = cure_of(sample.set.select(stiffest), pulls, options, proposed(options, worst));
         for (Stiffness& stiffness : all)
             if (!stiffness.is_exact()) stiffness.cure = cure;
-    } catch (const Error&) {  // it blows up: then the run says so
+    } catch (const Error&) {  // unstable: the run itself reports it
     }
     return all;
 }

@@ -1,9 +1,10 @@
-// Which forces and actions are stiff: change a point within a sub-step about as much as it is there at all.
+// Detection of stiff forces and actions: those whose time scale is that of a sub-step or shorter.
 //
-// Found from a sample of the points where they are. Linear drags and springs say their rates themselves, and are solved
-// exactly at any step. Of all else the derivatives of the acceleration by place and velocity are taken by differences:
-// x'' = J x + K x' turns and decays by the eigenvalues of both together. What it costs is solved, not guessed: the
-// sample's frame with the sub-steps that there are, with so many that the motion is followed, and with many more.
+// A sample of the points is examined where they are. The rates of linear drags and springs are known, and these are
+// solved exactly at any step. For all other parts the Jacobians of the acceleration by position and velocity, J and K,
+// are taken by finite differences: the eigenvalues of x'' = J x + K x' give the rates of oscillation and decay. The
+// resulting error is computed, not guessed: the frame of the sample is solved with the given sub-steps, with as many as
+// resolve the motion, and with many more.
 #pragma once
 
 #include <cstdint>
@@ -20,21 +21,21 @@ struct SolveOptions;
 
 struct Stiffness {
     enum Kind {
-        Drag,         // k dt, of a drag that is solved exactly
-        Spring,       // omega dt, of a spring that is
+        Drag,         // k dt, solved exactly
+        Spring,       // omega dt, solved exactly
         SquaredDrag,  // c v dt
-        Decay,        // k dt, of a drag that is not
-        Turning,      // omega dt
+        Decay,        // k dt
+        Oscillation,  // omega dt
     };
 
     std::string node;  // drag1; action "sun"
     Kind kind = Drag;
-    double step = 0;         // of the stiffest point: the number that `kind` names
-    int substeps = 1;        // that it is at
-    std::int64_t frame = 0;  // that it was found in
+    double step = 0;         // the product that `kind` names, of the stiffest point
+    int substeps = 1;        // of the frame
+    std::int64_t frame = 0;  // in which it was found
 
-    // The largest errors of the sample's positions after this frame, m, as it is and with more sub-steps. Nothing of
-    // what is exact, nor where points are coupled: a sample alone goes elsewhere.
+    // The largest position errors of the sample after this frame, m, now and with more sub-steps. Nothing for parts
+    // that are solved exactly, nor where points are coupled, because a sample alone moves differently.
     struct Cure {
         double error;
         int substeps;
@@ -45,10 +46,10 @@ struct Stiffness {
     bool is_exact() const { return kind == Drag || kind == Spring; }
 };
 
-// Of the points as they are before Solve, in the order of the chain; what is not stiff is left out. Changes nothing.
+// The stiff forces and actions, in the order of the chain, on the points before Solve. Changes nothing.
 std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
-// Of all that was found of a node the worst.
+// Merges `found` into `worst`, which keeps the stiffest result of each node.
 void keep_worst(std::vector<Stiffness>& worst, const std::vector<Stiffness>& found);
 
 // drag1: k dt = 16; treated exactly

@@ -77,7 +77,7 @@ TEST_CASE("an attraction is reported by its omega dt, with the errors of a frame
     const auto found = found_in(pulled_by(omega));
     REQUIRE(found.size() == 1);
     CHECK(found[0].node == "push1");
-    CHECK(found[0].kind == Stiffness::Turning);
+    CHECK(found[0].kind == Stiffness::Oscillation);
     CHECK(found[0].step == Approx(1.9).epsilon(1e-6));
     REQUIRE(found[0].cure);
     CHECK(found[0].cure->substeps == 8);  // 1.9 / 8 is the first half of a half that is below 1/4
@@ -119,7 +119,7 @@ TEST_CASE("a velocity-dependent force is reported by k dt where it damps and by 
     turned.force([](const Chunk& chunk, std::size_t i) -> Vec3d { return Vec3d(0, 36, 0).cross(chunk.v[i]); });
     const auto turning = found_in(turned);
     REQUIRE(turning.size() == 1);
-    CHECK(turning[0].kind == Stiffness::Turning);
+    CHECK(turning[0].kind == Stiffness::Oscillation);
     CHECK(turning[0].step == Approx(1.5));
 }
 
@@ -165,7 +165,7 @@ TEST_CASE("the worst result of a node is kept, separately for exact and inexact 
     drag.step = 3;
     later.step = 5;
     later.frame = 7;
-    turning.kind = Stiffness::Turning;
+    turning.kind = Stiffness::Oscillation;
     turning.step = 0.7;
     std::vector<Stiffness> worst;
     keep_worst(worst, {drag, turning});

@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <map>
 
-#include "runtime/graph/at_node.h"
+#include "runtime/at_node.h"
+#include "runtime/points/point_names.h"
 
 namespace rapid {
 namespace {
-
-// A column that every point has, or that Solve and the emitters share.
-bool is_own(std::string_view name) { return name == "P" || name == "v" || name == "id" || name == "dt"; }
 
 // What the nodes of one simulation make.
 struct MadeNames {
@@ -38,8 +36,8 @@ struct MadeNames {
 
     void check_attribute(const std::string& name) const
     {
-        if (is_own(name) || attributes.count(name) || known_attribute(name)) return;
-        std::vector<std::string> names = {"P", "v", "id", "dt"};
+        if (is_own_column(name) || attributes.count(name) || known_attribute(name)) return;
+        std::vector<std::string> names = point_names_of(PointName::OwnColumn);
         for (const auto& [made, maker] : attributes) names.push_back(made);
         for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
         const std::string near = nearest_name(name, names);
@@ -184,12 +182,12 @@ void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
     MadeNames made;
     for (const PlannedNode& planned : nodes)
         if (planned.simulation == simulation)
-            at_node(planned.node->name, planned.node->location, [&] { made.add(uses_of(planned), *planned.node); });
+            name_errors(planned.node->name, planned.node->location, [&] { made.add(uses_of(planned), *planned.node); });
 
     for (const PlannedNode& planned : nodes) {
         // Points of other simulations, which come through a merge, bring names of their own.
         if (planned.simulation != simulation || planned.carries.size() > 1) continue;
-        at_node(planned.node->name, planned.node->location, [&] {
+        name_errors(planned.node->name, planned.node->location, [&] {
             const Uses uses = uses_of(planned);
             for (const auto* list : {&uses.reads, &uses.writes})
                 for (const std::string& name : *list) made.check_attribute(name);

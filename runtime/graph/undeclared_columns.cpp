@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runtime/error.h"
+#include "runtime/points/point_names.h"
 
 namespace rapid {
 namespace {
@@ -101,7 +102,8 @@ bool is_poisoned(const AnyColumn& any)
 
 UndeclaredColumns::UndeclaredColumns(PointSet& points, std::span<const Uses> declared) : ids_(points.id())
 {
-    std::set<std::string> names = {"P", "v", "id", "dt"};
+    const std::vector<std::string> own = point_names_of(PointName::OwnColumn);
+    std::set<std::string> names(own.begin(), own.end());
     for (const Uses& uses : declared) {
         if (uses.reads_all) return;
         add_names(uses, names);

@@ -75,9 +75,9 @@ private:
 
 // The first contact of each path.
 template <class Sampler>
-class FirstContacts {
+class FirstContactSearch {
 public:
-    FirstContacts(const Sampler& sampler, std::span<const Path> paths, std::span<Contact> contacts)
+    FirstContactSearch(const Sampler& sampler, std::span<const Path> paths, std::span<Contact> contacts)
         : sampler_(sampler),
           paths_(paths),
           contacts_(contacts),
@@ -195,7 +195,7 @@ public:
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {
         const auto sampler = derived().sampler();
-        FirstContacts(sampler, paths, contacts).find();
+        FirstContactSearch(sampler, paths, contacts).find();
     }
 
     double smallest_feature() const override { return derived().sampler().smallest_feature(); }

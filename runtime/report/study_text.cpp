@@ -56,16 +56,16 @@ std::string order_text(const StudyLine& line)
     return line.at_rounding ? "exact: every error is at rounding" : "no order: fewer than two rows to fit";
 }
 
-using Table = std::vector<std::vector<std::string>>;
+using TextTable = std::vector<std::vector<std::string>>;
 
 // A row for each setting, below a row of titles; the knobs come first.
-Table table_of(const StudyResult& result)
+TextTable table_of(const StudyResult& result)
 {
     const Study& study = result.study;
     std::vector<std::string> knobs = study.lines;
     if (const std::string step = study.step(); !step.empty()) knobs.push_back(step);
 
-    Table table = {{""}};
+    TextTable table = {{""}};
     table[0].insert(table[0].end(), knobs.begin(), knobs.end());
     table[0].insert(table[0].end(), {"error", "run time", "least", "most"});
     const bool missing = std::any_of(result.rows.begin(), result.rows.end(), [](auto& row) { return row.missing > 0; });
@@ -94,7 +94,7 @@ Table table_of(const StudyResult& result)
 std::string to_text(const StudyResult& result)
 {
     const Study& study = result.study;
-    const Table table = table_of(result);
+    const TextTable table = table_of(result);
     std::vector<std::size_t> widths(table[0].size());
     for (const auto& cells : table)
         for (std::size_t c = 0; c < cells.size(); ++c) widths[c] = std::max(widths[c], cells[c].size());

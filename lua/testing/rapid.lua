@@ -102,7 +102,7 @@ return function(native)
   end
 
   local known_options = { frames = true, set = true, seed = true, threads = true, script_timeout = true,
-    watch_traces = true }
+    check_declarations = true, watch_traces = true }
 
   local function whole(name, value, least)
     if type(value) ~= "number" or value % 1 ~= 0 or (least and value < least) then
@@ -119,8 +119,8 @@ return function(native)
     if type(path) ~= "string" then error("rapid.run takes the path of a graph", 2) end
     for name in pairs(options) do
       if not known_options[name] then
-        error(("rapid.run: unknown option %q; it must be frames, set, seed, threads, script_timeout or watch_traces")
-          :format(tostring(name)), 2)
+        error(("rapid.run: unknown option %q; it must be frames, set, seed, threads, script_timeout, "
+          .. "check_declarations or watch_traces"):format(tostring(name)), 2)
       end
     end
     local frames = options.frames
@@ -140,6 +140,7 @@ return function(native)
       seed = options.seed and whole("seed", options.seed, 0),
       threads = options.threads and whole("threads", options.threads, 0),
       script_timeout = options.script_timeout,
+      check_declarations = options.check_declarations == true,
       watch_traces = options.watch_traces == true,
       set = set,
     })

@@ -1,6 +1,5 @@
 // Points are sorted into tiles; each tile sorts its own by depth and composites them front to back, until a pixel is
 // covered. A tile's points come in the order of their depth, and of their place in the set where depths are equal.
-// Tests: tests/picture/test_picture.cpp.
 #include "runtime/picture/discs.h"
 
 #include <tbb/parallel_for.h>

@@ -1,4 +1,3 @@
-// Tests: tests/picture/test_picture.cpp.
 #include "runtime/picture/ground.h"
 
 #include <algorithm>

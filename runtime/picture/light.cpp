@@ -1,4 +1,3 @@
-// Tests: tests/picture/test_picture.cpp.
 #include "runtime/picture/light.h"
 
 #include <tbb/parallel_for.h>

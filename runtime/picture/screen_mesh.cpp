@@ -1,4 +1,3 @@
-// Tests: tests/picture/test_picture.cpp.
 #include "runtime/picture/screen_mesh.h"
 
 #include <limits>

@@ -1,4 +1,3 @@
-// Tests: tests/shapes/motion/test_motion.cpp.
 #include "runtime/shapes/pose.h"
 
 namespace rapid {

@@ -9,6 +9,13 @@ describe("every scene in graphs", function()
       for _, points in result:frames() do assert.points(points).finite() end
       assert.is_true(#result[24] > 0)
     end)
+
+    it(path .. " uses no column that its nodes do not declare, to the bit", function()
+      local options = { frames = {12, 12}, set = path:find "first" and { rate = 2000 } or nil }
+      local plain = rapid.run(path, options)
+      options.check_declarations = true
+      assert.same_points(plain[12], rapid.run(path, options)[12])
+    end)
   end
 end)
 

@@ -42,12 +42,21 @@ std::optional<double> number_field(lua_State* L, int table, const char* name)
     return number;
 }
 
+bool flag_field(lua_State* L, int index, const char* name)
+{
+    lua_getfield(L, index, name);
+    const bool flag = lua_toboolean(L, -1) != 0;
+    lua_pop(L, 1);
+    return flag;
+}
+
 struct SceneRun {
     std::string graph;
     std::int64_t first = 0, last = 0;
     std::optional<std::uint64_t> seed;
     int threads = 0;
     SessionOptions session;
+    bool check_declarations = false;
     bool watch_traces = false;  // only on request: the JIT's events are not safe in every run
 };
 
@@ -64,9 +73,8 @@ SceneRun read_run(lua_State* L)
     if (const auto seconds = number_field(L, 2, "script_timeout")) run.session.script_timeout = *seconds;
     run.session.on_timeout = host.options.on_timeout;
     run.session.may_write = false;
-    lua_getfield(L, 2, "watch_traces");
-    run.watch_traces = lua_toboolean(L, -1) != 0;
-    lua_pop(L, 1);
+    run.check_declarations = flag_field(L, 2, "check_declarations");
+    run.watch_traces = flag_field(L, 2, "watch_traces");
     lua_getfield(L, 2, "set");
     for (lua_pushnil(L); lua_next(L, -2); lua_pop(L, 1)) run.session.set[text_at(L, -2)] = text_at(L, -1);
     lua_pop(L, 1);
@@ -90,6 +98,7 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
         add(session.warnings());
         add(plan.warnings);
         Evaluator evaluator(plan);
+        if (run.check_declarations) evaluator.check_declarations();
         while (evaluator.next_frame() <= run.last) {
             FrameResult result = evaluator.advance();
             add(result.warnings);

@@ -1,5 +1,4 @@
 // A box with its edges along the axes.
-// Tests: tests/shapes/analytic/test_analytic.cpp.
 #include <fmt/format.h>
 
 #include <array>

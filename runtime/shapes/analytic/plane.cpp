@@ -1,5 +1,4 @@
 // The half space below a plane. Contacts are the roots of a quadratic: exact for a bouncing ball.
-// Tests: tests/shapes/analytic/test_analytic.cpp.
 #include <fmt/format.h>
 
 #include "runtime/error.h"

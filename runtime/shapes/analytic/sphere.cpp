@@ -1,5 +1,4 @@
 // A solid sphere.
-// Tests: tests/shapes/analytic/test_analytic.cpp.
 #include <fmt/format.h>
 
 #include <numbers>

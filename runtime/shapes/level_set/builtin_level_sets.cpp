@@ -1,5 +1,4 @@
 // Built-in level sets, from formulas of their distance: exact at every voxel of the band.
-// Tests: tests/shapes/level_set/test_level_set.cpp.
 #include <fmt/format.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>

@@ -1,4 +1,3 @@
-// Tests: tests/shapes/level_set/test_level_set_file.cpp.
 #include "runtime/shapes/level_set/grid_file.h"
 
 #include <fmt/format.h>

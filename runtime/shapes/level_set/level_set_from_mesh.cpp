@@ -1,5 +1,4 @@
 // Level sets from meshes, and the warnings about meshes that make doubtful ones.
-// Tests: tests/shapes/level_set/test_level_set.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

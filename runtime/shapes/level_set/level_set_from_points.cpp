@@ -1,5 +1,4 @@
 // Level sets around points: the union of their balls, exact outside of them.
-// Tests: tests/shapes/level_set/test_level_set_tools.cpp.
 #include <fmt/format.h>
 #include <openvdb/tools/ParticlesToLevelSet.h>
 

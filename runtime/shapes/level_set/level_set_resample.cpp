@@ -1,5 +1,4 @@
 // Level sets on other voxels: by their surface as a mesh, which restores the distances.
-// Tests: tests/shapes/level_set/test_level_set_tools.cpp.
 #include <fmt/format.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/LevelSetRebuild.h>

@@ -4,7 +4,6 @@
 // are corrected here: the signs are wrong at some voxels next to the surface (dents of up to a third of a voxel, 2 to 3
 // % of a thin body's volume at ten voxels across), and beyond two voxels the nearest triangle may be wrong (up to 0.7
 // of a voxel).
-// Tests: tests/shapes/level_set/test_level_set.cpp.
 #include <openvdb/math/Proximity.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/SignedFloodFill.h>

@@ -1,4 +1,3 @@
-// Tests: tests/shapes/motion/test_motion.cpp.
 #include "runtime/shapes/level_set/placed.h"
 
 #include <algorithm>

@@ -1,4 +1,3 @@
-// Tests: tests/shapes/scatter/test_scatter.cpp.
 #include "runtime/shapes/level_set/scatter_level_set.h"
 
 #include <algorithm>

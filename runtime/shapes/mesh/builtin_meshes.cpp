@@ -1,5 +1,4 @@
 // Meshes from a formula, or from given points and faces.
-// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -2,7 +2,6 @@
 //
 // A mesh is its surface: normals and texture coordinates are dropped, because at a seam a vertex has several and every
 // point born on the mesh would carry them. Vertex colours become Cd, and Alpha if any is not 1.
-// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>

@@ -1,4 +1,3 @@
-// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include "runtime/shapes/mesh/ray_crossings.h"
 
 #include <algorithm>

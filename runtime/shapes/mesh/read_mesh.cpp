@@ -1,5 +1,4 @@
 // Meshes from the contents of files: merges vertices by position, drops faces without area.
-// Tests: tests/shapes/mesh/test_mesh.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,3 @@
-// Tests: tests/shapes/motion/test_body_path.cpp.
 #include "runtime/shapes/motion/animated.h"
 
 namespace rapid {

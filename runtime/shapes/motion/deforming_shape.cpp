@@ -1,4 +1,3 @@
-// Tests: tests/shapes/motion/test_deforming.cpp.
 #include "runtime/shapes/motion/deforming_shape.h"
 
 #include <algorithm>

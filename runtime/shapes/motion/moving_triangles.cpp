@@ -1,4 +1,3 @@
-// Tests: tests/shapes/motion/test_deforming.cpp.
 #include "runtime/shapes/motion/moving_triangles.h"
 
 #include <openvdb/math/Proximity.h>

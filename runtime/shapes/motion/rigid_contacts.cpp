@@ -1,4 +1,3 @@
-// Tests: tests/shapes/motion/test_moving.cpp.
 #include "runtime/shapes/motion/rigid_contacts.h"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 // Births in the volume of a mesh.
-// Tests: tests/shapes/scatter/test_scatter.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

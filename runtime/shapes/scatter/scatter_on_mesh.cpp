@@ -1,5 +1,4 @@
 // Births on the surface of a mesh, uniform by area.
-// Tests: tests/shapes/scatter/test_scatter.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -27,6 +27,13 @@ describe("every node in lua/nodes", function()
       assert.is_true(#read(picture) < 75000, picture)
     end)
 
+    it(name .. " declares what it uses", function()
+      local frames = { frames = {12, 12} }
+      local plain = rapid.run(scene, frames)
+      frames.check_declarations = true
+      assert.same_points(plain[12], rapid.run(scene, frames)[12])
+    end)
+
     it(name .. " is compiled, stays finite, and is the same on 1, 2 and 7 threads", function()
       local one = rapid.run(scene, { frames = {1, 24}, threads = 1, watch_traces = true })
       assert.same({}, one.trace_aborts)

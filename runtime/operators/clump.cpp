@@ -3,8 +3,8 @@
 //   C = |P_i - P_j| - rest, with the distance that the two had when they first touched, at least the sum of their
 //   radii; breaks where it pulls with more than `strength` (N)
 //
-// A bond that breaks is gone; the points stick again when they have been apart and touch anew. Points that are pressed
-// together further are contact's matter, not that of bonds: a bond only pulls.
+// A bond that breaks is gone; the points stick again when they have been apart and touch once more. A bond only pulls:
+// that points do not sink into each other is the matter of contact.
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/contact_search.h"
@@ -33,12 +33,12 @@ struct Bond {
 };
 
 // The bonds of a node, over a run. New ones are looked for once a frame, where it begins.
-struct Bonds {
-    Rows<Bond> rows;
-    double strength = 0;                           // N, of the last frame
+class Bonds : public Rows<Bond> {
+public:
+    double strength = 0;                           // N, in this frame
     std::set<std::array<std::int64_t, 2>> parted;  // broken, and not yet apart: by id, the smaller first
 
-    // What the last search has seen: where all sleep, there is nothing new.
+    // What the last search has seen: where all points sleep, there is nothing new.
     struct Searched {
         std::vector<std::int64_t> ids;
         std::vector<Vec3d> at;
@@ -47,28 +47,12 @@ struct Bonds {
         bool operator==(const Searched&) const = default;
     };
     Searched searched;
-};
 
-class ClumpCoupling : public Coupling {
-public:
-    ClumpCoupling(std::shared_ptr<Bonds> bonds, double strength) : bonds_(std::move(bonds)), strength_(strength) {}
-
-    void tie(std::span<std::uint8_t> tied) const override { bonds_->rows.tie(tied); }
-    void bind(Islands& islands) const override { bonds_->rows.bind(islands); }
-    void resume(Substep& now) override { bonds_->rows.resume(now); }
-    void prepare(Substep& now) override { bonds_->rows.prepare(now); }
-    void project(Substep& now) override { bonds_->rows.project(now); }
-    void suspend(Substep& now) override { bonds_->rows.suspend(now); }
-    void settle(Substep& now) override
+    void solve_velocities(Substep& step) override
     {
-        bonds_->rows.settle(now);
-        bonds_->rows.break_above(strength_, now, [&](const Rows<Bond>::Ids& ids) { bonds_->parted.insert(ids); });
+        Rows<Bond>::solve_velocities(step);
+        break_above(strength, step, [&](const Ids& ids) { parted.insert(ids); });
     }
-    Residual close(Substep& now) override { return bonds_->rows.close(now); }
-
-private:
-    std::shared_ptr<Bonds> bonds_;
-    double strength_;  // N
 };
 
 class ClumpConstraint : public Constraint {
@@ -80,19 +64,19 @@ public:
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
         bond(points);
-        bonds->rows.follow(points, group);
-        if (strength < std::exchange(bonds->strength, strength)) bonds->rows.wake_all();
-        return std::make_shared<ClumpCoupling>(bonds, strength);
+        bonds->follow(points, group);
+        if (strength < std::exchange(bonds->strength, strength)) bonds->wake_all();
+        return bonds;
     }
 
 private:
-    // All pairs that touch and are not bonded yet. Of a bond that has broken nothing is left once its points are apart.
+    // Bonds all pairs that touch and are not bonded yet. A broken bond is forgotten once its points are apart.
     void bond(const PointSet& points) const
     {
         const std::size_t n = points.size();
         const Strided<float> given = radii_of(radius, points);
         const Strided<std::uint8_t> members = members_of(points, group);
-        // What rests on another touches it within rounding, and what solving leaves.
+        // Points that rest on each other touch within rounding and the error of solving.
         constexpr float touch = 1.02f;
         const Strided<std::int64_t> id = points.id().read();
         Bonds::Searched now{std::vector<std::int64_t>(n), std::vector<Vec3d>(n), std::vector<float>(n)};
@@ -114,9 +98,9 @@ private:
                 const std::array<std::int64_t, 2> pair{std::min(id[i], id[j]), std::max(id[i], id[j])};
                 if (bonds->parted.count(pair)) {
                     touching.insert(pair);
-                } else if (!bonds->rows.has(pair)) {
+                } else if (!bonds->has(pair)) {
                     const double touch_at = double(given[i]) + double(given[j]);
-                    bonds->rows.add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
+                    bonds->add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
                 }
             }
         bonds->parted = std::move(touching);

@@ -1,14 +1,14 @@
-// contact: points are spheres that keep each other out, rub and bounce (paper §5.1, §5.2).
+// contact: points collide as spheres, with friction and restitution (paper §5.1, §5.2).
 //
 // Pairs are found in sparse grids of cells, one for each cluster of radii: `max_difference` and `max_grids` trade the
-// time of many grids for that of wide cells (Algorithm 1; solver/contact_search.h).
+// time of many grids for that of wide cells (Algorithm 1; solver/constraints/radius_grids.h).
 #include "runtime/graph/node.h"
 #include "runtime/solver/constraints/contacts.h"
 
 namespace rapid {
 namespace {
 
-// Above it what is born in one another may fly: 10 m/s at 5, 2,700 at 8, of masses of 1 and 10 kg in 0.02 m.
+// Above it points that are born in one another may fly: 10 m/s at 5, 2,700 at 8, for 1 and 10 kg in 0.02 m.
 constexpr double most_scaling = 4;
 
 class ContactConstraint : public Constraint {

@@ -2,7 +2,7 @@
 //
 //   C = |P_i - P_j| - rest >= and <= 0        compliance in m/N: 0 for a rod, 1 / stiffness for a spring
 //
-// Chains and trees of pairs are solved directly (solver/forest.h), whatever their length.
+// Chains and trees of pairs are solved directly whatever their length (solver/constraints/tree_solver.h).
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/contact_search.h"
@@ -12,7 +12,7 @@
 
 namespace rapid {
 
-// Two points by their places, from 1, in the set that first enters the node.
+// Two points by their numbers, from 1, in the set that first enters the node.
 struct PointPair {
     int i = 0, j = 0;
 };
@@ -40,7 +40,7 @@ struct Tie {
     {
         const Vec3d d = P[0] - P[1];
         const double length = d.norm();
-        // Of two points in one place any direction parts them.
+        // Any direction parts two points in one place.
         gradient[0] = length > 0 ? Vec3d(d / length) : Vec3d(Vec3d::UnitY());
         gradient[1] = -gradient[0];
         return length - rest;

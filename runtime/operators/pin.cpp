@@ -1,13 +1,14 @@
-// pin: holds points at a place, at the place that each has by an attribute, or on a body that moves.
+// pin: holds points at a position, at one that each has as an attribute, or on a body that moves.
 //
-// Rigid, a pinned point has its place and velocity given, and no other constraint moves it: what hangs from it hangs
-// from a wall. With a compliance it is three springs, one along each axis.
+// Rigid, a pinned point is kinematic: its position and velocity are prescribed, and no other constraint moves it. With
+// a compliance it is held by three springs, one along each axis.
 #include "runtime/graph/node.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/members.h"
 #include "runtime/shapes/motion/animated.h"
 #include "runtime/shapes/motion/motion.h"
 #include "runtime/solver/constraints/rows.h"
+#include "runtime/solver/constraints/sleep.h"
 
 #include <map>
 
@@ -41,7 +42,7 @@ struct Pin {
 
 struct Along {
     static constexpr int points = 1;
-    static constexpr bool rests = true;  // a target that moves is the coupling's matter
+    static constexpr bool rests = true;  // PinCoupling sees to targets that move
     const Pin* pin;
     int axis;
 
@@ -53,9 +54,9 @@ struct Along {
 };
 
 struct Pins {
-    std::map<std::int64_t, Pin> by_id;  // a pin stays where it is in memory
+    std::map<std::int64_t, Pin> by_id;  // addresses of pins are stable
     std::vector<std::int64_t> held;     // in the last frame
-    Rows<Along> springs;                // of all, where they have a compliance
+    Rows<Along> springs;                // where pins have a compliance
 };
 
 class PinCoupling : public Coupling {
@@ -66,36 +67,32 @@ public:
     }
 
     void hold_at(std::size_t i, Pin& pin) { held_.push_back({i, &pin}); }
-    void keep_awake(std::uint32_t i) { awake_.push_back(i); }  // it is held otherwise than it was
+    void keep_awake(std::uint32_t i) { awake_.push_back(i); }  // its target moves, or it is newly held or let go
 
-    void hold(Substep& now) override
+    void join(Sleep* sleep) override
     {
-        const double since = (now.index + 1) * now.dt;
+        pins_->springs.join(sleep);
+        if (!sleep) return;
+        for (const std::uint32_t i : awake_) sleep->keep_awake(i);
+        for (const auto& [i, pin] : held_)
+            if (rigid_) sleep->make_kinematic(static_cast<std::uint32_t>(i));
+    }
+    void subtract_half_kick(Substep& step) override { pins_->springs.subtract_half_kick(step); }
+    void move_kinematic(Substep& step) override
+    {
+        const double since = (step.index + 1) * step.dt;
         aim(since);
         if (!rigid_) return;
         for (const auto& [i, pin] : held_) {
-            now.at[i] = {pin->now, 0};
-            now.v[i] = track_ ? track_->velocity_at(since).at(pin->now) : Vec3d((pin->to - pin->from) / h_);
+            step.points[i] = {pin->now, 0};
+            step.v[i] = track_ ? track_->velocity_at(since).at(pin->now) : Vec3d((pin->to - pin->from) / h_);
         }
     }
-
-    void tie(std::span<std::uint8_t> tied) const override
-    {
-        for (const std::uint32_t i : awake_) tied[i] = 1;
-        pins_->springs.tie(tied);
-    }
-    void bind(Islands& islands) const override
-    {
-        pins_->springs.bind(islands);
-        for (const auto& [i, pin] : held_)
-            if (rigid_) islands.hold(static_cast<std::uint32_t>(i));
-    }
-    void resume(Substep& now) override { pins_->springs.resume(now); }
-    void prepare(Substep& now) override { pins_->springs.prepare(now); }
-    void project(Substep& now) override { pins_->springs.project(now); }
-    void suspend(Substep& now) override { pins_->springs.suspend(now); }
-    void settle(Substep& now) override { pins_->springs.settle(now); }
-    Residual close(Substep& now) override { return pins_->springs.close(now); }
+    void warm_start(Substep& step) override { pins_->springs.warm_start(step); }
+    void project(Substep& step) override { pins_->springs.project(step); }
+    void add_half_kick(Substep& step) override { pins_->springs.add_half_kick(step); }
+    void solve_velocities(Substep& step) override { pins_->springs.solve_velocities(step); }
+    Residual close(Substep& step) override { return pins_->springs.close(step); }
 
 private:
     void aim(double since)

@@ -98,7 +98,7 @@ private:
         options.iterations = iterations;
         options.loads = &loads_;
         options.sleep = sleep;
-        options.beds = &beds_;
+        options.sleep_records = &sleep_records_;
         return options;
     }
 
@@ -201,7 +201,7 @@ private:
     Shadows shadows_;
     EnergyDrift drift_;
     ShapeLoads loads_;  // of the previous frame, where points are coupled
-    SleepMemory beds_;  // of the previous frame
+    SleepRecords sleep_records_;  // of the previous frame
 };
 RAPID_NODE(Solve);
 

@@ -10,39 +10,42 @@ CoupledStep::CoupledStep(StepContext& context)
     : context_(context),
       at_(context.points.size()),
       v_(context.points.size()),
-      begin_(context.points.size()),
-      weight_(context.points.size()),
-      projection_(context.scene.constraints, context.scene.obstacles, context.points.size())
+      start_(context.points.size()),
+      inverse_mass_(context.points.size())
 {
 }
 
 void CoupledStep::run()
 {
     const SolveOptions& options = context_.options;
+    const StepScene& scene = context_.scene;
     const Column<std::int64_t>& ids = std::as_const(context_.points).id();
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { read_points(begin, end); });
     begin_substeps();
-    projection_.open(now_, options.loads, ids);
-    if (options.beds && std::isfinite(options.sleep) && context_.points.has("still")) begin_sleep();
+    if (options.sleep_records && std::isfinite(options.sleep) && context_.points.has("still")) {
+        sleep_.emplace(context_.points, inverse_mass_, options.sleep);
+        skips_sleepers_ = scene.is_ballistic() && scene.uniform.linear.is_zero();
+    }
+    Projection projection(scene.constraints, scene.obstacles, now_, sleep_ ? &*sleep_ : nullptr, options.loads, ids);
+    if (sleep_) sleep_->open(*options.sleep_records);
 
     for (int substep = 0; substep < options.substeps; ++substep) {
         now_.index = substep;
         now_.time = options.time - now_.dt * (options.substeps - substep - 1);
-        now_.pull = 0;
-        if (sleepers_) sleepers_->begin(now_, context_.scene.obstacles);
+        now_.max_acceleration = 0;
+        if (sleep_) sleep_->begin(now_, scene.obstacles);
         context_.for_each_chunk([&](std::size_t begin, std::size_t end) { advance_freely(begin, end); });
-        if (!sleepers_ || !sleepers_->all()) projection_.advance(now_);
+        projection.advance(now_);
     }
 
     SolveResult& result = context_.result();
-    if (sleepers_) sleepers_->unload();
-    result.residual = projection_.close(now_, options.loads, ids);
-    if (sleepers_) sleepers_->close(now_, context_.P, context_.time);
+    if (sleep_) sleep_->clear_loads();
+    result.residual = projection.close(now_, options.loads, ids);
+    if (sleep_) sleep_->close(now_, context_.P, context_.time);
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { store(begin, end); });
-    if (sleepers_) {
-        sleepers_->remember(*options.beds, context_.points, now_, context_.scene.obstacles);
-        result.asleep = options.beds->beds.size();
-    }
+    if (!sleep_) return;
+    sleep_->remember(*options.sleep_records, now_, scene.obstacles);
+    result.asleep = options.sleep_records->records.size();
 }
 
 void CoupledStep::read_points(std::size_t begin, std::size_t end)
@@ -50,7 +53,7 @@ void CoupledStep::read_points(std::size_t begin, std::size_t end)
     context_.errors.require_finite(begin, context_.P.subspan(begin, end - begin),
                                    context_.v.subspan(begin, end - begin), PointErrors::before_step);
     for (std::size_t i = begin; i < end; ++i) {
-        weight_[i] = at_[i].w = inverse_mass(i);
+        inverse_mass_[i] = at_[i].w = inverse_mass(i);
         at_[i].P = context_.P[i].cast<double>();
         v_[i] = context_.v[i].cast<double>();
     }
@@ -59,32 +62,17 @@ void CoupledStep::read_points(std::size_t begin, std::size_t end)
 void CoupledStep::begin_substeps()
 {
     const StepScene& scene = context_.scene;
-    now_.at = at_;
+    now_.points = at_;
     now_.v = v_;
-    now_.begin = begin_;
+    now_.start = start_;
     now_.dead = context_.dead;
     now_.dt = context_.options.h / context_.options.substeps;
     now_.iterations = context_.options.iterations;
     if (!scene.uniform.a.isZero(0)) now_.up = -scene.uniform.a.normalized();
     if (!scene.forces.empty() || !scene.uniform.linear.is_zero()) {
-        yields_.assign(at_.size(), {now_.dt, 0.5 * now_.dt * now_.dt});
-        now_.yields = yields_;
+        mobility_.assign(at_.size(), {now_.dt, 0.5 * now_.dt * now_.dt});
+        now_.mobility = mobility_;
     }
-}
-
-void CoupledStep::begin_sleep()
-{
-    const StepScene& scene = context_.scene;
-    islands_.emplace(weight_);
-    std::vector<std::uint8_t> tied(at_.size());
-    for (const LocalConstraint& local : scene.constraints) {
-        local.coupling->tie(tied);
-        local.coupling->bind(*islands_);
-    }
-    islands_->close();
-    sleepers_.emplace(context_.points, *context_.options.beds, weight_, tied, *islands_, context_.options.sleep);
-    now_.sleepers = &*sleepers_;
-    skips_sleepers_ = scene.is_ballistic() && scene.uniform.linear.is_zero();
 }
 
 // The free motion of a chunk in one sub-step.
@@ -95,16 +83,16 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
     BlockStep step(context_);
     const PointBlock& block = step.block;
     std::vector<std::uint32_t> places;
-    double pull = 0;
+    double max_acceleration = 0;
     for (std::size_t first = begin; first < end; first += block_size) {
         const std::size_t last = std::min(first + block_size, end);
         places.clear();
         for (std::size_t i = first; i < last; ++i) {
-            begin_[i] = at_[i].P;
+            start_[i] = at_[i].P;
             if (!skips_sleepers_ || !leaves_out(i)) places.push_back(static_cast<std::uint32_t>(i));
         }
         if (places.empty()) {
-            pull = std::max(pull, scene.uniform.a.norm());
+            max_acceleration = std::max(max_acceleration, scene.uniform.a.norm());
             continue;
         }
         begin_block(step, places);
@@ -112,13 +100,14 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         step.advance(collisions, now_.index);
         // A point that was put out of a shape gets no velocity from that towards those that it is put into, as if it
         // had been born there.
-        for (const auto& [k, by] : collisions.displacements()) begin_[block.places[k]] += by;
+        for (const auto& [k, by] : collisions.displacements()) start_[block.places[k]] += by;
         for (std::size_t k = 0; k < block.size(); ++k) take_point(block, k);
-        for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k) pull = std::max(pull, block.a[k].norm());
+        for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
+            max_acceleration = std::max(max_acceleration, block.a[k].norm());
     }
     context_.count(collisions, 0, begin);
     const std::scoped_lock lock(mutex_);
-    now_.pull = std::max(now_.pull, pull);
+    now_.max_acceleration = std::max(now_.max_acceleration, max_acceleration);
 }
 
 void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> places)
@@ -129,7 +118,7 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
         const std::uint32_t i = places[k];
         block.P[k] = at_[i].P;
         block.v[k] = v_[i];
-        if (now_.asleep(i)) block.moved_dt[k] = 0;
+        if (sleep_ && sleep_->asleep(i)) block.moved_dt[k] = 0;
     }
 }
 
@@ -137,11 +126,11 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
 void CoupledStep::take_point(const PointBlock& block, std::size_t k)
 {
     const std::uint32_t i = block.places[k];
-    Place& at = at_[i];
-    at.w = weight_[i];
-    if (sleepers_ && !skips_sleepers_) {
-        const bool asleep = now_.asleep(i);
-        sleepers_->feel(i, pull_on(block, k, asleep));
+    ProjectedPoint& at = at_[i];
+    at.w = inverse_mass_[i];
+    if (sleep_ && !skips_sleepers_) {
+        const bool asleep = sleep_->asleep(i);
+        sleep_->check_acceleration(i, acceleration_of(block, k, asleep));
         if (asleep) {
             at.w = 0;
             return;
@@ -155,23 +144,23 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     v_[i] = block.v[k];
     if (!block.linear.data) return;
     const Propagator by = respond(block.damped[k].k, block.damped[k].w2, now_.dt);
-    yields_[i] = {by.v_of_G, by.x_of_G};
+    mobility_[i] = {by.v_of_G, by.x_of_G};
     at.w *= by.v_of_G / now_.dt;
 }
 
 // Whether a sleeper under uniform forces stays asleep, and out of the blocks.
 bool CoupledStep::leaves_out(std::size_t i)
 {
-    sleepers_->feel(i, context_.scene.uniform.a);
-    if (!now_.asleep(i)) return false;
+    sleep_->check_acceleration(i, context_.scene.uniform.a);
+    if (!sleep_->asleep(i)) return false;
     at_[i].w = 0;
     return true;
 }
 
 // What acts on a point in a sub-step, m/s²; on a sleeper also the motion and velocity that actions give it.
-Vec3d CoupledStep::pull_on(const PointBlock& block, std::size_t k, bool asleep) const
+Vec3d CoupledStep::acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const
 {
-    const Vec3d& from = begin_[block.places[k]];
+    const Vec3d& from = start_[block.places[k]];
     Vec3d a = block.a[k];
     if (block.linear.data) {
         const Linear& linear = block.linear[k];

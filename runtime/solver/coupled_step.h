@@ -24,26 +24,23 @@ public:
 private:
     void read_points(std::size_t begin, std::size_t end);
     void begin_substeps();
-    void begin_sleep();
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
     void take_point(const PointBlock& block, std::size_t k);
     bool leaves_out(std::size_t i);
     void store(std::size_t begin, std::size_t end);
-    Vec3d pull_on(const PointBlock& block, std::size_t k, bool asleep) const;
+    Vec3d acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const;
     double inverse_mass(std::size_t i) const;
 
     StepContext& context_;
     // By point.
-    std::vector<Place> at_;
-    std::vector<Vec3d> v_, begin_;
-    std::vector<double> weight_;  // inverse masses, 1/kg
-    std::vector<Yield> yields_;
+    std::vector<ProjectedPoint> at_;
+    std::vector<Vec3d> v_, start_;
+    std::vector<double> inverse_mass_;  // 1/kg
+    std::vector<Mobility> mobility_;    // empty where no force has a linear part
 
     Substep now_;
-    Projection projection_;
-    std::optional<Islands> islands_;
-    std::optional<Sleepers> sleepers_;
+    std::optional<Sleep> sleep_;   // where points may sleep
     bool skips_sleepers_ = false;  // only uniform forces act: sleeping points are left out of the blocks
     std::mutex mutex_;
 };

@@ -14,6 +14,7 @@
 #include "runtime/points/point_set.h"
 #include "runtime/solver/collision/contact_energy.h"
 #include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/constraints/sleep_records.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
@@ -36,7 +37,7 @@ struct SolveOptions {
 
     // s after which points at rest sleep, where they have the column `still`; and what is kept from frame to frame
     double sleep = std::numeric_limits<double>::infinity();
-    SleepMemory* beds = nullptr;
+    SleepRecords* sleep_records = nullptr;
 };
 
 struct SolveResult {

@@ -141,41 +141,43 @@ public:
         friction_ = options.friction.read(points)[0];
     }
 
-    void rouse(Substep& now) override
+    void detect(Substep& step) override
     {
-        if (near_.begin.empty() || list_.expired(now)) {
+        if (near_.begin.empty() || list_.expired(step)) {
             const float largest = *std::max_element(radius_.begin(), radius_.end());
-            list_.build(now, radius_, RadiusGrids({radius_.data(), 1}, now.size(), largest / 4, 8));
+            list_.build(step, radius_, RadiusGrids({radius_.data(), 1}, step.size(), largest / 4, 8));
             before_ = std::exchange(near_, list_.pairs());
             take_over();
         }
         rows_.clear();
-        for (std::uint32_t i = 0; i < now.size(); ++i)
-            for (std::uint32_t k = near_.begin[i]; k < near_.begin[i + 1]; ++k) enter(i, k, now);
+        for (std::uint32_t i = 0; i < step.size(); ++i)
+            for (std::uint32_t k = near_.begin[i]; k < near_.begin[i + 1]; ++k) enter(i, k, step);
     }
 
-    void prepare(Substep& now) override
+    void warm_start(Substep& step) override
     {
-        for (Row& row : rows_) row.change = row.pressed * row.n + 0.5 * row.rubbed, row.shift.setZero();
-        apply(now, now.dt, /*averaged=*/false);
+        for (Row& row : rows_)
+            row.change = row.normal_impulse * row.n + 0.5 * row.tangential_impulse, row.shift.setZero();
+        apply(step, step.dt, /*averaged=*/false);
     }
 
-    void project(Substep& now) override
+    void project(Substep& step) override
     {
         for (Row& row : rows_) {
-            const double C = row.n.dot(now.at[row.i].P - now.at[row.j].P) - row.reach - row.allowed;
-            const double wanted = std::max(0.0, row.pressed - C / now.dt * row.per_w);
+            const double C = row.n.dot(step.points[row.i].P - step.points[row.j].P) - row.reach - row.allowed;
+            const double wanted = std::max(0.0, row.normal_impulse - C / step.dt * row.per_w);
             row.change.setZero();
-            row.shift = now.dt * (wanted - row.pressed) * row.n;
+            row.shift = step.dt * (wanted - row.normal_impulse) * row.n;
         }
-        apply(now, 0, true);
-        for (Row& row : rows_) row.pressed += row.n.dot(row.shift) / now.dt;
+        apply(step, 0, true);
+        for (Row& row : rows_) row.normal_impulse += row.n.dot(row.shift) / step.dt;
     }
 
-    void settle(Substep& now) override
+    void solve_velocities(Substep& step) override
     {
-        for (int k = 1; k <= now.iterations; ++k) settle_once(now, k == now.iterations);
-        for (const Row& row : rows_) pressed_[row.pair] = row.pressed, rubbed_[row.pair] = row.rubbed;
+        for (int k = 1; k <= step.iterations; ++k) solve_velocities_once(step, k == step.iterations);
+        for (const Row& row : rows_)
+            normal_impulse_[row.pair] = row.normal_impulse, tangential_impulse_[row.pair] = row.tangential_impulse;
     }
 
     Residual close(Substep&) override { return {}; }
@@ -183,59 +185,59 @@ public:
 private:
     struct Row {
         std::uint32_t i, j, pair;
-        double reach, allowed, pressed, held, per_w;
-        Vec3d n, rubbed;
+        double reach, allowed, normal_impulse, carried, per_w;
+        Vec3d n, tangential_impulse;
         Vec3d change, shift;  // N s, and kg m: what a pass gives the velocities, and the places
     };
 
-    void enter(std::uint32_t i, std::uint32_t k, const Substep& now)
+    void enter(std::uint32_t i, std::uint32_t k, const Substep& step)
     {
         const std::uint32_t j = near_.other[k];
-        const Vec3d d = now.at[i].P - now.at[j].P;
+        const Vec3d d = step.points[i].P - step.points[j].P;
         const double reach = double(radius_[i]) + double(radius_[j]);
-        if (d.squaredNorm() > 1.02 * 1.02 * reach * reach && !(pressed_[k] > 0)) return;
+        if (d.squaredNorm() > 1.02 * 1.02 * reach * reach && !(normal_impulse_[k] > 0)) return;
         Row row;
         row.i = i, row.j = j, row.pair = k;
         row.reach = reach;
-        row.allowed = std::min(0.0, (now.begin[i] - now.begin[j]).norm() - reach);
-        row.pressed = row.held = 0.5 * pressed_[k];
-        row.per_w = 1 / (now.at[i].w + now.at[j].w);
+        row.allowed = std::min(0.0, (step.start[i] - step.start[j]).norm() - reach);
+        row.normal_impulse = row.carried = 0.5 * normal_impulse_[k];
+        row.per_w = 1 / (step.points[i].w + step.points[j].w);
         row.n = d.normalized();
-        row.rubbed = rubbed_[k] - row.n.dot(rubbed_[k]) * row.n;
+        row.tangential_impulse = tangential_impulse_[k] - row.n.dot(tangential_impulse_[k]) * row.n;
         rows_.push_back(row);
     }
 
-    void settle_once(Substep& now, bool last)
+    void solve_velocities_once(Substep& step, bool last)
     {
         for (Row& row : rows_) {
-            const Vec3d relative = now.v[row.i] - now.v[row.j];
-            const double closing = row.n.dot(relative), before = row.pressed + row.held;
-            const double overlap = row.reach - row.n.dot(now.at[row.i].P - now.at[row.j].P);
-            row.pressed = before, row.held = 0;
+            const Vec3d relative = step.v[row.i] - step.v[row.j];
+            const double closing = row.n.dot(relative), before = row.normal_impulse + row.carried;
+            const double overlap = row.reach - row.n.dot(step.points[row.i].P - step.points[row.j].P);
+            row.normal_impulse = before, row.carried = 0;
             row.change.setZero(), row.shift.setZero();
             if (!(before > 0) && !(overlap > 0)) continue;
             const double p = std::max(0.0, before - closing * row.per_w);
-            const Vec3d held = row.rubbed - (relative - closing * row.n) * row.per_w;
-            const Vec3d rub = std::min(1.0, friction_ * p / held.norm()) * held - row.rubbed;
+            const Vec3d sticking = row.tangential_impulse - (relative - closing * row.n) * row.per_w;
+            const Vec3d rub = std::min(1.0, friction_ * p / sticking.norm()) * sticking - row.tangential_impulse;
             row.change = (p - before) * row.n + rub;
-            row.shift = 0.5 * now.dt * rub;
+            row.shift = 0.5 * step.dt * rub;
             if (last) row.shift += 0.8 * std::max(0.0, overlap - 1e-4 * row.reach) * row.per_w * row.n;
         }
-        apply(now, 0, true);
+        apply(step, 0, true);
         for (Row& row : rows_) {
-            const double pressed = row.n.dot(row.change);
-            row.pressed += pressed;
-            row.rubbed += row.change - pressed * row.n;
+            const double normal_impulse = row.n.dot(row.change);
+            row.normal_impulse += normal_impulse;
+            row.tangential_impulse += row.change - normal_impulse * row.n;
         }
     }
 
     // Gives each row's change to its points: to the places, too, over so many seconds.
-    void apply(Substep& now, double over, bool averaged)
+    void apply(Substep& step, double over, bool averaged)
     {
-        count_.assign(now.size(), 0);
+        count_.assign(step.size(), 0);
         for (const Row& row : rows_)
             if (!row.change.isZero(0) || !row.shift.isZero(0)) ++count_[row.i], ++count_[row.j];
-        moved_.assign(now.size(), {Vec3d::Zero(), Vec3d::Zero()});
+        moved_.assign(step.size(), {Vec3d::Zero(), Vec3d::Zero()});
         for (Row& row : rows_) {
             const double part =
                 averaged ? relaxation / std::max<std::uint32_t>(1, std::max(count_[row.i], count_[row.j])) : 1;
@@ -245,25 +247,25 @@ private:
             moved_[row.i][0] += place, moved_[row.j][0] -= place;
             moved_[row.i][1] += row.change, moved_[row.j][1] -= row.change;
         }
-        for (std::size_t i = 0; i < now.size(); ++i) {
-            now.at[i].P += now.at[i].w * moved_[i][0];
-            now.v[i] += now.at[i].w * moved_[i][1];
+        for (std::size_t i = 0; i < step.size(); ++i) {
+            step.points[i].P += step.points[i].w * moved_[i][0];
+            step.v[i] += step.points[i].w * moved_[i][1];
         }
     }
 
     void take_over()
     {
-        const std::vector<double> pressed = std::move(pressed_);
-        const std::vector<Vec3d> rubbed = std::move(rubbed_);
-        pressed_.assign(near_.size(), 0);
-        rubbed_.assign(near_.size(), Vec3d::Zero());
+        const std::vector<double> normal_impulse = std::move(normal_impulse_);
+        const std::vector<Vec3d> tangential_impulse = std::move(tangential_impulse_);
+        normal_impulse_.assign(near_.size(), 0);
+        tangential_impulse_.assign(near_.size(), Vec3d::Zero());
         for (std::uint32_t i = 0; i + 1 < before_.begin.size(); ++i)
             for (std::uint32_t k = before_.begin[i]; k < before_.begin[i + 1]; ++k) {
                 const auto here = near_.of(i);
                 const auto found = std::lower_bound(here.begin(), here.end(), before_.other[k]);
                 if (found == here.end() || *found != before_.other[k]) continue;
                 const std::size_t to = near_.begin[i] + static_cast<std::size_t>(found - here.begin());
-                pressed_[to] = pressed[k], rubbed_[to] = rubbed[k];
+                normal_impulse_[to] = normal_impulse[k], tangential_impulse_[to] = tangential_impulse[k];
             }
     }
 
@@ -271,8 +273,8 @@ private:
     double friction_ = 0;
     NeighbourList list_;
     Pairs near_, before_;
-    std::vector<double> pressed_;
-    std::vector<Vec3d> rubbed_;
+    std::vector<double> normal_impulse_;
+    std::vector<Vec3d> tangential_impulse_;
     std::vector<Row> rows_;
     std::vector<std::uint32_t> count_;
     std::vector<std::array<Vec3d, 2>> moved_;  // kg m, N s

@@ -31,7 +31,7 @@ public:
     PointSet points;
     Dynamics dynamics;
     SolveOptions options;
-    SleepMemory beds;
+    SleepRecords sleep_records;
     SolveResult last;              // of the last frame
     std::uint64_t collisions = 0;  // of all frames
     double penetration_max = 0;    // of all frames, m
@@ -83,7 +83,7 @@ public:
     {
         if (!points.has("still")) points.add({"still", 0.0f});
         options.sleep = after;
-        options.beds = &beds;
+        options.sleep_records = &sleep_records;
         return *this;
     }
 

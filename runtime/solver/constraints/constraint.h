@@ -1,25 +1,26 @@
-// What couples the motions of points: the one interface of all constraints (paper §5), for Solve to project.
+// Constraints between points (paper §5): the interface that a constraint node implements, for Solve to project.
 //
 // A Constraint is what a node adds to the points that travel down a chain. At each frame it gives the solver a
-// Coupling, which holds its rows: residuals over a few points each, with their gradients. The solver calls the
-// couplings, and knows none by its kind. A sub-step is (numerics.md, Constraints; Macklin et al. 2014, 2016)
+// Coupling: its rows, which are scalar constraints C(x) = 0 or C(x) >= 0 over a few points each, with their Lagrange
+// multipliers. A sub-step is one of XPBD (Macklin et al. 2014, 2016; numerics.md, Constraints), with warm starting:
 //
-//   x~ = P + v dt + a dt²/2         each point by itself, by all that acts on it: forces, actions, shapes
-//   resume(), hold(), rouse()       points whose place is given; which rows there are, and whom they wake
-//   prepare()                       what the rows did before
-//   project()                       P = x~ + Δx, as often as the solve has iterations; Δx = w ∇C Δλ
+//   x~ = P + v dt + a dt²/2         free motion: each point by its forces, actions and collisions
+//   subtract_half_kick()            velocities and positions lose half of the constraint forces of the last sub-step
+//   move_kinematic()                points whose positions are prescribed
+//   detect()                        finds the rows of this sub-step, as contacts
+//   warm_start()                    applies the multipliers of the last sub-step
+//   project()                       P = x~ + Δx by Gauss-Seidel, `iterations` times; Δx = w ∇C Δλ
 //   v+ = v + a dt + Δx/dt           never the difference of stored positions
-//   suspend()                       v+ + Δx/(2dt) between sub-steps: 0 at rest
-//   settle()                        velocities: friction, restitution
-//   take_back()                     what shapes have had the last word on, and has come out too far off
+//   add_half_kick()                 v+ + Δx/(2dt): the velocity between sub-steps, 0 at rest
+//   solve_velocities()              restitution, friction; rows that break
+//   correct_penetration()           what is left too deep after all shapes
 //
-// w is the inverse mass times v_of_a / dt, with v_of_a what a constant acceleration does to the velocity of a point
-// that drag and springs hold back: so that what hangs from a constraint under drag stretches it as its weight does.
+// w is the inverse mass times v_of_a / dt, with v_of_a the mobility of the velocity under drag and springs: so that
+// what hangs from a constraint under drag stretches it by its weight.
 //
-// Most constraints need none of this but a residual: rows.h makes a Coupling of it.
+// Most constraints need only a residual and its gradient: rows.h makes a Coupling of these.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -27,48 +28,35 @@
 #include <vector>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/constraints/sleep.h"
+#include "runtime/solver/constraints/projected_point.h"
 #include "runtime/solver/dynamics.h"
 
 namespace rapid {
 
-// Where a point is, m, and its inverse mass, 1/kg: 0 for one that no constraint moves, or that sleeps. A cache line
-// holds two.
-struct alignas(32) Place {
-    Vec3d P;
-    double w;
-};
-
-// What a constant acceleration (1 m/s²) does to a point in a sub-step, m/s and m: dt and dt²/2, but for drag and
-// springs.
-struct Yield {
-    double v, x;
-};
+class Sleep;
 
 // The coupled points of a set in one sub-step; shapes [size].
 struct Substep {
-    std::span<Place> at;                 // from the end of their free ways on
+    std::span<ProjectedPoint> points;    // from the end of their free motion on
     std::span<Vec3d> v;                  // m/s, at the end of the sub-step
-    std::span<const Vec3d> begin;        // where they were at its beginning
-    std::span<const std::uint8_t> dead;  // 1: takes no part any more; empty where nobody can have died
-    std::span<const Yield> yields;       // empty where no force has a linear part
+    std::span<const Vec3d> start;        // positions at its beginning
+    std::span<const std::uint8_t> dead;  // 1: takes no part any more; empty where none can have died
+    std::span<const Mobility> mobility;  // empty where no force has a linear part
     double dt = 0;                       // s, of a point that lives through the whole frame
     double time = 0;                     // s since the start, at its end
-    double pull = 0;           // m/s², the largest acceleration by forces: what a point at rest is pressed by
-    Vec3d up = Vec3d::Zero();  // unit, against the sum of what is the same for all points, as gravity; 0 where it is 0
-    int index = 0;             // from 0
+    double max_acceleration = 0;         // m/s², by forces
+    Vec3d up = Vec3d::Zero();            // unit, against the acceleration that is the same for all; 0 where that is 0
+    int index = 0;                       // from 0
     int iterations = 1;
-    Sleepers* sleepers = nullptr;  // null where nobody may sleep
 
-    // How near each is to a shape that bears it: 255 where it touches one, one less for each point between, 0 where
-    // nothing bears it. Of the sub-step before; and of this one, as it is found.
-    std::span<const std::uint8_t> borne;
-    std::span<std::uint8_t> found_borne;
+    // How directly a shape supports each point: 255 where it touches one, one less for each point between, 0 without
+    // support. Of the sub-step before; and of this one, as contacts are solved.
+    std::span<const std::uint8_t> support;
+    std::span<std::uint8_t> next_support;
 
-    std::size_t size() const { return at.size(); }
-    Yield yield_of(std::size_t i) const { return yields.empty() ? Yield{dt, 0.5 * dt * dt} : yields[i]; }
+    std::size_t size() const { return points.size(); }
+    Mobility mobility_of(std::size_t i) const { return mobility.empty() ? Mobility{dt, 0.5 * dt * dt} : mobility[i]; }
     bool lives(std::size_t i) const { return dead.empty() || !dead[i]; }
-    bool asleep(std::size_t i) const { return sleepers && sleepers->asleep(i); }
 };
 
 // How well a frame's rows are satisfied; and of contacts, how their pairs were found.
@@ -91,27 +79,22 @@ class Coupling {
 public:
     virtual ~Coupling() = default;
 
-    // Places and velocities become those that the projection starts from: without half of what the rows did in the
-    // sub-step before, which suspend() adds again. So velocities between sub-steps are what they seem, 0 at rest, and
-    // what others settle is all of them.
-    virtual void resume(Substep&) {}
-    virtual void suspend(Substep&) {}
+    // Before the first sub-step: declares which points stay awake, and which fall asleep and wake together (sleep.h).
+    // Null where no point may sleep in this frame. By default all points stay awake.
+    virtual void join(Sleep* sleep);
 
-    virtual void hold(Substep&) {}
-    virtual void rouse(Substep&) {}
-    virtual void prepare(Substep&) {}
-    virtual void project(Substep& now) = 0;
-    virtual void settle(Substep&) {}
-    virtual void take_back(Substep&) {}
+    // In the order of the calls; see above.
+    virtual void subtract_half_kick(Substep&) {}
+    virtual void move_kinematic(Substep&) {}
+    virtual void detect(Substep&) {}
+    virtual void warm_start(Substep&) {}
+    virtual void project(Substep& step) = 0;
+    virtual void add_half_kick(Substep&) {}
+    virtual void solve_velocities(Substep&) {}
+    virtual void correct_penetration(Substep&) {}
 
-    // Before the first sub-step: sets to 1 the points that are not to sleep in this frame. All, but where a coupling
-    // knows better.
-    virtual void tie(std::span<std::uint8_t> tied) const { std::fill(tied.begin(), tied.end(), std::uint8_t{1}); }
-    // And which of them are to fall asleep and wake as one.
-    virtual void bind(Islands&) const {}
-
-    // The last sub-step is over. What the next frame begins with is kept.
-    virtual Residual close(Substep& now) = 0;
+    // The last sub-step is over: keeps what the next frame begins with.
+    virtual Residual close(Substep& step) = 0;
 };
 
 // What a constraint node adds. Lives for a frame; what it has to remember belongs to its node.

@@ -25,74 +25,75 @@ Vec3f impulse_of(const PairContact& contact, const PairImpulses& impulses)
 bool ContactSleep::wake_by_impact(const ContactPacks& packs, const PairImpulses& impulses,
                                   const ContactMaterial& material, Substep& step)
 {
+    if (!any()) return false;
     const double at_rest = resting_speed(step);
     shock_.clear();
     packs.for_each([&](const PairContact& contact) {
         const auto [i, j] = std::pair(contact.i, contact.j);
-        const bool first = step.asleep(i);
-        if (first == step.asleep(j)) return;
+        const bool first = asleep(i);
+        if (first == asleep(j)) return;
         const double closing = -contact.n.dot(step.v[i] - step.v[j]);
-        if (closing < at_rest || contact.n.dot(step.at[i].P - step.at[j].P) > contact.reach) return;
+        if (closing < at_rest || contact.n.dot(step.points[i].P - step.points[j].P) > contact.reach) return;
         if (shock_.empty()) shock_.assign(step.size(), 0);
         const std::uint32_t hit = first ? i : j, by = first ? j : i;
-        shock_[hit] = std::max(shock_[hit], closing / step.at[by].w);
+        shock_[hit] = std::max(shock_[hit], closing / step.points[by].w);
     });
     if (shock_.empty()) return false;
-    const auto moves = [&](std::size_t i) { return shock_[i] * step.sleepers->inverse_mass(i) >= at_rest; };
+    const auto moves = [&](std::size_t i) { return shock_[i] * sleep_->inverse_mass(i) >= at_rest; };
     for (bool spreads = true; spreads;) {
         spreads = false;
         for (const auto& [i, j] : impulses.pairs) {
             for (const auto& [from, to] : {std::pair(i, j), std::pair(j, i)}) {
-                if (!(0.5 * shock_[from] > shock_[to]) || !moves(from) || !step.asleep(to)) continue;
+                if (!(0.5 * shock_[from] > shock_[to]) || !moves(from) || !asleep(to)) continue;
                 const double reach = near_contact * material.reach(i, j);
-                if ((step.at[i].P - step.at[j].P).squaredNorm() > reach * reach) continue;
+                if ((step.points[i].P - step.points[j].P).squaredNorm() > reach * reach) continue;
                 shock_[to] = 0.5 * shock_[from];
                 spreads |= moves(to);
             }
         }
     }
-    bool any = false;
+    bool woken = false;
     for (std::size_t i = 0; i < step.size(); ++i) {
-        if (!step.asleep(i) || !moves(i)) continue;
-        any = true;
-        step.sleepers->rouse(i, step);
+        if (!asleep(i) || !moves(i)) continue;
+        woken = true;
+        sleep_->wake_now(i, step);
     }
-    step.sleepers->rouse(step);
-    return any;
+    sleep_->wake_islands_now(step);
+    return woken;
 }
 
-void ContactSleep::wake_by_load(const PairContact& contact, const PairImpulses& impulses, const Substep& step)
+void ContactSleep::wake_by_load(const PairContact& contact, const PairImpulses& impulses, const Substep& step) const
 {
-    const bool first = step.asleep(contact.i);
-    if (first == step.asleep(contact.j)) return;
+    const bool first = asleep(contact.i);
+    if (first == asleep(contact.j)) return;
     const std::uint32_t sleeper = first ? contact.i : contact.j;
     Vec3f change = impulse_of(contact, impulses);
     if (!impulses.resting.empty()) change -= impulses.resting[contact.pair];
-    if (change.norm() > disturbing * step.dt * step.sleepers->burden(sleeper)) step.sleepers->wake(sleeper);
+    if (change.norm() > disturbing * step.dt * sleep_->burden(sleeper)) sleep_->wake(sleeper);
 }
 
 void ContactSleep::report(const ContactPacks& packs, PairImpulses& impulses, const ContactMaterial& material,
-                          const Substep& step)
+                          const Substep& step) const
 {
     if (impulses.resting.empty()) impulses.resting.assign(impulses.pairs.size(), Vec3f::Zero());
     const double per_dt = 1 / step.dt;
     std::vector<std::uint8_t> deep;
     packs.for_each([&](const PairContact& contact) {
         const auto [i, j] = std::pair(contact.i, contact.j);
-        if (step.asleep(i) && step.asleep(j)) return;
-        const double overlap = contact.reach - (step.at[i].P - step.at[j].P).norm();
+        if (both_asleep(i, j)) return;
+        const double overlap = contact.reach - (step.points[i].P - step.points[j].P).norm();
         const Vec3f impulse = impulse_of(contact, impulses);
-        for (const std::uint32_t k : {i, j}) step.sleepers->load(k, impulse.norm() * per_dt);
+        for (const std::uint32_t k : {i, j}) sleep_->add_load(k, impulse.norm() * per_dt);
         if (overlap > too_deep_to_sleep * std::min(material.radius[i], material.radius[j])) {
             deep.resize(step.size());
             deep[i] = deep[j] = 1;
         }
-        if (!step.asleep(i) && !step.asleep(j)) impulses.resting[contact.pair] = impulse;
+        if (!asleep(i) && !asleep(j)) impulses.resting[contact.pair] = impulse;
     });
     if (deep.empty()) return;
     packs.for_each([&](const PairContact& contact) {
         if (!deep[contact.i] && !deep[contact.j]) return;
-        for (const std::uint32_t i : {contact.i, contact.j}) step.sleepers->keep_awake(i);
+        for (const std::uint32_t i : {contact.i, contact.j}) sleep_->keep_awake(i);
     });
 }
 

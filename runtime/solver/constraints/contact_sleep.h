@@ -9,25 +9,39 @@
 #include "runtime/solver/constraints/contact_material.h"
 #include "runtime/solver/constraints/contact_pack.h"
 #include "runtime/solver/constraints/pair_impulses.h"
+#include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
 
 class ContactSleep {
 public:
+    // Null where no point may sleep in this frame.
+    void join(Sleep* sleep) { sleep_ = sleep; }
+    Sleep* sleep() const { return sleep_; }
+    void wake_both(std::uint32_t i, std::uint32_t j) const
+    {
+        if (sleep_) sleep_->wake(i), sleep_->wake(j);
+    }
+
+    bool any() const { return sleep_ && sleep_->any(); }
+    bool asleep(std::uint32_t i) const { return sleep_ && sleep_->asleep(i); }
+    bool both_asleep(std::uint32_t i, std::uint32_t j) const { return asleep(i) && asleep(j); }
+
     // Wakes the sleepers that are hit, and those that the shock reaches: each passes half of it on to those that it
     // touches. They move on as their weight makes them. True if any wakes.
     bool wake_by_impact(const ContactPacks& packs, const PairImpulses& impulses, const ContactMaterial& material,
                         Substep& step);
 
     // Wakes the sleeper of a contact that is loaded otherwise than when it fell asleep.
-    static void wake_by_load(const PairContact& contact, const PairImpulses& impulses, const Substep& step);
+    void wake_by_load(const PairContact& contact, const PairImpulses& impulses, const Substep& step) const;
 
     // At the end of a frame: tells the loads of all points, keeps what they rest under, and keeps those awake that
     // overlap too far, with all that touch them: they have to give way.
-    static void report(const ContactPacks& packs, PairImpulses& impulses, const ContactMaterial& material,
-                       const Substep& step);
+    void report(const ContactPacks& packs, PairImpulses& impulses, const ContactMaterial& material,
+                const Substep& step) const;
 
 private:
+    Sleep* sleep_ = nullptr;
     std::vector<double> shock_;  // N s, of each point
 };
 

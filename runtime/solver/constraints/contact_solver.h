@@ -9,17 +9,17 @@
 namespace rapid {
 
 template <class Weights>
-[[gnu::always_inline]] inline void warm_start(const ContactPack& pack, Substep& step, const Weights& weights)
+[[gnu::always_inline]] inline void apply_warm_start(const ContactPack& pack, Substep& step, const Weights& weights)
 {
     if (!any(widen(pack.normal_impulse) > 0)) return;
-    PointPack a = gather(step.at, pack.i), b = gather(step.at, pack.j);
+    PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
     const auto [wa, wb] = weights(pack, a, b);
     const double dt = step.dt;
     const Vectors<Doubles> half = widen(pack.normal_impulse * pack.n + 0.5f * pack.tangential_impulse);
     a.P += (wa * dt) * half;
     b.P -= (wb * dt) * half;
-    scatter(a, step.at, pack.i, pack.count);
-    scatter(b, step.at, pack.j, pack.count);
+    scatter(a, step.points, pack.i, pack.count);
+    scatter(b, step.points, pack.j, pack.count);
 }
 
 // The gap is to be no less than at the beginning of the sub-step, nor than 0.
@@ -27,7 +27,7 @@ template <class Weights>
 [[gnu::always_inline]] inline void project_positions(ContactPack& pack, Substep& step, double per_dt,
                                                      const Weights& weights)
 {
-    PointPack a = gather(step.at, pack.i), b = gather(step.at, pack.j);
+    PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
     const auto [wa, wb] = weights(pack, a, b);
     const Vectors<Doubles> n = widen(pack.n);
     const Doubles before = widen(pack.normal_impulse);
@@ -37,22 +37,22 @@ template <class Weights>
     pack.normal_impulse = narrow(impulse);
     a.P += (wa * change) * n;
     b.P -= (wb * change) * n;
-    scatter(a, step.at, pack.i, pack.count);
-    scatter(b, step.at, pack.j, pack.count);
+    scatter(a, step.points, pack.i, pack.count);
+    scatter(b, step.points, pack.j, pack.count);
 }
 
 // Normal velocities first: none into the other point, or that of restitution; then Coulomb friction by the whole normal
 // impulse. Friction acts throughout the sub-step, and so half of it on positions: else a point that is held would
 // creep. recovery(pack): which part of an overlap is taken away; null but in the last iteration.
 template <class Weights, class Recovery>
-[[gnu::always_inline]] inline void solve_velocities(ContactPack& pack, Substep& step, const Weights& weights,
-                                                    const Recovery* recovery)
+[[gnu::always_inline]] inline void solve_pack_velocities(ContactPack& pack, Substep& step, const Weights& weights,
+                                                         const Recovery* recovery)
 {
     // As a part of the sum of the radii, an overlap that is left: a contact that is just lost is found again in the
     // next sub-step, and that is jitter.
     constexpr double slop = 1e-4;
 
-    PointPack a = gather(step.at, pack.i), b = gather(step.at, pack.j);
+    PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
     const Vectors<Doubles> n = widen(pack.n), tangential_before = widen(pack.tangential_impulse);
     const Doubles before = widen(pack.normal_impulse) + widen(pack.carried_impulse), reach = widen(pack.reach);
     const Doubles overlap = reach - dot(n, a.P - b.P), mass = widen(pack.effective_mass);
@@ -79,8 +79,8 @@ template <class Weights, class Recovery>
     if (recovery) shift += ((*recovery)(pack)*most(overlap - slop * reach, Doubles{}) * mass) * n;
     a.P += wa * shift;
     b.P -= wb * shift;
-    scatter(a, step.at, pack.i, pack.count);
-    scatter(b, step.at, pack.j, pack.count);
+    scatter(a, step.points, pack.i, pack.count);
+    scatter(b, step.points, pack.j, pack.count);
     scatter(va, step.v, pack.i, pack.count);
     scatter(vb, step.v, pack.j, pack.count);
 }

@@ -89,7 +89,7 @@ void Contacts::search(const Substep& step)
         for (std::size_t k = first; k < last; ++k)
             reach_[k] = static_cast<float>(material_.reach(pairs[k][0], pairs[k][1]));
     });
-    impulses_.take_over(previous_, list_.pairs(), blocks_.slots(), step.sleepers);
+    impulses_.take_over(previous_, list_.pairs(), blocks_.slots(), sleep_.sleep());
     search_seconds_ += stopwatch.seconds();
 }
 
@@ -106,7 +106,14 @@ void Contacts::sweep(const F& f)
     });
 }
 
-void Contacts::rouse(Substep& step)
+void Contacts::join(Sleep* sleep)
+{
+    sleep_.join(sleep);
+    if (!sleep) return;
+    for (const std::uint32_t i : disturbed_) sleep->keep_awake(i);
+}
+
+void Contacts::detect(Substep& step)
 {
     if (per_dt_ > 0 && per_dt_ * step.dt != 1) impulses_.scale(static_cast<float>(step.dt * per_dt_));
     per_dt_ = 1 / step.dt;
@@ -115,8 +122,7 @@ void Contacts::rouse(Substep& step)
     begins_frame_ = list_is_stale_ = false;
     scaling_.begin(step);
     find_contacts(step);
-    if (step.sleepers && step.sleepers->any() && sleep_.wake_by_impact(packs_, impulses_, material_, step))
-        find_contacts(step);
+    if (sleep_.wake_by_impact(packs_, impulses_, material_, step)) find_contacts(step);
 }
 
 // Pairs that touch where their free motion ends, or have pressed each other until now.
@@ -147,7 +153,7 @@ std::size_t Contacts::find_near(std::size_t block, const Substep& step, std::vec
         }
         Floats reach;
         std::memcpy(&reach, &reach_[k], sizeof reach);
-        const Vectors<Doubles> d = gather(step.at, i).P - gather(step.at, j).P;
+        const Vectors<Doubles> d = gather(step.points, i).P - gather(step.points, j).P;
         const Doubles farthest = near_contact * widen(reach);
         const std::uint64_t are_near = bytes(dot(d, d) <= farthest * farthest);
         for (std::uint32_t l = 0; l < count; ++l) {
@@ -163,9 +169,9 @@ bool Contacts::may_touch(std::uint32_t pair, const Substep& step) const
 {
     const auto [i, j] = impulses_.pairs[pair];
     if (!step.lives(i) || !step.lives(j)) return false;
-    if (step.at[i].w + step.at[j].w > 0) return true;
+    if (step.points[i].w + step.points[j].w > 0) return true;
     // A point of infinite mass that moves wakes a sleeper that it touches.
-    if (step.sleepers && step.v[i] != step.v[j]) step.sleepers->wake(i), step.sleepers->wake(j);
+    if (step.v[i] != step.v[j]) sleep_.wake_both(i, j);
     return false;
 }
 
@@ -182,8 +188,8 @@ void Contacts::begin(ContactPack& pack, const Substep& step) const
         const Vec3f& before = impulses_.tangential[k];
         tangential.x[l] = before.x(), tangential.y[l] = before.y(), tangential.z[l] = before.z();
     }
-    const PointPack a = gather(step.at, pack.i), b = gather(step.at, pack.j);
-    const Vectors<Doubles> apart = gather(step.begin, pack.i) - gather(step.begin, pack.j);
+    const PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
+    const Vectors<Doubles> apart = gather(step.start, pack.i) - gather(step.start, pack.j);
     pack.reach = narrow(reach);
     pack.initial_gap = narrow(least(sqrt(dot(apart, apart)) - reach, Doubles{}));
     pack.n = narrow(directions(a.P - b.P, pack));
@@ -202,7 +208,7 @@ void Contacts::begin(ContactPack& pack, const Substep& step) const
                               static_cast<float>(approach[l]);
 }
 
-void Contacts::prepare(Substep& step)
+void Contacts::warm_start(Substep& step)
 {
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
@@ -210,10 +216,10 @@ void Contacts::prepare(Substep& step)
         });
     };
     before_.resize(step.size());
-    each_point([&](std::size_t i) { before_[i] = step.at[i].P; });
+    each_point([&](std::size_t i) { before_[i] = step.points[i].P; });
     scaling_.with_weights(
-        [&](const auto& weights) { sweep([&](const ContactPack& pack) { warm_start(pack, step, weights); }); });
-    each_point([&](std::size_t i) { step.v[i] += per_dt_ * (step.at[i].P - before_[i]); });
+        [&](const auto& weights) { sweep([&](const ContactPack& pack) { apply_warm_start(pack, step, weights); }); });
+    each_point([&](std::size_t i) { step.v[i] += per_dt_ * (step.points[i].P - before_[i]); });
 }
 
 void Contacts::project(Substep& step)
@@ -223,30 +229,30 @@ void Contacts::project(Substep& step)
     });
 }
 
-void Contacts::settle(Substep& step)
+void Contacts::solve_velocities(Substep& step)
 {
-    const bool some_asleep = step.sleepers && step.sleepers->any();
+    const bool some_asleep = sleep_.any();
     const auto part_recovered = [&](const ContactPack& pack) {
         Doubles part = Doubles{} + recovery;
         if (some_asleep)
             for (std::uint32_t l = 0; l < lanes; ++l)
-                if (step.asleep(pack.i[l]) || step.asleep(pack.j[l])) part[l] = recovery_asleep;
+                if (sleep_.asleep(pack.i[l]) || sleep_.asleep(pack.j[l])) part[l] = recovery_asleep;
         return part;
     };
     scaling_.with_weights([&](const auto& weights) {
         const decltype(part_recovered)* none = nullptr;
         for (int k = 1; k < step.iterations; ++k) {
             backwards_ = !backwards_;
-            sweep([&](ContactPack& pack) { solve_velocities(pack, step, weights, none); });
+            sweep([&](ContactPack& pack) { solve_pack_velocities(pack, step, weights, none); });
         }
         backwards_ = !backwards_;
         sweep([&](ContactPack& pack) {
-            solve_velocities(pack, step, weights, &part_recovered);
+            solve_pack_velocities(pack, step, weights, &part_recovered);
             store(pack);
             if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
             if (some_asleep)
-                for_each_contact(
-                    pack, [&](const PairContact& contact) { ContactSleep::wake_by_load(contact, impulses_, step); });
+                for_each_contact(pack,
+                                 [&](const PairContact& contact) { sleep_.wake_by_load(contact, impulses_, step); });
         });
     });
 }
@@ -259,7 +265,7 @@ void Contacts::store(const ContactPack& pack)
     }
 }
 
-void Contacts::take_back(Substep& step)
+void Contacts::correct_penetration(Substep& step)
 {
     if (!heavy_.any()) return;
     sweep([&](const ContactPack& pack) {
@@ -271,22 +277,21 @@ Residual Contacts::close(Substep& step)
 {
     Residual result;
     const auto count = [&](std::uint32_t i, std::uint32_t j, double reach, std::uint32_t pair) {
-        const double overlap = reach - (step.at[i].P - step.at[j].P).norm();
+        const double overlap = reach - (step.points[i].P - step.points[j].P).norm();
         if (!(overlap > 0) && !(impulses_.normal[pair] > 0)) return;
         ++result.rows;
         result.worst = std::max(result.worst, overlap);
         result.loose += overlap > 0.1 * std::min(material_.radius[i], material_.radius[j]);
     };
     packs_.for_each([&](const PairContact& contact) {
-        if (!step.asleep(contact.i) || !step.asleep(contact.j))
-            count(contact.i, contact.j, contact.reach, contact.pair);
+        if (!sleep_.both_asleep(contact.i, contact.j)) count(contact.i, contact.j, contact.reach, contact.pair);
     });
-    if (step.sleepers) {
-        ContactSleep::report(packs_, impulses_, material_, step);
+    if (sleep_.sleep()) {
+        sleep_.report(packs_, impulses_, material_, step);
         // Pairs that sleep are in no pack.
         for (std::uint32_t k = 0; k < impulses_.pairs.size(); ++k) {
             const auto [i, j] = impulses_.pairs[k];
-            if (step.asleep(i) && step.asleep(j)) count(i, j, material_.reach(i, j), k);
+            if (sleep_.both_asleep(i, j)) count(i, j, material_.reach(i, j), k);
         }
     }
     Residual::Search search{{}, grids_.error, grids_.excess, search_seconds_};

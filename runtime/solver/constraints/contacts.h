@@ -32,15 +32,12 @@ public:
     // Before a frame; impulses are kept by the ids of points. Error: see ContactMaterial.
     void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
 
-    void tie(std::span<std::uint8_t> tied) const override
-    {
-        for (const std::uint32_t i : disturbed_) tied[i] = 1;
-    }
-    void rouse(Substep& step) override;
-    void prepare(Substep& step) override;
+    void join(Sleep* sleep) override;
+    void detect(Substep& step) override;
+    void warm_start(Substep& step) override;
     void project(Substep& step) override;
-    void settle(Substep& step) override;
-    void take_back(Substep& step) override;
+    void solve_velocities(Substep& step) override;
+    void correct_penetration(Substep& step) override;
     Residual close(Substep& step) override;
 
 private:

@@ -22,7 +22,7 @@ constexpr double uneven = 2;
 void HeavyContacts::begin(const Substep& step)
 {
     double most = 0, least = std::numeric_limits<double>::infinity();
-    for (const Place& at : step.at)
+    for (const ProjectedPoint& at : step.points)
         if (at.w > 0) most = std::max(most, at.w), least = std::min(least, at.w);
     any_ = most > uneven * least;
 }
@@ -32,8 +32,8 @@ void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
     for (std::uint32_t l = 0; l < pack.count; ++l) {
         if (!(pack.normal_impulse[l] > 0)) continue;
         const std::uint32_t i = pack.i[l], j = pack.j[l];
-        const std::uint8_t support_i = step.borne[i], support_j = step.borne[j];
-        std::uint8_t &next_i = step.found_borne[i], &next_j = step.found_borne[j];
+        const std::uint8_t support_i = step.support[i], support_j = step.support[j];
+        std::uint8_t &next_i = step.next_support[i], &next_j = step.next_support[j];
         next_i = std::max<std::uint8_t>(next_i, std::max<std::uint8_t>(support_j, 1) - 1);
         next_j = std::max<std::uint8_t>(next_j, std::max<std::uint8_t>(support_i, 1) - 1);
     }
@@ -45,19 +45,19 @@ void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
 // what a shape that lifts both has to.
 void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& material, Substep& step)
 {
-    const bool first = step.at[contact.i].w < step.at[contact.j].w;  // is the heavier
+    const bool first = step.points[contact.i].w < step.points[contact.j].w;  // is the heavier
     const std::uint32_t heavy = first ? contact.i : contact.j, light = first ? contact.j : contact.i;
-    if (!(step.at[heavy].w > 0) || step.borne[light] == 0) return;
-    const Vec3d d = step.at[heavy].P - step.at[light].P;
+    if (!(step.points[heavy].w > 0) || step.support[light] == 0) return;
+    const Vec3d d = step.points[heavy].P - step.points[light].P;
     const double distance = d.norm(), overlap = contact.reach - distance;
     const double allowed = too_deep * std::min(material.radius[contact.i], material.radius[contact.j]);
     const double depth = overlap - allowed;
     if (!(depth > 0) || !(distance > 0)) return;
     const bool wedged = -contact.initial_gap > allowed && overlap > stuck * -contact.initial_gap &&
-                        step.at[light].w > uneven * step.at[heavy].w;
-    if (step.borne[light] <= step.borne[heavy] && !wedged) return;
+                        step.points[light].w > uneven * step.points[heavy].w;
+    if (step.support[light] <= step.support[heavy] && !wedged) return;
     const Vec3d n = d / distance;
-    step.at[heavy].P += depth * n;
+    step.points[heavy].P += depth * n;
     const double own = -n.dot(step.v[heavy]), closing = own + n.dot(step.v[light]);
     step.v[heavy] += std::clamp(closing, 0.0, std::max(own, resting_speed(step))) * n;
 }

@@ -1,24 +1,25 @@
-// Islands: points that fall asleep and wake as one, because what binds them passes on to all what one of them feels.
+// Islands: points that fall asleep and wake together, as the rows between them carry forces from one to all.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
+
+#include "runtime/solver/constraints/disjoint_sets.h"
 
 namespace rapid {
 
 class Islands {
 public:
-    static constexpr std::uint32_t none = UINT32_MAX;
-
-    // weight: inverse masses; a point without one parts what is tied to it, as a wall does.
+    // weight: inverse masses; a point of infinite mass separates what is linked to it, as a wall does.
     explicit Islands(std::span<const double> weight) : weight_(weight) {}
 
     // A row acts between these points.
-    void bind(std::span<const std::uint32_t> points);
-    // This one's place is given: it is bound, and no row moves it.
-    void hold(std::uint32_t i);
-    // All is said. Islands are in order of their first points.
+    void link(std::span<const std::uint32_t> points);
+    // This point is kinematic: it is in an island, but no row moves it.
+    void make_kinematic(std::uint32_t i);
+    // Numbers the islands, in the order of their first points.
     void close();
 
     std::size_t size() const { return begin_.size() - 1; }
@@ -26,15 +27,13 @@ public:
     {
         return std::span(points_).subspan(begin_[island], begin_[island + 1] - begin_[island]);
     }
-    bool binds(std::size_t i) const { return !root_.empty() && root_[i] != none; }
-    bool holds(std::size_t i) const { return !held_.empty() && held_[i]; }
+    bool has(std::size_t i) const { return !linked_.empty() && linked_[i]; }
+    bool is_kinematic(std::size_t i) const { return !kinematic_.empty() && kinematic_[i]; }
 
 private:
-    std::uint32_t root_of(std::uint32_t i);
-
     std::span<const double> weight_;
-    std::vector<std::uint32_t> root_;  // a point nearer to the first of the island; none where nothing binds it
-    std::vector<std::uint8_t> held_;
+    std::optional<DisjointSets> sets_;              // once points are linked
+    std::vector<std::uint8_t> linked_, kinematic_;  // empty where none is
     std::vector<std::uint32_t> begin_{0}, points_;
 };
 

@@ -30,9 +30,10 @@ public:
             const double c = pack.n[l].dot(step.up), scale = std::exp(0.5 * k_ * c);
             pack.scale[l] = static_cast<float>(scale);
             pack.effective_mass[l] = static_cast<float>(1 / (scale * a.w[l] + b.w[l] / scale));
-            const double borne = step.pull * step.dt / ((c > 0 ? a.w[l] : b.w[l]) * std::abs(c * (scale - 1 / scale)));
+            const double carried =
+                step.max_acceleration * step.dt / ((c > 0 ? a.w[l] : b.w[l]) * std::abs(c * (scale - 1 / scale)));
             pack.normal_impulse[l] = pack.carried_impulse[l] =
-                std::min(pack.normal_impulse[l], static_cast<float>(0.5 * borne));
+                std::min(pack.normal_impulse[l], static_cast<float>(0.5 * carried));
         }
     }
 

@@ -43,7 +43,7 @@ void NeighbourList::store_positions(const Substep& step, std::span<const float> 
     coordinates_.resize(n);
     for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            at_[i] = step.at[i].P;
+            at_[i] = step.points[i].P;
             for (int k = 0; k < 3; ++k)
                 coordinates_[i][k] = static_cast<std::int32_t>(
                     std::clamp(std::floor(at_[i][k] / edge_), double(INT32_MIN / 2), double(INT32_MAX / 2)));
@@ -164,11 +164,11 @@ void NeighbourList::measure_motion(const Substep& step)
                 const std::span<const std::uint32_t> here =
                     std::span(points_).subspan(begin_[b], begin_[b + 1] - begin_[b]);
                 Vec3d shift = Vec3d::Zero();
-                for (const std::uint32_t i : here) shift += step.at[i].P - at_[i];
+                for (const std::uint32_t i : here) shift += step.points[i].P - at_[i];
                 shift /= static_cast<double>(here.size());
                 double excess = -std::numeric_limits<double>::infinity();
                 for (const std::uint32_t i : here)
-                    excess = std::max(excess, (step.at[i].P - at_[i] - shift).norm() - slack_[i]);
+                    excess = std::max(excess, (step.points[i].P - at_[i] - shift).norm() - slack_[i]);
                 frames_[b] = {shift, excess};
             }
         },

@@ -44,7 +44,7 @@ void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<st
 }
 
 void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std::span<const std::uint32_t> slot,
-                             Sleepers* sleepers)
+                             Sleep* sleep)
 {
     const std::size_t m = pairs.size();
     normal.assign(m, 0);
@@ -58,7 +58,7 @@ void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std:
             const auto here = list.of(i);
             const auto found = std::lower_bound(here.begin(), here.end(), j);
             if (found == here.end() || *found != j) {
-                if (pressed && sleepers) sleepers->wake(i), sleepers->wake(j);
+                if (pressed && sleep) sleep->wake(i), sleep->wake(j);
                 continue;
             }
             const std::uint32_t to = slot[list.begin[i] + static_cast<std::size_t>(found - here.begin())];

@@ -32,8 +32,7 @@ struct PairImpulses {
 
     // Takes over the impulses of the pairs before a search that are listed still; pairs[slot[k]] is the k-th of the
     // list. Others have been moved apart by a node: sleepers among them wake.
-    void take_over(const PairImpulses& before, const Pairs& list, std::span<const std::uint32_t> slot,
-                   Sleepers* sleepers);
+    void take_over(const PairImpulses& before, const Pairs& list, std::span<const std::uint32_t> slot, Sleep* sleep);
 };
 
 }  // namespace rapid

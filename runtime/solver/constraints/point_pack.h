@@ -12,7 +12,7 @@ struct PointPack {
     Doubles w;
 };
 
-[[gnu::always_inline]] inline PointPack gather(std::span<const Place> at, const Indices& i)
+[[gnu::always_inline]] inline PointPack gather(std::span<const ProjectedPoint> at, const Indices& i)
 {
     const auto c = detail::gathered([&](std::uint32_t l) __attribute__((always_inline)) {
         detail::Four row;
@@ -23,13 +23,13 @@ struct PointPack {
 }
 
 // Of the first `count` lanes.
-[[gnu::always_inline]] inline void scatter(const PointPack& pack, std::span<Place> at, const Indices& i,
+[[gnu::always_inline]] inline void scatter(const PointPack& pack, std::span<ProjectedPoint> at, const Indices& i,
                                            std::uint32_t count)
 {
     detail::store_rows(
         {pack.P.x, pack.P.y, pack.P.z, pack.w},
         count, [&](std::uint32_t l, const auto& row) __attribute__((always_inline)) {
-            std::memcpy(static_cast<void*>(&at[i[l]]), &row, sizeof(Place));
+            std::memcpy(static_cast<void*>(&at[i[l]]), &row, sizeof(ProjectedPoint));
         });
 }
 

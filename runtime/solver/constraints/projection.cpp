@@ -3,86 +3,77 @@
 #include <algorithm>
 
 #include "runtime/parallel.h"
+#include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
 
 Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
-                       std::size_t size)
-    : constraints_(constraints), free_(size)
+                       const Substep& step, Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids)
+    : constraints_(constraints), sleep_(sleep), free_(step.size())
 {
-    if (!obstacles.empty()) shapes_.emplace(obstacles, size);
+    if (!obstacles.empty()) shapes_.emplace(obstacles, step.size(), sleep);
+    if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, ids, step.dt);
+    for (const LocalConstraint& local : constraints_) local.coupling->join(sleep);
 }
 
 template <class F>
 void Projection::each(const F& f)
 {
-    for (const LocalConstraint& local : constraints_) {
-        try {
-            f(*local.coupling);
-        } catch (Error& error) {
-            error.in_node(local.constraint->node).at(local.constraint->location);
-            throw;
-        }
-    }
+    for (const LocalConstraint& local : constraints_) at_node(*local.constraint, [&] { f(*local.coupling); });
 }
 
-void Projection::open(const Substep& now, const ShapeLoads* loads, const Column<std::int64_t>& ids)
+void Projection::advance(Substep& step)
 {
-    if (shapes_ && loads && now.dt > 0) shapes_->recall(*loads, ids, now.dt);
-}
-
-void Projection::advance(Substep& now)
-{
-    if (!(now.dt > 0)) return;
-    if (now.sleepers) now.sleepers->rouse(now);
-    each([&](Coupling& coupling) { coupling.resume(now); });
-    each([&](Coupling& coupling) { coupling.hold(now); });
-    find_borne(now);
-    each([&](Coupling& coupling) { coupling.rouse(now); });
-    for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) free_[i] = now.at[i].P;
+    if (!(step.dt > 0) || (sleep_ && sleep_->all())) return;
+    if (sleep_) sleep_->wake_islands_now(step);
+    each([&](Coupling& coupling) { coupling.subtract_half_kick(step); });
+    each([&](Coupling& coupling) { coupling.move_kinematic(step); });
+    begin_support(step);
+    each([&](Coupling& coupling) { coupling.detect(step); });
+    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) free_[i] = step.points[i].P;
     });
-    each([&](Coupling& coupling) { coupling.prepare(now); });
-    if (shapes_) shapes_->prepare(now, free_);
-    for (int k = 0; k < now.iterations; ++k) {
-        each([&](Coupling& coupling) { coupling.project(now); });
-        if (shapes_) shapes_->project(now);
+    each([&](Coupling& coupling) { coupling.warm_start(step); });
+    if (shapes_) shapes_->warm_start(step, free_);
+    for (int k = 0; k < step.iterations; ++k) {
+        each([&](Coupling& coupling) { coupling.project(step); });
+        if (shapes_) shapes_->project(step);
     }
-    for_each_chunk(now.size(), [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) now.v[i] += (now.at[i].P - free_[i]) / now.dt;
+    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) step.v[i] += (step.points[i].P - free_[i]) / step.dt;
     });
-    each([&](Coupling& coupling) { coupling.suspend(now); });
-    each([&](Coupling& coupling) { coupling.settle(now); });
-    if (shapes_) shapes_->settle(now);
-    each([&](Coupling& coupling) { coupling.take_back(now); });
+    each([&](Coupling& coupling) { coupling.add_half_kick(step); });
+    each([&](Coupling& coupling) { coupling.solve_velocities(step); });
+    if (shapes_) shapes_->solve_velocities(step);
+    each([&](Coupling& coupling) { coupling.correct_penetration(step); });
 }
 
-// What no constraint moves bears, as shapes do.
-void Projection::find_borne(Substep& now)
+// Points that no constraint moves support others, as shapes do.
+void Projection::begin_support(Substep& step)
 {
-    borne_.resize(now.size());
-    found_borne_.resize(now.size());
-    std::swap(borne_, found_borne_);
-    for (std::size_t i = 0; i < now.size(); ++i) {
-        if (!(now.at[i].w > 0)) borne_[i] = 255;
-        found_borne_[i] = 0;
+    support_.resize(step.size());
+    next_support_.resize(step.size());
+    std::swap(support_, next_support_);
+    for (std::size_t i = 0; i < step.size(); ++i) {
+        if (!(step.points[i].w > 0)) support_[i] = 255;
+        next_support_[i] = 0;
     }
-    now.borne = borne_;
-    now.found_borne = found_borne_;
+    step.support = support_;
+    step.next_support = next_support_;
 }
 
-Residual Projection::close(Substep& now, ShapeLoads* loads, const Column<std::int64_t>& ids)
+Residual Projection::close(Substep& step, ShapeLoads* loads, const Column<std::int64_t>& ids)
 {
     Residual all;
-    if (!(now.dt > 0)) return all;
+    if (!(step.dt > 0)) return all;
     each([&](Coupling& coupling) {
-        const Residual residual = coupling.close(now);
+        const Residual residual = coupling.close(step);
         all.worst = std::max(all.worst, residual.worst);
         all.rows += residual.rows;
         all.loose += residual.loose;
         if (residual.search) all.search = residual.search;
     });
-    if (shapes_ && loads) shapes_->remember(*loads, ids, now.dt);
+    if (shapes_ && loads) shapes_->remember(*loads, ids, step.dt);
     return all;
 }
 

@@ -1,5 +1,5 @@
-// A sub-step of points that are coupled, once each has gone its own way: all constraints, and the shapes that those
-// push points into (constraint.h says in which order, and why).
+// The coupled part of a sub-step, once each point has moved freely: all constraints, and the shapes that these push
+// points into (constraint.h says in which order).
 #pragma once
 
 #include <memory>
@@ -19,23 +19,23 @@ struct LocalConstraint {
 
 class Projection {
 public:
-    Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles, std::size_t size);
+    // sleep: null where no point may sleep; the constraints join it. loads: of the frame before; null for none.
+    Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles, const Substep& step,
+               Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids);
 
-    // loads: of the frame before; null for none.
-    void open(const Substep& now, const ShapeLoads* loads, const Column<std::int64_t>& ids);
-    void advance(Substep& now);
-    Residual close(Substep& now, ShapeLoads* loads, const Column<std::int64_t>& ids);
+    void advance(Substep& step);
+    Residual close(Substep& step, ShapeLoads* loads, const Column<std::int64_t>& ids);
 
 private:
     template <class F>
     void each(const F& f);
+    void begin_support(Substep& step);
 
     std::span<const LocalConstraint> constraints_;
+    Sleep* sleep_;
     std::optional<ShapeContacts> shapes_;
-    void find_borne(Substep& now);
-
-    std::vector<Vec3d> free_;                        // where the points' own ways have ended
-    std::vector<std::uint8_t> borne_, found_borne_;  // Substep::borne
+    std::vector<Vec3d> free_;                           // where the points' free motion has ended
+    std::vector<std::uint8_t> support_, next_support_;  // Substep::support
 };
 
 }  // namespace rapid

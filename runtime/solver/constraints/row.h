@@ -82,7 +82,7 @@ struct Row {
     Vectors positions(const Substep& step) const
     {
         Vectors P;
-        for (int k = 0; k < arity; ++k) P[k] = step.at[points[k]].P;
+        for (int k = 0; k < arity; ++k) P[k] = step.points[points[k]].P;
         return P;
     }
 
@@ -92,9 +92,9 @@ struct Row {
     {
         for (int k = 0; active && k < arity; ++k) {
             const std::uint32_t i = points[k];
-            if (!(step.at[i].w > 0)) continue;
-            const Yield mobility = step.yield_of(i);
-            step.at[i].P -= (mobility.v * step.dt - mobility.x) * acceleration[k];
+            if (!(step.points[i].w > 0)) continue;
+            const Mobility mobility = step.mobility_of(i);
+            step.points[i].P -= (mobility.v * step.dt - mobility.x) * acceleration[k];
             step.v[i] -= 0.5 * mobility.v * acceleration[k];
         }
     }
@@ -102,8 +102,8 @@ struct Row {
     {
         for (int k = 0; active && !asleep && k < arity; ++k) {
             const std::uint32_t i = points[k];
-            const Yield mobility = step.yield_of(i);
-            acceleration[k] = step.at[i].w * (step.dt / mobility.v) * lambda * per_dt2 * direction[k];
+            const Mobility mobility = step.mobility_of(i);
+            acceleration[k] = step.points[i].w * (step.dt / mobility.v) * lambda * per_dt2 * direction[k];
             step.v[i] += 0.5 * mobility.v * acceleration[k];
         }
     }
@@ -112,11 +112,12 @@ struct Row {
     void warm_start(Substep& step)
     {
         Vectors P;
-        for (int k = 0; k < arity; ++k) P[k] = step.begin[points[k]];
+        for (int k = 0; k < arity; ++k) P[k] = step.start[points[k]];
         function.residual(P, direction);
         previous_lambda = lambda;
         if (Traits::one_sided)
-            for (int k = 0; k < arity; ++k) step.at[points[k]].P += step.at[points[k]].w * lambda * direction[k];
+            for (int k = 0; k < arity; ++k)
+                step.points[points[k]].P += step.points[points[k]].w * lambda * direction[k];
         else
             lambda = 0;
     }
@@ -128,13 +129,13 @@ struct Row {
         const double C = function.residual(P, gradient), softness = compliance * per_dt2;
         choose_direction(step, P, gradient);
         double stiffness = softness;
-        for (int k = 0; k < arity; ++k) stiffness += step.at[points[k]].w * gradient[k].dot(direction[k]);
+        for (int k = 0; k < arity; ++k) stiffness += step.points[points[k]].w * gradient[k].dot(direction[k]);
         if (!(stiffness > 0)) return;
         double change = (-C - softness * lambda) / stiffness;
         if (Traits::one_sided) change = std::max(change, -lambda);
         lambda += change;
         for (int k = 0; k < arity; ++k) {
-            Place& point = step.at[points[k]];
+            ProjectedPoint& point = step.points[points[k]];
             point.P += point.w * change * direction[k];
         }
     }
@@ -148,7 +149,7 @@ struct Row {
         for (int k = 0; k < arity; ++k) {
             same += gradient[k].dot(direction[k]);
             size += gradient[k].squaredNorm();
-            weight += step.at[points[k]].w;
+            weight += step.points[points[k]].w;
         }
         bool here = same < 0.8 * size;
         if constexpr (Traits::has_curvature)

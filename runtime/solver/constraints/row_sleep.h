@@ -15,6 +15,9 @@ namespace rapid {
 template <class Function>
 class RowSleep {
 public:
+    // Null where no point may sleep in this frame.
+    void join(Sleep* sleep) { sleep_ = sleep; }
+
     using Row = rapid::Row<Function>;
     using Traits = FunctionTraits<Function>;
 
@@ -33,42 +36,42 @@ public:
     // Points that are awake in this frame, even where no row is left.
     const std::vector<std::uint32_t>& disturbed() const { return disturbed_; }
 
-    static bool is_asleep(const Row& row, const Substep& step)
+    bool is_asleep(const Row& row, const Substep& step) const
     {
-        if (!Traits::rests || !row.active || !step.sleepers) return false;
+        if (!Traits::rests || !row.active || !sleep_) return false;
         bool any = false;
         for (const std::uint32_t i : row.points) {
-            if (step.at[i].w > 0) return false;
-            any |= step.asleep(i);
+            if (step.points[i].w > 0) return false;
+            any |= sleep_->asleep(i);
         }
         return any;
     }
 
     // A point of infinite mass that moves wakes the sleepers that are linked to it.
-    static void wake_by_motion(const Row& row, const Substep& step)
+    void wake_by_motion(const Row& row, const Substep& step) const
     {
         const bool moves = std::any_of(row.points.begin(), row.points.end(),
-                                       [&](std::uint32_t i) { return !step.asleep(i) && !step.v[i].isZero(0); });
+                                       [&](std::uint32_t i) { return !sleep_->asleep(i) && !step.v[i].isZero(0); });
         if (!moves) return;
-        for (const std::uint32_t i : row.points) step.sleepers->wake(i);
+        for (const std::uint32_t i : row.points) sleep_->wake(i);
     }
 
     // A one-sided row wakes sleepers that it begins to load.
-    static void wake_by_load(const Row& row, const Substep& step)
+    void wake_by_load(const Row& row, const Substep& step) const
     {
+        if (!sleep_ || !sleep_->any()) return;
         constexpr double disturbing = 0.1;  // of what they bear
         for (int k = 0; row.active && !row.asleep && row.lambda > 0 && k < Row::arity; ++k) {
             const std::uint32_t i = row.points[k];
-            if (step.asleep(i) && row.lambda > disturbing * step.dt * step.dt * step.sleepers->burden(i))
-                step.sleepers->wake(i);
+            if (sleep_->asleep(i) && row.lambda > disturbing * step.dt * step.dt * sleep_->burden(i)) sleep_->wake(i);
         }
     }
 
     // The points of a row that is gone do not fall asleep in this frame.
-    static void release(const Row& row, const Substep& step)
+    void release(const Row& row) const
     {
-        if (step.sleepers)
-            for (const std::uint32_t i : row.points) step.sleepers->keep_awake(i);
+        if (sleep_)
+            for (const std::uint32_t i : row.points) sleep_->keep_awake(i);
     }
 
 private:
@@ -90,6 +93,7 @@ private:
         return change > rounding;
     }
 
+    Sleep* sleep_ = nullptr;
     std::vector<std::uint32_t> disturbed_;
 };
 

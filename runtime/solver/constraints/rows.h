@@ -74,7 +74,7 @@ public:
         remove([&](const Row& row) {
             if (!row.active || row.asleep || !(std::abs(row.lambda) > most)) return false;
             removed(row.ids);
-            Sleep::release(row, step);
+            sleep_.release(row);
             return true;
         });
     }
@@ -87,33 +87,33 @@ public:
         for (const Row& row : rows_) sleep_.disturb(row);
     }
 
-    void tie(std::span<std::uint8_t> tied) const override
+    void join(Sleep* sleep) override
     {
-        for (const std::uint32_t i : sleep_.disturbed()) tied[i] = 1;
-        if (Traits::rests) return;
-        for (const Row& row : rows_)
-            for (int k = 0; row.active && k < arity; ++k) tied[row.points[k]] = 1;
+        sleep_.join(sleep);
+        if (!sleep) return;
+        for (const std::uint32_t i : sleep_.disturbed()) sleep->keep_awake(i);
+        for (const Row& row : rows_) {
+            if (!row.active) continue;
+            if (!Traits::rests)
+                for (const std::uint32_t i : row.points) sleep->keep_awake(i);
+            else if (!Traits::one_sided || row.lambda != 0)
+                sleep->link(row.points);
+        }
     }
 
-    void bind(Islands& islands) const override
-    {
-        for (const Row& row : rows_)
-            if (Traits::rests && row.active && !(Traits::one_sided && row.lambda == 0)) islands.bind(row.points);
-    }
-
-    void resume(Substep& step) override
+    void subtract_half_kick(Substep& step) override
     {
         keep_forces(step.dt);
         for (Row& row : rows_) {
-            row.asleep = Sleep::is_asleep(row, step);
+            row.asleep = sleep_.is_asleep(row, step);
             if (row.asleep)
-                Sleep::wake_by_motion(row, step);
+                sleep_.wake_by_motion(row, step);
             else
                 row.subtract_half_kick(step);
         }
     }
 
-    void prepare(Substep& step) override
+    void warm_start(Substep& step) override
     {
         if (!step.dead.empty()) {
             for (Row& row : rows_)
@@ -122,7 +122,7 @@ public:
         }
         // A shock may have woken points since.
         for (Row& row : rows_)
-            if (row.asleep && !Sleep::is_asleep(row, step)) row.asleep = false, row.subtract_half_kick(step);
+            if (row.asleep && !sleep_.is_asleep(row, step)) row.asleep = false, row.subtract_half_kick(step);
         schedule(step);
         for (Row& row : rows_)
             if (row.active && !row.asleep) row.warm_start(step);
@@ -137,21 +137,21 @@ public:
         schedule_.for_each_coloured([&](std::uint32_t r) { rows_[r].project(step, per_dt2); });
     }
 
-    void suspend(Substep& step) override
+    void add_half_kick(Substep& step) override
     {
         const double per_dt2 = 1 / (step.dt * step.dt);
         for (Row& row : rows_) row.add_half_kick(step, per_dt2);
     }
 
-    void settle(Substep& step) override
+    void solve_velocities(Substep& step) override
     {
-        if (Traits::one_sided && step.sleepers && step.sleepers->any())
-            for (const Row& row : rows_) Sleep::wake_by_load(row, step);
+        if (Traits::one_sided)
+            for (const Row& row : rows_) sleep_.wake_by_load(row, step);
         if constexpr (requires(const Function& function) { function.breaks(0.0); })
             remove([&](const Row& row) {
                 typename Row::Vectors gradient;
                 const bool breaks = row.active && !row.asleep && row.function.breaks(row.residual(step, gradient));
-                if (breaks) Sleep::release(row, step);
+                if (breaks) sleep_.release(row);
                 return breaks;
             });
     }
@@ -170,14 +170,13 @@ public:
             const double error = std::abs(row.error(residual, per_dt2));
             result.worst = std::max(result.worst, error);
             if constexpr (arity > 1)
-                result.loose += error > 0.1 * (step.at[row.points[0]].P - step.at[row.points[1]].P).norm();
+                result.loose += error > 0.1 * (step.points[row.points[0]].P - step.points[row.points[1]].P).norm();
         }
         return result;
     }
 
 private:
     using Traits = FunctionTraits<Function>;
-    using Sleep = RowSleep<Function>;
     static constexpr int arity = Row::arity;
     static constexpr bool direct = arity == 2 && !Traits::one_sided;
 
@@ -200,11 +199,11 @@ private:
                 if (row.previous_lambda < 0 && row.direction == gradient)
                     link.K = -row.previous_lambda * row.function.curvature(P);
         }
-        const Vec3d root = solve_tree(tree, first, [&](std::uint32_t i) { return step.at[i].w; });
-        step.at[tree.front().parent].P += root;
+        const Vec3d root = solve_tree(tree, first, [&](std::uint32_t i) { return step.points[i].w; });
+        step.points[tree.front().parent].P += root;
         for (const Forest::Link& link : tree) {
             rows_[link.row].lambda += link.e;
-            step.at[link.child].P += link.shift;
+            step.points[link.child].P += link.shift;
         }
     }
 
@@ -226,7 +225,7 @@ private:
     void schedule(const Substep& step)
     {
         std::vector<std::uint8_t> fixed(step.size());
-        for (std::size_t i = 0; i < fixed.size(); ++i) fixed[i] = !(step.at[i].w > 0);
+        for (std::size_t i = 0; i < fixed.size(); ++i) fixed[i] = !(step.points[i].w > 0);
         if (!changed_ && fixed == fixed_) return;
         changed_ = false;
         fixed_ = std::move(fixed);

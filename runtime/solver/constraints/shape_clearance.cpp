@@ -40,7 +40,7 @@ void ShapeClearance::open(ShapeQuery& query, const Substep& step, std::size_t en
     std::size_t count = 0;
     for (std::size_t i = query.begin; i < end; ++i) {
         // At least (|moved| + |moved since asked|)².
-        const double moved2 = 2 * ((free[i] - step.begin[i]).squaredNorm() + (free[i] - asked_at_[i]).squaredNorm());
+        const double moved2 = 2 * ((free[i] - step.start[i]).squaredNorm() + (free[i] - asked_at_[i]).squaredNorm());
         open[count] = static_cast<std::uint32_t>(i);
         count += any_moves_ | !(room_[i] > 0 && double(room_[i]) * double(room_[i]) > moved2);
     }
@@ -48,7 +48,7 @@ void ShapeClearance::open(ShapeQuery& query, const Substep& step, std::size_t en
     query.moved.resize(end - query.begin);
     query.since_asked.resize(end - query.begin);
     for (const std::uint32_t i : open) {
-        query.moved[i - query.begin] = (free[i] - step.begin[i]).norm();
+        query.moved[i - query.begin] = (free[i] - step.start[i]).norm();
         query.since_asked[i - query.begin] = (free[i] - asked_at_[i]).norm();
         room_[i] = std::numeric_limits<float>::infinity();
     }
@@ -85,7 +85,7 @@ void ShapeClearance::list(ShapeQuery& query, std::size_t o, const Substep& step)
     asked.resize(near);
     query.P.clear();
     std::erase_if(asked, [&](std::uint32_t i) {
-        if (!(step.at[i].w > 0) || !obstacle.members[i] || !step.lives(i)) return true;
+        if (!(step.points[i].w > 0) || !obstacle.members[i] || !step.lives(i)) return true;
         const Vec3d& P = query.free[i];
         const double off =
             (P - obstacle.bounds.max()).cwiseMax(obstacle.bounds.min() - P).maxCoeff() - obstacle.radius[i];

@@ -6,6 +6,7 @@
 
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
+#include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
 namespace {
@@ -18,9 +19,10 @@ constexpr std::size_t points_a_task = 2048;
 
 }  // namespace
 
-ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size)
+ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, const Sleep* sleep)
     : obstacles_(obstacles),
       size_(size),
+      sleep_(sleep),
       clearance_(obstacles, size),
       contacts_((size + points_a_task - 1) / points_a_task),
       before_(contacts_.size())
@@ -58,7 +60,7 @@ void ShapeContacts::remember(ShapeLoads& loads, const Column<std::int64_t>& ids,
         }
 }
 
-void ShapeContacts::prepare(Substep& step, std::span<const Vec3d> free)
+void ShapeContacts::warm_start(Substep& step, std::span<const Vec3d> free)
 {
     clearance_.begin(free);
     std::swap(contacts_, before_);
@@ -66,11 +68,11 @@ void ShapeContacts::prepare(Substep& step, std::span<const Vec3d> free)
         Batch& contacts = contacts_[begin / points_a_task];
         find(contacts, before_[begin / points_a_task], step, free, begin, end);
         for (const ShapeContact& contact : contacts) {
-            const double w = step.at[contact.i].w;
+            const double w = step.points[contact.i].w;
             if (!(contact.normal_impulse > 0) || !(w > 0)) continue;
             const Vec3d half =
                 0.5 * ((contact.normal_impulse + contact.carried_impulse) * contact.n + contact.tangential_impulse);
-            step.at[contact.i].P += w * step.dt * half;
+            step.points[contact.i].P += w * step.dt * half;
             step.v[contact.i] += w * half;
         }
     };
@@ -105,7 +107,7 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
             contacts.push_back(made);
         }
         clearance_.close(query, o);
-        if (step.sleepers) keep_of_sleepers(contacts, first, before, o, step);
+        if (sleep_) keep_of_sleepers(contacts, first, before, o);
     }
 }
 
@@ -124,12 +126,12 @@ ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std:
 }
 
 // The contacts of sleepers with a shape: as they were, and out of use.
-void ShapeContacts::keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle,
-                                     const Substep& step)
+void ShapeContacts::keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before,
+                                     std::size_t obstacle) const
 {
     const auto middle = static_cast<std::ptrdiff_t>(contacts.size());
     for (const ShapeContact& contact : before)
-        if (contact.obstacle == obstacle && step.asleep(contact.i)) contacts.push_back(contact);
+        if (contact.obstacle == obstacle && sleep_->asleep(contact.i)) contacts.push_back(contact);
     std::inplace_merge(contacts.begin() + static_cast<std::ptrdiff_t>(begin), contacts.begin() + middle, contacts.end(),
                        [](const ShapeContact& a, const ShapeContact& b) { return a.i < b.i; });
 }
@@ -138,7 +140,7 @@ void ShapeContacts::project(Substep& step)
 {
     tbb::parallel_for(std::size_t{0}, contacts_.size(), [&](std::size_t c) {
         for (ShapeContact& contact : contacts_[c]) {
-            Place& at = step.at[contact.i];
+            ProjectedPoint& at = step.points[contact.i];
             if (!(at.w > 0)) continue;
             const double C = contact.n.dot(at.P) - contact.level;
             const double change = std::max(-contact.normal_impulse, -C / (at.w * step.dt));
@@ -148,14 +150,14 @@ void ShapeContacts::project(Substep& step)
     });
 }
 
-void ShapeContacts::settle(Substep& step)
+void ShapeContacts::solve_velocities(Substep& step)
 {
     tbb::parallel_for(std::size_t{0}, contacts_.size(), [&](std::size_t c) {
         for (ShapeContact& contact : contacts_[c]) {
             const std::uint32_t i = contact.i;
-            if (!(step.at[i].w > 0)) continue;
-            if (contact.n.dot(step.at[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i])
-                step.found_borne[i] = 255;
+            if (!(step.points[i].w > 0)) continue;
+            if (contact.n.dot(step.points[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i])
+                step.next_support[i] = 255;
             solve_velocity(contact, step);
         }
         move_out(contacts_[c], step);
@@ -166,7 +168,7 @@ void ShapeContacts::settle(Substep& step)
 // Friction acts throughout the sub-step, and so half of it on the position: else a point that is held would creep.
 void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
 {
-    const double w = step.at[contact.i].w, before = contact.normal_impulse + contact.carried_impulse;
+    const double w = step.points[contact.i].w, before = contact.normal_impulse + contact.carried_impulse;
     contact.carried_impulse = 0;
     contact.normal_impulse = before;
     if (!(before > 0)) return;
@@ -181,7 +183,7 @@ void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
     if (size > most) tangential *= most / size;
     const Vec3d change = w * (tangential - contact.tangential_impulse);
     v += change;
-    step.at[contact.i].P += 0.5 * step.dt * change;
+    step.points[contact.i].P += 0.5 * step.dt * change;
     contact.tangential_impulse = tangential;
 }
 
@@ -194,13 +196,13 @@ void ShapeContacts::move_out(const Batch& contacts, Substep& step) const
         const Obstacle& obstacle = obstacles_[contacts[begin].obstacle];
         P.clear();
         for (; end < contacts.size() && contacts[end].obstacle == contacts[begin].obstacle; ++end)
-            P.push_back(step.at[contacts[end].i].P);
+            P.push_back(step.points[contacts[end].i].P);
         phi.resize(P.size());
         gradient.resize(P.size());
         time.assign(P.size(), (step.index + 1) * step.dt);
         obstacle.shape->distance_at(P, time, phi, gradient);
         for (std::size_t k = 0; k < P.size(); ++k) {
-            Place& at = step.at[contacts[begin + k].i];
+            ProjectedPoint& at = step.points[contacts[begin + k].i];
             const double slope2 = gradient[k].squaredNorm();
             const double depth = obstacle.radius[contacts[begin + k].i] - phi[k];
             if (depth > 0 && slope2 > 0 && at.w > 0) at.P += depth / slope2 * gradient[k];

@@ -32,15 +32,16 @@ struct ShapeLoads {
 
 class ShapeContacts {
 public:
-    ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size);
+    // sleep: null where no point may sleep.
+    ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, const Sleep* sleep);
 
     void recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt);
     void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, double dt) const;
 
-    // free: where the points' free motion has ended; `step.at` may be there, or beyond.
-    void prepare(Substep& step, std::span<const Vec3d> free);
+    // free: where the points' free motion has ended; `step.points` may be there, or beyond.
+    void warm_start(Substep& step, std::span<const Vec3d> free);
     void project(Substep& step);
-    void settle(Substep& step);
+    void solve_velocities(Substep& step);
 
 private:
     struct ShapeContact {
@@ -57,13 +58,13 @@ private:
     void find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free, std::size_t begin,
               std::size_t end);
     ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle) const;
-    static void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle,
-                                 const Substep& step);
+    void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle) const;
     static void solve_velocity(ShapeContact& contact, Substep& step);
     void move_out(const Batch& contacts, Substep& step) const;
 
     std::span<const Obstacle> obstacles_;
     std::size_t size_;
+    const Sleep* sleep_;
     ShapeClearance clearance_;
     std::vector<Batch> contacts_, before_;  // a chunk of points each
 };

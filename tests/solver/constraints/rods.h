@@ -33,10 +33,10 @@ struct Rod {
     }
 };
 
-template <class Kind>
+template <class Function>
 class RowsConstraint : public Constraint {
 public:
-    std::shared_ptr<Rows<Kind>> rows = std::make_shared<Rows<Kind>>();
+    std::shared_ptr<Rows<Function>> rows = std::make_shared<Rows<Function>>();
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
@@ -45,11 +45,11 @@ public:
     }
 };
 
-template <class Kind = Rod>
-std::shared_ptr<RowsConstraint<Kind>> rods(const std::vector<std::array<std::int64_t, 2>>& pairs, double length,
-                                           double compliance = 0)
+template <class Function = Rod>
+std::shared_ptr<RowsConstraint<Function>> rods(const std::vector<std::array<std::int64_t, 2>>& pairs, double length,
+                                               double compliance = 0)
 {
-    auto made = std::make_shared<RowsConstraint<Kind>>();
+    auto made = std::make_shared<RowsConstraint<Function>>();
     made->node = "rods1";
     for (const auto& pair : pairs) made->rows->add(pair, {length}, compliance);
     return made;

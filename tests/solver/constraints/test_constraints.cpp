@@ -159,7 +159,7 @@ TEST_CASE("rods keep the momentum, and a dumbbell its angular momentum to second
     CHECK((fine < 2e-6 || coarse / fine > 3));
 }
 
-TEST_CASE("a net, which no tree is, comes to the same bits on any number of threads", "[constraints][threads]")
+TEST_CASE("a net, which is no tree, has the same bits on any number of threads", "[constraints][threads]")
 {
     constexpr std::int64_t side = 60;
     const auto hang = [&](int threads) {
@@ -187,7 +187,7 @@ TEST_CASE("a net, which no tree is, comes to the same bits on any number of thre
     CHECK(std::memcmp(one.v().read().data, four.v().read().data, one.size() * sizeof(Vec3f)) == 0);
 }
 
-TEST_CASE("a spring under drag is stretched by its load all the same", "[constraints]")
+TEST_CASE("drag does not change how far a load stretches a spring", "[constraints]")
 {
     class Drag : public Force {
         void contribute(const Chunk& chunk, Forces& forces) const override
@@ -204,7 +204,7 @@ TEST_CASE("a spring under drag is stretched by its load all the same", "[constra
     CHECK(-scene.P(1).y() == Approx(1 + compliance * 2 * g).margin(2e-6));
 }
 
-TEST_CASE("what a rod pushes into the ground lies on it", "[constraints]")
+TEST_CASE("a point that a rod pushes into the ground lies on it", "[constraints]")
 {
     // A rod that stands on the ground: it is the ground that bears both.
     Scene scene(points({{0, 0.1f, 0}, {0, 1.1f, 0}}).set<float>("mass", {1, 2}).set<float>("pscale", {0.1f, 0.1f}));

@@ -81,7 +81,7 @@ TEST_CASE("a stack of points rests on the ground: no overlap, no creep, no jitte
     CHECK(scene.P(0).y() >= r);
 }
 
-// n spheres of 1 kg and 0.02 m on the ground, one upon the other.
+// A stack of n spheres of 1 kg and 0.02 m on the ground.
 Granular stack(std::size_t n, double mass_scaling)
 {
     const float r = 0.02f;
@@ -93,7 +93,7 @@ Granular stack(std::size_t n, double mass_scaling)
     return scene;
 }
 
-TEST_CASE("mass scaling takes six sevenths of what a tall stack is pressed together, and throws nothing", "[contacts]")
+TEST_CASE("mass scaling takes six sevenths off the compression of a tall stack, and throws nothing", "[contacts]")
 {
     const std::size_t n = GENERATE(50, 100);
     const auto worst_of = [&](double mass_scaling) {
@@ -110,7 +110,7 @@ TEST_CASE("mass scaling takes six sevenths of what a tall stack is pressed toget
     CHECK(worst_of(1) < worst_of(0) / 6);
 }
 
-TEST_CASE("with mass scaling a stack bears m g / (2 sinh(k/2)) at most, as the closed form has it", "[contacts]")
+TEST_CASE("with mass scaling contacts of a stack bear at most m g / (2 sinh(k/2)), as in the closed form", "[contacts]")
 {
     const std::size_t n = 12;
     const double k = GENERATE(0.5, 1.0, 2.0);
@@ -125,15 +125,16 @@ TEST_CASE("with mass scaling a stack bears m g / (2 sinh(k/2)) at most, as the c
         for (std::size_t i = 0; i < j; ++i) sum += g * std::exp(-k * (0.5 + static_cast<double>(i)));
         return sum;
     };
-    for (const SleepMemory::Bed& bed : scene.beds.beds) {
-        const std::size_t j = n - static_cast<std::size_t>(bed.id);
-        const double load = between(j - 1) + (bed.id > 0 ? between(j) : 0);  // from above and below, but for the ground
-        CHECK(bed.load == Approx(load).epsilon(0.01));
-        CHECK(bed.load < 2 * g / (2 * std::sinh(k / 2)));
+    for (const SleepRecords::Record& record : scene.sleep_records.records) {
+        const std::size_t j = n - static_cast<std::size_t>(record.id);
+        const double load =
+            between(j - 1) + (record.id > 0 ? between(j) : 0);  // from above and below, but for the ground
+        CHECK(record.load == Approx(load).epsilon(0.01));
+        CHECK(record.load < 2 * g / (2 * std::sinh(k / 2)));
     }
 }
 
-TEST_CASE("up is against what pulls all points, for mass scaling: not those of a group", "[contacts]")
+TEST_CASE("mass scaling takes up from the accelerations of all points, not from those of a group", "[contacts]")
 {
     const std::size_t n = 30;
     Granular alone = stack(n, 1), beside = stack(n, 1);
@@ -170,7 +171,7 @@ TEST_CASE("with mass scaling a heap that is born overlapping parts, and does not
     CHECK(fastest < 1.05 * std::sqrt(2 * g * 1.6));  // of a fall from the top
 }
 
-TEST_CASE("points that are level, but for less than rounding, are alike to mass scaling", "[contacts][extreme]")
+TEST_CASE("mass scaling treats points alike that are level within rounding", "[contacts][extreme]")
 {
     const float higher = GENERATE(0.0f, 1e-20f, -1e-20f);
     Granular scene(points({{0, 0, 0}, {0.3f, higher, 0}})
@@ -195,7 +196,7 @@ TEST_CASE("without gravity there is no height, and mass scaling changes no bit",
     CHECK(same_bits(collided(0), collided(2)));
 }
 
-TEST_CASE("points that are born in each other part, and fly nowhere", "[contacts]")
+TEST_CASE("points that are born overlapping part without speed", "[contacts]")
 {
     Granular scene(points({{0, 0, 0}, {0.01f, 0, 0}, {0.05f, 0.02f, 0}}).set<float>("pscale", alike(3, 0.1f)));
     scene.substeps(4).run(12);
@@ -241,7 +242,7 @@ TEST_CASE("points of 1 : 10^6 kg that are born in each other, in a pipe, do not 
     }
 }
 
-TEST_CASE("points that are all in one place part", "[contacts][extreme]")
+TEST_CASE("points at one position part", "[contacts][extreme]")
 {
     Granular scene(points(std::vector<Vec3f>(20, Vec3f(1, 2, 3))).set<float>("pscale", alike(20, 0.1f)));
     scene.substeps(8).run(96);
@@ -282,7 +283,7 @@ Granular heap(std::size_t n, float smallest, float largest, unsigned seed = 1)
     return scene;
 }
 
-TEST_CASE("a heap comes to the same bits on any number of threads, and with any grids", "[contacts][threads]")
+TEST_CASE("a heap has the same bits on any number of threads, and with any grids", "[contacts][threads]")
 {
     const double mass_scaling = GENERATE(0.0, 1.0);
     const auto run = [&](int threads, int max_grids) {
@@ -319,7 +320,7 @@ TEST_CASE("radii of 1 : 1,000 and masses of 1 : 10^6 in one heap stay finite, an
     }
 }
 
-TEST_CASE("what is heavy rests on what is light, and does not go through it", "[contacts][extreme]")
+TEST_CASE("a heavy point rests on a light one, and does not sink through it", "[contacts][extreme]")
 {
     const float ratio = GENERATE(1e3f, 1e6f);
     const std::size_t n = GENERATE(1, 3);
@@ -342,7 +343,7 @@ TEST_CASE("what is heavy rests on what is light, and does not go through it", "[
     CHECK(scene.P(n).y() == Approx(at[n].y()).margin(0.06 * r * static_cast<double>(n)));
 }
 
-TEST_CASE("what is heavy does not go through what is light by wedging it into a corner", "[contacts][extreme]")
+TEST_CASE("a heavy point does not sink through a light one by wedging it into a corner", "[contacts][extreme]")
 {
     const double r = 0.005, R = 0.02, x = r + 2 * std::sqrt(R * r);  // on the floor, (x - r)² + (R - r)² = (R + r)²
     const float ratio = GENERATE(64.0f, 1e4f, 1e6f);
@@ -355,7 +356,7 @@ TEST_CASE("what is heavy does not go through what is light by wedging it into a 
     scene.substeps(11);
     for (int second = 0; second < 4; ++second) {
         scene.run(24);
-        // A twentieth of the smaller radius is let be.
+        // A twentieth of the smaller radius is left uncorrected.
         CHECK(scene.deepest() < 0.06 * r);
         CHECK_THAT(scene.P(0), close_to(Vec3d(r, r, 0), 0.05 * r));
         CHECK(scene.P(1).x() == Approx(x).epsilon(0.03));
@@ -418,7 +419,7 @@ TEST_CASE("a heap comes to rest, and its energy does not grow", "[contacts]")
     CHECK(scene.deepest() < 0.05 * 0.04);
 }
 
-TEST_CASE("the search finds each pair that touches once, whatever the radii, grids and places", "[contacts]")
+TEST_CASE("the search finds each touching pair once, whatever the radii, grids and positions", "[contacts]")
 {
     const auto [smallest, scatter, spread] =
         GENERATE(table<double, double, double>({{0.05, 1, 0}, {0.002, 1, 0}, {0.05, 1, 1e7}, {0.05, 0, 0}}));
@@ -557,7 +558,7 @@ TEST_CASE("grids are those of Algorithm 1, and their quality that of equation 5"
     CHECK(RadiusGrids({&same, 0}, 10, 0, 8).excess == 0);
 }
 
-TEST_CASE("a radius that is no length is refused, with the point", "[contacts]")
+TEST_CASE("an invalid radius is refused, with the point", "[contacts]")
 {
     Granular scene(points({{0, 0, 0}, {1, 0, 0}}).set<float>("pscale", {1, -1}));
     std::string text;

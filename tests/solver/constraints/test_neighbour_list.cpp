@@ -10,7 +10,7 @@ namespace {
 
 // Moving points, and the pairs of them that a search has not listed.
 struct Swarm {
-    std::vector<Place> at;
+    std::vector<ProjectedPoint> at;
     std::vector<Vec3d> v;
     std::vector<float> radius;
     NeighbourList list;
@@ -19,7 +19,7 @@ struct Swarm {
     Substep step()
     {
         Substep step;
-        step.at = at;
+        step.points = at;
         step.v = v;
         step.dt = 1e-3;
         return step;

@@ -13,10 +13,10 @@ constexpr Indices indices = {3, 17, 4, 15, 9, 2, 6, 5};
 
 TEST_CASE("gather loads points and vectors by their indices, lane by lane", "[simd]")
 {
-    std::vector<Place> at(20);
+    std::vector<ProjectedPoint> at(20);
     std::vector<Vec3d> v(20);
     for (int k = 0; k < 20; ++k) at[k] = {Vec3d(k, 100 + k, 200 + k), 300.0 + k}, v[k] = Vec3d(k, -k, 0.5 * k);
-    const PointPack got = gather(std::span<const Place>(at), indices);
+    const PointPack got = gather(std::span<const ProjectedPoint>(at), indices);
     const Vectors<Doubles> vectors = gather(std::span<const Vec3d>(v), indices);
     for (std::uint32_t l = 0; l < lanes; ++l) {
         CHECK(got.P[l] == at[indices[l]].P);
@@ -29,7 +29,7 @@ TEST_CASE("scatter writes the first lanes, and nothing else", "[simd]")
 {
     const std::uint32_t count = GENERATE(range(1u, lanes + 1));
     CAPTURE(count);
-    std::vector<Place> at(20, Place{Vec3d(1, 2, 3), 4});
+    std::vector<ProjectedPoint> at(20, ProjectedPoint{Vec3d(1, 2, 3), 4});
     std::vector<Vec3d> v(20, Vec3d(1, 2, 3));
     PointPack to;
     for (std::uint32_t l = 0; l < lanes; ++l) to.P.set(l, Vec3d(10 + l, 20 + l, 30 + l)), to.w[l] = 40 + l;

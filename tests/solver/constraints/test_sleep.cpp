@@ -1,5 +1,5 @@
-// Sleep: piles that rest are the same bits from frame to frame; what is hit, pulled, moved or loses its support wakes,
-// and then goes as if it had never slept.
+// Sleep: piles at rest have the same bits from frame to frame; points that are hit, pushed, moved or unsupported wake,
+// and then moves as if it had never slept.
 #include "runtime/solver/constraints/sleep.h"
 
 #include <tbb/global_control.h>
@@ -63,7 +63,7 @@ Granular asleep_on_floor(const std::vector<Vec3f>& at, float bounce = 0, float f
     return scene;
 }
 
-TEST_CASE("a pile that rests sleeps: the same bits from frame to frame, and no more energy than before", "[sleep]")
+TEST_CASE("a pile at rest sleeps: the same bits from frame to frame, and no more energy than before", "[sleep]")
 {
     Box box(400);
     box.run(24);
@@ -79,7 +79,7 @@ TEST_CASE("a pile that rests sleeps: the same bits from frame to frame, and no m
     box.run(100);
     CHECK(same_bits(box.points, rests));
     CHECK(box.last.asleep == 400);
-    CHECK(box.last.residual.rows > 400);  // told of those that sleep, too
+    CHECK(box.last.residual.rows > 400);  // sleeping rows are counted, too
     CHECK(box.deepest() == Approx(box.last.residual.worst).margin(1e-6));
     CHECK(box.deepest() < 0.06 * r);
 }
@@ -97,8 +97,7 @@ TEST_CASE("most piles sleep six seconds after their fall, and all after ten", "[
     CHECK(early >= 3);
 }
 
-TEST_CASE("piles that fall asleep and are woken come to the same bits on any number of threads",
-          "[sleep][threads][long]")
+TEST_CASE("piles that fall asleep and are woken have the same bits on any number of threads", "[sleep][threads][long]")
 {
     const auto run = [](int threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
@@ -114,7 +113,7 @@ TEST_CASE("piles that fall asleep and are woken come to the same bits on any num
     CHECK(same_bits(one, run(5)));
 }
 
-TEST_CASE("the points alone tell who sleeps: what else is kept may be lost", "[sleep]")
+TEST_CASE("the column alone decides who sleeps: records may be lost", "[sleep]")
 {
     Box box(200);
     box.run(120);
@@ -126,7 +125,7 @@ TEST_CASE("the points alone tell who sleeps: what else is kept may be lost", "[s
     CHECK(again.last.asleep == 200);
 }
 
-TEST_CASE("a sleeper that is hit head on takes the velocity, as one that is awake", "[sleep]")
+TEST_CASE("a sleeper that is hit head on takes the velocity, as an awake point does", "[sleep]")
 {
     const float bounce = GENERATE(0.0f, 1.0f);
     Granular scene = asleep_on_floor({{0, r, 0}, {0.5f, r, 0}}, bounce);
@@ -138,7 +137,7 @@ TEST_CASE("a sleeper that is hit head on takes the velocity, as one that is awak
     CHECK_THAT(scene.v(1), close_to(Vec3d(1.0 + bounce, 0, 0), 1e-3));
 }
 
-TEST_CASE("a shock wakes as far as it goes: a sleeping cluster takes all of the momentum", "[sleep]")
+TEST_CASE("a shock wakes all points that it reaches: a sleeping cluster takes all of the momentum", "[sleep]")
 {
     std::vector<Vec3f> at{{-0.5f, r, 0}};
     for (int k = 0; k < 6; ++k) at.emplace_back(2 * r * static_cast<float>(k), r, 0.0f);
@@ -156,7 +155,7 @@ TEST_CASE("a shock wakes as far as it goes: a sleeping cluster takes all of the 
     CHECK(scene.v(0).x() == Approx(2.5).epsilon(0.02));  // 150/56 where all stay together: the others fly off
 }
 
-TEST_CASE("a sleeper whose support is gone falls", "[sleep]")
+TEST_CASE("a sleeper that loses its support falls", "[sleep]")
 {
     SECTION("a point under it")
     {
@@ -191,14 +190,14 @@ TEST_CASE("a sleeper whose support is gone falls", "[sleep]")
     }
 }
 
-TEST_CASE("a sleeper wakes when forces change, and goes by them", "[sleep]")
+TEST_CASE("a sleeper wakes when forces change, and moves by them", "[sleep]")
 {
     double push = 0;
     Granular scene = asleep_on_floor({{0, r, 0}});
     scene.force([&](const Chunk&, std::size_t) { return Vec3d(push, 0, 0); });
     scene.sleep().run(12);
     REQUIRE(scene.last.asleep == 1);
-    push = 0.5;  // a twentieth of its weight: it is let lie
+    push = 0.5;  // a twentieth of its weight: it sleeps on
     scene.run(1);
     CHECK(scene.v().norm() == 0);
     push = 4;
@@ -206,7 +205,7 @@ TEST_CASE("a sleeper wakes when forces change, and goes by them", "[sleep]")
     CHECK(scene.v().x() == Approx(4.0 / 24 * 7 / 8).epsilon(1e-4));
 }
 
-TEST_CASE("a sleeper that a node gives a velocity, or another place, goes", "[sleep]")
+TEST_CASE("a sleeper that a node moves, or gives a velocity, wakes", "[sleep]")
 {
     Granular scene = asleep_on_floor({{0, r, 0}, {1, r, 0}});
     scene.sleep().run(12);
@@ -218,7 +217,7 @@ TEST_CASE("a sleeper that a node gives a velocity, or another place, goes", "[sl
     CHECK(scene.v(1).y() == Approx(-g / 24).epsilon(1e-5));
 }
 
-TEST_CASE("a sleeper on a slope slides when the slope's friction is taken away", "[sleep]")
+TEST_CASE("a sleeper on a slope slides when the slope loses its friction", "[sleep]")
 {
     const double angle = 0.3;
     const Vec3d n(std::sin(angle), std::cos(angle), 0);
@@ -233,7 +232,7 @@ TEST_CASE("a sleeper on a slope slides when the slope's friction is taken away",
     CHECK(scene.v().norm() == Approx(g * std::sin(angle) / 24).epsilon(1e-4));
 }
 
-TEST_CASE("what slides slowly, or is pulled by nothing, does not fall asleep", "[sleep]")
+TEST_CASE("a point that slides slowly, or that no force acts on, does not fall asleep", "[sleep]")
 {
     Granular slides = asleep_on_floor({{0, r, 0}});
     slides.points.v().write()[0] = Vec3f(0.01f, 0, 0);
@@ -247,7 +246,7 @@ TEST_CASE("what slides slowly, or is pulled by nothing, does not fall asleep", "
     CHECK(floats.last.asleep == 0);
 }
 
-TEST_CASE("a sleeper that is loaded more than it was wakes, and bears it", "[sleep]")
+TEST_CASE("a sleeper wakes under a larger load, and bears it", "[sleep]")
 {
     Granular scene = asleep_on_floor({{0, r, 0}});
     scene.sleep().run(12);

@@ -45,7 +45,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = places } }
 end
 
 describe("sleep", function()
-  it("leaves a heap that rests as it is, and out of what is written", function()
+  it("leaves a heap at rest unchanged, and the column out of the output", function()
     local result = scene.run(heap(floor), { frames = {96, 144} })
     for f = 97, 144 do assert.is_true(same(result[96], result[f]), f) end
     assert.equal(vec3(0, 0, 0), result[144]:max("v"))
@@ -57,7 +57,7 @@ describe("sleep", function()
     assert.is_falsy(same(result[96], result[97]))
   end)
 
-  it("ends where a floor begins to rise, and the heap goes with it", function()
+  it("ends where a floor begins to rise, and the heap rises with it", function()
     local result = scene.run(heap [[:collide { shape = rapid.shape.plane {}, transform = rising, bounce = 0,
       friction = 0.6 }]], { frames = {96, 120} })
     for i = 1, #result[120] do
@@ -66,7 +66,7 @@ describe("sleep", function()
     end
   end)
 
-  it("ends where a floor rises more slowly than what counts as still", function()
+  it("ends where a floor rises more slowly than a still point may move", function()
     local result = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}}, pscale = {0.1} } }
   :gravity {} :contact {}
@@ -93,7 +93,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}}, 
   end)
 end)
 
-describe("sleep of what is tied", function()
+describe("sleep of linked points", function()
   -- Whether the net of these frames sleeps at frame 300, and has moved again 24 frames later, by how much at most.
   local function moved(with)
     local result = net(with, 324)
@@ -106,7 +106,7 @@ describe("sleep of what is tied", function()
     return most, result
   end
 
-  it("comes over a net on pins that hangs in balance, and lasts", function()
+  it("comes to a net on pins that hangs in balance, and lasts", function()
     local still, result = moved {}
     assert.equal(0, still)
     local low = 0
@@ -126,7 +126,7 @@ describe("sleep of what is tied", function()
     assert.truthy(moved { WIND = "function(frame) return {frame.number > 300 and 2 or 0, 0, 0} end" } > 0.01)
   end)
 
-  it("ends when what it is pinned to moves", function()
+  it("ends when its pins move", function()
     local most, result = moved {
       PIN = "transform = function(frame) return rapid.translate(0.01 * math.max(0, frame.number - 300), 0, 0) end" }
     assert.near(0.24, result[324][1].P.x - result[300][1].P.x, 1e-5)
@@ -168,7 +168,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0,
     assert.truthy(result[72][2].P.y < -4, result[72][2].P.y)
   end)
 
-  it("comes over a heap of clumps", function()
+  it("comes to a heap of clumps", function()
     local result = scene.run(heap(floor .. " :clump { strength = 20 }"), { frames = {276, 300} })
     for f = 277, 300 do assert.is_true(same(result[276], result[f]), f) end
     assert.equal(vec3(0, 0, 0), result[300]:max("v"))

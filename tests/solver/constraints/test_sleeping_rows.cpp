@@ -1,4 +1,4 @@
-// Sleep of what rows hold together: it falls asleep in balance, and only there; all of it wakes when any of it is
+// Sleep of points that rows link: they fall asleep in balance, and only there; all of an island wakes when any of it is
 // moved, hit, pulled or let go.
 #include <tbb/global_control.h>
 
@@ -89,7 +89,7 @@ TEST_CASE("a pendulum of a long period never falls asleep, and keeps its phase",
     CHECK(off < 0.01 * width);
 }
 
-TEST_CASE("a rope that has come to rest sleeps where it hangs in balance", "[sleep]")
+TEST_CASE("a rope falls asleep where it hangs in balance", "[sleep]")
 {
     Scene scene = rope(20);
     fall_asleep(scene, 20);
@@ -101,14 +101,14 @@ TEST_CASE("a rope that has come to rest sleeps where it hangs in balance", "[sle
     scene.run(100);
     CHECK(same_bits(scene.points, rests));
     CHECK(scene.last.asleep == 20);
-    CHECK(scene.last.residual.rows == 20);  // told of those that sleep, too
+    CHECK(scene.last.residual.rows == 20);  // sleeping rows are counted, too
 }
 
-TEST_CASE("a rope that sleeps wakes, all of it, when anything of it is changed", "[sleep]")
+TEST_CASE("all of a sleeping rope wakes when any part of it changes", "[sleep]")
 {
     Scene scene = rope(10);
     fall_asleep(scene, 10);
-    SECTION("what it hangs from is moved")
+    SECTION("its support is moved")
     {
         scene.points.P().write()[0] = Vec3f(0.02f, 0, 0);
         scene.run(12);
@@ -116,7 +116,7 @@ TEST_CASE("a rope that sleeps wakes, all of it, when anything of it is changed",
         CHECK(scene.P(10).x() > 1e-4);
         CHECK(scene.last.asleep == 0);
     }
-    SECTION("what it hangs from goes its way")
+    SECTION("its support moves by itself")
     {
         scene.points.v().write()[0] = Vec3f(0.1f, 0, 0);
         scene.run(24);
@@ -162,7 +162,7 @@ TEST_CASE("a rope that sleeps wakes, all of it, when anything of it is changed",
     }
 }
 
-TEST_CASE("what hangs from a spring and sleeps sinks when it grows heavier", "[sleep]")
+TEST_CASE("a sleeping weight on a spring sinks when it grows heavier", "[sleep]")
 {
     const double compliance = 1e-3;
     Scene scene = rope(1, compliance);
@@ -173,7 +173,7 @@ TEST_CASE("what hangs from a spring and sleeps sinks when it grows heavier", "[s
     CHECK(scene.P(1).y() == Approx(-0.1 - 3 * compliance * g).margin(1e-5));
 }
 
-TEST_CASE("a rope that wakes goes on from the forces that it fell asleep with", "[sleep]")
+TEST_CASE("a rope wakes with the forces that it fell asleep with", "[sleep]")
 {
     Scene scene = rope(20, 1e-5);
     fall_asleep(scene, 20);
@@ -185,7 +185,7 @@ TEST_CASE("a rope that wakes goes on from the forces that it fell asleep with", 
     }
 }
 
-TEST_CASE("two ropes that hang from one immovable point sleep each by itself", "[sleep]")
+TEST_CASE("two ropes on one immovable point sleep independently", "[sleep]")
 {
     Scene scene(points({{0, 0, 0}, {0.1f, 0, 0}, {-0.1f, 0, 0}}).set<float>("mass", {immovable, 1, 1}));
     scene.gravity().substeps(8);
@@ -198,7 +198,7 @@ TEST_CASE("two ropes that hang from one immovable point sleep each by itself", "
     CHECK(scene.v(2).norm() == 0);
 }
 
-TEST_CASE("points of rows whose kind does not say that it rests stay awake", "[sleep]")
+TEST_CASE("points of rows whose function does not say that it rests stay awake", "[sleep]")
 {
     Scene scene(points({{0, 0, 0}, {0, -0.1f, 0}}).set<float>("mass", {immovable, 1}));
     scene.gravity().substeps(8).sleep();
@@ -232,11 +232,11 @@ Granular net(std::int64_t n, const Vec3f& ball)
     return scene;
 }
 
-TEST_CASE("a ball that falls into a net that sleeps wakes all of it, and is caught as by one that is awake", "[sleep]")
+TEST_CASE("a ball wakes all of a sleeping net, and is caught as by an awake one", "[sleep]")
 {
     const auto caught = [](bool sleeps) {
         Granular scene = net(8, {0.3f, -10, 0.3f});
-        scene.points.column<float>("mass").write()[64] = immovable;  // waits there
+        scene.points.column<float>("mass").write()[64] = immovable;  // held there at first
         if (sleeps) fall_asleep(scene, 60, 720);
         scene.run(720 - static_cast<int>(scene.options.frame));
         CHECK(scene.last.asleep == (sleeps ? 60 : 0));
@@ -278,7 +278,7 @@ Granular dumbbells(std::int64_t n, std::int64_t side)
     return scene;
 }
 
-TEST_CASE("a heap of dumbbells sleeps, and is then the same bits from frame to frame", "[sleep]")
+TEST_CASE("a heap of dumbbells falls asleep, and then has the same bits from frame to frame", "[sleep]")
 {
     Granular scene = dumbbells(128, 4);
     scene.run(360);
@@ -289,7 +289,7 @@ TEST_CASE("a heap of dumbbells sleeps, and is then the same bits from frame to f
     CHECK(same_bits(scene.points, rests));
 }
 
-TEST_CASE("islands that fall asleep and wake come to the same bits on any number of threads", "[sleep][threads]")
+TEST_CASE("islands that fall asleep and wake have the same bits on any number of threads", "[sleep][threads]")
 {
     const auto run = [](int threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,

@@ -1,0 +1,21 @@
+// The points that constraints act on, as the projection sees them.
+#pragma once
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// A position, m, and an inverse mass, 1/kg: 0 of a point that no constraint moves, or that sleeps. A cache line holds
+// two.
+struct alignas(32) ProjectedPoint {
+    Vec3d P;
+    double w;
+};
+
+// What a constant acceleration of 1 m/s² does to a point in a sub-step: to its velocity, m/s, and to its position, m.
+// dt and dt²/2, but for drag and springs.
+struct Mobility {
+    double v, x;
+};
+
+}  // namespace rapid

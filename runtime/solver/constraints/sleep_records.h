@@ -1,0 +1,23 @@
+// What sleeping points fell asleep under, kept from frame to frame.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+struct SleepRecords {
+    struct Record {
+        std::int64_t id;
+        Vec3f P;              // m
+        double inverse_mass;  // 1/kg
+        Vec3f acceleration;   // m/s²
+        float grip;           // of the shapes that it touches (shape_grip.h)
+        float load;           // N, the sum of what other points press it by
+    };
+    std::vector<Record> records;
+};
+
+}  // namespace rapid

@@ -1,4 +1,4 @@
--- group_by_shape: who is in a shape, or near it, is in a group, in each frame anew.
+-- group_by_shape: who is in a shape, or near it, is in a group, at each frame.
 --
 -- A level set knows distances within its band alone: `distance` beyond it means as far as the band goes.
 local rapid = require "rapid"

@@ -1,4 +1,4 @@
--- jitter: kicks in random directions, anew in each frame.
+-- jitter: kicks in random directions, new ones at each frame.
 --
 --   v += strength sqrt(dt) k            k: each component uniform in [-1, 1], so that |k|² is 1 on average
 --

@@ -200,7 +200,7 @@ private:
     ColliderShapes shapes_;
     Shadows shadows_;
     EnergyDrift drift_;
-    ShapeLoads loads_;  // of the previous frame, where points are coupled
+    ShapeLoads loads_;            // of the previous frame, where points are coupled
     SleepRecords sleep_records_;  // of the previous frame
 };
 RAPID_NODE(Solve);

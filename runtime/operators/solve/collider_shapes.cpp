@@ -142,9 +142,8 @@ void ColliderShapes::set_in_motion(Dynamics& dynamics, const PointSet& points, c
         options.cuts = collider->cuts;
         std::optional<Jump> jump;
         try {
-            in_motion->shape = collider->deforming
-                                   ? deformed(*collider, options, jump)
-                                   : moving_shape(*collider, clock, step, from, to, options, jump);
+            in_motion->shape = collider->deforming ? deformed(*collider, options, jump)
+                                                   : moving_shape(*collider, clock, step, from, to, options, jump);
         } catch (Error& error) {
             error.in_node(collider->node).at(collider->location);
             throw;

@@ -174,6 +174,8 @@ std::vector<Uses> Evaluator::declared_for(std::size_t node) const
 {
     std::vector<Uses> declared = {uses_of(plan_.nodes[node])};
     if (plan_.nodes[node].node->type->kind != NodeKind::Solve) return declared;
+    // The plan lets Solve read ages where a life may end; how long a point has been still is Solve's own.
+    declared.emplace_back().takes = {"age", "still"};
     for (const std::vector<std::size_t>& pass : plan_.passes()) {
         if (std::find(pass.begin(), pass.end(), node) == pass.end()) continue;
         for (const std::size_t other : pass) declared.push_back(uses_of(plan_.nodes[other]));

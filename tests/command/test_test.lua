@@ -286,7 +286,7 @@ describe("a test", function()
       "assert.conserved takes the result of rapid.run, a function of a point, and a tolerance")
   end)
 
-  it("fails as README shows it", function()
+  it("fails as docs/lua-api.md shows it", function()
     local folder = new_folder { ["test_sparks.lua"] = ([[
 describe("sparks", function()
   it("never enter the floor", function()
@@ -296,8 +296,8 @@ describe("sparks", function()
 end)
 ]]):format(io.popen("pwd"):read "*l" .. "/graphs/sparks.lua") }
     local shown = folder:test("test_sparks.lua").stdout:gsub("([^\n]+\n)", "    %1")
-    local readme = io.open("README.md"):read "*a"
-    assert.truthy(readme:find(shown:gsub("\n$", ""), 1, true), shown)
+    local page = io.open("docs/lua-api.md"):read "*a"
+    assert.truthy(page:find(shown:gsub("\n$", ""), 1, true), shown)
   end)
 
   it("finds NaN near nothing", function()

@@ -105,6 +105,10 @@ describe("the study", function()
     assert.near(1, lines["of v"].order, 0.1)
   end)
 
+  it("rods is of second order, whatever the masses", function()
+    for ratio, line in pairs(lines_of "rods") do assert.near(2, line.order, 0.05, ratio) end
+  end)
+
   it("subframes is of first order by sub-frames, and no better by sub-steps, which a script does not see", function()
     local lines = lines_of "subframes"
     assert.near(1, lines.subframes.order, 0.15)
@@ -114,6 +118,6 @@ describe("the study", function()
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
     assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua kepler.lua net.lua " ..
-      "orbit.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
+      "orbit.lua rods.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
   end)
 end)

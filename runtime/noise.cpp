@@ -64,7 +64,8 @@ struct Axis {
         below = below > x ? below - 1.0 : below;
         corner = Lane::low(std::bit_cast<typename Lane::Words>(below + whole));
         f = x - below;
-        f = f * f < 1.0 ? f : f - f;  // beyond 2⁵¹ numbers have no fractions; NaN stays
+        // 1 just below a corner, where the fraction rounds to it. Beyond 2⁵¹ numbers have no fractions; NaN stays.
+        f = (f >= 0.0) & (f <= 1.0) ? f : f - f;
         s = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
         slope = f * f * (f * (f * 30.0 - 60.0) + 30.0);
     }

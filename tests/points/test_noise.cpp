@@ -132,6 +132,23 @@ TEST_CASE("noise and its curl are continuous across cells, in place and in time,
     }
 }
 
+TEST_CASE("curl noise just below a plane of its lattice is what it is on it", "[noise]")
+{
+    const NoiseOptions options{0.3, 3, 5};
+    const double below = GENERATE(-1e-300, -7e-21, -1e-17);
+    for (Vec3d P : random_places(200, 20)) {
+        const int axis = static_cast<int>(std::abs(P.sum())) % 3;
+        P[axis] = 0;
+        const Vec3d on = curl_noise(P, options);
+        P[axis] = below;
+        CHECK((curl_noise(P, options) - on).norm() < 1e-12);
+        const std::vector<Vec3d> eight(8, P);
+        std::vector<Vec3d> curl(8);
+        curl_noise(eight, options, curl);
+        CHECK((curl[0] - on).norm() < 1e-12);
+    }
+}
+
 TEST_CASE("noises two cells apart, of two seeds and of two times know nothing of each other", "[noise]")
 {
     std::vector<double> value, far, other_seed, later, next_axis;

@@ -5,6 +5,7 @@
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"
+#include "runtime/shapes/plane_rest.h"
 
 namespace rapid {
 namespace {
@@ -62,8 +63,8 @@ public:
             if (f < -flush) {
                 contact.time = 0;
                 contact.depth = -f;
-            } else if (f <= flush && (vn < 0 || (an < 0 && vn * vn <= -2 * an * flush))) {
-                contact.time = 0;  // moves inwards, or would be back before it has risen by more than rounding
+            } else if (f <= flush && (vn < 0 || stays_on_plane(vn, -an, flush, T))) {
+                contact.time = 0;
             } else {
                 const double s = first_fall_through(std::max(f, 0.0), vn, an);
                 if (!(s < T)) continue;

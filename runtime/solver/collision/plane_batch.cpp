@@ -73,7 +73,8 @@ void PlaneBatch::solve(const HalfSpace& plane)
         const double vn = dot(n, v), g = -dot(n, a), tolerance = contact_tolerance(P, radius);
         const bool is_over = (g > 0) & (f >= -tolerance), touches = f <= tolerance;
         const bool stays_above = !touches & (f + dt * (vn - 0.5 * dt * g) > 0);
-        const bool rests = touches & (vn * vn <= 2 * g * tolerance), only_pressed = is_zero(a + g * n);
+        const bool rests = touches & (vn * vn <= 2 * g * tolerance) & (2 * vn <= g * dt);  // stays_on_plane()
+        const bool only_pressed = is_zero(a + g * n);
         const State slid = slide({P, v}, n, vn, g, friction, dt);
 
         // One bounce, from where the parabola first goes through the plane.

@@ -1,6 +1,7 @@
 #include "runtime/solver/collision/plane_contacts.h"
 
 #include "runtime/shapes/first_contact.h"
+#include "runtime/shapes/plane_rest.h"
 #include "runtime/solver/collision/response.h"
 
 namespace rapid {
@@ -49,10 +50,11 @@ bool PlaneContacts::slides_on_plane(std::size_t i)
     const int o = contacts_.obstacle(i);
     const Obstacle& obstacle = block_.obstacles[o];
     const Vec3d &P = block_.P[i], &v = block_.v[i];
+    if (motion_.longest_parabola(i, block_.dt[i]) < block_.dt[i]) return false;
     if (obstacle.response == Response::Stick || obstacle.response == Response::Die) return false;
     if (!obstacle.acceleration_at(P, v, block_.frame_time(i, block_.dt[i])).isZero(0)) return false;
     const double g = -motion_.acceleration(i).dot(contact.n), vn = (v - contact.vc).dot(contact.n);
-    if (!(g > 0) || vn * vn > 2 * g * obstacle.contact_tolerance(P, block_.radius(obstacle, i))) return false;
+    if (!stays_on_plane(vn, g, obstacle.contact_tolerance(P, block_.radius(obstacle, i)), block_.dt[i])) return false;
 
     const Support on{o, contact.n, contact.vc, 0, obstacle.friction[block_.indices[i]], true, obstacle.feature};
     if (!slide_on_plane(i, on)) return false;

@@ -1,0 +1,76 @@
+-- Points at rest on planes: what lifts them, and what they do under a force that varies from place to place.
+local scene = require "testing.scene"
+
+-- The heights over a plane through a random place, after some frames, of points that lay on it anywhere, pulled onto it
+-- by gravity and lifted by an action of `net` m/s² more.
+local function lifted(net, substeps, frames, size, seed)
+  local result = scene.run(([[
+local seed, size, net = %d, %g, %g
+local function random()
+  seed = (seed * 16807) %% 2147483647
+  return seed / 2147483647
+end
+local n = vec3(random() - 0.5, random() + 0.2, random() - 0.5):normalized()
+local at = size * vec3(random() - 0.5, random() - 0.5, random() - 0.5)
+local P = {}
+for k = 1, 20 do
+  local x = at + size * vec3(random() - 0.5, random() - 0.5, random() - 0.5)
+  x = x - n:dot(x - at) * n
+  P[k] = {x.x, x.y, x.z}
+end
+return rapid.create { fps = 24, points = rapid.points.from { P = P } } :attribute { n = {n.x, n.y, n.z} }
+  :gravity { g = {-9.81 * n.x, -9.81 * n.y, -9.81 * n.z} }
+  :action("lift", function(p) p.force = p.force + (9.81 + net) * n end)
+  :collide { shape = rapid.shape.plane { normal = {n.x, n.y, n.z}, offset = n:dot(at) }, bounce = 0.5 }
+  :solve { substeps = %d }]]):format(seed, size, net, substeps), { frames = {1, frames} })
+  local heights = {}
+  for i = 1, #result[1] do heights[i] = (result[frames][i].P - result[1][i].P):dot(result[frames][i].n) end
+  return heights
+end
+
+describe("a point that rests on a plane", function()
+  it("leaves it where an action lifts it by more than its weight, at any number of sub-steps", function()
+    local frames = 13
+    local t = (frames - 1) / 24
+    for k, substeps in ipairs { 1, 4, 64, 256 } do
+      for _, size in ipairs { 1, 20, 200 } do
+        local heights = lifted(1, substeps, frames, size, 7 * k)
+        assert.equal(20, #heights)
+        for i = 1, #heights do
+          -- The plane still bears it for half a sub-step. A frame's roundings move it by an ulp of its place.
+          local half = 0.5 / (24 * substeps)
+          local height = 0.5 * t * t + 9.81 * half * (t - half / 2)
+          assert.near(height, heights[i], 1e-5 + 1e-6 * size)
+        end
+      end
+    end
+  end)
+
+  it("stays where the action bears less than its weight", function()
+    for _, height in ipairs(lifted(-1, 64, 13, 20, 3)) do assert.near(0, height, 2e-5) end
+  end)
+end)
+
+describe("points that turbulence drives over a plane without bounce", function()
+  -- Positions at frame 10 of points some of which slide, take off and land.
+  local function positions(substeps)
+    return scene.run(([[
+local P = {}
+for i = 0, 99 do P[i + 1] = {i %% 10 * 0.3, i %% 3 * 0.1, math.floor(i / 10) * 0.3} end
+return rapid.create { fps = 24, points = rapid.points.from { P = P } }
+  :gravity {} :turbulence { amplitude = 50, size = 1 }
+  :collide { shape = rapid.shape.plane {}, bounce = 0, friction = 0.4 } :solve { substeps = %d }]]):format(substeps),
+      { frames = {10, 10} })[10]
+  end
+
+  it("come to the same places as the sub-steps are doubled", function()
+    local differences, last = {}, positions(16)
+    for k, substeps in ipairs { 32, 64, 128, 256 } do
+      local now, largest = positions(substeps), 0
+      for i = 1, #now do largest = math.max(largest, (now[i].P - last[i].P):length()) end
+      differences[k], last = largest, now
+    end
+    local all = table.concat(differences, " ")
+    for k = 2, #differences do assert.truthy(differences[k] < 0.4 * differences[k - 1], all) end
+  end)
+end)

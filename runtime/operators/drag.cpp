@@ -2,8 +2,8 @@
 //
 //   a = -linear v - quadratic |v| v
 //
-// The linear part is exact at any step. The quadratic part never reverses a velocity, and keeps the terminal speed
-// √(g/quadratic).
+// Exact at any step, alone and along an acceleration; of second order across one. It never reverses a velocity, and
+// keeps the terminal speed.
 #include "runtime/graph/node.h"
 
 namespace rapid {

@@ -1,5 +1,7 @@
 #include "runtime/solver/point_block.h"
 
+#include "runtime/solver/motion/quadratic_drag.h"
+
 namespace rapid {
 
 void PointBlock::begin(std::span<const std::uint32_t> block_places, std::span<const Vec3f> P0,
@@ -42,37 +44,25 @@ void PointBlock::drift_damped(std::span<const double> t)
     Responder responder;
     for (std::size_t i = 0; i < P.size(); ++i) {
         const Vec3d G = acceleration_at_rest(P[i], a[i], linear[i]);
-        const Propagator& r = responder(drag_rate(v[i], G, linear[i], t[i]), linear[i].w2, t[i]);
+        const Propagator r = respond(v[i], G, linear[i], t[i], responder).by;
         P[i] += v[i] * r.x_of_v + G * r.x_of_G;
         v[i] = v[i] * r.v_of_v + G * r.v_of_G;
     }
 }
 
-// The same without springs: the exponentials of all points at once. Quadratic drag as in drag_rate().
+// The same without springs: the exponentials of all points at once, but for those with quadratic drag.
 void PointBlock::drift_dragged(std::span<const double> t)
 {
     const std::size_t n = P.size();
-    const auto G = [&](std::size_t i) { return acceleration_at_rest(P[i], a[i], linear[i]); };
     rates_.resize(n);
-    bool quadratic = false;
-    for (std::size_t i = 0; i < n; ++i) {
-        rates_[i] = linear[i].k;
-        quadratic |= linear[i].c > 0;
-    }
-    if (quadratic) {
-        for (std::size_t i = 0; i < n; ++i)
-            rates_[i] = drag_rate_along(v[i].squaredNorm() > 0 ? v[i] : G(i), v[i], G(i), linear[i], t[i]);
-        dragged_.respond(rates_, t);
-        for (std::size_t i = 0; i < n; ++i) {
-            const Vec3d after_first = v[i] + (v[i] * dragged_.v_of_v[i] + G(i) * dragged_.x_of_v[i]);
-            rates_[i] = drag_rate_along(after_first, v[i], G(i), linear[i], t[i]);
-        }
-    }
+    for (std::size_t i = 0; i < n; ++i) rates_[i] = linear[i].k;
     dragged_.respond(rates_, t);
     for (std::size_t i = 0; i < n; ++i) {
-        const Vec3d g = G(i);
-        P[i] += v[i] * dragged_.x_of_v[i] + g * dragged_.x_of_G[i];
-        v[i] = v[i] * dragged_.v_of_v[i] + g * dragged_.x_of_v[i];
+        const Vec3d G = acceleration_at_rest(P[i], a[i], linear[i]);
+        Propagator r{dragged_.x_of_v[i], dragged_.x_of_G[i], dragged_.v_of_v[i], dragged_.x_of_v[i]};
+        if (linear[i].c > 0) r = respond_to_quadratic_drag(v[i], G, linear[i].k, linear[i].c, t[i]).by;
+        P[i] += v[i] * r.x_of_v + G * r.x_of_G;
+        v[i] = v[i] * r.v_of_v + G * r.v_of_G;
     }
 }
 

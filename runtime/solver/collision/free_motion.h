@@ -34,6 +34,12 @@ public:
         if (is_damped()) mean_a_[i] = damped_[i].mean_acceleration(block_.v[i], left);
     }
 
+    // What part of `left`, s, that mean may stand for.
+    double longest_parabola(std::size_t i, double left) const
+    {
+        return is_damped() ? damped_[i].longest_parabola(block_.v[i], left) : left;
+    }
+
     // The free paths of all points, from where they are.
     void trace();
     FreePaths& paths() { return paths_; }

@@ -21,8 +21,9 @@ bool PathPlanner::plan(CollidingPoint& point)
 {
     const std::size_t i = point.i;
     while (point.left > 0) {
-        motion_.update_acceleration(i, point.left);
-        point.path = {block_.P[i], block_.v[i], motion_.acceleration(i), point.left, 0};
+        const double duration = motion_.longest_parabola(i, point.left);
+        motion_.update_acceleration(i, duration);
+        point.path = {block_.P[i], block_.v[i], motion_.acceleration(i), duration, 0};
         point.kind = CollidingPoint::Free;
         point.stops = false;
         if (point.supports == 0) return true;
@@ -40,12 +41,12 @@ Slide PathPlanner::slide(CollidingPoint& point)
 {
     const Vec3d &v = block_.v[point.i], &a = motion_.acceleration(point.i);
     if (point.supports == 1) {
-        const Slide next = slide_on(point.on[0], v, a, point.left, min_turning_piece * block_.dt[point.i]);
+        const Slide next = slide_on(point.on[0], v, a, point.path.duration, min_turning_piece * block_.dt[point.i]);
         if (next.kind == Slide::Leaves) point.supports = 0;
         return next;
     }
     int lifted = -1;
-    const Slide next = slide_along(point.on[0], point.on[1], v, a, point.left, lifted);
+    const Slide next = slide_along(point.on[0], point.on[1], v, a, point.path.duration, lifted);
     if (next.kind == Slide::Leaves) {
         if (lifted == 0) point.on[0] = point.on[1];
         point.supports = 1;

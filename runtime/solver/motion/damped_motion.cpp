@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "runtime/simd.h"
+#include "runtime/solver/motion/quadratic_drag.h"
 
 namespace rapid {
 namespace {
@@ -124,51 +125,26 @@ void DragPropagators::respond(std::span<const double> k, std::span<const double>
     }
 }
 
-double mean_speed(double speed, double a, double c, double t)
+Dragged respond(const Vec3d& v, const Vec3d& G, const Linear& linear, double t, Responder& respond)
 {
-    if (!(t > 0)) return speed;
-    const double rate2 = std::abs(a) * c;
-    const double x = std::sqrt(rate2) * t, push = c * speed * t;
-    // ∫ c speed dt = ln of the factor by which the speed falls, which is 1 + push without acceleration.
-    double log_ratio;
-    if (x < 1e-4) {
-        log_ratio = std::log1p(push + (a > 0 ? 0.5 : -0.5) * x * x);
-    } else if (a > 0) {
-        // ln(cosh x + (push/x) sinh x), for any size of x
-        log_ratio = x + std::log(0.5 * ((1 + push / x) + (1 - push / x) * std::exp(-2 * x)));
-    } else {
-        // Slowed to rest at the time when the angle is atan(push/x); from then on at rest: drag turns no point round.
-        const double stop = std::atan2(push, x);
-        const double angle = std::min(x, stop);
-        log_ratio = std::log(std::cos(angle) + push / x * std::sin(angle));
-    }
-    return std::max(log_ratio, 0.0) / (c * t);
-}
-
-double drag_rate_along(const Vec3d& direction, const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
-{
-    if (!(linear.c > 0)) return linear.k;
-    const double size = direction.norm();
-    const double along = size > 0 ? G.dot(direction) / size : 0;
-    return linear.k + linear.c * mean_speed(v.norm(), along, linear.c, t);
-}
-
-double drag_rate(const Vec3d& v, const Vec3d& G, const Linear& linear, double t)
-{
-    if (!(linear.c > 0)) return linear.k;
-    // The direction of the motion depends on the rate: a second iteration with that of the first.
-    const double first = drag_rate_along(v.squaredNorm() > 0 ? v : G, v, G, linear, t);
-    const Propagator r = respond(first, linear.w2, t);
-    return drag_rate_along(v + (v * r.v_of_v + G * r.v_of_G), v, G, linear, t);
+    if (!(linear.c > 0) || !(t > 0)) return {respond(linear.k, linear.w2, t), linear.k};
+    Dragged dragged = respond_to_quadratic_drag(v, G, linear.k, linear.c, t);
+    if (linear.w2 == 0) return dragged;
+    const double alone = dragged.by.x_of_v / rapid::respond(dragged.rate, 0, t).x_of_v;
+    dragged.by = respond(dragged.rate, linear.w2, t);
+    dragged.by.x_of_v *= alone;
+    return dragged;
 }
 
 Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t, Responder& respond)
 {
     Damped damped;
+    damped.c = linear.c;
     damped.w2 = linear.w2;
     damped.G = acceleration_at_rest(P, a, linear);
-    damped.k = drag_rate(v, damped.G, linear, t);
-    const Propagator& r = respond(damped.k, damped.w2, t);
+    const auto [r, rate] = rapid::respond(v, damped.G, linear, t, respond);
+    damped.k = rate;
+    damped.linear_k = linear.k;
     damped.travel = v * r.x_of_v + damped.G * r.x_of_G;
     damped.v = v * r.v_of_v + damped.G * r.v_of_G;
     damped.path_v = t > 0 ? Vec3d(v * (r.x_of_v / t)) : v;
@@ -178,9 +154,18 @@ Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear
 
 Vec3d Damped::mean_acceleration(const Vec3d& from, double t) const
 {
-    if (!(t > 0)) return G - k * from;
-    const Propagator r = respond(k, w2, t);
+    if (!(t > 0)) return G - (linear_k + c * from.norm()) * from;
+    Responder responder;
+    const Propagator r = respond(from, G, {.k = linear_k, .w2 = w2, .c = c}, t, responder).by;
     return (from * (r.v_of_v - 1) + G * r.v_of_G) / t;
+}
+
+double Damped::longest_parabola(const Vec3d& from, double t) const
+{
+    constexpr double slowed = 1.0 / 16;
+    const double speed = from.norm(), rate = c * speed;
+    if (!(rate * t > slowed) || rate * speed * speed < 2 * std::abs(G.dot(from))) return t;
+    return slowed / rate;
 }
 
 }  // namespace rapid

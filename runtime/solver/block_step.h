@@ -2,6 +2,9 @@
 //
 //   no actions     x(t + dt) by the forces at the middle of the sub-step
 //   with actions   half a drift, all actions, half a drift: second order (numerics.md, Motion)
+//
+// Why beside the ballistic batch, which needs none: forces that differ from point to point, actions and contacts have
+// no closed form for the whole frame.
 #pragma once
 
 #include <span>

@@ -1,5 +1,6 @@
 // A block of points within a frame: their state in double precision, the acceleration of the sub-step, and motion along
-// it without contacts.
+// it without contacts. Why beside the free paths (motion/free_paths.h): where nothing is to be met a sub-step has no
+// use for the boxes of paths, nor for a copy of the states.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,8 @@
 // A step of points that do not depend on one another: each block goes through the whole frame while it is in cache.
+//
+// Why beside the coupled step, where the sub-step is a barrier: main memory is read and written once a frame, whatever
+// the number of sub-steps; and points that nothing but a uniform acceleration and linear drag moves take no sub-steps
+// at all (motion/ballistic_batch.h).
 #pragma once
 
 #include <cstdint>

@@ -27,7 +27,8 @@ struct Dragged {
     double rate = 0;  // 1/s, mean of k + c |v|
 };
 
-// The same of many points without springs, a pack at a time.
+// The motion under drag of many points without springs, a pack at a time. Why beside respond(): where each point has a
+// drag of its own the exponentials are most of the cost, and a third of it in packs (bench_forces, air_by_attribute).
 struct DragPropagators {
     std::vector<double> x_of_v, x_of_G, v_of_v;  // by point; v_of_G is x_of_v
 

@@ -1,4 +1,5 @@
-// A shape's queries, and its first contact with many paths, from a sampler of its distance.
+// A shape's queries, and its first contact with many paths, from a sampler of its distance (docs/extending.md, A
+// shape).
 //
 // ShapeOf<Derived> gives a shape its queries from one member function, `sampler()`, which returns a small copyable
 // struct, made once for a batch of points:
@@ -7,7 +8,6 @@
 //   double distance(const Vec3d& P, Vec3d& gradient) const;  and the gradient, not normalised, zero where there is none
 //   double slope_bound() const;                              the largest slope of the field
 //   double smallest_feature() const;                         m: a wall thinner than this may be missed; 0: convex
-//   double band() const;                                     m: the largest |distance| that is exact
 //   Box3d bounds() const;                                    outside it the distance is above 0
 //   double rounding() const;                                 m: error of a distance; where missing, of single precision
 //

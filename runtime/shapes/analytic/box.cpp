@@ -42,7 +42,6 @@ struct BoxSampler {
     }
     double slope_bound() const { return 1; }
     double smallest_feature() const { return 0; }
-    double band() const { return std::numeric_limits<double>::infinity(); }
     Box3d bounds() const { return {center - half, center + half}; }
     double rounding() const { return 0x1p-50 * (half + center.cwiseAbs()).maxCoeff(); }
 };

@@ -27,7 +27,6 @@ struct SphereSampler {
     }
     double slope_bound() const { return 1; }
     double smallest_feature() const { return 0; }
-    double band() const { return std::numeric_limits<double>::infinity(); }
     Box3d bounds() const { return {center - Vec3d::Constant(radius), center + Vec3d::Constant(radius)}; }
     double rounding() const { return 0x1p-50 * (radius + center.cwiseAbs().maxCoeff()); }
 };

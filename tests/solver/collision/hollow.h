@@ -20,7 +20,6 @@ public:
         }
         double slope_bound() const { return 1; }
         double smallest_feature() const { return radius / 100; }
-        double band() const { return std::numeric_limits<double>::infinity(); }
         Box3d bounds() const
         {
             const double inf = std::numeric_limits<double>::infinity();
@@ -50,7 +49,6 @@ public:
         }
         double slope_bound() const { return 1; }
         double smallest_feature() const { return half_width / 3; }
-        double band() const { return half_width; }
         Box3d bounds() const { return {Vec3d::Constant(-radius - half_width), Vec3d::Constant(radius + half_width)}; }
     };
     Sampler sampler() const { return sampler_; }

@@ -116,7 +116,7 @@ local function analyse_inside(value, found)
   end
 end
 
--- The place of an instruction, and what is known there: f and pc; the operands a, b, c, d; the registers; what has been
+-- An instruction, and the facts known there: f and pc; the operands a, b, c, d; the registers; what has been
 -- found; `outer` as analyse_function() has it; the call that is being followed.
 local At = {}
 At.__index = At
@@ -162,7 +162,7 @@ function At:read_field(object, key)
   if found.methods[key] then return { kind = "method", value = key, of_unknown = true } end
 end
 
--- Of object[key] by a number, or by what is not constant: `key` is the number, if there is one.
+-- Of object[key] by a number, or by a value that varies: `key` is the number, if there is one.
 function At:read_element(object, key)
   if object and object.kind == "shared" then
     analyse_inside(object.value, self.found)
@@ -295,7 +295,7 @@ function group_calls.within(at, _, group)
   if group and group.kind == "string" then at.found.asks[group.value] = true else at.found.asks_any = true end
 end
 
--- A shared function, called with these shared values. Returns what it returns, if all points share it.
+-- A shared function, called with these shared values. Returns its result, if all points share it.
 local function call_shared(at, called, given, arguments)
   local found = at.found
   local writer = writers[called]

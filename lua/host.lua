@@ -64,7 +64,7 @@ local entry = {}
 
 local asked -- the definition of the study file that was run
 
--- Runs the graph and returns what it returned: a node, or a table of nodes by name. With knobs the file is a study,
+-- Runs the graph and returns its result: a node, or a table of nodes by name. With knobs the file is a study,
 -- and the graph is that of its scene; with an empty table of knobs there is no graph.
 function entry.run(text, name, knobs)
   local chunk, message = load_text(text, name)

@@ -144,7 +144,7 @@ int run_command(Command& command, const CommonOptions& common)
         return status_refused;
     } catch (const std::bad_alloc&) {
         print_error(Error("out of memory"), false);
-    } catch (const std::exception& error) {  // of a library: what it says is all that is known
+    } catch (const std::exception& error) {  // of a library: its text is all that is known
         print_error(Error(error.what()), false);
     }
     return status_failed;

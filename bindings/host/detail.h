@@ -12,7 +12,8 @@ class Kernel;
 struct KernelArguments;
 
 // Runs the function once, in the main state: function(points, frame, params). When it ends, the points that it added
-// are appended, with ids of their own, and those that it killed are removed. Error: what it raised, with the frame.
+// are appended, with ids of their own, and those that it killed are removed. Error: the one that it raised, with the
+// frame.
 void run_detail(const Kernel& function, Flow& flow, const Evaluation& now, const KernelArguments& arguments);
 
 // As scripts see them.

@@ -1,4 +1,4 @@
-// A function of a point, written in Lua: what it reads and writes, and how it runs over a set.
+// A function of a point, written in Lua: the columns that it reads and writes, and its run over a set.
 #pragma once
 
 #include <map>

@@ -54,7 +54,7 @@ std::string message_of(lua_State* L, int index)
 std::string shown(const Location& place) { return fmt::format("{}:{}", place.file, place.line); }
 
 // The line of the error itself where that is graph code, else the nearest line of graph code that led there; empty
-// where there is none. Takes the position that Lua's `error` has put in front off the message.
+// where there is none. Removes the position that Lua's `error` puts in front of the message.
 std::string find_place(lua_State* L, std::string& message)
 {
     const Location& tail_call = State::of(L).tail_call;

@@ -34,8 +34,8 @@ public:
     ScriptHost& host() const { return host_; }
     bool is_main() const { return main_; }
 
-    // Calls the function below its `arguments` on the stack. Error: what it raised, at the nearest line of graph code;
-    // the stack is then as before the function was pushed.
+    // Calls the function below its `arguments` on the stack. Error: the one that it raised, at the nearest line of
+    // graph code; the stack is then as before the function was pushed.
     void call(int arguments, int results);
 
     // Pushes an entry point of lua/host.lua.

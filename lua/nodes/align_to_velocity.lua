@@ -1,4 +1,4 @@
--- align_to_velocity: what is drawn at a point looks where the point goes: its z axis along v, its y axis towards `up`.
+-- align_to_velocity: turns the `orient` of points to where they go: its z axis along v, its y axis towards `up`.
 --
 -- First the shortest turn of z into the direction of v, then the turn about that direction by which y comes nearest to
 -- `up`. A point that is slower than `least` keeps its orientation.

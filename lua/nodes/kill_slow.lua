@@ -1,4 +1,4 @@
--- kill_slow: what has come to rest goes, so that a heap of debris costs nothing.
+-- kill_slow: removes points that have come to rest, so that a heap of debris costs nothing.
 --
 -- Tested before the frame's motion: the speed is the one with which the point left the frame before.
 local rapid = require "rapid"

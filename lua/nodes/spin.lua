@@ -1,4 +1,4 @@
--- spin: what is drawn at a point turns about an axis, each at a rate of its own.
+-- spin: turns the `orient` of points about an axis, each at a rate of its own.
 --
 --   orient = rotation(axis, rate (1 + variation r) dt) orient            r: the point's own number in [-1, 1]
 local rapid = require "rapid"

@@ -29,7 +29,7 @@ std::size_t stagger()
 std::size_t whole_pages(std::size_t bytes) { return (bytes + page - 1) / page * page; }
 
 // Pages that were given back, for who next needs about as many: columns that come and go in every frame would else have
-// the system clear theirs anew each time, page by page.
+// the system clear theirs again each time, page by page.
 class SparePages {
 public:
     struct Block {

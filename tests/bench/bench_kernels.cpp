@@ -170,7 +170,7 @@ double median(std::vector<double> times)
 }
 
 constexpr std::size_t in_cache = 16384;  // points: 450 KB
-constexpr int warm = 40;                 // runs in which traces are made, and once anew
+constexpr int warm = 40;                 // runs in which traces are made, and once made again
 constexpr int samples = 200;
 
 void in_lua(benchmark::State& state, const Subject& subject)

@@ -74,7 +74,7 @@ describe("rapid run --watch", function()
     assert.equal("id,Px,Py,Pz,vx,vy,vz\n0,0,4,0,0,0,0\n", folder:read "all.0002.csv")
   end)
 
-  it("stops a run that is not done, and starts anew", function()
+  it("stops a run that is not done, and starts again", function()
     local log = watch {
       { "^watching", 1, "echo 'local x = 0 while true do x = x + 1 end' >height.lua" },
       { "running again", 1, "sleep 0.3; echo 'return 5' >height.lua" },

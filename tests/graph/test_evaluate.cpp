@@ -25,7 +25,7 @@ TEST_CASE("what solve posts is what create yields in the next frame", "[evaluate
         CHECK(evaluator.next_frame() == frame);
         const FrameResult result = evaluator.advance();
         CHECK(result.frame == frame);
-        // Between create and solve nothing runs at the first frame; what is behind solve changes the output alone.
+        // Between create and solve nothing runs at the first frame; nodes behind solve change the output alone.
         CHECK(result.outputs.at("main").P()[0] == Vec3f(static_cast<float>(frame - 3), 5, 0));
         CHECK(result.fps.at("main") == 10);
         CHECK(result.time.at("main") == (frame - 3) / 10.0);
@@ -34,7 +34,7 @@ TEST_CASE("what solve posts is what create yields in the next frame", "[evaluate
     CHECK(starts == std::map<std::string, int>{{"post1", 1}});
 }
 
-TEST_CASE("with sub-frames what solve feeds back is evaluated so many times a frame, what is behind it once",
+TEST_CASE("with sub-frames the nodes of the loop are evaluated so many times a frame, those behind solve once",
           "[evaluate]")
 {
     GraphUnderTest scene;

@@ -15,7 +15,7 @@ using test::same_bits;
 
 const Uses nothing;
 
-TEST_CASE("what is not declared is poison, and comes back as it was", "[declarations]")
+TEST_CASE("undeclared columns are poisoned, and restored afterwards", "[declarations]")
 {
     PointSet set = points({{1, 2, 3}, {4, 5, 6}}).set<float>("heat", {0.5f, 0.25f}).group("hot", {1});
     const PointSet before = set;
@@ -42,7 +42,7 @@ TEST_CASE("values go back to the points that are left, and newborn points keep t
     CHECK(same_bits(set.column<float>("heat"), Column<float>(std::span<const float>(std::vector<float>{1, 3, 9}))));
 }
 
-TEST_CASE("what is declared stays as it is", "[declarations]")
+TEST_CASE("declared columns stay as they are", "[declarations]")
 {
     PointSet set = points({{1, 0, 0}}).set<float>("heat", {1}).set<float>("cold", {2}).group("hot", {0});
     Uses uses;
@@ -60,7 +60,7 @@ TEST_CASE("what is declared stays as it is", "[declarations]")
     CHECK(all.column<float>("heat")[0] == 1);
 }
 
-TEST_CASE("a node that uses what it does not declare is an error with its name", "[declarations]")
+TEST_CASE("a node that uses an undeclared column is an error with its name", "[declarations]")
 {
     const auto [what, message] = GENERATE(table<std::string, std::string>({
         {"nothing", ""},

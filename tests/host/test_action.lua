@@ -125,7 +125,7 @@ return rapid.create { fps = 24, points = two }
     assert.near(0, result[5]:max("P").y, 1e-6)
   end)
 
-  it("draws the point's random numbers, the same at each sub-step or anew", function()
+  it("draws the point's random numbers, the same at each sub-step or other ones", function()
     local points = scene.run([[
 return rapid.create { fps = 24, points = two } :attribute { last = 0, sum = 0, last_anew = 0, sum_anew = 0 }
   :action("draw", function(p, step)

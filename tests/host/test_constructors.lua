@@ -141,7 +141,7 @@ describe("rapid.shape", function()
   end)
 
   it("bears points on it, evenly by area, and in it, evenly by volume", function()
-    -- The mean of f within five standard errors of what it is over the whole shape; sigma is f's deviation there.
+    -- The mean of f within five standard errors of its mean over the whole shape; sigma is f's deviation there.
     local function mean_is(expected, sigma, points, f)
       local sum = 0
       each(points, function(P) sum = sum + f(P) end)
@@ -185,7 +185,7 @@ describe("rapid.shape", function()
 end)
 
 describe("rapid.points", function()
-  it(".from holds what it is given, of the types that are given", function()
+  it(".from holds the columns that it is given, of their types", function()
     local points = scene.run([[
 return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, vec3(4, 5, 6)}, v = {{0, 0, 1}, {0, 0, 2}},
   heat = {0.5, 7}, up = {{0, 1, 0}, vec3(1, 0, 0)}, orient = {{0, 0, 0, 1}, {1, 0, 0, 0}} } }]], { frames = {1, 1} })[1]
@@ -225,7 +225,7 @@ return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, {4, 5, 6}}, h
   end)
 end)
 
-describe("a constructor that can't make what it is asked for", function()
+describe("a constructor with arguments that nothing can be made of", function()
   it("says why, with the line of the call", function()
     for expression, expected in pairs {
       ["rapid.mesh.sphere { radius = 0 }"] = "radius = 0 is out of range; it must be above 0",

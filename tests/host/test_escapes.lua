@@ -34,7 +34,7 @@ local function nothing(name) return ("attempt to index global '%s' (a nil value)
 local function no_call(name) return ("attempt to call global '%s' (a nil value)"):format(name) end
 local function no_field(name) return ("attempt to call field '%s' (a nil value)"):format(name) end
 
--- What is not there at all, in any place.
+-- Names that do not exist in any place.
 local absent = {
   ["files by io.open"] = { "io.open('escaped', 'w')", nothing "io" },
   ["files by io.lines"] = { "for line in io.lines '/etc/passwd' do print(line) end", nothing "io" },
@@ -64,7 +64,7 @@ local absent = {
   ["chance by math.random"] = { "math.random()", no_field "random" },
 }
 
--- What is there and does not give way.
+-- Names that exist and refuse.
 local firm = {
   ["the metatable of strings"] = { "getmetatable('').__index.rep = print", "attempt to index a nil value" },
   ["the methods of strings"] = { "local s = 'x' s.rep = print", "attempt to index local 's' (a string value)" },
@@ -114,7 +114,7 @@ local function each(attempts, f)
   for _, name in ipairs(names) do f(name, attempts[name][1], attempts[name][2]) end
 end
 
--- A scene whose every library does what it should, in all the places.
+-- A scene with legal uses of every library, in all the places.
 local function nothing_is_left()
   local listed = table.concat(scene.folder:list(), " ")
   assert.falsy(listed:find "escaped", listed)
@@ -128,7 +128,7 @@ return rapid.create { points = two } :points("k", function(p) p.v = vec3(#("x"):
 end
 
 describe("a way out", function()
-  it("by what is not there is an error in every place, with file and line", function()
+  it("by a name that does not exist is an error in every place, with file and line", function()
     local count = 0
     each(absent, function(name, code, expected)
       count = count + 1
@@ -142,7 +142,7 @@ describe("a way out", function()
     nothing_is_left()
   end)
 
-  it("by what is there is an error in every place, with file and line", function()
+  it("by a name that exists is an error in every place, with file and line", function()
     local count = 0
     each(firm, function(name, code, expected)
       count = count + 1
@@ -178,7 +178,7 @@ describe("a way out", function()
     nothing_is_left()
   end)
 
-  it("is none in a module or a node beside the graph either", function()
+  it("fails in a module or a node beside the graph, too", function()
     for _, attempts in ipairs { absent, firm } do
       each(attempts, function(name, code, expected)
         scene.folder:write("helper.lua", files.module:format(code:gsub("rapid", "require('rapid')"):gsub("two",
@@ -224,9 +224,9 @@ describe("a way out", function()
   end)
 end)
 
--- Things that a function has been given, and their methods, kept for when what they stand for is gone. Whoever keeps
+-- Things that a function has been given, and their methods, kept after their object is gone. Whoever keeps
 -- them does so in a coroutine, out of sight of the bytecode's reader.
-describe("what was kept for later", function()
+describe("a value kept for later", function()
   local keep = [[
 local keeper = coroutine.wrap(function(kept) while true do kept = coroutine.yield(kept) or kept end end)
 local held = { keeper }

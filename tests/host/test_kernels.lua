@@ -16,18 +16,18 @@ describe("a kernel", function()
     assert.same({ 6, 8 }, values(points, "heat"))
   end)
 
-  it("moves the point at once, by what it writes before Solve", function()
+  it("moves the point at once, by a write to P before Solve", function()
     local points = scene.kernel("p.P = p.P + vec3(0, 10, 0) p.v = vec3(24, 0, 0)")
     assert.near({1, 11, 0}, points[1].P, 1e-6)
     assert.near({2, 11, 0}, points[2].P, 1e-6)
   end)
 
-  it("reads back what it has written", function()
+  it("reads back its own writes", function()
     local points = scene.kernel("p.heat = 3 p.heat = p.heat + 1 p.v = vec3(p.heat, 0, 0)", "heat = {0, 0}")
     assert.near({4, 0, 0}, points[2].v, 0)
   end)
 
-  it("rounds what it writes to the float that is kept", function()
+  it("rounds its writes to the floats that are kept", function()
     local points = scene.kernel("p.heat = 0.1 if p.heat == 0.1 then p.heat = 7 end", "heat = {0, 0}")
     assert.near(0.1, points[1].heat, 1e-8)
     assert.not_equal(0.1, points[1].heat)
@@ -193,7 +193,7 @@ return rapid.create { points = two } :attribute { heat = 0 }
   end)
 end)
 
-describe("a kernel that asks for what is not there", function()
+describe("a kernel that asks for something unknown", function()
   it("is refused before the first frame, with the nearest name", function()
     for body, expected in pairs {
       ["p.v = p.v * p.haet"] = 'scene.lua:1: node "kernel": no attribute "haet"; did you mean "heat"? ' ..
@@ -280,7 +280,7 @@ describe("a kernel that writes what can't be kept", function()
     end
   end)
 
-  it("tells of what is not finite with all that the point has", function()
+  it("reports a value that is not finite with all that the point has", function()
     assert.equal(place .. "heat became inf; a float is finite, within 3.4e38 either way (point id 0, frame 2; " ..
       "P = {0, 1, 0}, v = {0, 0, 0}, heat = 3, in \"hot\")",
       scene.kernel_error("p:join 'hot' p.heat = 3 p.heat = 1 / 0", "heat = {1, 2}"))

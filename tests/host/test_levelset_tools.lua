@@ -1,4 +1,4 @@
--- Level-set tools, as graphs call them. What they compute is tested in tests/shapes/level_set/test_level_set_tools.cpp.
+-- Level-set tools, as graphs call them. Their results are tested in tests/shapes/level_set/test_level_set_tools.cpp.
 local scene = require "testing.scene"
 
 local ball = "rapid.levelset.sphere { radius = 1, voxel = 0.05 }"

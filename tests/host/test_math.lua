@@ -1,4 +1,4 @@
--- rapid.math in kernels: closed forms, the noises of the C++ runtime to the bit, and what is refused.
+-- rapid.math in kernels: closed forms, the noises of the C++ runtime to the bit, refused arguments.
 local scene = require "testing.scene"
 
 -- x, as a kernel computes it and keeps it: a double's bits in three floats.
@@ -63,7 +63,7 @@ return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing 
     assert.points(result[4]).finite()
   end)
 
-  it("refuses what is no number, with what it was given", function()
+  it("refuses an argument that is no number, and shows it", function()
     for expression, expected in pairs {
       ["rapid.math.clamp(nil, 0, 1)"] = "clamp(x, lo, hi) takes numbers, not nil",
       ["rapid.math.clamp(1, 3, 2)"] = "clamp(x, lo, hi): lo = 3 is above hi = 2",

@@ -1,4 +1,4 @@
--- Motions as graphs write them: constants, products, functions of the frame, keys; and what they move.
+-- Motions as graphs write them: constants, products, functions of the frame, keys; and the shapes they move.
 local scene = require "testing.scene"
 
 local speck = "rapid.mesh.from { points = {{0, 0, 0}, {1e-6, 0, 0}, {0, 0, 1e-6}}, faces = {{1, 2, 3}} }"
@@ -38,18 +38,18 @@ describe("a motion", function()
     close(vec3(8.5 - radius * math.sin(angle), radius * math.cos(angle), 0), result[10]:by_id(33).P)
   end)
 
-  it("moves what is moved already", function()
+  it("moves a thing that is moved already", function()
     local result = births_of(speck .. ":transform { [1] = rapid.translate(0, 0, 0), [11] = rapid.translate(10, 0, 0) }"
       .. ":transform(rapid.translate(0, 7, 0) * rapid.scale(2))")
     close(vec3(2 * 4, 7, 0), result[5]:by_id(15).P)
   end)
 
-  it("that is constant moves the thing itself, which stays what it is", function()
+  it("that is constant moves the thing itself, which keeps its type", function()
     local result = births_of("rapid.shape.sphere {}:transform(rapid.translate(5, 0, 0) * rapid.scale(0.5))")
     for k = 0, 3 do assert.near(0.5, (result[5]:by_id(12 + k).P - vec3(5, 0, 0)):length(), 1e-6) end
   end)
 
-  it("that is no motion is refused with what it may be", function()
+  it("that is no motion is refused with the list of motions", function()
     assert.truthy(error_of("rapid.mesh.box {}:transform(3)"):find(
       ":transform: motion = 3 has the wrong type; it must be a motion (rapid.translate, rapid.rotate, rapid.scale, "
         .. "or a product), a function of the frame that returns one, or keys {[1] = ..., [24] = ...}", 1, true))

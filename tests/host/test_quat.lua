@@ -1,4 +1,4 @@
--- quat in kernels: turns against numbers worked out by hand, the attribute that keeps one, and what is refused.
+-- quat in kernels: turns against numbers worked out by hand, the attribute that keeps one, refused arguments.
 local scene = require "testing.scene"
 
 local half = math.sqrt(0.5)
@@ -64,7 +64,7 @@ return rapid.create { fps = 10, points = two } :attribute { orient = {0, 0, 0, 1
     assert.near(half, q.w, 1e-6)
   end)
 
-  it("refuses what it is not made of", function()
+  it("refuses parts that make no quat", function()
     local place = 'scene.lua:2: node "kernel": '
     for body, expected in pairs {
       ["p.P = quat(0, 0, 0, 1) * p.P"] =

@@ -81,7 +81,7 @@ describe("p:rand", function()
     assert.near(0, correlation(numbers, shifted), bound)
   end)
 
-  it("is anew each frame where it is given the frame, which counts as its number", function()
+  it("is another each frame where it is given the frame, which counts as its number", function()
     local second, third = drawn("p:rand(1, frame)", { frame = 2 }), drawn("p:rand(1, frame)", { frame = 3 })
     assert.near(0, correlation(second, third), 5 / math.sqrt(8000))
     assert.same(second, (drawn("p:rand(1, frame.number)", { frame = 2 })))

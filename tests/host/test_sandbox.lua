@@ -33,7 +33,7 @@ describe("graph code", function()
     end
   end)
 
-  it("can't load what is not beside the graph", function()
+  it("can't load a module from elsewhere than beside the graph", function()
     for _, name in ipairs {
       "ffi", "io", "os", "debug", "jit", "jit.util", "jit.vmdef", "package", "string", "bytecode", "kernel", "sandbox",
       "host", "socket", "posix", "lfs", "testing.command", "nodes.lift",
@@ -156,7 +156,7 @@ for key, value in pairs(t) do assert(key == value) words[#words + 1] = tostring(
       " words = {} local key = next(t) while key ~= nil do words[#words + 1] = tostring(key) key = next(t, key) end"))
   end)
 
-  it("lets a loop over pairs remove what it visits", function()
+  it("lets a loop over pairs remove the entries that it visits", function()
     assert.equal("a c", text_of("table.concat(words, ' ')", [[
 local t, words = { a = 1, b = 2, c = 3 }, {}
 for key in pairs(t) do words[#words + 1] = key t[key] = nil t.b = nil end]]))

@@ -27,7 +27,7 @@ local function pushed(options)
 end
 
 describe("a node written in Lua", function()
-  it("acts with its defaults, and with what it is given", function()
+  it("acts with its defaults, and with given parameters", function()
     for options, expected in pairs {
       ["{}"] = {0, 2, 0}, ["()"] = {0, 2, 0}, ["{ strength = 2 }"] = {0, 4, 0}, ["{ axis = {1, 0, 0} }"] = {2, 0, 0},
       ["{ axis = vec3(1, 0, 0), times = 3 }"] = {6, 0, 0}, ["{ reverse = true }"] = {0, -2, 0},
@@ -195,7 +195,7 @@ return rapid.node { name = "%s", doc = "Rises.", points = function(p) p.P = p.P 
     end
   end)
 
-  it("is told what is wrong with its declaration, at the line of rapid.node", function()
+  it("is refused for a fault of its declaration, at the line of rapid.node", function()
     local before = 'local rapid = require "rapid"\n'
     local points = "points = function(p) end"
     local roles = 'rapid.node "odd": give it one of points = function(p, frame, params), ' ..

@@ -111,7 +111,7 @@ describe("a node in Lua that makes attributes", function()
     assert.near({0.5, 0.5, 0.25}, behind[3][1].Cd, 0)
   end)
 
-  it("refuses what is no attribute", function()
+  it("refuses a value that is no attribute", function()
     define("", "", "makes = 3,")
     assert.truthy(fault(""):find('rapid.node "mine": makes = 3', 1, true), fault "")
     define("", "", "maeks = {},")

@@ -44,7 +44,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
     end
   end)
 
-  it("refuses what is no place, and a mesh is none", function()
+  it("refuses an argument that is no place, and a mesh, which has no distance", function()
     local function fault(body)
       return (scene.kernel_error(body, nil, (shapes .. " local mesh = rapid.mesh.box {}"):gsub("\n", " "))
         :gsub('^scene%.lua:2: node "kernel": ', ""):gsub(" %(point id 0, frame 2%)$", ""))

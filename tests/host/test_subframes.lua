@@ -113,7 +113,7 @@ return rapid.create { fps = 10, seed = 3, subframes = %d }
     end
   end)
 
-  it("what is counted in a frame is that of the whole frame", function()
+  it("the counts of a frame are those of all its sub-frames", function()
     local text = [[
 return rapid.create { fps = 2, subframes = %d, points = rapid.points.from { P = {{0, 0.5, 0}}, v = {{0, -8, 0}} } }
   :collide { shape = rapid.shape.plane {}, bounce = 1, record = 0 }

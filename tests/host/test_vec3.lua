@@ -1,4 +1,4 @@
--- vec3 in graph code: arithmetic against numbers worked out by hand, and what is not arithmetic.
+-- vec3 in graph code: arithmetic against numbers worked out by hand, and operations that are refused.
 local scene = require "testing.scene"
 
 -- The value of an expression of graph code: a vec3, or a number.
@@ -10,7 +10,7 @@ local function value(expression, before)
   return point.is_number == 1 and point.P.x or point.P
 end
 
--- What is wrong with an expression, without its place.
+-- The error of an expression, without its place.
 local function fault(expression)
   local message = scene.error("local value = " .. expression .. " return rapid.create {}")
   return assert(message:match "^scene%.lua:1: (.*)$", message)
@@ -73,7 +73,7 @@ describe("a vec3", function()
 end)
 
 describe("an operation on a vec3", function()
-  it("names what it can't use, and what it could", function()
+  it("names the operand that it can't use, and those that it could", function()
     for expression, expected in pairs {
       ["vec3(1, 2, 3) + nil"] = "can't compute vec3(1, 2, 3) + nil; both must be a vec3",
       ["1 + vec3(1, 2, 3)"] = "can't compute 1 + vec3(1, 2, 3); both must be a vec3",

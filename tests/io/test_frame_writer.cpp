@@ -164,7 +164,7 @@ TEST_CASE("a file has its name only when it is complete, and replaces the old on
     CHECK(file_names(folder.path()) == std::vector<std::string>{"a.ply"});
 }
 
-TEST_CASE("a signal handler's call removes what is unfinished, and no file is begun after it", "[io][writer]")
+TEST_CASE("a signal handler's call removes unfinished files, and no file is begun after it", "[io][writer]")
 {
     const TemporaryFolder folder;
     // In a process of its own: the call is for one that ends.

@@ -107,7 +107,7 @@ TEST_CASE("points that are appended without a value get the fallback", "[column]
     CHECK(values_of(column) == std::vector{1.0f, 8.0f, 8.0f});
 }
 
-TEST_CASE("a uniform column stays one while what is appended is its value", "[column]")
+TEST_CASE("a uniform column stays uniform while its own value is appended", "[column]")
 {
     Column<float> column(2, 0.02f);
     column.append(3);
@@ -177,7 +177,7 @@ TEST_CASE("a mask gives the runs of points that stay", "[column]")
     CHECK(runs_of({0, 0}) == Runs{});
     CHECK(runs_of({1, 1, 1}) == Runs{{0, 3}});
     CHECK(runs_of({0, 1, 1, 0, 0, 1}) == Runs{{1, 2}, {5, 1}});
-    CHECK(runs_of({0, 2, 255, 0}) == Runs{{1, 2}});  // what is not 0 stays
+    CHECK(runs_of({0, 2, 255, 0}) == Runs{{1, 2}});  // all but 0 stays
 }
 
 TEMPLATE_TEST_CASE("a column of any type does what a vector does", "[column]", float, Vec3f, std::int32_t, std::int64_t,

@@ -4,7 +4,7 @@
 
 namespace rapid {
 
-TEST_CASE("an error says file, line and node before what is wrong", "[error]")
+TEST_CASE("an error says file, line and node before the fault", "[error]")
 {
     Error error("bounce = 1.4 is out of range; it must be from 0 to 1");
     CHECK(std::string(error.what()) == "bounce = 1.4 is out of range; it must be from 0 to 1");

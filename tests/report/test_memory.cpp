@@ -6,7 +6,7 @@
 
 using namespace rapid;
 
-TEST_CASE("the peak is at least what was touched at once, and stays when it is given back", "[report]")
+TEST_CASE("the peak is at least the memory touched at once, and stays when that is given back", "[report]")
 {
     constexpr std::size_t size = std::size_t{96} << 20;
     {

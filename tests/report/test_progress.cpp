@@ -11,7 +11,7 @@ using namespace rapid;
 
 namespace {
 
-// A stream that keeps what is written.
+// A stream that keeps its text.
 class Memory {
 public:
     Memory() : file_(open_memstream(&text_, &size_)) {}
@@ -49,7 +49,7 @@ std::string bar_of(int done) { return fmt::format("[{:=<{}}{: <{}}]", "", done, 
 
 }  // namespace
 
-TEST_CASE("what is no terminal gets lines", "[report]")
+TEST_CASE("a stream that is not a terminal gets lines", "[report]")
 {
     Memory memory;
     CHECK(progress_style(memory.file()) == ProgressStyle::Lines);

@@ -22,7 +22,7 @@ namespace rapid {
 
 class NeighbourList {
 public:
-    // Lists the pairs anew. Points of radius 0 take no part. Radii stay the same until the next call; grids are theirs.
+    // Finds all pairs. Points of radius 0 take no part. Radii stay the same until the next call; grids are theirs.
     void build(const Substep& step, std::span<const float> radius, const RadiusGrids& grids);
 
     // Whether points may touch by now that are not listed.

@@ -27,7 +27,7 @@ describe("every node in lua/nodes", function()
       assert.is_true(#read(picture) < 75000, picture)
     end)
 
-    it(name .. " declares what it uses", function()
+    it(name .. " declares the attributes that it uses", function()
       local frames = { frames = {12, 12} }
       local plain = rapid.run(scene, frames)
       frames.check_declarations = true

@@ -1,0 +1,95 @@
+-- How fast grain runs out of a slot in the flat floor of a silo that is thin: Beverloo's law for slots,
+--
+--   W = C rho sqrt(g) l (D - k d)^(3/2)        D the slot's width, l its length, d the grain, rho the bulk density
+--
+-- The silo is 40 grains wide and 5 thick, without friction at its front and back. W^(2/3) is a straight line over D,
+-- whose slope is C^(2/3).
+local scene = require "testing.scene"
+local matrix = require "tests.verification.matrix"
+
+local d, width, depth, g = 0.02, 0.8, 0.1, 9.81
+
+local silo = [[
+local gap = rapid.param("gap", 0.2, "width of the slot, m")
+local d, width, depth = 0.02, 0.8, 0.1
+local P, pscale = {}, {}
+for k = 0, 37 * 4 * 51 - 1 do
+  local i, j, layer = k % 37, math.floor(k / 37) % 4, math.floor(k / 148)
+  P[k + 1] = {width * ((i + 0.5) / 37 - 0.5), 1.06 * d * (layer + 0.5), depth * ((j + 0.5) / 4 - 0.5)}
+  pscale[k + 1] = d / 2 * (0.9 + 0.2 * ((k * 0.618034) % 1))
+end
+local chain = rapid.create { fps = 24, points = rapid.points.from { P = P, pscale = pscale } }
+  :points("shake", function(p, frame)
+    if frame.number == 2 then p.v = vec3(p:rand(1) - 0.5, p:rand(2) - 0.5, p:rand(3) - 0.5) / 2 end
+    if p.P.y < -8 * d then p:kill() end
+  end)
+  :gravity {}
+local function wall(shape, friction) chain = chain:collide { shape = shape, bounce = 0, friction = friction } end
+wall(rapid.shape.plane { normal = {1, 0, 0}, offset = -width / 2 }, 0.3)
+wall(rapid.shape.plane { normal = {-1, 0, 0}, offset = -width / 2 }, 0.3)
+wall(rapid.shape.plane { normal = {0, 0, 1}, offset = -depth / 2 }, 0)
+wall(rapid.shape.plane { normal = {0, 0, -1}, offset = -depth / 2 }, 0)
+for _, side in ipairs { -1, 1 } do
+  wall(rapid.shape.box { size = {1, 10 * d, 1}, center = {side * (gap / 2 + 0.5), -5 * d, 0} }, 0.3)
+end
+wall(function(frame) if frame.number < 37 then return rapid.shape.plane {} end end, 0.3) -- until all are at rest
+return chain:contact { friction = 0.3 } :solve { substeps = 12, iterations = 4 }]]
+
+local opens, begins, ends = 36, 42, 54 -- frames: the flow is steady after a quarter of a second
+
+local function inside(points)
+  local count = 0
+  for i = 1, #points do
+    if points[i].P.y > 0 then count = count + 1 end
+  end
+  return count
+end
+
+-- Volume of bulk a second, per sqrt(g) and length of the slot: C (D - k d)^(3/2).
+local function flow(gap)
+  local result = scene.run(silo, { frames = {opens, ends}, set = { gap = gap } })
+  local bulk, low, high = 0, 5 * d, 25 * d
+  for i = 1, #result[opens] do
+    local y = result[opens][i].P.y
+    if y > low and y < high then bulk = bulk + 1 / ((high - low) * width * depth) end
+  end
+  local rate = (inside(result[begins]) - inside(result[ends])) * 24 / (ends - begins)
+  return rate / bulk / depth / math.sqrt(g)
+end
+
+local measured
+local function flows()
+  measured = measured or { gaps = { 6 * d, 8 * d, 10 * d, 13 * d } }
+  if not measured.flows then
+    measured.flows = {}
+    for i, gap in ipairs(measured.gaps) do measured.flows[i] = flow(gap) end
+  end
+  return measured.gaps, measured.flows
+end
+
+return {
+  {
+    feature = "contact, collide", law = "flow out of a slot of 6 to 13 grains: exponent of D - 1.5 d",
+    reference = "3/2, Beverloo 1961", at_least = 1.35, at_most = 1.65, long = true,
+    measure = function()
+      local gaps, list = flows()
+      local open = {}
+      for i, gap in ipairs(gaps) do open[i] = gap - 1.5 * d end
+      return matrix.order(open, list)
+    end,
+  },
+  {
+    feature = "contact, collide", law = "the same: coefficient C", reference = "1.03, Nedderman 1992",
+    at_least = 0.8, at_most = 1.25, long = true,
+    measure = function()
+      -- The slope of the line that fits W^(2/3) over D best.
+      local gaps, list = flows()
+      local n, sx, sy, sxx, sxy = #gaps, 0, 0, 0, 0
+      for i = 1, n do
+        local x, y = gaps[i], list[i] ^ (2 / 3)
+        sx, sy, sxx, sxy = sx + x, sy + y, sxx + x * x, sxy + x * y
+      end
+      return ((n * sxy - sx * sy) / (n * sxx - sx * sx)) ^ 1.5
+    end,
+  },
+}

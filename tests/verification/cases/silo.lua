@@ -3,7 +3,8 @@
 --   W = C rho sqrt(g) l (D - k d)^(3/2)        D the slot's width, l its length, d the grain, rho the bulk density
 --
 -- The silo is 40 grains wide and 5 thick, without friction at its front and back. W^(2/3) is a straight line over D,
--- whose slope is C^(2/3).
+-- whose slope is C^(2/3), whatever k. With k taken to be 1.4 the same flows have a C of 0.73 at 6 grains and of 0.83 at
+-- 13: narrow slots are slower than the law, as Mankoc et al. 2007 found.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 

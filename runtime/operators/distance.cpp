@@ -45,12 +45,15 @@ struct Tie {
         gradient[1] = -gradient[0];
         return length - rest;
     }
-    Eigen::Matrix3d curvature(const std::array<Vec3d, 2>& P) const
+    // (d + d')/(|d| + |d'|); of a half turn, which leaves no direction, that at its beginning.
+    void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
+                           std::array<Vec3d, 2>& gradient) const
     {
-        const Vec3d d = P[0] - P[1];
-        const double length = d.norm();
-        if (!(length > 0)) return Eigen::Matrix3d::Zero();
-        return (Eigen::Matrix3d::Identity() - d * d.transpose() / (length * length)) / length;
+        const Vec3d d = from[0] - from[1], e = to[0] - to[1], sum = d + e;
+        const double lengths = d.norm() + e.norm();
+        if (!(sum.squaredNorm() > 1e-6 * lengths * lengths)) return void(residual(from, gradient));
+        gradient[0] = sum / lengths;
+        gradient[1] = -gradient[0];
     }
     bool breaks(double residual) const { return residual > most; }
 };

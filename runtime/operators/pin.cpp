@@ -77,9 +77,10 @@ public:
         for (const auto& [i, pin] : held_)
             if (rigid_) sleep->make_kinematic(static_cast<std::uint32_t>(i));
     }
-    void subtract_half_kick(Substep& step) override { pins_->springs.subtract_half_kick(step); }
+    bool has_forces() const override { return !rigid_; }
     void move_kinematic(Substep& step) override
     {
+        pins_->springs.move_kinematic(step);  // with the targets of before
         const double since = (step.index + 1) * step.dt;
         aim(since);
         if (!rigid_) return;
@@ -88,9 +89,9 @@ public:
             step.v[i] = track_ ? track_->velocity_at(since).at(pin->now) : Vec3d((pin->to - pin->from) / h_);
         }
     }
+    void advance(Substep& step) override { pins_->springs.advance(step); }
     void warm_start(Substep& step) override { pins_->springs.warm_start(step); }
     void project(Substep& step) override { pins_->springs.project(step); }
-    void add_half_kick(Substep& step) override { pins_->springs.add_half_kick(step); }
     void solve_velocities(Substep& step) override { pins_->springs.solve_velocities(step); }
     Residual close(Substep& step) override { return pins_->springs.close(step); }
 
@@ -138,7 +139,7 @@ public:
             Pin& pin = pins->by_id[id[i]];
             const Vec3d to = target[i].cast<double>();
             if (!pin.taken) {
-                pin.from = pin.to = to;
+                pin.from = pin.to = pin.now = to;
                 if (track) pin.rest = track->at(0).inverse() * to;
                 for (int axis = 0; compliance > 0 && axis < 3; ++axis)
                     pins->springs.add({id[i]}, {&pin, axis}, compliance);

@@ -65,10 +65,15 @@ void CoupledStep::begin_substeps()
     now_.points = at_;
     now_.v = v_;
     now_.start = start_;
+    now_.inverse_mass = inverse_mass_;
     now_.dead = context_.dead;
     now_.dt = context_.options.h / context_.options.substeps;
     now_.iterations = context_.options.iterations;
     if (!scene.uniform.a.isZero(0)) now_.up = -scene.uniform.a.normalized();
+    const bool has_forces = std::any_of(scene.constraints.begin(), scene.constraints.end(),
+                                        [](const LocalConstraint& local) { return local.coupling->has_forces(); });
+    if (has_forces) displacement_.resize(at_.size());
+    now_.displacement = displacement_;
     if (!scene.forces.empty() || !scene.uniform.linear.is_zero()) {
         mobility_.assign(at_.size(), {now_.dt, 0.5 * now_.dt * now_.dt});
         now_.mobility = mobility_;
@@ -142,10 +147,14 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     }
     at.P = block.P[k];
     v_[i] = block.v[k];
+    if (!displacement_.empty())
+        displacement_[i] =
+            block.linear.data ? Vec3d(at.P - start_[i]) : Vec3d(block.dt[k] * (v_[i] - 0.5 * block.dt[k] * block.a[k]));
     if (!block.linear.data) return;
     const Propagator by = respond(block.damped[k].k, block.damped[k].w2, now_.dt);
-    mobility_[i] = {by.v_of_G, by.x_of_G};
-    at.w *= by.v_of_G / now_.dt;
+    mobility_[i] = {by.v_of_G, by.x_of_G, block.a[k] + block.linear[k].w2q, block.linear[k].w2};
+    // Of a spring that swings through in the sub-step v_of_G is of any sign.
+    at.w *= std::max(by.v_of_G, by.x_of_G / now_.dt) / now_.dt;
 }
 
 // Whether a sleeper under uniform forces stays asleep, and out of the blocks.

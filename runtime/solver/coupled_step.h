@@ -38,6 +38,7 @@ private:
     std::vector<Vec3d> v_, start_;
     std::vector<double> inverse_mass_;  // 1/kg
     std::vector<Mobility> mobility_;    // empty where no force has a linear part
+    std::vector<Vec3d> displacement_;   // Substep::displacement; empty where no constraint needs it
 
     Substep now_;
     std::optional<Sleep> sleep_;   // where points may sleep

@@ -314,8 +314,9 @@ local set = rapid.points.from { P = {{0, 1, 0}, {2, 1, 0}}, heat = {1, 7}, mass 
       [':gravity { g = function(f) return {0, f.number == 4 and 0 / 0 or 0, 0} end } :solve {}'] =
         { 'node "gravity1": g', "frame 4" },
       [':distance { within = 3 } ' ..
-        ':attract { falloff = -20, strength = function(f) return f.number == 4 and 3e38 or 0 end } :solve {}'] =
-        { 'node "solve1": point 1, frame 4: ', " became {-inf, -inf, 0}", had },
+        ':attract { falloff = -60, strength = function(f) return f.number == 4 and 3e38 or 0 end } :solve {}'] =
+        { 'node "solve1": point 0, frame 4: P became {-inf, -inf, 0}',
+          "it had P = {0, 1, 0}, v = {0, 0, 0}, heat = 1, mass = 1" },
     } do
       local result, folder = failing(chain)
       assert.equal(1, result.status, chain)

@@ -1,22 +1,21 @@
 // Constraints between points (paper §5): the interface that a constraint node implements, for Solve to project.
 //
 // A Constraint is what a node adds to the points that travel down a chain. At each frame it gives the solver a
-// Coupling: its rows, which are scalar constraints C(x) = 0 or C(x) >= 0 over a few points each, with their Lagrange
-// multipliers. A sub-step is one of XPBD (Macklin et al. 2014, 2016; numerics.md, Constraints), with warm starting:
+// Coupling: its rows, which are scalar constraints C(x) = 0 or C(x) >= 0 over a few points each, with their impulses. A
+// sub-step (numerics.md, Constraints):
 //
 //   x~ = P + v dt + a dt²/2         free motion: each point by its forces, actions and collisions
-//   subtract_half_kick()            velocities and positions lose half of the constraint forces of the last sub-step
 //   move_kinematic()                points whose positions are prescribed
+//   advance()                       points that rods and springs link move by those forces, too
 //   detect()                        finds the rows of this sub-step, as contacts
-//   warm_start()                    applies the multipliers of the last sub-step
-//   project()                       P = x~ + Δx by Gauss-Seidel, `iterations` times; Δx = w ∇C Δλ
-//   v+ = v + a dt + Δx/dt           never the difference of stored positions
-//   add_half_kick()                 v+ + Δx/(2dt): the velocity between sub-steps, 0 at rest
-//   solve_velocities()              restitution, friction; rows that break
+//   warm_start()                    applies the impulses of the last sub-step
+//   project()                       P = x~ + Δx by Gauss-Seidel, `iterations` times; Δx = w ∇C p dt
+//   v + Δx/dt                       never the difference of stored positions
+//   solve_velocities()              restitution, friction; what is left along rigid rows; rows that break
 //   correct_penetration()           what is left too deep after all shapes
 //
 // w is the inverse mass times v_of_a / dt, with v_of_a the mobility of the velocity under drag and springs: so that
-// what hangs from a constraint under drag stretches it by its weight.
+// what lies on another under drag is borne by its weight. Rods and springs take both mobilities, which is exact.
 //
 // Most constraints need only a residual and its gradient: rows.h makes a Coupling of these.
 #pragma once
@@ -37,16 +36,21 @@ class Sleep;
 
 // The coupled points of a set in one sub-step; shapes [size].
 struct Substep {
-    std::span<ProjectedPoint> points;    // from the end of their free motion on
-    std::span<Vec3d> v;                  // m/s, at the end of the sub-step
-    std::span<const Vec3d> start;        // positions at its beginning
-    std::span<const std::uint8_t> dead;  // 1: takes no part any more; empty where none can have died
-    std::span<const Mobility> mobility;  // empty where no force has a linear part
-    double dt = 0;                       // s, of a point that lives through the whole frame
-    double time = 0;                     // s since the start, at its end
-    double max_acceleration = 0;         // m/s², by forces
-    Vec3d up = Vec3d::Zero();            // unit, against the acceleration that is the same for all; 0 where that is 0
-    int index = 0;                       // from 0
+    std::span<ProjectedPoint> points;      // from the end of their free motion on
+    std::span<Vec3d> v;                    // m/s, at the end of the sub-step
+    std::span<Vec3d> start;                // positions at its beginning; moved by what corrects positions alone
+    std::span<const std::uint8_t> dead;    // 1: takes no part any more; empty where none can have died
+    std::span<const double> inverse_mass;  // 1/kg; 0 of points that do not move by themselves
+    std::span<const Mobility> mobility;    // empty where no force has a linear part
+    // m: of each point that moves, by its acceleration up to its velocity at the end; collisions aside. Empty unless
+    // some constraint has forces.
+    std::span<Vec3d> displacement;
+    bool is_shared = false;       // contacts, shapes or other constraints act, too, beside a constraint
+    double dt = 0;                // s, of a point that lives through the whole frame
+    double time = 0;              // s since the start, at its end
+    double max_acceleration = 0;  // m/s², by forces
+    Vec3d up = Vec3d::Zero();     // unit, against the acceleration that is the same for all; 0 where that is 0
+    int index = 0;                // from 0
     int iterations = 1;
 
     // How directly a shape supports each point: 255 where it touches one, one less for each point between, 0 without
@@ -83,13 +87,15 @@ public:
     // Null where no point may sleep in this frame. By default all points stay awake.
     virtual void join(Sleep* sleep);
 
+    // Whether it has two-sided rows, which act with forces: then Substep::displacement is there.
+    virtual bool has_forces() const { return false; }
+
     // In the order of the calls; see above.
-    virtual void subtract_half_kick(Substep&) {}
     virtual void move_kinematic(Substep&) {}
+    virtual void advance(Substep&) {}
     virtual void detect(Substep&) {}
     virtual void warm_start(Substep&) {}
     virtual void project(Substep& step) = 0;
-    virtual void add_half_kick(Substep&) {}
     virtual void solve_velocities(Substep&) {}
     virtual void correct_penetration(Substep&) {}
 

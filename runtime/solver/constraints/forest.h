@@ -17,14 +17,13 @@ public:
         std::uint32_t above;               // the parent's own link, as an index in `links`; itself at the root
         bool flipped;                      // the child is the row's first point
 
-        // For the solution of the tree.
-        Vec3d gradient, gradient_above;    // of the residual, by the child's and the parent's position
-        Vec3d direction, direction_above;  // that the row acts along at each
-        Eigen::Matrix3d K;                 // kg: geometric stiffness times dt²
-        Eigen::Matrix3d M;                 // kg: effective mass of the child's subtree; then its inverse
-        Vec3d f;                           // kg m: what the subtree adds to the child
-        Vec3d shift;                       // m: what the child is moved by
-        double e, s;                       // C + α~ λ, then Δλ; compliance α~, then with that of the subtree
+        // For the solution of the tree (tree_solver.h).
+        Vec3d gradient, gradient_above;  // of the residual, by the child's and the parent's position
+        double e, s;                     // residual and compliance; then with those of what is joined already
+        double lambda;                   // multiplier
+        Vec3d shift;                     // of the child
+        Vec3d reach;                     // shift of the parent by the link's impulse
+        Eigen::Matrix3d mobility;        // of the child with its subtree
     };
 
     // ends: two points a row. fixed: 1 for points of infinite mass; where a tree has one it is rooted there. Rows of a

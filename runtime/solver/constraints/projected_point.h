@@ -12,10 +12,12 @@ struct alignas(32) ProjectedPoint {
     double w;
 };
 
-// What a constant acceleration of 1 m/s² does to a point in a sub-step: to its velocity, m/s, and to its position, m.
-// dt and dt²/2, but for drag and springs.
+// What a constant acceleration of 1 m/s² does to a point in a sub-step: to its velocity, m/s, and to its position, m:
+// dt and dt²/2, but for drag and springs. And what draws the point, at P, m/s²: pull - stiffness P.
 struct Mobility {
     double v, x;
+    Vec3d pull = Vec3d::Zero();
+    double stiffness = 0;  // 1/s²
 };
 
 }  // namespace rapid

@@ -9,7 +9,7 @@ namespace rapid {
 
 Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
                        const Substep& step, Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids)
-    : constraints_(constraints), sleep_(sleep), free_(step.size())
+    : constraints_(constraints), sleep_(sleep), has_forces_(!step.displacement.empty()), free_(step.size())
 {
     if (!obstacles.empty()) shapes_.emplace(obstacles, step.size(), sleep);
     if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, ids, step.dt);
@@ -26,25 +26,44 @@ void Projection::advance(Substep& step)
 {
     if (!(step.dt > 0) || (sleep_ && sleep_->all())) return;
     if (sleep_) sleep_->wake_islands_now(step);
-    each([&](Coupling& coupling) { coupling.subtract_half_kick(step); });
+    step.is_shared = shapes_ || constraints_.size() > 1;
     each([&](Coupling& coupling) { coupling.move_kinematic(step); });
+    const auto each_point = [&](const auto& f) {
+        for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) f(i);
+        });
+    };
+    const auto keep_positions = [&](std::vector<Vec3d>& P) {
+        P.resize(step.size());
+        each_point([&](std::size_t i) { P[i] = step.points[i].P; });
+    };
+    // Shapes are asked about where the free motion of each point alone has ended, which is outside of them; but moved
+    // by what has only been corrected since, which is to give no velocity.
+    if (has_forces_) {
+        free_.resize(step.size());
+        each_point([&](std::size_t i) { free_[i] = step.points[i].P - step.start[i]; });
+        each([&](Coupling& coupling) { coupling.advance(step); });
+        each_point([&](std::size_t i) { free_[i] += step.start[i]; });
+        keep_positions(linked_);
+    }
+    const std::vector<Vec3d>& before = has_forces_ ? linked_ : free_;
     begin_support(step);
     each([&](Coupling& coupling) { coupling.detect(step); });
-    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) free_[i] = step.points[i].P;
-    });
+    if (has_forces_)
+        each_point([&](std::size_t i) { free_[i] += step.points[i].P - linked_[i]; });  // of woken sleepers
+    keep_positions(has_forces_ ? linked_ : free_);
     each([&](Coupling& coupling) { coupling.warm_start(step); });
     if (shapes_) shapes_->warm_start(step, free_);
     for (int k = 0; k < step.iterations; ++k) {
         each([&](Coupling& coupling) { coupling.project(step); });
         if (shapes_) shapes_->project(step);
     }
-    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) step.v[i] += (step.points[i].P - free_[i]) / step.dt;
-    });
-    each([&](Coupling& coupling) { coupling.add_half_kick(step); });
-    each([&](Coupling& coupling) { coupling.solve_velocities(step); });
-    if (shapes_) shapes_->solve_velocities(step);
+    each_point([&](std::size_t i) { step.v[i] += (step.points[i].P - before[i]) / step.dt; });
+    // Rods carry what shapes do to one point on to others, and back.
+    for (int k = has_forces_ && shapes_ ? 0 : step.iterations - 1; k < step.iterations; ++k) {
+        each([&](Coupling& coupling) { coupling.solve_velocities(step); });
+        if (shapes_) shapes_->solve_velocities(step);
+    }
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
 }
 

@@ -33,8 +33,10 @@ private:
 
     std::span<const LocalConstraint> constraints_;
     Sleep* sleep_;
+    bool has_forces_;  // some constraint (Coupling::has_forces)
     std::optional<ShapeContacts> shapes_;
     std::vector<Vec3d> free_;                           // where the points' free motion has ended
+    std::vector<Vec3d> linked_;                         // where the forces of constraints take them then
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
 };
 

@@ -1,9 +1,10 @@
-// One row: a scalar constraint C(x) = 0, or C(x) >= 0, between a few points, and its projection by XPBD (Macklin et al.
-// 2016):
+// One row: a scalar constraint C(x) = 0, or C(x) >= 0, between a few points. What its impulse does to them is
 //
-//   Δλ = (-C - α~ λ) / (Σ w |∇C|² + α~),   Δx = w ∇C Δλ,   α~ = α / dt²
+//   Δv = w ∇C p
 //
-// The multiplier λ is accumulated over the iterations of a sub-step: reset in each, it would make every spring rigid.
+// with w their inverse masses. Two-sided rows carry their own force through a sub-step (tree_motion.h, row_system.h),
+// which neither gives nor takes energy; here is what they do where contacts, shapes and other constraints have pushed
+// their points since. One-sided rows do all of their work here, as contacts do.
 #pragma once
 
 #include <algorithm>
@@ -31,11 +32,6 @@ struct FunctionTraits {
         if constexpr (requires { Function::rests; }) return Function::rests;
         return false;
     }();
-
-    static constexpr bool has_curvature = requires(const Function& function, const std::array<Vec3d, arity>& P)
-    {
-        function.curvature(P);
-    };
 };
 
 template <class Function>
@@ -50,9 +46,11 @@ struct Row {
     double compliance;  // m/N
     Ids ids;
     Points points = filled(IdIndex::none);
-    double lambda = 0, previous_lambda = 0;  // N s², of this sub-step and of the one before
-    Vectors direction = zero();              // the gradient that it acts along
-    Vectors acceleration = zero();           // m/s², what it gives each point, as of the last sub-step
+    double impulse = 0;          // N s along the gradient, of the last sub-step; at least 0 where it is one-sided
+    double first = 0;            // C where the sub-step begins
+    double reference = 0;        // C that its points are kept at, once the row's own force has acted
+    double added = 0;            // N s, the part of the impulse that is due to others
+    Vectors direction = zero();  // the gradient that it acts along
     bool active = true, was_active = false;
     bool asleep = false;  // in this sub-step: none of its points moves, as one of them sleeps
 
@@ -86,84 +84,107 @@ struct Row {
         return P;
     }
 
-    // A row's force acts as a kick of half a sub-step at its beginning and one at its end. The first is taken off from
-    // where the free motion went and from the velocity that it gave: the projection finds it again.
-    void subtract_half_kick(Substep& step) const
+    // Before the sub-step.
+    void measure(const Substep& step)
     {
-        for (int k = 0; active && k < arity; ++k) {
-            const std::uint32_t i = points[k];
-            if (!(step.points[i].w > 0)) continue;
-            const Mobility mobility = step.mobility_of(i);
-            step.points[i].P -= (mobility.v * step.dt - mobility.x) * acceleration[k];
-            step.v[i] -= 0.5 * mobility.v * acceleration[k];
-        }
+        Vectors P, gradient;
+        for (int k = 0; k < arity; ++k) P[k] = step.start[points[k]];
+        first = function.residual(P, gradient);
     }
-    void add_half_kick(Substep& step, double per_dt2)
+    // From here on the row keeps its points as they are now.
+    void keep(const Substep& step)
     {
-        for (int k = 0; active && !asleep && k < arity; ++k) {
-            const std::uint32_t i = points[k];
-            const Mobility mobility = step.mobility_of(i);
-            acceleration[k] = step.points[i].w * (step.dt / mobility.v) * lambda * per_dt2 * direction[k];
-            step.v[i] += 0.5 * mobility.v * acceleration[k];
-        }
+        Vectors gradient;
+        reference = residual(step, gradient);
+        added = 0;
     }
 
-    // One-sided rows begin with the multiplier of the sub-step before.
+    // The rate of the residual, 1/s.
+    double rate(const Substep& step, const Vectors& gradient) const
+    {
+        double sum = 0;
+        for (int k = 0; k < arity; ++k) sum += gradient[k].dot(step.v[points[k]]);
+        return sum;
+    }
+    // Of the residual by an impulse, 1/kg.
+    double inverse_mass(const Substep& step, const Vectors& gradient) const
+    {
+        double sum = 0;
+        for (int k = 0; k < arity; ++k) sum += step.points[points[k]].w * gradient[k].squaredNorm();
+        return sum;
+    }
+
+    // Whether a spring is too stiff for the sub-step to resolve: then it acts as a rod that gives way. W: inverse mass.
+    bool is_stiff(double W, double dt) const { return compliance < W * dt * dt; }
+
+    // A one-sided row begins with half of its last impulse on positions, and with all of it on velocities, as a force
+    // that is the same throughout the sub-step.
     void warm_start(Substep& step)
     {
         Vectors P;
         for (int k = 0; k < arity; ++k) P[k] = step.start[points[k]];
-        function.residual(P, direction);
-        previous_lambda = lambda;
-        if (Traits::one_sided)
-            for (int k = 0; k < arity; ++k)
-                step.points[points[k]].P += step.points[points[k]].w * lambda * direction[k];
-        else
-            lambda = 0;
+        reference = compliance > 0 ? 0 : std::min(0.0, function.residual(P, direction));
+        residual(step, direction);
+        added = 0.5 * impulse;  // what the velocities get with the positions (Projection::advance)
+        for (int k = 0; k < arity; ++k) {
+            ProjectedPoint& point = step.points[points[k]];
+            point.P += point.w * step.dt * added * direction[k];
+            step.v[points[k]] += point.w * (impulse - added) * direction[k];
+        }
     }
 
-    void project(Substep& step, double per_dt2)
+    // Keeps C at the reference, or above it. A residual that was there before is not made worse, and gives no speed.
+    void project(Substep& step)
     {
         const Vectors P = positions(step);
         Vectors gradient;
-        const double C = function.residual(P, gradient), softness = compliance * per_dt2;
-        choose_direction(step, P, gradient);
+        const double C = function.residual(P, gradient) - reference;
+        if (!Traits::one_sided) direction = gradient;
+        const double softness = compliance / (step.dt * step.dt);
         double stiffness = softness;
         for (int k = 0; k < arity; ++k) stiffness += step.points[points[k]].w * gradient[k].dot(direction[k]);
         if (!(stiffness > 0)) return;
-        double change = (-C - softness * lambda) / stiffness;
-        if (Traits::one_sided) change = std::max(change, -lambda);
-        lambda += change;
+        const double total = Traits::one_sided ? impulse : added;
+        double change = (-C / step.dt - softness * step.dt * total) / stiffness;
+        if (Traits::one_sided) change = std::max(change, -added);
+        added += change;
+        impulse += change;
         for (int k = 0; k < arity; ++k) {
             ProjectedPoint& point = step.points[points[k]];
-            point.P += point.w * change * direction[k];
+            point.P += point.w * step.dt * change * direction[k];
         }
     }
 
-    // The gradient at the sub-step's beginning keeps angular momentum and is of second order (as SHAKE is). Where the
-    // points have turned too far since, or are held so tightly that they would swing across it, the gradient here is
-    // taken, which is of first order and always stable.
-    void choose_direction(const Substep& step, const Vectors& P, const Vectors& gradient)
+    // Takes off the velocity that is left along a rigid row.
+    void solve_velocity(Substep& step)
     {
-        double same = 0, size = 0, weight = 0;
-        for (int k = 0; k < arity; ++k) {
-            same += gradient[k].dot(direction[k]);
-            size += gradient[k].squaredNorm();
-            weight += step.points[points[k]].w;
+        Vectors gradient;
+        const double C = residual(step, gradient), W = inverse_mass(step, gradient);
+        if (!(W > 0) || !is_stiff(W, step.dt)) return;
+        double change = -rate(step, gradient) / W;
+        if (Traits::one_sided) {
+            if (!(impulse > 0 || C < 0)) return;
+            change = std::max(change, -impulse);
         }
-        bool here = same < 0.8 * size;
-        if constexpr (Traits::has_curvature)
-            here |= std::abs(previous_lambda) * weight * function.curvature(P).diagonal().maxCoeff() > 0.5;
-        else
-            static_cast<void>(P), static_cast<void>(weight);
-        if (here) direction = gradient;
+        impulse += change;
+        for (int k = 0; k < arity; ++k) step.v[points[k]] += step.points[points[k]].w * change * gradient[k];
     }
 
-    // How far it is off, m: 0 where it is one-sided and satisfied.
-    double error(double residual, double per_dt2) const
+    // Moves the points to where C = 0, which gives no velocity.
+    void correct_position(Substep& step) const
     {
-        const double C = residual + compliance * per_dt2 * lambda;
-        return Traits::one_sided ? std::min(C, 0.0) : C;
+        if (compliance > 0) return;
+        Vectors gradient;
+        const double C = residual(step, gradient), W = inverse_mass(step, gradient);
+        if (!(W > 0) || (Traits::one_sided && !(C < 0))) return;
+        for (int k = 0; k < arity; ++k) step.points[points[k]].P -= step.points[points[k]].w * (C / W) * gradient[k];
+    }
+
+    // How far it is off, m, where C is `residual`: a spring from what its own force has come to.
+    double error(double residual, double dt) const
+    {
+        if (Traits::one_sided) return std::min(residual + compliance * impulse / dt, 0.0);
+        return compliance > 0 ? residual - reference + compliance * added / dt : residual;
     }
 
 private:
@@ -180,5 +201,21 @@ private:
         return result;
     }
 };
+
+// The gradient along which a force that is the same throughout a sub-step does the work F (C(to) - C(from)), and turns
+// nothing (Gonzalez 1996): of a distance |d| it is (d + d')/(|d| + |d'|). Of functions that do not give it, the
+// gradient in the middle, which is so to second order.
+template <class Function>
+void discrete_gradient(const Function& function, const typename Row<Function>::Vectors& from,
+                       const typename Row<Function>::Vectors& to, typename Row<Function>::Vectors& gradient)
+{
+    if constexpr (requires { function.discrete_gradient(from, to, gradient); }) {
+        function.discrete_gradient(from, to, gradient);
+    } else {
+        typename Row<Function>::Vectors middle;
+        for (std::size_t k = 0; k < middle.size(); ++k) middle[k] = 0.5 * (from[k] + to[k]);
+        function.residual(middle, gradient);
+    }
+}
 
 }  // namespace rapid

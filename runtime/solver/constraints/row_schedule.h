@@ -39,7 +39,10 @@ public:
                           [&](const auto& range) { solve_trees(range.begin(), range.end()); });
     }
 
-    // Calls project(row) for the rows that are in no tree.
+    // The rows that are in no tree.
+    std::span<const std::uint32_t> others() const { return others_; }
+
+    // Calls project(k) for them, by their places in others().
     template <class Project>
     void for_each_coloured(const Project& project) const
     {
@@ -48,11 +51,12 @@ public:
             for_each_chunk(colours_.begin[c + 1] - colours_.begin[c], [&](std::size_t begin, std::size_t end) {
                 for (std::size_t k = begin; k < end; ++k) project(order[colours_.begin[c] + k]);
             });
-        for (const std::uint32_t row : order.last(colours_.uncoloured)) project(row);
+        for (const std::uint32_t k : order.last(colours_.uncoloured)) project(k);
     }
 
 private:
     Forest forest_;
+    std::vector<std::uint32_t> others_;
     GraphColouring colours_;
 };
 

@@ -61,9 +61,9 @@ public:
     {
         if (!sleep_ || !sleep_->any()) return;
         constexpr double disturbing = 0.1;  // of what they bear
-        for (int k = 0; row.active && !row.asleep && row.lambda > 0 && k < Row::arity; ++k) {
+        for (int k = 0; row.active && !row.asleep && row.impulse > 0 && k < Row::arity; ++k) {
             const std::uint32_t i = row.points[k];
-            if (sleep_->asleep(i) && row.lambda > disturbing * step.dt * step.dt * sleep_->burden(i)) sleep_->wake(i);
+            if (sleep_->asleep(i) && row.impulse > disturbing * step.dt * sleep_->burden(i)) sleep_->wake(i);
         }
     }
 

@@ -8,11 +8,13 @@
 //       bool breaks(double residual) const;       where it can: asked at the end of every sub-step
 //       static constexpr bool rests = true;       where its points may sleep (sleep.h): the residual depends on nothing
 //                                                 but their positions and its own members; false if not said
-//       Eigen::Matrix3d curvature(const std::array<Vec3d, 2>& P) const;   where it has one: the second derivative of
-//                                                             the residual by P[0] - P[1]; keeps taut ropes stable
+//       void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
+//                              std::array<Vec3d, 2>& gradient) const;   where it has one (row.h)
 //   };
 //
-// Rows over two points that form trees are solved directly, all others by Gauss-Seidel in colours (row_schedule.h).
+// Two-sided rows carry their forces first, as part of the points' free motion: those over two points that form trees
+// directly (tree_motion.h), all others by conjugate gradients (row_system.h). Then, and one-sided rows altogether, they
+// take part in the projection beside contacts and shapes, by Gauss-Seidel in colours (row_schedule.h).
 #pragma once
 
 #include <algorithm>
@@ -24,7 +26,8 @@
 #include "runtime/solver/constraints/row.h"
 #include "runtime/solver/constraints/row_schedule.h"
 #include "runtime/solver/constraints/row_sleep.h"
-#include "runtime/solver/constraints/tree_solver.h"
+#include "runtime/solver/constraints/system_motion.h"
+#include "runtime/solver/constraints/tree_motion.h"
 
 namespace rapid {
 
@@ -70,9 +73,9 @@ public:
     template <class F>
     void break_above(double force, const Substep& step, const F& removed)
     {
-        const double most = force * step.dt * step.dt;
+        const double most = force * step.dt;
         remove([&](const Row& row) {
-            if (!row.active || row.asleep || !(std::abs(row.lambda) > most)) return false;
+            if (!row.active || row.asleep || !(std::abs(row.impulse) > most)) return false;
             removed(row.ids);
             sleep_.release(row);
             return true;
@@ -96,57 +99,82 @@ public:
             if (!row.active) continue;
             if (!Traits::rests)
                 for (const std::uint32_t i : row.points) sleep->keep_awake(i);
-            else if (!Traits::one_sided || row.lambda != 0)
+            else if (!Traits::one_sided || row.impulse != 0)
                 sleep->link(row.points);
         }
     }
 
-    void subtract_half_kick(Substep& step) override
+    bool has_forces() const override { return !Traits::one_sided; }
+
+    void move_kinematic(Substep& step) override
     {
-        keep_forces(step.dt);
+        keep_impulses(step.dt);
         for (Row& row : rows_) {
             row.asleep = sleep_.is_asleep(row, step);
             if (row.asleep)
                 sleep_.wake_by_motion(row, step);
-            else
-                row.subtract_half_kick(step);
+            else if (row.active)
+                row.measure(step);
         }
+    }
+
+    void advance(Substep& step) override
+    {
+        if (Traits::one_sided) return;
+        leave_out_dead(step);
+        schedule(step);
+        if constexpr (in_trees)
+            schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
+                thread_local TreeMotion<Function> motion;
+                motion.begin(tree, first, rows_);
+                motion.advance(step);
+            });
+        if (!schedule_.others().empty()) system_.advance(rows_, schedule_, step);
     }
 
     void warm_start(Substep& step) override
     {
-        if (!step.dead.empty()) {
-            for (Row& row : rows_)
-                for (const std::uint32_t i : row.points)
-                    changed_ |= row.active && step.dead[i], row.active &= !step.dead[i];
-        }
+        leave_out_dead(step);
         // A shock may have woken points since.
-        for (Row& row : rows_)
-            if (row.asleep && !sleep_.is_asleep(row, step)) row.asleep = false, row.subtract_half_kick(step);
+        for (Row& row : rows_) row.asleep = row.asleep && sleep_.is_asleep(row, step);
         schedule(step);
-        for (Row& row : rows_)
-            if (row.active && !row.asleep) row.warm_start(step);
+        for (Row& row : rows_) {
+            if (!row.active || row.asleep) continue;
+            if (Traits::one_sided)
+                row.warm_start(step);
+            else
+                row.keep(step);
+        }
     }
 
     void project(Substep& step) override
     {
-        const double per_dt2 = 1 / (step.dt * step.dt);
-        if constexpr (direct)
-            schedule_.for_each_tree(
-                [&](std::span<Forest::Link> tree, std::size_t first) { project_tree(step, tree, first, per_dt2); });
-        schedule_.for_each_coloured([&](std::uint32_t r) { rows_[r].project(step, per_dt2); });
-    }
-
-    void add_half_kick(Substep& step) override
-    {
-        const double per_dt2 = 1 / (step.dt * step.dt);
-        for (Row& row : rows_) row.add_half_kick(step, per_dt2);
+        if constexpr (in_trees)
+            schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
+                thread_local TreeMotion<Function> motion;
+                motion.begin(tree, first, rows_);
+                motion.project(step);
+            });
+        schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].project(step); });
     }
 
     void solve_velocities(Substep& step) override
     {
-        if (Traits::one_sided)
+        if (step.is_shared || Traits::one_sided) {
+            if constexpr (in_trees)
+                schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
+                    thread_local TreeMotion<Function> motion;
+                    motion.begin(tree, first, rows_);
+                    motion.solve_velocities(step);
+                });
+            for (int k = 0; k < step.iterations; ++k)
+                schedule_.for_each_coloured(
+                    [&](std::uint32_t r) { rows_[schedule_.others()[r]].solve_velocity(step); });
+        }
+        if (Traits::one_sided) {
+            schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].correct_position(step); });
             for (const Row& row : rows_) sleep_.wake_by_load(row, step);
+        }
         if constexpr (requires(const Function& function) { function.breaks(0.0); })
             remove([&](const Row& row) {
                 typename Row::Vectors gradient;
@@ -158,16 +186,14 @@ public:
 
     Residual close(Substep& step) override
     {
-        keep_forces(step.dt);
         Residual result;
-        const double per_dt2 = 1 / (step.dt * step.dt);
         typename Row::Vectors gradient;
         for (Row& row : rows_) {
             if (!row.active) continue;
             ++result.rows;
             const double residual = row.residual(step, gradient);
             if (!row.resting_residual_exact) row.resting_residual = residual;
-            const double error = std::abs(row.error(residual, per_dt2));
+            const double error = std::abs(row.error(residual, step.dt));
             result.worst = std::max(result.worst, error);
             if constexpr (arity > 1)
                 result.loose += error > 0.1 * (step.points[row.points[0]].P - step.points[row.points[1]].P).norm();
@@ -178,41 +204,22 @@ public:
 private:
     using Traits = FunctionTraits<Function>;
     static constexpr int arity = Row::arity;
-    static constexpr bool direct = arity == 2 && !Traits::one_sided;
+    static constexpr bool in_trees = arity == 2 && !Traits::one_sided;
 
-    void project_tree(Substep& step, std::span<Forest::Link> tree, std::size_t first, double per_dt2)
-    {
-        typename Row::Vectors gradient;
-        for (Forest::Link& link : tree) {
-            Row& row = rows_[link.row];
-            const typename Row::Vectors P = row.positions(step);
-            link.s = row.compliance * per_dt2;
-            link.e = row.function.residual(P, gradient) + link.s * row.lambda;
-            row.choose_direction(step, P, gradient);
-            const int child = link.flipped ? 0 : 1;
-            link.gradient = gradient[child];
-            link.gradient_above = gradient[1 - child];
-            link.direction = row.direction[child];
-            link.direction_above = row.direction[1 - child];
-            link.K.setZero();
-            if constexpr (Traits::has_curvature)
-                if (row.previous_lambda < 0 && row.direction == gradient)
-                    link.K = -row.previous_lambda * row.function.curvature(P);
-        }
-        const Vec3d root = solve_tree(tree, first, [&](std::uint32_t i) { return step.points[i].w; });
-        step.points[tree.front().parent].P += root;
-        for (const Forest::Link& link : tree) {
-            rows_[link.row].lambda += link.e;
-            step.points[link.child].P += link.shift;
-        }
-    }
-
-    // A sub-step of another length begins with the same forces: multipliers are forces times dt².
-    void keep_forces(double dt)
+    // A sub-step of another length begins with the same forces.
+    void keep_impulses(double dt)
     {
         if (dt_ > 0 && dt_ != dt)
-            for (Row& row : rows_) row.lambda *= dt / dt_ * (dt / dt_);
+            for (Row& row : rows_) row.impulse *= dt / dt_;
         dt_ = dt;
+    }
+
+    void leave_out_dead(const Substep& step)
+    {
+        if (step.dead.empty()) return;
+        for (Row& row : rows_)
+            for (const std::uint32_t i : row.points)
+                changed_ |= row.active && step.dead[i], row.active &= !step.dead[i];
     }
 
     template <class F>
@@ -234,7 +241,7 @@ private:
         for (std::uint32_t r = 0; r < rows_.size(); ++r)
             if (rows_[r].active && !rows_[r].asleep)
                 acting.push_back(r), points.insert(points.end(), rows_[r].points.begin(), rows_[r].points.end());
-        schedule_ = RowSchedule(acting, points, arity, fixed_, direct);
+        schedule_ = RowSchedule(acting, points, arity, fixed_, in_trees);
     }
 
     std::vector<Row> rows_;
@@ -244,6 +251,7 @@ private:
     double dt_ = 0;                   // s, of the last sub-step
     std::vector<std::uint8_t> fixed_;
     RowSchedule schedule_;
+    SystemMotion<Function> system_;
     RowSleep<Function> sleep_;
 };
 

@@ -1,8 +1,9 @@
 // Direct solution of a tree of links.
 //
 // One sweep of Gauss-Seidel carries a correction one link far, so that a chain of 1,000 links would need as many. The
-// linear system of a tree is solved in one pass from the leaves to the root and one back, in linear time (Baraff 1996):
-// a point, with its subtree, is a 3 by 3 matrix.
+// linear system of a tree is solved in one pass from the leaves to the root and one back, in linear time (Baraff 1996).
+// What each point can still do, once its subtree is joined to it, is a 3 by 3 mobility, to which a link is joined by an
+// update of rank one: no matrix is inverted, and rigid links to points that do not move need no care.
 #pragma once
 
 #include <algorithm>
@@ -12,60 +13,57 @@
 
 namespace rapid {
 
-// Solves one tree: link.e is then Δλ, link.shift what the child is moved by, m; returns the root's shift. Given are the
-// index `first` of the tree's first link, each link's gradients, directions and K, e = C + α~ λ and s = α~, and by
-// w(point) inverse masses.
+// Solves one tree for the multipliers λ of its links and the shifts of its points:
 //
-//   (M + K) Δx - K Δx' = f + a λ        of a child, with Δx' and a' those of its parent
-//   g Δx + g' Δx' + s λ = -e            of its link
+//   Δ = w Σ g λ           of each point, over its links
+//   Σ g·Δ + s λ = -e      of each link, over its two ends
 //
-// from which Δx and λ are eliminated, leaf by leaf.
-template <class InverseMass>
-Vec3d solve_tree(std::span<Forest::Link> tree, std::size_t first, const InverseMass& w)
+// Given are each link's gradients g, e and s >= 0 (infinite: the link does not act), and by w(k) the weights: of the
+// root for k = 0, of the child of link k - 1 else. A weight of 0 is a point that does not move. Returns the root's
+// shift; link.lambda and link.shift are set. `first` is the index of the tree's first link.
+template <class Weight>
+Vec3d solve_tree(std::span<Forest::Link> tree, std::size_t first, const Weight& w)
 {
-    using Link = Forest::Link;
-    // The compliance of a link to a point of infinite mass is at least this part of its other end's inverse mass.
+    // A link that what is joined already leaves no way to go gives by this part of what its ends would: pins that no
+    // tree can reach get a finite load.
     constexpr double least_compliance = 1e-9;
-    const auto mass = [&](std::uint32_t point) {
-        return Eigen::Matrix3d(Eigen::Matrix3d::Identity() / (w(point) > 0 ? w(point) : 1));
-    };
-    const std::uint32_t root = tree.front().parent;
-    Eigen::Matrix3d root_M = mass(root);
-    Vec3d root_f = Vec3d::Zero();
-    for (Link& link : tree) link.M = mass(link.child), link.f.setZero();
 
-    for (std::size_t k = tree.size(); k-- > 0;) {
-        Link& link = tree[k];
-        Eigen::Matrix3d K = link.K;
-        Vec3d pulled = Vec3d::Zero();
-        if (w(link.child) > 0) {
-            link.M = (link.M + link.K).inverse().eval();
-            const Vec3d y = link.M * link.direction;
-            link.s += link.gradient.dot(y);
-            link.e += link.gradient.dot(link.M * link.f);
-            link.gradient_above += link.K * (link.M.transpose() * link.gradient);
-            link.direction_above += link.K * y;
-            pulled = link.K * (link.M * link.f);
-            K -= link.K * link.M * link.K;
-        }
-        if (!(w(link.parent) > 0)) continue;
-        link.s = std::max(link.s, least_compliance * w(link.parent) * link.gradient_above.squaredNorm());
-        if (!(link.s > 0)) continue;
-        const bool at_root = link.above == first + k;
-        Eigen::Matrix3d& M = at_root ? root_M : tree[link.above - first].M;
-        Vec3d& f = at_root ? root_f : tree[link.above - first].f;
-        M += K + link.direction_above * (link.gradient_above / link.s).transpose();
-        f += pulled - link.direction_above * (link.e / link.s);
-    }
-    const Vec3d root_shift = w(root) > 0 ? Vec3d(root_M.inverse() * root_f) : Vec3d(Vec3d::Zero());
+    // From the leaves: `mobility` is what an impulse shifts a point by, `shift` what its subtree does.
+    Eigen::Matrix3d root_mobility = w(0) * Eigen::Matrix3d::Identity();
+    Vec3d root_shift = Vec3d::Zero();
     for (std::size_t k = 0; k < tree.size(); ++k) {
-        Link& link = tree[k];
-        const Vec3d& above = link.above == first + k ? root_shift : tree[link.above - first].shift;
-        link.e = link.s > 0 ? -(link.e + link.gradient_above.dot(above)) / link.s : 0;
-        link.shift = w(link.child) > 0 ? Vec3d(link.M * (link.f + link.K * above + link.direction * link.e))
-                                       : Vec3d(Vec3d::Zero());
+        tree[k].mobility = w(k + 1) * Eigen::Matrix3d::Identity();
+        tree[k].shift.setZero();
     }
-    return root_shift;
+    for (std::size_t k = tree.size(); k-- > 0;) {
+        Forest::Link& link = tree[k];
+        const std::size_t above = link.above - first;
+        const double w_above = above == k ? w(0) : w(above + 1);
+        Eigen::Matrix3d& mobility = above == k ? root_mobility : tree[above].mobility;
+        Vec3d& shift = above == k ? root_shift : tree[above].shift;
+        link.reach = mobility * link.gradient_above;
+        link.e += link.gradient.dot(link.shift) + link.gradient_above.dot(shift);
+        const double least =
+            least_compliance * (w(k + 1) * link.gradient.squaredNorm() + w_above * link.gradient_above.squaredNorm());
+        link.s = std::max(
+            link.s + link.gradient.dot(link.mobility * link.gradient) + link.gradient_above.dot(link.reach), least);
+        if (!(link.s > 0)) continue;
+        mobility -= link.reach * (link.reach / link.s).transpose();
+        shift -= link.e / link.s * link.reach;
+    }
+
+    // Back: `shift` is the sum of the impulses on a point, of its links so far.
+    root_shift.setZero();
+    for (std::size_t k = 0; k < tree.size(); ++k) {
+        Forest::Link& link = tree[k];
+        const std::size_t above = link.above - first;
+        Vec3d& impulse = above == k ? root_shift : tree[above].shift;
+        link.lambda = link.s > 0 ? -(link.e + link.reach.dot(impulse)) / link.s : 0;
+        impulse += link.lambda * link.gradient_above;
+        link.shift = link.lambda * link.gradient;
+    }
+    for (std::size_t k = 0; k < tree.size(); ++k) tree[k].shift *= w(k + 1);
+    return w(0) * root_shift;
 }
 
 }  // namespace rapid

@@ -24,13 +24,6 @@ struct Rod {
         gradient[1] = -gradient[0];
         return d.norm() - rest;
     }
-    Eigen::Matrix3d curvature(const std::array<Vec3d, 2>& P) const
-    {
-        const Vec3d d = P[0] - P[1];
-        const double length = d.norm();
-        if (!(length > 0)) return Eigen::Matrix3d::Zero();
-        return (Eigen::Matrix3d::Identity() - d * d.transpose() / (length * length)) / length;
-    }
 };
 
 template <class Function>

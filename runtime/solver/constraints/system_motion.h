@@ -1,0 +1,200 @@
+// The motion of points that two-sided rows link to nets, through a sub-step: as in trees (tree_motion.h), with all rows
+// solved at once by conjugate gradients (row_system.h), to a part of 1e-8 or as far as `iterations` allow. The discrete
+// gradient is towards where the forces of the sub-step before would take the points.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "runtime/solver/constraints/row.h"
+#include "runtime/solver/constraints/row_system.h"
+
+namespace rapid {
+
+template <class Function>
+class SystemMotion {
+public:
+    using Row = rapid::Row<Function>;
+
+    // Takes the points of the rows in no tree from the end of their free motion to where the rows take them.
+    void advance(std::span<Row> rows, const RowSchedule& schedule, Substep& step)
+    {
+        rows_ = rows, schedule_ = &schedule, step_ = &step;
+        read();
+        solve_forces(to_);
+        for (const std::uint32_t i : points_) to_[i] = step.points[i].P + moved_[i];
+        solve_forces(to_);
+        for (const std::uint32_t i : points_) {
+            if (!(inverse_mass_[i] > 0)) continue;
+            const Mobility mobility = step.mobility_of(i);
+            step.points[i].P += moved_[i];
+            if (mobility.x > 0) step.v[i] += mobility.v / mobility.x * moved_[i];
+        }
+        solve_velocities();
+        correct_positions();
+        for (const std::uint32_t i : points_)
+            if (step.points[i].w > 0) step.displacement[i] += step.dt * (step.v[i] - free_v_[i]);
+    }
+
+private:
+    static constexpr int arity = Row::arity;
+    static constexpr double accuracy = 1e-8;
+    static constexpr int iterations = 20, corrections = 10;  // for one of the step's
+    // Compliance of a rigid row, as a part of its points' inverse mass: rows that contradict each other get a finite
+    // load.
+    static constexpr double least_compliance = 1e-9;
+
+    template <class F>
+    void each_row(const F& f)
+    {
+        const std::span<const std::uint32_t> others = schedule_->others();
+        for_each_chunk(others.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t r = begin; r < end; ++r) f(r, rows_[others[r]]);
+        });
+    }
+    void solve() { system_.solve(*schedule_, accuracy, iterations * step_->iterations); }
+    // A row with this gradient, residual and compliance; a row that does not act has a gradient of 0.
+    void set(std::size_t r, const typename Row::Vectors& gradient, double e, double s)
+    {
+        std::copy(gradient.begin(), gradient.end(), system_.gradient.begin() + static_cast<std::ptrdiff_t>(r * arity));
+        system_.e[r] = e, system_.s[r] = s;
+    }
+    void leave_out(std::size_t r)
+    {
+        typename Row::Vectors none;
+        none.fill(Vec3d::Zero());
+        set(r, none, 0, 1);
+    }
+
+    void read()
+    {
+        Substep& step = *step_;
+        const std::span<const std::uint32_t> others = schedule_->others();
+        system_.begin(others.size(), arity, step.size());
+        points_.clear();
+        for (std::size_t r = 0; r < others.size(); ++r)
+            for (int k = 0; k < arity; ++k) {
+                const std::uint32_t i = rows_[others[r]].points[k];
+                system_.points[r * arity + k] = i;
+                points_.push_back(i);
+            }
+        std::sort(points_.begin(), points_.end());
+        points_.erase(std::unique(points_.begin(), points_.end()), points_.end());
+
+        for (std::vector<Vec3d>* values : {&from_, &to_, &moved_, &free_v_}) values->resize(step.size());
+        inverse_mass_.resize(step.size());
+        for (const std::uint32_t i : points_) {
+            const ProjectedPoint& at = step.points[i];
+            const bool moves = at.w > 0;
+            from_[i] = moves ? Vec3d(at.P - step.displacement[i]) : step.start[i];
+            to_[i] = at.P;
+            free_v_[i] = step.v[i];
+            inverse_mass_[i] = moves ? step.inverse_mass[i] : 0;
+            system_.w[i] = inverse_mass_[i] * step.mobility_of(i).x;
+        }
+        for (const std::uint32_t r : others)
+            for (int k = 0; k < arity; ++k) {
+                const std::uint32_t i = rows_[r].points[k];
+                to_[i] += system_.w[i] * (rows_[r].impulse / step.dt) * rows_[r].direction[k];
+            }
+    }
+    void weigh_by_mass()
+    {
+        for (const std::uint32_t i : points_) system_.w[i] = inverse_mass_[i];
+        std::fill(system_.lambda.begin(), system_.lambda.end(), 0.0);
+    }
+    typename Row::Vectors of(const Row& row, const std::vector<Vec3d>& values) const
+    {
+        typename Row::Vectors result;
+        for (int k = 0; k < arity; ++k) result[k] = values[row.points[k]];
+        return result;
+    }
+
+    double inverse_mass(const Row& row, const typename Row::Vectors& gradient) const
+    {
+        double sum = 0;
+        for (int k = 0; k < arity; ++k) sum += inverse_mass_[row.points[k]] * gradient[k].squaredNorm();
+        return sum;
+    }
+
+    // With the discrete gradients towards `to`; moved_ is then what the forces add to the free motion.
+    void solve_forces(const std::vector<Vec3d>& to)
+    {
+        Substep& step = *step_;
+        each_row([&](std::size_t r, Row& row) {
+            const typename Row::Vectors from = of(row, from_);
+            typename Row::Vectors gradient;
+            const double C = row.function.residual(from, gradient);
+            discrete_gradient(row.function, from, of(row, to), row.direction);
+            const double W = inverse_mass(row, row.direction);
+            double e = 0;
+            for (int k = 0; k < arity; ++k) e += row.direction[k].dot(step.points[row.points[k]].P - from[k]);
+            system_.lambda[r] = row.impulse / step.dt;
+            row.added = 0;
+            if (!(row.compliance > 0))
+                set(r, row.direction, e, least_compliance * W * step.mobility_of(row.points[0]).x);
+            else if (row.is_stiff(W, step.dt))
+                set(r, row.direction, e + C, row.compliance);
+            else
+                set(r, row.direction, e + C + row.first, 2 * row.compliance);
+        });
+        solve();
+        for (const std::uint32_t i : points_) moved_[i] = system_.shift(i);
+        each_row([&](std::size_t r, Row& row) { row.impulse = step.dt * system_.lambda[r]; });
+    }
+
+    // Takes off the velocities along rigid rows.
+    void solve_velocities()
+    {
+        Substep& step = *step_;
+        weigh_by_mass();
+        each_row([&](std::size_t r, Row& row) {
+            typename Row::Vectors gradient;
+            row.residual(step, gradient);
+            const double W = inverse_mass(row, gradient);
+            if (row.is_stiff(W, step.dt))
+                set(r, gradient, row.rate(step, gradient), least_compliance * W);
+            else
+                leave_out(r);
+        });
+        solve();
+        for (const std::uint32_t i : points_) step.v[i] += system_.shift(i);
+        each_row([&](std::size_t r, Row& row) { row.impulse += system_.lambda[r]; });
+    }
+
+    // Moves the points to where the rigid rows have C = 0, row by row: a step of Newton's for all at once would throw a
+    // net that is nearly flat. Not where a spring draws a point, which would take energy from it.
+    void correct_positions()
+    {
+        Substep& step = *step_;
+        for (int k = 0; k < corrections * step.iterations; ++k)
+            schedule_->for_each_coloured([&](std::uint32_t r) {
+                const Row& row = rows_[schedule_->others()[r]];
+                typename Row::Vectors gradient;
+                const double C = row.residual(step, gradient), W = inverse_mass(row, gradient);
+                if (row.compliance > 0 || !(W > 0) || is_drawn(row)) return;
+                for (int l = 0; l < arity; ++l) {
+                    const std::uint32_t i = row.points[l];
+                    const Vec3d shift = -inverse_mass_[i] * (C / W) * gradient[l];
+                    step.points[i].P += shift;
+                    step.start[i] += shift;
+                }
+            });
+    }
+    bool is_drawn(const Row& row) const
+    {
+        return std::any_of(row.points.begin(), row.points.end(),
+                           [&](std::uint32_t i) { return step_->mobility_of(i).stiffness > 0; });
+    }
+
+    std::span<Row> rows_;
+    const RowSchedule* schedule_ = nullptr;
+    Substep* step_ = nullptr;
+    RowSystem system_;
+    std::vector<std::uint32_t> points_;              // of the rows, ascending
+    std::vector<Vec3d> from_, to_, moved_, free_v_;  // by point: beginning, estimate of the end, m; m/s
+    std::vector<double> inverse_mass_;               // by point, 1/kg
+};
+
+}  // namespace rapid

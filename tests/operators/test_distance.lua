@@ -115,7 +115,8 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}, {2,
   it("gives by its compliance: a weight of m g hangs compliance m g below", function()
     local p = points_of(scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, mass = {2} } }
-  :gravity {} :drag { linear = 20 } :pin { compliance = 1e-3 } :solve { substeps = 2, sleep = math.huge }]], { frames = {1, 96} }), 96)
+  :gravity {} :drag { linear = 20 } :pin { compliance = 1e-3 }
+  :solve { substeps = 2, sleep = math.huge }]], { frames = {1, 96} }), 96)
     assert.near({0, -2 * 9.81 * 1e-3, 0}, p[1].P, 1e-6)
   end)
 end)

@@ -28,6 +28,10 @@ void CoupledStep::run()
     }
     Projection projection(scene.constraints, scene.obstacles, now_, sleep_ ? &*sleep_ : nullptr, options.loads, ids);
     if (sleep_) sleep_->open(*options.sleep_records);
+    if (projection.bounces()) {
+        paths_.resize(at_.size());
+        now_.paths = paths_;
+    }
 
     for (int substep = 0; substep < options.substeps; ++substep) {
         now_.index = substep;
@@ -133,6 +137,7 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     const std::uint32_t i = block.places[k];
     ProjectedPoint& at = at_[i];
     at.w = inverse_mass_[i];
+    if (!paths_.empty()) paths_[i] = free_path(block, k);
     if (sleep_ && !skips_sleepers_) {
         const bool asleep = sleep_->asleep(i);
         sleep_->check_acceleration(i, acceleration_of(block, k, asleep));
@@ -163,7 +168,22 @@ bool CoupledStep::leaves_out(std::size_t i)
     sleep_->check_acceleration(i, context_.scene.uniform.a);
     if (!sleep_->asleep(i)) return false;
     at_[i].w = 0;
+    if (!paths_.empty()) paths_[i] = {context_.scene.uniform.a, Vec3d::Zero()};
     return true;
+}
+
+// What a point accelerates by towards the end of its free motion. A shape that bears it, by no more than what forces
+// give it, has done so throughout; what changes a velocity by more was a contact.
+FreePath CoupledStep::free_path(const PointBlock& block, std::size_t k) const
+{
+    const std::uint32_t i = block.places[k];
+    const Vec3d a = acceleration_of(block, k, false);
+    const double dt = block.moved_dt[k];
+    if (context_.scene.obstacles.empty() || !context_.scene.actions.empty() || !(dt > 0)) return {a, Vec3d::Zero()};
+    const Vec3d free = block.linear.data ? block.damped[k].v : Vec3d(v_[i] + dt * a);
+    const Vec3d reaction = (block.v[k] - free) / dt;
+    if (!(reaction.squaredNorm() <= 1.001 * a.squaredNorm())) return {a, Vec3d::Zero()};
+    return {a + reaction, reaction};
 }
 
 // What acts on a point in a sub-step, m/s²; on a sleeper also the motion and velocity that actions give it.

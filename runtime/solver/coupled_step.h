@@ -29,6 +29,7 @@ private:
     void take_point(const PointBlock& block, std::size_t k);
     bool leaves_out(std::size_t i);
     void store(std::size_t begin, std::size_t end);
+    FreePath free_path(const PointBlock& block, std::size_t k) const;
     Vec3d acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const;
     double inverse_mass(std::size_t i) const;
 
@@ -39,6 +40,7 @@ private:
     std::vector<double> inverse_mass_;  // 1/kg
     std::vector<Mobility> mobility_;    // empty where no force has a linear part
     std::vector<Vec3d> displacement_;   // Substep::displacement; empty where no constraint needs it
+    std::vector<FreePath> paths_;       // empty where nothing bounces
 
     Substep now_;
     std::optional<Sleep> sleep_;   // where points may sleep

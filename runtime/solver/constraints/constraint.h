@@ -8,10 +8,11 @@
 //   move_kinematic()                points whose positions are prescribed
 //   advance()                       points that rods and springs link move by those forces, too
 //   detect()                        finds the rows of this sub-step, as contacts
+//   solve_impacts()                 restitution, at the times of impacts within the sub-step, until none is left
 //   warm_start()                    applies the impulses of the last sub-step
 //   project()                       P = x~ + Δx by Gauss-Seidel, `iterations` times; Δx = w ∇C p dt
 //   v + Δx/dt                       never the difference of stored positions
-//   solve_velocities()              restitution, friction; what is left along rigid rows; rows that break
+//   solve_velocities()              friction; what is left along rigid rows; rows that break
 //   correct_penetration()           what is left too deep after all shapes
 //
 // w is the inverse mass times v_of_a / dt, with v_of_a the mobility of the velocity under drag and springs: so that
@@ -45,6 +46,7 @@ struct Substep {
     // m: of each point that moves, by its acceleration up to its velocity at the end; collisions aside. Empty unless
     // some constraint has forces.
     std::span<Vec3d> displacement;
+    std::span<FreePath> paths;    // empty where nothing bounces
     bool is_shared = false;       // contacts, shapes or other constraints act, too, beside a constraint
     double dt = 0;                // s, of a point that lives through the whole frame
     double time = 0;              // s since the start, at its end
@@ -89,11 +91,15 @@ public:
 
     // Whether it has two-sided rows, which act with forces: then Substep::displacement is there.
     virtual bool has_forces() const { return false; }
+    // Whether it has impacts to solve.
+    virtual bool bounces() const { return false; }
 
     // In the order of the calls; see above.
     virtual void move_kinematic(Substep&) {}
     virtual void advance(Substep&) {}
     virtual void detect(Substep&) {}
+    // One sweep, numbered from 1, over what the sweep before has changed. False where nothing is hit.
+    virtual bool solve_impacts(Substep&, std::uint32_t) { return false; }
     virtual void warm_start(Substep&) {}
     virtual void project(Substep& step) = 0;
     virtual void solve_velocities(Substep&) {}

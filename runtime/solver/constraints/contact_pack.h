@@ -20,7 +20,7 @@ struct alignas(64) ContactPack {
     Floats normal_impulse;               // N s along n: at first of the projection of positions, then the whole
     Floats carried_impulse;              // N s along n: that the warm start gives to velocities alone
     Floats friction;                     // μ
-    Floats rebound;                      // m/s, along n: by restitution
+    Floats restitution;                  // ε
     Floats effective_mass;               // kg: 1 / (w_i + w_j)
     Floats scale;                        // what w_i is multiplied by, and w_j divided by, under mass scaling
     Vectors<Floats> n;                   // from j to i, unit

@@ -1,12 +1,56 @@
-// Sequential impulses for a pack of contacts: warm start, projection of positions, restitution and friction.
+// Sequential impulses for a pack of contacts: impacts, warm start, projection of positions, velocities and friction.
 //
 // weights: see MassScaling::with_weights().
 #pragma once
 
 #include "runtime/solver/constraints/contact_pack.h"
+#include "runtime/solver/constraints/impact.h"
 #include "runtime/solver/constraints/point_pack.h"
+#include "runtime/solver/constraints/resting_speed.h"
 
 namespace rapid {
+
+// Of the contact in one lane: whether it was an impact.
+inline bool solve_impact(const ContactPack& pack, std::uint32_t l, Substep& step, double at_rest, std::uint32_t sweep)
+{
+    const std::uint32_t i = pack.i[l], j = pack.j[l];
+    const double wi = impact_inverse_mass(step, i), wj = impact_inverse_mass(step, j);
+    const double longest = std::min(wi > 0 ? step.paths[i].since : step.dt, wj > 0 ? step.paths[j].since : step.dt);
+    const Vec3d acceleration = path_acceleration(step, i) - path_acceleration(step, j);
+    const Vec3d end = step.points[i].P - step.points[j].P;
+    Vec3d d = end, u = step.v[i] - step.v[j];
+    double since = 0;
+    for (int k = 0; k < path_iterations; ++k) {
+        const Vec3d mean = u - 0.5 * since * acceleration;
+        const std::optional<double> found = time_of_impact(end, mean, pack.reach[l], longest);
+        if (!found) return false;
+        since = *found;
+        d = end - since * mean;
+    }
+    u -= since * acceleration;
+    const double distance = d.norm();
+    if (!(distance > 0) || !(u.dot(d) < -at_rest * distance)) return false;
+    const Vec3d impulse = impact_impulse(d / distance, u, 1 / (wi + wj), pack.restitution[l], pack.friction[l]);
+    take_impulse(step, i, impulse, since, sweep);
+    take_impulse(step, j, -impulse, since, sweep);
+    return true;
+}
+
+// Of contacts that close faster than at rest. False where there are none, which is seen at once of most packs.
+inline bool solve_impacts(const ContactPack& pack, Substep& step, double at_rest, std::uint32_t sweep)
+{
+    const PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
+    const Vectors<Doubles> d = a.P - b.P, u = gather(step.v, pack.i) - gather(step.v, pack.j);
+    const Doubles farthest = near_contact * widen(pack.reach);
+    std::uint32_t may_hit =
+        bits((widen(pack.restitution) > 0) & (dot(d, d) < farthest * farthest) & (dot(u, u) > at_rest * at_rest));
+    bool hit = false;
+    for (; may_hit != 0; may_hit &= may_hit - 1) {
+        const auto l = static_cast<std::uint32_t>(std::countr_zero(may_hit));
+        if (l < pack.count) hit |= solve_impact(pack, l, step, at_rest, sweep);
+    }
+    return hit;
+}
 
 template <class Weights>
 [[gnu::always_inline]] inline void apply_warm_start(const ContactPack& pack, Substep& step, const Weights& weights)
@@ -41,12 +85,14 @@ template <class Weights>
     scatter(b, step.points, pack.j, pack.count);
 }
 
-// Normal velocities first: none into the other point, or that of restitution; then Coulomb friction by the whole normal
-// impulse. Friction acts throughout the sub-step, and so half of it on positions: else a point that is held would
-// creep. recovery(pack): which part of an overlap is taken away; null but in the last iteration.
+// Normal velocities first: none into the other point; then Coulomb friction by the whole normal impulse. Friction acts
+// throughout the sub-step, and so half of it on positions: else a point that is held would creep. recovery(pack): which
+// part of an overlap is taken away; null but in the last iteration. impact_speed: pairs that bounce, are pushed into
+// one another by recovery and close faster than this are left to the impacts of the next sub-step; infinite where none
+// bounce.
 template <class Weights, class Recovery>
 [[gnu::always_inline]] inline void solve_pack_velocities(ContactPack& pack, Substep& step, const Weights& weights,
-                                                         const Recovery* recovery)
+                                                         const Recovery* recovery, double impact_speed)
 {
     // As a part of the sum of the radii, an overlap that is left: a contact that is just lost is found again in the
     // next sub-step, and that is jitter.
@@ -60,9 +106,10 @@ template <class Weights, class Recovery>
 
     const Vectors<Doubles> relative = va - vb;
     const Doubles normal_velocity = dot(n, relative);
-    const Flags touches = (before > 0) | (overlap > 0);
-    const Doubles normal =
-        touches ? most(before + (widen(pack.rebound) - normal_velocity) * mass, Doubles{}) : Doubles{};
+    Flags touches = (before > 0) | (overlap > 0);
+    if (std::isfinite(impact_speed))
+        touches &= (before > 0) | (widen(pack.restitution) <= 0) | (normal_velocity >= -impact_speed);
+    const Doubles normal = touches ? most(before - normal_velocity * mass, Doubles{}) : Doubles{};
     const Vectors<Doubles> sticking = tangential_before - mass * (relative - normal_velocity * n);
     const Doubles size = sqrt(dot(sticking, sticking)), bound = widen(pack.friction) * normal;
     const Vectors<Doubles> tangential = (bound < size ? bound / size : Doubles{} + 1) * sticking;

@@ -1,8 +1,10 @@
 #include "runtime/solver/constraints/contacts.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
 
 #include "runtime/parallel.h"
@@ -118,11 +120,48 @@ void Contacts::detect(Substep& step)
     if (per_dt_ > 0 && per_dt_ * step.dt != 1) impulses_.scale(static_cast<float>(step.dt * per_dt_));
     per_dt_ = 1 / step.dt;
     if (begins_frame_) heavy_.begin(step);
-    if (list_is_stale_ || list_.expired(step)) search(step);
-    begins_frame_ = list_is_stale_ = false;
+    begins_frame_ = false;
     scaling_.begin(step);
+    update_contacts(step);
+}
+
+void Contacts::update_contacts(Substep& step)
+{
+    if (list_is_stale_ || list_.expired(step)) search(step);
+    list_is_stale_ = impacts_moved_ = false;
     find_contacts(step);
     if (sleep_.wake_by_impact(packs_, impulses_, material_, step)) find_contacts(step);
+}
+
+// An impact moves points into others that were not near: once none is left, contacts are found again.
+bool Contacts::solve_impacts(Substep& step, std::uint32_t sweep)
+{
+    bool hit = sweep_impacts(step, sweep, sweep - 1);
+    if (!hit && impacts_moved_) {
+        update_contacts(step);
+        hit = sweep_impacts(step, sweep, 1);
+    }
+    impacts_moved_ |= hit;
+    return hit;
+}
+
+// Of the points that were hit in sweep `since` or later, 0 for all.
+bool Contacts::sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t since)
+{
+    const double at_rest = resting_speed(step);
+    const auto changed = [&](const ContactPack& pack) {
+        std::uint32_t last = 0;
+        for (std::uint32_t l = 0; l < lanes; ++l)
+            last = std::max({last, step.paths[pack.i[l]].sweep, step.paths[pack.j[l]].sweep});
+        return last >= since;
+    };
+    std::atomic<bool> hit = false;
+    backwards_ = !backwards_;
+    sweep([&](const ContactPack& pack) {
+        if (changed(pack) && rapid::solve_impacts(pack, step, at_rest, number))
+            hit.store(true, std::memory_order_relaxed);
+    });
+    return hit;
 }
 
 // Pairs that touch where their free motion ends, or have pressed each other until now.
@@ -198,18 +237,20 @@ void Contacts::begin(ContactPack& pack, const Substep& step) const
     pack.friction = friction;
     pack.effective_mass = narrow(1 / (a.w + b.w));
     scaling_.apply(pack, a, b, step);
-    pack.rebound = Floats{};
+    pack.restitution = Floats{};
     if (!material_.bounces) return;
-    const double at_rest = resting_speed(step);
-    const Doubles approach = dot(directions(apart, pack), gather(step.v, pack.i) - gather(step.v, pack.j));
-    for (std::uint32_t l = 0; l < lanes; ++l)
-        if (approach[l] < -at_rest)
-            pack.rebound[l] = -std::max(material_.restitution[pack.i[l]], material_.restitution[pack.j[l]]) *
-                              static_cast<float>(approach[l]);
+    const Vectors<Doubles> d = a.P - b.P, u = gather(step.v, pack.i) - gather(step.v, pack.j);
+    for (std::uint32_t l = 0; l < lanes; ++l) {
+        pack.restitution[l] = std::max(material_.restitution[pack.i[l]], material_.restitution[pack.j[l]]);
+        // What impacts have left in one another, and parting, is parted by no impulse.
+        if (pack.restitution[l] > 0 && d[l].dot(u[l]) >= 0)
+            pack.initial_gap[l] = std::min(pack.initial_gap[l], static_cast<float>(d[l].norm() - reach[l]));
+    }
 }
 
 void Contacts::warm_start(Substep& step)
 {
+    if (impacts_moved_) find_contacts(step);  // some impacts are left
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) f(i);
@@ -239,15 +280,16 @@ void Contacts::solve_velocities(Substep& step)
                 if (sleep_.asleep(pack.i[l]) || sleep_.asleep(pack.j[l])) part[l] = recovery_asleep;
         return part;
     };
+    const double impact_speed = material_.bounces ? resting_speed(step) : std::numeric_limits<double>::infinity();
     scaling_.with_weights([&](const auto& weights) {
         const decltype(part_recovered)* none = nullptr;
         for (int k = 1; k < step.iterations; ++k) {
             backwards_ = !backwards_;
-            sweep([&](ContactPack& pack) { solve_pack_velocities(pack, step, weights, none); });
+            sweep([&](ContactPack& pack) { solve_pack_velocities(pack, step, weights, none, impact_speed); });
         }
         backwards_ = !backwards_;
         sweep([&](ContactPack& pack) {
-            solve_pack_velocities(pack, step, weights, &part_recovered);
+            solve_pack_velocities(pack, step, weights, &part_recovered, impact_speed);
             store(pack);
             if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
             if (some_asleep)

@@ -33,7 +33,9 @@ public:
     void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
 
     void join(Sleep* sleep) override;
+    bool bounces() const override { return material_.bounces; }
     void detect(Substep& step) override;
+    bool solve_impacts(Substep& step, std::uint32_t sweep) override;
     void warm_start(Substep& step) override;
     void project(Substep& step) override;
     void solve_velocities(Substep& step) override;
@@ -43,7 +45,9 @@ public:
 private:
     void renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index);
     void search(const Substep& step);
+    void update_contacts(Substep& step);
     void find_contacts(const Substep& step);
+    bool sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t since);
     std::size_t find_near(std::size_t block, const Substep& step, std::vector<std::uint32_t>& near) const;
     bool may_touch(std::uint32_t pair, const Substep& step) const;
     void begin(ContactPack& pack, const Substep& step) const;
@@ -64,6 +68,7 @@ private:
     ContactSleep sleep_;
 
     bool begins_frame_ = true, list_is_stale_ = true, backwards_ = false;
+    bool impacts_moved_ = false;            // points, since their contacts were found
     double per_dt_ = 0;                     // 1/s, of the last sub-step
     double search_seconds_ = 0;             // in this frame
     std::vector<Vec3d> before_;             // positions before the warm start

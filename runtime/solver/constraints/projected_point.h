@@ -1,6 +1,8 @@
 // The points that constraints act on, as the projection sees them.
 #pragma once
 
+#include <cstdint>
+
 #include "runtime/vec.h"
 
 namespace rapid {
@@ -10,6 +12,14 @@ namespace rapid {
 struct alignas(32) ProjectedPoint {
     Vec3d P;
     double w;
+};
+
+// A point's motion in a sub-step since its last impact; kept where something bounces (impact.h).
+struct FreePath {
+    Vec3d acceleration;       // m/s², of the point
+    Vec3d reaction;           // m/s², the part of it by the shape on which the point lies
+    double since = 0;         // s, until the end of the sub-step; the whole of it where there was no impact
+    std::uint32_t sweep = 0;  // in which the impact was solved, from 1; 0 for none
 };
 
 // What a constant acceleration of 1 m/s² does to a point in a sub-step: to its velocity, m/s, and to its position, m:

@@ -6,6 +6,12 @@
 #include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
+namespace {
+
+// In a cradle an impact takes one; in a gas two or three.
+constexpr std::uint32_t most_impact_sweeps = 32;
+
+}  // namespace
 
 Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
                        const Substep& step, Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids)
@@ -20,6 +26,12 @@ template <class F>
 void Projection::each(const F& f)
 {
     for (const LocalConstraint& local : constraints_) at_node(*local.constraint, [&] { f(*local.coupling); });
+}
+
+bool Projection::bounces() const
+{
+    return std::any_of(constraints_.begin(), constraints_.end(),
+                       [](const LocalConstraint& local) { return local.coupling->bounces(); });
 }
 
 void Projection::advance(Substep& step)
@@ -46,14 +58,19 @@ void Projection::advance(Substep& step)
         each_point([&](std::size_t i) { free_[i] += step.start[i]; });
         keep_positions(linked_);
     }
-    const std::vector<Vec3d>& before = has_forces_ ? linked_ : free_;
     begin_support(step);
     each([&](Coupling& coupling) { coupling.detect(step); });
     if (has_forces_)
         each_point([&](std::size_t i) { free_[i] += step.points[i].P - linked_[i]; });  // of woken sleepers
-    keep_positions(has_forces_ ? linked_ : free_);
+    else
+        keep_positions(free_);
+    if (shapes_) shapes_->detect(step, free_);
+    if (!step.paths.empty()) solve_impacts(step);
+    const bool moved = has_forces_ || !step.paths.empty();  // since the free motion
+    if (moved) keep_positions(linked_);
+    const std::vector<Vec3d>& before = moved ? linked_ : free_;
     each([&](Coupling& coupling) { coupling.warm_start(step); });
-    if (shapes_) shapes_->warm_start(step, free_);
+    if (shapes_) shapes_->warm_start(step);
     for (int k = 0; k < step.iterations; ++k) {
         each([&](Coupling& coupling) { coupling.project(step); });
         if (shapes_) shapes_->project(step);
@@ -65,6 +82,27 @@ void Projection::advance(Substep& step)
         if (shapes_) shapes_->solve_velocities(step);
     }
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
+}
+
+// One impact leads to others: what is still closing after so many sweeps is left to the rows, which let nothing bounce.
+void Projection::solve_impacts(Substep& step)
+{
+    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) step.paths[i].since = step.dt, step.paths[i].sweep = 0;
+    });
+    bool hit = true;
+    std::size_t woken = sleep_ ? sleep_->woken_now() : 0;
+    for (std::uint32_t sweep = 1; hit && sweep <= most_impact_sweeps; ++sweep) {
+        hit = false;
+        each([&](Coupling& coupling) { hit |= coupling.solve_impacts(step, sweep); });
+        if (!shapes_) continue;
+        // Sleepers that impacts have woken come to have contacts with shapes.
+        if (sleep_ && woken != sleep_->woken_now()) {
+            woken = sleep_->woken_now();
+            shapes_->detect(step, free_);
+        }
+        if (hit) shapes_->solve_impacts(step, sweep);
+    }
 }
 
 // Points that no constraint moves support others, as shapes do.

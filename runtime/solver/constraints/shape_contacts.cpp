@@ -6,6 +6,8 @@
 
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
+#include "runtime/solver/constraints/impact.h"
+#include "runtime/solver/constraints/resting_speed.h"
 #include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
@@ -60,14 +62,52 @@ void ShapeContacts::remember(ShapeLoads& loads, const Column<std::int64_t>& ids,
         }
 }
 
-void ShapeContacts::warm_start(Substep& step, std::span<const Vec3d> free)
+void ShapeContacts::detect(const Substep& step, std::span<const Vec3d> free)
 {
     clearance_.begin(free);
     std::swap(contacts_, before_);
-    const auto prepare_chunk = [&](std::size_t begin, std::size_t end) {
-        Batch& contacts = contacts_[begin / points_a_task];
-        find(contacts, before_[begin / points_a_task], step, free, begin, end);
-        for (const ShapeContact& contact : contacts) {
+    const auto find_in_chunk = [&](std::size_t begin, std::size_t end) {
+        find(contacts_[begin / points_a_task], before_[begin / points_a_task], step, free, begin, end);
+    };
+    for_each_chunk(size_, find_in_chunk, points_a_task);
+}
+
+void ShapeContacts::solve_impacts(Substep& step, std::uint32_t sweep)
+{
+    tbb::parallel_for(std::size_t{0}, contacts_.size(), [&](std::size_t c) {
+        for (const ShapeContact& contact : contacts_[c]) {
+            const FreePath& path = step.paths[contact.i];
+            if (path.sweep > 0 && path.sweep + 1 >= sweep) solve_impact(contact, step, sweep);
+        }
+    });
+}
+
+// Of a point that another has hit: back along the normal, to where it met the shape.
+void ShapeContacts::solve_impact(const ShapeContact& contact, Substep& step, std::uint32_t sweep) const
+{
+    const std::uint32_t i = contact.i;
+    const FreePath& path = step.paths[i];
+    const double C = contact.n.dot(step.points[i].P) - contact.level, pull = contact.n.dot(path.acceleration);
+    if (!(step.points[i].w > 0) || !(C < 0)) return;
+    Vec3d u = step.v[i] - contact.vc;
+    const double speed = contact.n.dot(u);
+    double since = 0;
+    for (int k = 0; k < path_iterations; ++k) {
+        const double mean = speed - 0.5 * since * pull;
+        if (!(mean < 0)) return;
+        since = std::min(C / mean, path.since);
+    }
+    u -= since * path.acceleration;
+    if (!(u.dot(contact.n) < -resting_speed(step))) return;
+    const double w = impact_inverse_mass(step, i), restitution = obstacles_[contact.obstacle].restitution(i);
+    take_impulse(step, i, impact_impulse(contact.n, u, 1 / w, restitution, contact.friction), since, sweep);
+}
+
+void ShapeContacts::warm_start(Substep& step)
+{
+    const auto start_chunk = [&](std::size_t begin, std::size_t) {
+        for (ShapeContact& contact : contacts_[begin / points_a_task]) {
+            if (!step.paths.empty()) leave_parting(contact, step);
             const double w = step.points[contact.i].w;
             if (!(contact.normal_impulse > 0) || !(w > 0)) continue;
             const Vec3d half =
@@ -76,7 +116,15 @@ void ShapeContacts::warm_start(Substep& step, std::span<const Vec3d> free)
             step.v[contact.i] += w * half;
         }
     };
-    for_each_chunk(size_, prepare_chunk, points_a_task);
+    for_each_chunk(size_, start_chunk, points_a_task);
+}
+
+// What impacts have left inside, and parting, is moved out by no impulse.
+void ShapeContacts::leave_parting(ShapeContact& contact, const Substep& step)
+{
+    const std::uint32_t i = contact.i;
+    if (step.paths[i].sweep > 0 && contact.n.dot(step.v[i] - contact.vc) >= 0)
+        contact.level = std::min(contact.level, contact.n.dot(step.points[i].P));
 }
 
 void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free,

@@ -38,8 +38,11 @@ public:
     void recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt);
     void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, double dt) const;
 
-    // free: where the points' free motion has ended; `step.points` may be there, or beyond.
-    void warm_start(Substep& step, std::span<const Vec3d> free);
+    // free: where the points' free motion has ended.
+    void detect(const Substep& step, std::span<const Vec3d> free);
+    // One sweep, over the points that others hit in this one or in that before.
+    void solve_impacts(Substep& step, std::uint32_t sweep);
+    void warm_start(Substep& step);
     void project(Substep& step);
     void solve_velocities(Substep& step);
 
@@ -59,6 +62,8 @@ private:
               std::size_t end);
     ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle) const;
     void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle) const;
+    void solve_impact(const ShapeContact& contact, Substep& step, std::uint32_t sweep) const;
+    static void leave_parting(ShapeContact& contact, const Substep& step);
     static void solve_velocity(ShapeContact& contact, Substep& step);
     void move_out(const Batch& contacts, Substep& step) const;
 

@@ -102,6 +102,7 @@ void Sleep::wake_now(std::size_t i, Substep& step)
 {
     wake(i);
     if (islands_.is_kinematic(i)) return;
+    ++woken_now_;
     const Mobility mobility = step.mobility_of(i);
     step.points[i].w = inverse_mass_[i] * mobility.v / step.dt;
     step.points[i].P += mobility.x * acceleration_[i];

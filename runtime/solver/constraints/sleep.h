@@ -72,6 +72,7 @@ public:
     // has woken, but that a kinematic point stays where it is.
     void wake_now(std::size_t i, Substep& step);
     void wake_islands_now(Substep& step);
+    std::size_t woken_now() const { return woken_now_; }  // points so far
 
     // After the last sub-step: loads are summed again, of those that are awake.
     void clear_loads();
@@ -108,7 +109,7 @@ private:
     std::vector<Vec3d> acceleration_;  // m/s²; NaN where it is not known
     std::vector<float> grip_;          // of the sleepers; NaN where it is not known
     std::vector<float> load_;          // N
-    std::size_t count_ = 0, still_ = 0;
+    std::size_t count_ = 0, still_ = 0, woken_now_ = 0;
 };
 
 }  // namespace rapid

@@ -1,0 +1,43 @@
+-- Rows against each other and against a load: a bond that is pulled, a contact against a rod.
+local scene = require "testing.scene"
+
+return {
+  {
+    feature = "clump",
+    law = "two bonded points pulled with 1e4 N, one sub-step: energy above the work, of the pull by a radius",
+    reference = "conservation", at_most = 1e-3,
+    measure = function()
+      local pull, r, most = 1e4, 0.1, 0
+      local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{-%g, 0, 0}, {%g, 0, 0}} } }
+  :attribute { pscale = %g } :clump { strength = 1e9 }
+  :action("pull", function(p) p.force = p.force + vec3(p.id == 0 and -%g or %g, 0, 0) end)
+  :solve { substeps = 1, sleep = math.huge }]]):format(r, r, r, pull, pull), { frames = {1, 97} })
+      local function energy(points)
+        local a, b = points[1], points[2]
+        return (a.v:dot(a.v) + b.v:dot(b.v)) / 2 - pull * (b.P.x - a.P.x)
+      end
+      for _, points in result:frames() do most = math.max(most, energy(points) - energy(result[1])) end
+      return most / (pull * r)
+    end,
+  },
+  {
+    feature = "contact, distance", law = "a rod shorter than both radii, from rest: energy that comes of it, 2 s",
+    reference = "conservation", at_most = 1e-6, unit = "J",
+    measure = function()
+      local most = 0
+      for _, substeps in ipairs { 1, 4, 16 } do
+        local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.1, 0, 0}, {0.05, 0.1, 0}} } }
+  :attribute { pscale = 0.1 } :distance { pairs = {{1, 2}, {2, 3}, {1, 3}} } :contact {}
+  :solve { substeps = %d, sleep = math.huge }]]):format(substeps), { frames = {1, 49} })
+        for _, points in result:frames() do
+          local energy = 0
+          for i = 1, #points do energy = energy + points[i].v:dot(points[i].v) / 2 end
+          most = math.max(most, energy)
+        end
+      end
+      return most
+    end,
+  },
+}

@@ -1,0 +1,96 @@
+-- The mechanical energy of a scene of passive_scenes in a frame, J: of motion, of gravity, of springs and of compliant
+-- rows.
+--
+--   local mechanical_energy = require "tests.verification.mechanical_energy"
+--   local energy = mechanical_energy.of(scene, result)
+--   energy[frame].total, .lively (of motion and of what is stretched), .rounding (of the state's single precision)
+--   mechanical_energy.gain(scene, result)      the largest gain over the first frame, above rounding: as a part of the
+--                                              most that is lively in the run; its frame; in J. nil where there is none
+--
+-- Gravity's potential is 0 at the lowest place that a point reaches, so that a point that dies takes energy away.
+local mechanical_energy = {}
+
+local ulp = 2 ^ -23 -- of single precision, relative
+
+local function length(P) return math.sqrt(P:dot(P)) end
+
+-- The energy that a stretch of so much stores, and what rounding at that distance from the origin makes of it.
+local function stored(stiffness, stretch, size)
+  local error = ulp * size
+  return stiffness * stretch ^ 2 / 2, stiffness * (math.abs(stretch) * error + error ^ 2)
+end
+
+-- Sums over what a node stretches; by_id: points of the frame that live.
+local stretches = {}
+function stretches.spring(node, scene, by_id, add)
+  for id = 0, #scene.points - 1 do
+    local p = by_id[id]
+    if p then
+      local stretch = node.radius and length(p.P) - node.radius or length(p.P - vec3(unpack(node.target)))
+      add(node.stiffness, stretch, length(p.P) + (node.radius or 1))
+    end
+  end
+end
+function stretches.distance(node, _, by_id, add, place_of)
+  if node.compliance == 0 then return end
+  for _, pair in ipairs(node.pairs) do
+    local a, b = by_id[place_of[pair[1]] - 1], by_id[place_of[pair[2]] - 1]
+    if a and b then
+      local first = length(vec3(unpack(pair[1].P)) - vec3(unpack(pair[2].P)))
+      add(1 / node.compliance, length(a.P - b.P) - (node.rest or first), length(a.P) + length(b.P))
+    end
+  end
+end
+function stretches.pin(node, _, by_id, add, place_of)
+  if node.compliance == 0 then return end
+  for _, point in ipairs(node.points) do
+    local p = by_id[place_of[point] - 1]
+    if p then add(1 / node.compliance, length(p.P - vec3(unpack(point.P))), 2 * length(p.P)) end
+  end
+end
+
+local function of_frame(scene, points, lowest, place_of)
+  local by_id, moving, height, elastic, rounding = {}, 0, 0, 0, 0
+  for i = 1, #points do
+    local p = points[i]
+    by_id[p.id] = p
+    local mass, speed2 = scene.points[p.id + 1].mass, p.v:dot(p.v)
+    moving = moving + mass * speed2 / 2
+    height = height + mass * scene.g * (p.P.y - lowest)
+    local slip = ulp * (length(p.P) + p.pscale) * scene.fps * scene.substeps -- of P, as a speed
+    rounding = rounding + mass * (ulp * (speed2 + scene.g * length(p.P)) + slip * (math.sqrt(speed2) + slip))
+  end
+  for _, node in ipairs(scene.nodes) do
+    if stretches[node.kind] then
+      stretches[node.kind](node, scene, by_id, function(stiffness, stretch, size)
+        local energy, error = stored(stiffness, stretch, size)
+        elastic, rounding = elastic + energy, rounding + error
+      end, place_of)
+    end
+  end
+  return { total = moving + height + elastic, lively = moving + elastic, rounding = rounding }
+end
+
+function mechanical_energy.of(scene, result)
+  local lowest, place_of, energies = math.huge, {}, {}
+  for i, point in ipairs(scene.points) do place_of[point] = i end
+  for _, points in result:frames() do
+    if #points > 0 then lowest = math.min(lowest, points:min("P").y) end
+  end
+  for frame, points in result:frames() do energies[frame] = of_frame(scene, points, lowest, place_of) end
+  return energies
+end
+
+function mechanical_energy.gain(scene, result)
+  local energies, lively = mechanical_energy.of(scene, result), 0
+  for _, energy in ipairs(energies) do lively = math.max(lively, energy.lively) end
+  local rounding, most, at = 0, 0, nil
+  for frame, energy in ipairs(energies) do
+    rounding = rounding + energy.rounding
+    local gain = energy.total - energies[1].total
+    if gain - rounding > most then most, at = gain - rounding, frame end
+  end
+  if at then return most / lively, at, most end
+end
+
+return mechanical_energy

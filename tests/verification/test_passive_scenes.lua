@@ -1,0 +1,86 @@
+-- Random scenes in which nothing can give energy (passive_scenes.lua): none has more than at its beginning, but for
+-- rounding, a hundredth, and what the run tells that contacts have added.
+--
+-- In the suite some are run; PASSIVE_SCENES=2000 PASSIVE_SEED=7 rapid test tests/verification runs more, and others. Of
+-- a scene that gains, the simplest that still does is shown, ready to run.
+local scene = require "testing.scene"
+local json = require "dkjson"
+local passive_scenes = require "tests.verification.passive_scenes"
+local mechanical_energy = require "tests.verification.mechanical_energy"
+
+local scenes = tonumber(os.getenv "PASSIVE_SCENES") or 100
+local seed = tonumber(os.getenv "PASSIVE_SEED") or 1
+local allowed = 0.01 -- of the most energy that is in motion or stored in springs
+local most_tries = 300 -- of simpler scenes
+
+-- What contacts have added up to a frame, as the run tells it, J.
+local function told(text, frame)
+  local run = scene.command("run", text, ("-f 1-%d --quiet --stats stats.json"):format(frame))
+  assert(run.status == 0, run.stderr)
+  local sum = 0
+  for _, one in ipairs(json.decode(scene.folder:read "stats.json").frames) do sum = sum + one.contact_energy.added end
+  return sum
+end
+
+-- What is wrong with a scene, as a text, and by how much; nil where nothing is.
+local function fault_of(description)
+  local text = passive_scenes.text(description)
+  local ok, result = pcall(scene.run, text, { frames = {1, description.frames}, threads = 1 })
+  if not ok then return tostring(result), math.huge end
+  local part, frame, gain = mechanical_energy.gain(description, result)
+  collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+  if not part or part <= allowed then return end
+  local excess = gain - told(text, frame)
+  if excess <= allowed * gain / part then return end
+  return ("%.3g J more in frame %d, %.3g of what is in motion or stored, and %.3g J told"):format(gain, frame, part,
+    gain - excess), part
+end
+
+-- The simplest scene found that gains still, at least a hundredth as much.
+local function simplest(description, fault, part)
+  local least, tries, found = part / 100, 0, true
+  while found and tries < most_tries do
+    found = false
+    for _, simpler in ipairs(passive_scenes.simpler(description)) do
+      tries = tries + 1
+      local other, other_part = fault_of(simpler)
+      if other and other_part >= least then
+        description, fault, found = simpler, other, true
+        break
+      end
+    end
+  end
+  return description, fault
+end
+
+-- Which nodes a scene has.
+local function nodes_of(description)
+  local has = {}
+  for _, node in ipairs(description.nodes) do has[node.kind] = true end
+  return has
+end
+
+-- Goes through so many of the scenes that are wanted; all that gain are told.
+local function none_gains(count, wanted)
+  local faults, number = {}, 0
+  while count > 0 do
+    number = number + 1
+    local description = passive_scenes.scene(seed, number)
+    if wanted(nodes_of(description)) then
+      count = count - 1
+      local fault, part = fault_of(description)
+      if fault then
+        description, fault = simplest(description, fault, part)
+        faults[#faults + 1] = ('scene %d of seed %d: %s\nlocal rapid = require "rapid"\n%s'):format(number, seed, fault,
+          passive_scenes.text(description))
+      end
+    end
+  end
+  assert.equal("", table.concat(faults, "\n\n"))
+end
+
+describe(("random passive scenes (%d of seed %d)"):format(scenes, seed), function()
+  it("of rods, bonds and pins gain no energy", function()
+    none_gains(scenes, function(has) return not (has.contact or has.spring or has.collide) end)
+  end)
+end)

@@ -98,6 +98,27 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     frame.figures = std::move(before);
 }
 
+namespace {
+
+std::vector<AttributeRange> ranges_for_solve(const PlannedNode& planned)
+{
+    const NodeType& type = *planned.node->type;
+    std::vector<AttributeRange> ranges;
+    if (type.kind != NodeKind::Dynamic && type.kind != NodeKind::Solve) return ranges;
+    for (const Param& param : type.params) {
+        const std::string attribute = param.attribute ? param.attribute(planned.op->fields()) : "";
+        if (!attribute.empty()) ranges.push_back({param.name, attribute, param.range});
+    }
+    for (const std::string& name : type.uses.takes) {
+        const AttributeSpec* known = known_attribute(name);
+        if (known && std::holds_alternative<float>(known->fallback))
+            ranges.push_back({name, name, range_of_attribute(name)});
+    }
+    return ranges;
+}
+
+}  // namespace
+
 // A node's Evaluation, with the objects that it refers to.
 class Evaluator::Context {
 public:
@@ -112,10 +133,10 @@ public:
             };
         // A simulation that begins at the end of this frame, or later, is counted once.
         const bool at_start = step_ <= simulation_.start;
-        evaluation.emplace(Evaluation{now_, at_start, planned.node->name, planned.node->location,
-                                      RandomKey(simulation_.seed, planned.node->name),
-                                      left > 0 && at_start ? repeated_ : frame.figures, frame.warnings, write_,
-                                      &evaluator.plan_.simulations[planned.simulation].left_out});
+        evaluation.emplace(Evaluation{
+            now_, at_start, planned.node->name, planned.node->location, RandomKey(simulation_.seed, planned.node->name),
+            left > 0 && at_start ? repeated_ : frame.figures, frame.warnings, write_,
+            &evaluator.plan_.simulations[planned.simulation].left_out, ranges_for_solve(planned)});
     }
     Context(const Context&) = delete;
     Context& operator=(const Context&) = delete;

@@ -12,6 +12,7 @@
 #include "runtime/frame.h"
 #include "runtime/graph/figures.h"
 #include "runtime/points/point_set.h"
+#include "runtime/points/range.h"
 #include "runtime/random.h"
 
 namespace rapid {
@@ -33,6 +34,8 @@ struct Evaluation {
     const std::function<void(const std::string& pattern, const PointSet& points)>& write;
     // Attributes and groups that the plan leaves out of this simulation (PlannedAttribute); null: none.
     const std::set<std::string>* left_out = nullptr;
+    // Of the attributes that a node reads for Solve: those of its parameters, and known ones.
+    std::vector<AttributeRange> ranges = {};
 
     // Whether a node that makes this attribute or group is to make it.
     bool keeps(const std::string& name) const { return !left_out || !left_out->count(name); }
@@ -47,6 +50,7 @@ std::shared_ptr<D> dynamic_of(const Evaluation& now, const std::string& group, A
     made->node = now.node;
     made->location = now.location;
     made->group = group;
+    made->ranges = now.ranges;
     return made;
 }
 

@@ -34,8 +34,7 @@ std::string right_type(const Param& param)
 
 double checked(const Param& param, double value)
 {
-    const bool finite = std::isfinite(value) || (param.range.infinity && !std::isnan(value));
-    if (!finite || !param.range.contains(value)) out_of_range(param, value);
+    if (!param.range.accepts(value)) out_of_range(param, value);
     return value;
 }
 
@@ -116,16 +115,6 @@ void check_attribute_name(std::string_view name)
 
 }  // namespace
 
-std::string Range::text() const
-{
-    const bool low = std::isfinite(lo), high = std::isfinite(hi);
-    if (low && high && !lo_excluded) return fmt::format("from {} to {}", lo, hi);
-    if (low && high) return fmt::format("above {} and at most {}", lo, hi);
-    if (low) return fmt::format("{} {}", lo_excluded ? "above" : "at least", lo);
-    if (high) return fmt::format("at most {}", hi);
-    return "any number";
-}
-
 void wrong_type(const Param& param, const Value& value)
 {
     if (value.is_nil()) throw Error(fmt::format("{} is nil; it must be {}", param.name, right_type(param)));
@@ -135,7 +124,7 @@ void wrong_type(const Param& param, const Value& value)
 
 void out_of_range(const Param& param, double value)
 {
-    std::string right = param.range.bounded() ? param.range.text() : "finite";
+    std::string right = param.range.right();
     if (std::isfinite(value) && param.range.contains(value))  // too large for float
         right = fmt::format("within ±{:.3g}", std::numeric_limits<float>::max());
     throw Error(fmt::format("{} = {} is out of range; it must be {}", param.name, value, right));
@@ -239,10 +228,9 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
             field = to_int<std::int32_t>(param, *number);
             return;
         }
-        Param finite = param;
-        const float* ordinary = known ? std::get_if<float>(&known->fallback) : nullptr;
-        finite.range.infinity = ordinary && std::isinf(*ordinary);  // life may be infinite
-        field = to_float(finite, checked(finite, *number));
+        Param ranged = param;
+        ranged.range = range_of_attribute(param.name);
+        field = to_float(ranged, checked(ranged, *number));
         return;
     }
     if (!known || std::holds_alternative<Vec3f>(known->fallback)) {

@@ -2,9 +2,7 @@
 // validation, `rapid nodes` and the annotations for editors.
 #pragma once
 
-#include <cmath>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,26 +13,10 @@
 #include "runtime/error.h"
 #include "runtime/graph/value.h"
 #include "runtime/points/per_point.h"
+#include "runtime/points/range.h"
 #include "runtime/shapes/motion/motion.h"
 
 namespace rapid {
-
-struct Range {
-    double lo = -std::numeric_limits<double>::infinity();
-    double hi = std::numeric_limits<double>::infinity();
-    bool lo_excluded = false;  // above lo, not at it
-    bool infinity = false;     // accepts math.huge too; NaN is never in range
-
-    bool contains(double x) const { return (lo_excluded ? x > lo : x >= lo) && x <= hi; }
-    bool bounded() const { return std::isfinite(lo) || std::isfinite(hi); }
-    std::string text() const;  // "from 0 to 1", "at least 0", "above 0"
-};
-
-inline Range any_number() { return {}; }
-inline Range at_least(double lo) { return {lo}; }
-inline Range above(double lo) { return {lo, std::numeric_limits<double>::infinity(), true}; }
-inline Range between(double lo, double hi) { return {lo, hi}; }
-inline Range or_infinity(Range range) { return range.infinity = true, range; }
 
 struct Param {
     std::string name, type;  // type for users: "number", "vec3", "shape"
@@ -51,6 +33,9 @@ struct Param {
 
     // Stores a value, which is not a function, in the node's field. Error: wrong type, out of range; with the value.
     std::function<void(const Param& self, void* fields, const Value& value)> assign;
+    // The attribute from which the field is read; empty where it is a constant. Null where the type takes no numbers
+    // of points.
+    std::function<std::string(const void* fields)> attribute;
 };
 
 // Reads a value into a field, or throws an Error with the name of the parameter, the value and what would be right. A
@@ -171,6 +156,13 @@ Param param_of(F T::*field, std::string name, Value fallback, Range range, std::
         if constexpr (std::is_same_v<F, double>)
             if (param.unit == "deg") read *= EIGEN_PI / 180;
     };
+    if constexpr (std::is_same_v<F, PerPoint<float>>)
+        p.attribute = [field](const void* fields) { return (static_cast<const T*>(fields)->*field).attribute; };
+    if constexpr (std::is_same_v<F, std::optional<PerPoint<float>>>)
+        p.attribute = [field](const void* fields) {
+            const F& given = static_cast<const T*>(fields)->*field;
+            return given ? given->attribute : std::string();
+        };
     return p;
 }
 

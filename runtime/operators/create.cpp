@@ -6,6 +6,7 @@
 // same.
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/points/attribute_like.h"
 
 #include <fmt/format.h>
 
@@ -43,7 +44,7 @@ struct Create {
         if (!points) return;
         for (const auto& [name, column] : points->points.columns())
             if (name != "P" && name != "v" && name != "id" && name != "dt")
-                uses.makes.push_back({name, fallback_of(column)});
+                uses.makes.push_back(attribute_like(name, fallback_of(column)));
         for (const auto& [name, members] : points->points.groups()) uses.makes_groups.push_back(name);
     }
 

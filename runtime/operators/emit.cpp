@@ -25,6 +25,7 @@
 #include "runtime/operators/emit/draws.h"
 #include "runtime/operators/emit/interval.h"
 #include "runtime/parallel.h"
+#include "runtime/points/attribute_like.h"
 
 namespace rapid {
 namespace {
@@ -44,16 +45,6 @@ void read_value(const Param& param, const Value& value, EmitSource& field)
 {
     read_value(param, value, field.object);
     if (!field.object) wrong_type(param, value);
-}
-
-// The value of points that have none, of an attribute that holds values of the type of `like`.
-AttributeSpec neutral(const std::string& name, const AttributeValue& like)
-{
-    if (const AttributeSpec* known = known_attribute(name)) return *known;
-    if (name == "Cd" && std::holds_alternative<Vec3f>(like))
-        return {name, Vec3f(Vec3f::Ones())};  // white, as in Houdini
-    return {name, std::visit([](const auto& v) -> AttributeValue { return Column<std::decay_t<decltype(v)>>::zero(); },
-                             like)};
 }
 
 // The newborn points' part of the columns in which each has a value of its own, shape [n]; the others are empty.
@@ -264,9 +255,9 @@ private:
     std::vector<AttributeSpec> made() const
     {
         std::vector<AttributeSpec> specs;
-        for (const auto& [name, value] : attributes) specs.push_back(neutral(name, value));
+        for (const auto& [name, value] : attributes) specs.push_back(attribute_like(name, value));
         for (const std::string& name : inherited())
-            std::visit([&](const auto& c) { specs.push_back(neutral(name, c.fallback())); },
+            std::visit([&](const auto& c) { specs.push_back(attribute_like(name, c.fallback())); },
                        *source_.values().find(name));
         return specs;
     }

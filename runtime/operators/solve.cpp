@@ -8,6 +8,7 @@
 #include "runtime/graph/node.h"
 #include "runtime/operators/solve/aging.h"
 #include "runtime/operators/solve/collider_shapes.h"
+#include "runtime/points/members.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/estimate/energy_drift.h"
 #include "runtime/solver/estimate/error_control.h"
@@ -58,6 +59,7 @@ struct Solve {
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
     {
         Flow flow = std::move(inputs[0]);
+        require_in_range(flow, now);
         SolveOptions options = begin(flow, now);
         note_stiffness(flow, options, now);
         if (flow.simulation->trial) {
@@ -67,6 +69,7 @@ struct Solve {
         interact(flow.points, flow.dynamics, options);
         begin_estimates(flow, options);
         const Tolerated done = advance(flow, options);
+        if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
         estimate(flow, options, now);
         interact(flow.points, flow.dynamics, options);
         report(done, now);
@@ -77,6 +80,26 @@ struct Solve {
 
 private:
     static bool is_coupled(const Flow& flow) { return !flow.dynamics.constraints().empty(); }
+    // Whether neighbours act on each other within the frame.
+    bool interacts(const Flow& flow) const
+    {
+        return substeps > 1 && !tolerance && !flow.dynamics.interactions().empty();
+    }
+
+    // The attributes that stand for parameters are refused as constants are, by one scan of each.
+    static void require_in_range(const Flow& flow, const Evaluation& now)
+    {
+        const auto frame = static_cast<std::int64_t>(std::ceil(now.frame.number));
+        const PointSet& points = flow.points;
+        flow.dynamics.visit_in_order([&](const auto& dynamic) {
+            at_node(*dynamic, [&] {
+                for (const AttributeRange& range : dynamic->ranges)
+                    rapid::require_in_range(points, members_of(points, dynamic->group), range, frame);
+            });
+        });
+        for (const AttributeRange& range : now.ranges)
+            rapid::require_in_range(points, members_of(points, {}), range, frame);
+    }
 
     SolveOptions begin(Flow& flow, const Evaluation& now)
     {

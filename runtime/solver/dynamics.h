@@ -15,6 +15,7 @@
 #include "runtime/error.h"
 #include "runtime/points/per_point.h"
 #include "runtime/points/point_set.h"
+#include "runtime/points/range.h"
 #include "runtime/shapes/motion/motion.h"
 #include "runtime/shapes/shape.h"
 #include "runtime/solver/forces.h"
@@ -25,9 +26,10 @@ class Dynamic {
 public:
     virtual ~Dynamic() = default;
 
-    std::string node;   // for messages
-    Location location;  // of the node, in the graph file
-    std::string group;  // acts on the points of this group only; on all when empty
+    std::string node;                    // for messages
+    Location location;                   // of the node, in the graph file
+    std::string group;                   // acts on the points of this group only; on all when empty
+    std::vector<AttributeRange> ranges;  // of the attributes that it reads
 };
 
 // Calls f; an Error that it throws gets the node of this dynamic.

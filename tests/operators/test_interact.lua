@@ -34,7 +34,7 @@ describe("interact", function()
     local text = "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, mass = {0} } } " ..
       ":interact { radius = 1 } :solve {}"
     assert.truthy(scene.error(text, { frames = {1, 2} })
-      :find('node "interact1": point 0, frame 2: its mass is 0; with interactions it must be above 0', 1, true))
+      :find('mass = 0 is out of range; it must be above 0', 1, true))
   end)
 
   it("finds neighbours within any radius, however small beside the scene", function()

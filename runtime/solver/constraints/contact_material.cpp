@@ -1,7 +1,6 @@
 #include "runtime/solver/constraints/contact_material.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <cmath>
 
 #include "runtime/points/members.h"
@@ -18,12 +17,6 @@ ContactMaterial::ContactMaterial(const PointSet& points, const ContactOptions& o
     root_friction.resize(n);
     restitution.resize(n);
     for (std::size_t i = 0; i < n; ++i) {
-        if (!(radii[i] >= 0) || !std::isfinite(radii[i]))
-            throw Error(fmt::format("point {}: its radius is {:g}; it must be finite and at least 0", points.id()[i],
-                                    radii[i]));
-        if (!(friction[i] >= 0))
-            throw Error(
-                fmt::format("point {}: its friction is {:g}; it must be at least 0", points.id()[i], friction[i]));
         radius[i] = members[i] ? radii[i] : 0;
         root_friction[i] = std::sqrt(friction[i]);
         restitution[i] = bounce[i];

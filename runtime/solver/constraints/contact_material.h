@@ -26,7 +26,7 @@ struct ContactMaterial {
     bool bounces = false;      // some restitution is above 0
 
     ContactMaterial() = default;
-    // Error: a radius that is negative or not finite, a friction below 0, with the point's id; an attribute is missing.
+    // Error: an attribute is missing.
     ContactMaterial(const PointSet& points, const ContactOptions& options, const std::string& group);
 
     double reach(std::uint32_t i, std::uint32_t j) const { return double(radius[i]) + double(radius[j]); }

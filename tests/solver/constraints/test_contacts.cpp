@@ -558,31 +558,5 @@ TEST_CASE("grids are those of Algorithm 1, and their quality that of equation 5"
     CHECK(RadiusGrids({&same, 0}, 10, 0, 8).excess == 0);
 }
 
-TEST_CASE("an invalid radius is refused, with the point", "[contacts]")
-{
-    Granular scene(points({{0, 0, 0}, {1, 0, 0}}).set<float>("pscale", {1, -1}));
-    std::string text;
-    try {
-        scene.run(1);
-    } catch (const Error& error) {
-        text = error.what();
-    }
-    CHECK(text == "node \"contact1\": point 1: its radius is -1; it must be finite and at least 0");
-}
-
-TEST_CASE("a friction below 0 is refused, with the point", "[contacts]")
-{
-    const float wrong = GENERATE(-1.0f, std::numeric_limits<float>::quiet_NaN());
-    Granular scene(points({{0, 0, 0}, {1, 0, 0}}).set<float>("pscale", {0.1f, 0.1f}).set<float>("mu", {0.5f, wrong}));
-    scene.spheres->options.friction = PerPoint<float>::of("mu");
-    std::string text;
-    try {
-        scene.run(1);
-    } catch (const Error& error) {
-        text = error.what();
-    }
-    CHECK(text.rfind("node \"contact1\": point 1: its friction is ", 0) == 0);
-}
-
 }  // namespace
 }  // namespace rapid

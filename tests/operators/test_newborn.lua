@@ -1,0 +1,26 @@
+-- Attributes that the initial points bring: points that are born without them have the default of a known name.
+local scene = require "testing.scene"
+
+describe("newborn points among initial ones with attributes of their own", function()
+  local points = scene.run([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}}, mass = {2, 3},
+    pscale = {0.1, 0.2}, life = {5, 6}, hitpath = {7, 8}, Cd = {{1, 0, 0}, {0, 1, 0}}, heat = {4, 4} } }
+  :emit { source = rapid.points.from { P = {{0, 5, 0}} }, impulse = { [2] = 1 }, birth = "end" }
+  :spring { stiffness = 6 } :contact {} :solve {}]], { frames = {2, 3} })
+
+  it("have the defaults of known names, zero of others, and white", function()
+    local p = points[2][3]
+    assert.equal(1, p.mass)
+    assert.equal(0, p.pscale)
+    assert.equal(math.huge, p.life)
+    assert.equal(-1, p.hitpath)
+    assert.equal(vec3(1, 1, 1), p.Cd)
+    assert.equal(0, p.heat)
+    assert.equal(2, points[2][1].mass)
+  end)
+
+  it("move as points of 1 kg do", function()
+    local p = points[3][3]
+    assert.near(5 * math.cos(math.sqrt(6) / 24), p.P.y, 1e-6)
+  end)
+end)

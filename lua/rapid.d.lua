@@ -571,7 +571,7 @@ function Node:clump(params) end
 ---@field cut? integer[]|fun(frame: rapid.Frame): integer[]  frames to which the shape jumps: nothing is swept along on the way; found where not given [list of frames]
 ---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution: the part of the speed that is kept [number, from 0 to 1, default 0.5, takes rapid.attr]
 ---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient [number, at least 0, default 0, takes rapid.attr]
----@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
+---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale, where that is 0 the radius of contact, else 0 [number, m, at least 0, takes rapid.attr]
 ---@field method? "continuous"|"backtrack"|"project"|fun(frame: rapid.Frame): "continuous"|"backtrack"|"project"  on the path, at the time of impact; or after the step, by going back or out along the gradient [string, one of continuous, backtrack, project, default "continuous"]
 ---@field response? "bounce"|"slide"|"stick"|"die"|fun(frame: rapid.Frame): "bounce"|"slide"|"stick"|"die"  slide: without bounce; stick: held by the shape; die: killed [string, one of bounce, slide, stick, die, default "bounce"]
 ---@field record? number|boolean|fun(frame: rapid.Frame): number|boolean  writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, hittime, hitimpulse, hitpath [false or number, m/s, at least 0, default false]

@@ -80,7 +80,7 @@ struct Collide {
                    "restitution: the part of the speed that is kept")
             .param(&Collide::friction, "friction", 0.0, at_least(0), "", "Coulomb's coefficient")
             .param(&Collide::radius, "radius", Value(), at_least(0), "m",
-                   "of the points; the attribute pscale where they have it, else 0")
+                   "of the points; the attribute pscale, where that is 0 the radius of contact, else 0")
             .param(&Collide::method, "method", "continuous", any_number(), "",
                    "on the path, at the time of impact; or after the step, by going back or out along the gradient")
             .choices({"continuous", "backtrack", "project"})

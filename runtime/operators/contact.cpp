@@ -21,6 +21,7 @@ public:
         contacts->follow(points, options, group);
         return contacts;
     }
+    std::optional<PerPoint<float>> radius() const override { return options.radius; }
 };
 
 struct ContactNode {

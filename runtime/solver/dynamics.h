@@ -108,7 +108,7 @@ public:
     std::optional<double> record;    // m/s: contacts at least as fast are written to the hit attributes
     PerPoint<float> bounce{0.5f};    // restitution ε in [0, 1]
     PerPoint<float> friction{0.0f};  // Coulomb μ >= 0
-    // The attribute pscale where the points have it, unless the node says otherwise.
+    // Of the points; collision_radii.h where it is not given.
     std::optional<PerPoint<float>> radius;
 };
 

@@ -20,7 +20,7 @@ public:
     }
     void operator()(const std::shared_ptr<const Collider>& collider) const
     {
-        at_node(*collider, [&] { scene_.obstacles.emplace_back(*collider, points_); });
+        at_node(*collider, [&] { scene_.obstacles.emplace_back(*collider, points_, scene_.radii->of(*collider)); });
         scene_.kills |= collider->response == Response::Die;
         scene_.records |= collider->record.has_value();
     }
@@ -72,6 +72,7 @@ StepScene::StepScene(PointSet& points, const Dynamics& dynamics, double h) : mas
             if (auto pass = action->begin(points)) actions.push_back({action.get(), std::move(pass)});
         });
     const PointSet& set = points;
+    radii.emplace(dynamics, set);
     dynamics.visit_in_order(SceneBuilder(*this, set, h));
     force = nonzero_forces_of(set);
     if (set.has("mass")) mass = set.column<float>("mass").read();

@@ -8,6 +8,7 @@
 
 #include "runtime/points/point_set.h"
 #include "runtime/solver/collision/obstacle.h"
+#include "runtime/solver/collision_radii.h"
 #include "runtime/solver/constraints/projection.h"
 #include "runtime/solver/dynamics.h"
 
@@ -33,6 +34,7 @@ struct StepScene {
     std::vector<StepAction> actions;
     Uniform uniform;  // the sum of all uniform forces on all points
     std::vector<StepForce> forces;
+    std::optional<CollisionRadii> radii;  // of the obstacles
     std::vector<Obstacle> obstacles;
     std::vector<LocalConstraint> constraints;
     bool kills = false, records = false;   // whether a collider does

@@ -68,8 +68,9 @@ describe("the study", function()
     local substeps, iterations = lines["sub-steps"].errors, lines.iterations.errors
     falls(substeps)
     assert.equal(substeps[1], iterations[1]) -- eight sub-steps of one iteration, both
-    for i = 2, #substeps do
-      assert.is_true(substeps[i] < iterations[i] / 2, ("%g and %g"):format(substeps[i], iterations[i]))
+    for i = 2, #substeps do -- 16, 32, 64, 128 sweeps
+      local most = i == 2 and iterations[i] or iterations[i] / 4
+      assert.is_true(substeps[i] < most, ("%g and %g"):format(substeps[i], iterations[i]))
     end
   end)
 

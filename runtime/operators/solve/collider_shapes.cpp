@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "runtime/shapes/motion/moving.h"
+#include "runtime/solver/collision_radii.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -14,9 +15,10 @@ namespace {
 // to hold: points that large are kept out without voxels that small.
 constexpr double most_voxels = 0x1p31, most_voxels_of_wide_band = 0x1p27;
 
-double largest_radius(const Collider& collider, const PointSet& points)
+double largest_radius(const Collider& collider, const Dynamics& dynamics, const PointSet& points)
 {
-    const Strided<float> radius = radii_of(collider.radius, points);
+    const CollisionRadii radii(dynamics, points);
+    const Strided<float> radius = radii.of(collider);
     float largest = 0;
     for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i) largest = std::max(largest, radius[i]);
     return largest;
@@ -24,11 +26,11 @@ double largest_radius(const Collider& collider, const PointSet& points)
 
 // The distance from the surface at which a level set is sampled (§4.3), m: the largest radius and two voxels, for the
 // cells at the edge of the band; and the depth that a sub-step reaches, where points are put back after it.
-double needed_band(const Collider& collider, const PointSet& points, double voxel, const Box3d& bounds, double h,
-                   int substeps)
+double needed_band(const Collider& collider, const Dynamics& dynamics, const PointSet& points, double voxel,
+                   const Box3d& bounds, double h, int substeps)
 {
     // A grid keeps its half width in single precision.
-    const double needed = (largest_radius(collider, points) + 2 * voxel) * (1 - 0x1p-20);
+    const double needed = (largest_radius(collider, dynamics, points) + 2 * voxel) * (1 - 0x1p-20);
     if (collider.method == Method::Continuous) return needed;
     float fastest2 = 0;
     const Strided<Vec3f> v = points.v().read();
@@ -93,7 +95,7 @@ void ColliderShapes::widen(Dynamics& dynamics, const PointSet& points, int subst
         const auto level_set = std::dynamic_pointer_cast<const LevelSet>(collider->shape);
         if (!level_set) continue;
         const double needed =
-            needed_band(*collider, points, level_set->voxel(), level_set->bounds(), now.frame.dt, substeps);
+            needed_band(*collider, dynamics, points, level_set->voxel(), level_set->bounds(), now.frame.dt, substeps);
         const auto known = widened_.find(collider->shape);
         LevelSetPtr shape = known == widened_.end() ? level_set : known->second;
         const Stopwatch stopwatch;
@@ -124,8 +126,8 @@ void ColliderShapes::set_in_motion(Dynamics& dynamics, const PointSet& points, c
         const bool same = known != deformations_.end() && known->second.body() == collider.deforming;
         Deformation& body =
             deformations.emplace(collider.node, same ? known->second : Deformation(collider.deforming)).first->second;
-        const double band = needed_band(collider, points, collider.deforming->voxel(), collider.deforming->bounds(),
-                                        now.frame.dt, substeps);
+        const double band = needed_band(collider, dynamics, points, collider.deforming->voxel(),
+                                        collider.deforming->bounds(), now.frame.dt, substeps);
         const Stopwatch stopwatch;
         Deformation::Interval interval = body.over({clock.fps, clock.start}, from, to, collider.motion, options, band);
         const LevelSet& built = *body.at_end();

@@ -7,7 +7,7 @@
 
 namespace rapid {
 
-Obstacle::Obstacle(const Collider& collider, const PointSet& points)
+Obstacle::Obstacle(const Collider& collider, const PointSet& points, Strided<float> radius_of_points)
     : shape(collider.shape.get()),
       bounds(shape->bounds()),
       feature(shape->smallest_feature()),
@@ -19,7 +19,7 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points)
       record(collider.record),
       bounce(collider.bounce.read(points)),
       friction(collider.friction.read(points)),
-      radius(radii_of(collider.radius, points)),
+      radius(radius_of_points),
       members(members_of(points, collider.group))
 {
 }

@@ -14,8 +14,8 @@
 namespace rapid {
 
 struct Obstacle {
-    // Error: a parameter's attribute is missing.
-    Obstacle(const Collider& collider, const PointSet& points);
+    // radius_of_points: m, valid as long as this. Error: a parameter's attribute is missing.
+    Obstacle(const Collider& collider, const PointSet& points, Strided<float> radius_of_points);
 
     const Shape* shape;
     Box3d bounds;

@@ -115,6 +115,10 @@ public:
     // Before a frame, on one thread, with the points where they begin it. Limits itself to `group`. Null where there is
     // nothing to do.
     virtual std::shared_ptr<Coupling> begin(const PointSet& points, double frame_length) const = 0;
+
+    // The radius, m, that it gives its points, where it is not the attribute pscale: shapes keep them at that distance,
+    // too (collision_radii.h).
+    virtual std::optional<PerPoint<float>> radius() const { return std::nullopt; }
 };
 
 }  // namespace rapid

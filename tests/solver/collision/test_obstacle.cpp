@@ -11,13 +11,14 @@ using test::points;
 // An obstacle refers to its collider.
 struct ShapeCollider : Collider {
     explicit ShapeCollider(ShapePtr of) { shape = std::move(of); }
+    Obstacle among(const PointSet& set) const { return {*this, set, radii_of(radius, set)}; }
 };
 
 TEST_CASE("the contact tolerance grows with the coordinates that are rounded, and with the radius", "[obstacle]")
 {
     const PointSet set = points({{0, 0, 0}});
     const ShapeCollider plane(make_plane({0, 1, 0}, 0));
-    const Obstacle obstacle(plane, set);
+    const Obstacle obstacle = plane.among(set);
     CHECK(obstacle.contact_tolerance({0, 0, 0}, 0) == 0);
     CHECK(obstacle.contact_tolerance({1, -4, 2}, 0) == 0x1p-20);
     CHECK(obstacle.contact_tolerance({0, 0, 0}, 2) == 0x1p-21);
@@ -27,7 +28,7 @@ TEST_CASE("the largest radius is that of the points that are asked about", "[obs
 {
     const PointSet set = points({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}).set<float>("pscale", {0.5f, 2, 1});
     const ShapeCollider plane(make_plane({0, 1, 0}, 0));
-    const Obstacle obstacle(plane, set);
+    const Obstacle obstacle = plane.among(set);
     const std::vector<std::uint32_t> some{0, 2}, all{0, 1, 2};
     CHECK(obstacle.largest_radius(some) == 1);
     CHECK(obstacle.largest_radius(all) == 2);
@@ -37,7 +38,7 @@ TEST_CASE("marks are kept on points outside all obstacles", "[obstacle]")
 {
     const PointSet set = points({{0, 3, 0}, {0, 0.5f, 0}, {5, 0, 0}, {0, 3, 0}}).set<float>("pscale", {0, 0, 0, 2});
     const ShapeCollider here(make_sphere_shape(1, {0, 0, 0})), there(make_sphere_shape(1, {5, 0, 0}));
-    const std::vector<Obstacle> obstacles{Obstacle(here, set), Obstacle(there, set)};
+    const std::vector<Obstacle> obstacles{here.among(set), there.among(set)};
     const std::vector<std::uint32_t> all{0, 1, 2, 3};
     const std::vector<Vec3d> P{{0, 3, 0}, {0, 0.5, 0}, {5, 0, 0}, {0, 3, 0}};  // the last touches
     std::vector<std::uint8_t> marks{1, 1, 1, 1};

@@ -45,7 +45,7 @@ void CoupledStep::run()
     SolveResult& result = context_.result();
     if (sleep_) sleep_->clear_loads();
     result.residual = projection.close(now_, options.loads, ids);
-    if (sleep_) sleep_->close(now_, context_.P, context_.time);
+    if (sleep_) sleep_->close(now_, context_.P, context_.v, context_.time);
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { store(begin, end); });
     if (!sleep_) return;
     sleep_->remember(*options.sleep_records, now_, scene.obstacles);

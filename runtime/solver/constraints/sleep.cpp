@@ -25,10 +25,17 @@ constexpr double still_shift = 0.05, still_speed = 0.25;
 // sub-steps.
 constexpr double still_hanging = 1e-4;
 
-// The part by which an acceleration may change without waking: friction holds what lies, and nothing what hangs.
-constexpr double same_acceleration = 0.1, same_acceleration_linked = 1e-3;
+// What no other point presses or holds comes to rest exactly, or slides: as a part of what the accelerations give it in
+// a sub-step. Above rounding, so that what drag slows down for ever falls asleep, too.
+constexpr double still_alone = 1e-6;
+
+// The part by which an acceleration may change without waking: friction may just have held what lies.
+constexpr double same_acceleration = 1e-3;
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+
+// What gains speed in a frame is not held by friction, however slow it is: it falls asleep when it does no longer.
+float just_before(double after) { return std::nextafter(static_cast<float>(after), 0.0f); }
 
 }  // namespace
 
@@ -45,7 +52,7 @@ Sleep::Sleep(PointSet& points, std::span<const double> inverse_mass, double afte
       asleep_(points.size()),
       kept_awake_(points.size()),
       acceleration_(points.size(), Vec3d::Constant(unknown)),
-      grip_(points.size(), unknown),
+      grip_(points.size()),
       load_(points.size(), 0.0f)
 {
 }
@@ -143,11 +150,11 @@ void Sleep::begin(const Substep& step, std::span<const Obstacle> obstacles)
 void Sleep::wake_by_grips(std::span<const std::uint32_t> sleepers, std::span<const Obstacle> obstacles,
                           std::span<const Vec3d> P)
 {
-    const std::vector<float> found = shape_grips(sleepers, obstacles, P, 0);
+    const std::vector<ShapeGrip> found = shape_grips(sleepers, obstacles, P, 0);
     for (std::size_t k = 0; k < sleepers.size(); ++k) {
-        float& known = grip_[sleepers[k]];
-        if (std::isnan(known)) known = found[k];
-        if (known != found[k]) wake(sleepers[k]);
+        std::optional<ShapeGrip>& known = grip_[sleepers[k]];
+        if (!known) known = found[k];
+        if (!known->is_like(found[k])) wake(sleepers[k]);
     }
 }
 
@@ -174,9 +181,9 @@ void Sleep::wake_by_motion_of(const Obstacle& obstacle, std::span<const std::uin
 
 void Sleep::check_acceleration(std::size_t i, const Vec3d& acceleration)
 {
-    const double same = islands_.has(i) ? same_acceleration_linked : same_acceleration;
     const bool known = acceleration_[i].allFinite();
-    if (asleep_[i] && known && (acceleration - acceleration_[i]).norm() > same * acceleration_[i].norm()) wake(i);
+    if (asleep_[i] && known && (acceleration - acceleration_[i]).norm() > same_acceleration * acceleration_[i].norm())
+        wake(i);
     if (!asleep_[i] || !known) acceleration_[i] = acceleration;
 }
 
@@ -199,7 +206,7 @@ std::vector<std::uint8_t> Sleep::find_hanging(const Substep& step) const
     return hangs;
 }
 
-void Sleep::close(Substep& step, std::span<const Vec3f> start, const OwnTime& lived)
+void Sleep::close(Substep& step, std::span<const Vec3f> P, std::span<const Vec3f> v, const OwnTime& lived)
 {
     const auto h = static_cast<float>(lived.h);
     const std::span<float> still = points_.column<float>("still").write();
@@ -211,35 +218,51 @@ void Sleep::close(Substep& step, std::span<const Vec3f> start, const OwnTime& li
         for (std::size_t i = first; i < last; ++i) {
             if (asleep_[i]) continue;
             const bool linked = islands_.has(i);
-            const double most = linked && hangs[i] ? hanging : std::numeric_limits<double>::infinity();
-            const double shift = (step.points[i].P - start[i].cast<double>()).norm();
+            const bool alone = !linked && !(load_[i] > 0);
+            const double most = linked && hangs[i] ? hanging
+                                : alone            ? still_alone * gained
+                                                   : std::numeric_limits<double>::infinity();
+            const double shift = (step.points[i].P - P[i].cast<double>()).norm();
             const bool is_still = inverse_mass_[i] > 0 && !kept_awake_[i] && step.lives(i) && !(lived(i) < lived.h) &&
                                   gained > 0 && shift <= std::min(still_shift * gained, most) * lived.h &&
                                   step.v[i].norm() <= std::min(still_speed * gained, most);
             // A sleeper that has woken begins at 0.
             still[i] = is_still && (linked || still[i] < after_) ? still[i] + h : 0;
-            if (!linked && still[i] >= after_) put_to_sleep(i, step);
+            if (linked || still[i] < after_) continue;
+            if (step.v[i].cast<float>().squaredNorm() > v[i].squaredNorm())
+                still[i] = just_before(after_);
+            else
+                put_to_sleep(i, step);
         }
     });
-    put_islands_to_sleep(still, step);
+    put_islands_to_sleep(still, v, step);
 }
 
-void Sleep::put_islands_to_sleep(std::span<float> still, Substep& step)
+void Sleep::put_islands_to_sleep(std::span<float> still, std::span<const Vec3f> v, Substep& step)
 {
     for (std::size_t k = 0; k < islands_.size(); ++k) {
         const std::span<const std::uint32_t> island = islands_[k];
         if (asleep_[island.front()]) continue;
         if (slept_[k])
             for (const std::uint32_t i : island) still[i] = 0;
-        if (std::all_of(island.begin(), island.end(), [&](std::uint32_t i) { return still[i] >= after_; }))
-            for (const std::uint32_t i : island) put_to_sleep(i, step);
+        if (!std::all_of(island.begin(), island.end(), [&](std::uint32_t i) { return still[i] >= after_; })) continue;
+        double gained = 0;  // J, in this frame
+        for (const std::uint32_t i : island)
+            if (inverse_mass_[i] > 0)
+                gained += (step.v[i].cast<float>().squaredNorm() - v[i].squaredNorm()) / inverse_mass_[i];
+        for (const std::uint32_t i : island) {
+            if (gained > 0)
+                still[i] = just_before(after_);
+            else
+                put_to_sleep(i, step);
+        }
     }
 }
 
 void Sleep::put_to_sleep(std::size_t i, Substep& step)
 {
     asleep_[i] = 1;
-    grip_[i] = unknown;
+    grip_[i].reset();
     step.v[i].setZero();
 }
 
@@ -252,16 +275,16 @@ void Sleep::remember(SleepRecords& records, const Substep& step, std::span<const
     for (std::size_t i = 0; i < asleep_.size(); ++i) {
         if (!asleep_[i]) continue;
         P[i] = rounded[i].cast<double>();
-        if (std::isnan(grip_[i])) fresh.push_back(static_cast<std::uint32_t>(i));
+        if (!grip_[i]) fresh.push_back(static_cast<std::uint32_t>(i));
     }
-    const std::vector<float> found = shape_grips(fresh, obstacles, P, (step.index + 1) * step.dt);
+    const std::vector<ShapeGrip> found = shape_grips(fresh, obstacles, P, (step.index + 1) * step.dt);
     for (std::size_t k = 0; k < fresh.size(); ++k) grip_[fresh[k]] = found[k];
     records.records.clear();
     const Strided<std::int64_t> id = points.id().read();
     for (std::size_t i = 0; i < asleep_.size(); ++i)
         if (asleep_[i])
             records.records.push_back(
-                {id[i], rounded[i], inverse_mass_[i], acceleration_[i].cast<float>(), grip_[i], load_[i]});
+                {id[i], rounded[i], inverse_mass_[i], acceleration_[i].cast<float>(), *grip_[i], load_[i]});
 }
 
 }  // namespace rapid

@@ -20,6 +20,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -80,8 +81,8 @@ public:
     {
         if (!asleep_[i]) load_[i] += static_cast<float>(force);
     }
-    // Then, with P as it was at the beginning of the frame: points that have been still fall asleep.
-    void close(Substep& step, std::span<const Vec3f> start, const OwnTime& lived);
+    // Then, with P and v as they were at the beginning of the frame: points that have been still fall asleep.
+    void close(Substep& step, std::span<const Vec3f> P, std::span<const Vec3f> v, const OwnTime& lived);
     // After rounding.
     void remember(SleepRecords& records, const Substep& step, std::span<const Obstacle> obstacles);
 
@@ -96,7 +97,7 @@ private:
                        std::span<const Vec3d> P);
     void wake_by_motion_of(const Obstacle& obstacle, std::span<const std::uint32_t> sleepers, const Substep& step);
     std::vector<std::uint8_t> find_hanging(const Substep& step) const;
-    void put_islands_to_sleep(std::span<float> still, Substep& step);
+    void put_islands_to_sleep(std::span<float> still, std::span<const Vec3f> v, Substep& step);
     void put_to_sleep(std::size_t i, Substep& step);
 
     PointSet& points_;
@@ -104,11 +105,11 @@ private:
     double after_;  // s
     Islands islands_;
     std::vector<std::uint8_t> asleep_, kept_awake_;
-    std::vector<std::uint8_t> slept_;  // of each island, whether it came to this frame asleep
-    std::atomic<bool> woken_ = false;  // any point, since the beginning of the sub-step
-    std::vector<Vec3d> acceleration_;  // m/s²; NaN where it is not known
-    std::vector<float> grip_;          // of the sleepers; NaN where it is not known
-    std::vector<float> load_;          // N
+    std::vector<std::uint8_t> slept_;             // of each island, whether it came to this frame asleep
+    std::atomic<bool> woken_ = false;             // any point, since the beginning of the sub-step
+    std::vector<Vec3d> acceleration_;             // m/s²; NaN where it is not known
+    std::vector<std::optional<ShapeGrip>> grip_;  // of the sleepers, where it is known
+    std::vector<float> load_;                     // N
     std::size_t count_ = 0, still_ = 0, woken_now_ = 0;
 };
 

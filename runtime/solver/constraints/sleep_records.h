@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "runtime/solver/constraints/shape_grip.h"
 #include "runtime/vec.h"
 
 namespace rapid {
@@ -14,7 +15,7 @@ struct SleepRecords {
         Vec3f P;              // m
         double inverse_mass;  // 1/kg
         Vec3f acceleration;   // m/s²
-        float grip;           // of the shapes that it touches (shape_grip.h)
+        ShapeGrip grip;       // of the shapes that it touches
         float load;           // N, the sum of what other points press it by
     };
     std::vector<Record> records;

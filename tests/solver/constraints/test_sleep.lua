@@ -174,3 +174,71 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0,
     assert.equal(vec3(0, 0, 0), result[300]:max("v"))
   end)
 end)
+
+-- A grain of radius r on a plane that is turned by 20 degrees, for four seconds; friction in parts of the tangent.
+local function slope(with)
+  local text = [[
+local angle, late = math.rad(20), function(frame) return frame.number > 48 end
+local normal = { math.sin(angle), math.cos(angle), 0 }
+local P = { 7 + R * normal[1], R * normal[2] - 7 * normal[1] / normal[2], 0 }
+return rapid.create { fps = 24, points = rapid.points.from { P = {P} } }
+  :gravity { g = GRAVITY } :contact { radius = 0.1 }
+  :collide { shape = rapid.shape.plane { normal = normal }, radius = R, bounce = BOUNCE,
+    friction = FRICTION, response = RESPONSE }
+  :solve { substeps = SUBSTEPS }]]
+  local default = { R = "0.1", GRAVITY = "{0, -9.81, 0}", BOUNCE = "0", FRICTION = "math.tan(angle) * 1.5",
+    RESPONSE = '"bounce"', SUBSTEPS = "1" }
+  text = text:gsub("%f[%u]%u+%f[%A]", function(name) return with[name] or default[name] end)
+  return scene.run(text, { frames = {1, 97} })
+end
+
+describe("what lies on a slope", function()
+  local tangent = math.tan(math.rad(20))
+
+  -- How far it has slid after frame 48.
+  local function slid(with)
+    local result = slope(with)
+    return (result[97][1].P - result[48][1].P):length(), result
+  end
+
+  it("sleeps while friction holds it", function()
+    local way, result = slid {}
+    assert.equal(0, way)
+    assert.equal(vec3(0, 0, 0), result[48][1].v)
+  end)
+
+  it("slides when friction goes, whatever its radius", function()
+    local expected = 0.5 * 9.81 * math.sin(math.rad(20)) * (49 / 24) ^ 2
+    for _, r in ipairs { "0", "1e-3", "0.1" } do
+      assert.near(expected, (slid { R = r, FRICTION = "function(f) return late(f) and 0 or 1 end" }), 0.01 * expected)
+    end
+  end)
+
+  it("slides when gravity turns by a little more than friction holds", function()
+    local angle = math.rad(0.5)
+    local way = slid { FRICTION = "math.tan(angle) * 1.005",
+      GRAVITY = ("function(f) local t = late(f) and %.17g or 0 return {9.81 * math.sin(t), -9.81 * math.cos(t), 0} end")
+        :format(angle) }
+    local along = 9.81 * (math.sin(math.rad(20) + angle) - 1.005 * tangent * math.cos(math.rad(20) + angle))
+    local expected = 0.5 * along * (49 / 24) ^ 2
+    assert.truthy(expected > 0.1)
+    assert.near(expected, way, 0.02 * expected)
+  end)
+
+  it("slides, at any number of sub-steps, where its weight is just more than friction holds", function()
+    for _, substeps in ipairs { 1, 4, 16 } do
+      for _, part in ipairs { 0.9, 0.98, 0.999, 0.9999 } do
+        local _, result = slid { FRICTION = ("math.tan(angle) * %g"):format(part), SUBSTEPS = tostring(substeps) }
+        local along = 9.81 * math.sin(math.rad(20)) * (1 - part)
+        assert.near(0.5 * along * 16, (result[97][1].P - result[1][1].P):length(), 0.02 * along * 8 + 2e-5)
+      end
+    end
+  end)
+
+  it("is awake for a moment after its shape was given another bounce or response, and stays", function()
+    for _, with in ipairs { { BOUNCE = "function(f) return late(f) and 0.5 or 0 end" },
+      { RESPONSE = 'function(f) return late(f) and "slide" or "bounce" end' } } do
+      assert.near(0, (slid(with)), 1e-6)
+    end
+  end)
+end)

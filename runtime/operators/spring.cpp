@@ -2,7 +2,8 @@
 //
 //   F = -stiffness (P - target) - damping v        accelerates a point by its mass; both parts are exact at any step
 //
-// The nearest position on a shape is found at the middle of the step: of second order in its change.
+// The target on a shape is the nearest position, wherever the point goes: exact on planes, of second order on curved
+// surfaces, and at any step without a gain of energy (solver/surface_springs.h).
 #include "runtime/graph/node.h"
 
 namespace rapid {
@@ -41,36 +42,33 @@ struct Spring {
 
     void contribute(const Chunk& chunk, Forces& forces) const
     {
-        std::vector<Vec3d> rest(chunk.size());
-        if (target.shape) {
-            std::vector<double> phi(chunk.size());
-            target.shape->distance(chunk.P, phi, rest);
-            for (std::size_t i = 0; i < chunk.size(); ++i) {
-                const double slope2 = rest[i].squaredNorm();
-                rest[i] = chunk.P[i] - (slope2 > 0 ? Vec3d(phi[i] / slope2 * rest[i]) : Vec3d(Vec3d::Zero()));
-            }
-        } else {
-            const Strided<Vec3f> own = chunk.read(target.position);
-            for (std::size_t i = 0; i < chunk.size(); ++i) rest[i] = own[i].cast<double>();
-        }
+        const Strided<Vec3f> place = chunk.read(target.position);
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
         const Strided<float> mass = masses_of(chunk.points);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             const double m = mass[chunk.first + i];
-            forces.add_spring(i, k[i] / m, rest[i]);
+            if (target.shape)
+                forces.add_surface_spring(i, k[i] / m, *target.shape);
+            else
+                forces.add_spring(i, k[i] / m, place[i].cast<double>());
             forces.add_drag(i, d[i] / m, Vec3d::Zero());
         }
     }
 
     bool add_potential(const Chunk& chunk, std::span<double> energy) const
     {
-        if (target.shape) return false;
-        const Strided<Vec3f> rest = chunk.read(target.position);
+        const Strided<Vec3f> place = chunk.read(target.position);
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
+        std::vector<double> phi(target.shape ? chunk.size() : 0);
+        std::vector<Vec3d> gradient(phi.size());
+        if (target.shape) target.shape->distance(chunk.P, phi, gradient);
         const Strided<float> mass = masses_of(chunk.points);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             if (d[i] > 0) return false;
-            energy[i] += 0.5 * k[i] / mass[chunk.first + i] * (chunk.P[i] - rest[i].cast<double>()).squaredNorm();
+            const double far2 = !target.shape           ? (chunk.P[i] - place[i].cast<double>()).squaredNorm()
+                                : gradient[i].isZero(0) ? 0.0
+                                                        : phi[i] * phi[i] / gradient[i].squaredNorm();
+            energy[i] += 0.5 * k[i] / mass[chunk.first + i] * far2;
         }
         return true;
     }

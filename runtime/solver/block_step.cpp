@@ -21,6 +21,13 @@ bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
 
 }  // namespace
 
+BlockStep::BlockStep(StepContext& context)
+    : context_(context),
+      shapes_move_(std::any_of(context.scene.obstacles.begin(), context.scene.obstacles.end(),
+                               [](const Obstacle& obstacle) { return obstacle.moves; }))
+{
+}
+
 void BlockStep::advance(Collisions& collisions, int substep)
 {
     add_forces(substep);
@@ -51,6 +58,7 @@ void BlockStep::add_forces(int substep)
     if (scene.force) add_force_attribute();
     if (scene.forces.empty()) return;
 
+    surface_springs_.begin(size);
     middle_.resize(size);
     for (std::size_t i = 0; i < size; ++i) middle_[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
     set_time(substep);
@@ -64,6 +72,7 @@ void BlockStep::add_forces(int substep)
         const bool plain = local.all && !one_.is_uniform() && one_.uniform().isZero(0);
         if (!plain || !add_finite(one_.accelerations(), block.own_a)) add_accelerations(local);
         if (one_.has_linear()) add_linear(local);
+        if (one_.has_surface_springs()) add_surface_springs(local);
     }
 }
 
@@ -86,23 +95,37 @@ void BlockStep::add_accelerations(const StepForce& local)
 
 void BlockStep::add_linear(const StepForce& local)
 {
-    const std::size_t size = block.size();
-    if (block.linear.stride == 0) {
-        block.own_linear.assign(size, context_.scene.uniform.linear);
-        block.linear = {block.own_linear.data(), 1};
-    }
-    for (std::size_t i = 0; i < size; ++i)
+    own_linear();
+    for (std::size_t i = 0; i < block.size(); ++i)
         if (local.all || local.members[block.places[i]]) block.own_linear[i].add(one_.linear(i));
+}
+
+void BlockStep::add_surface_springs(const StepForce& local)
+{
+    own_linear();
+    for (std::size_t i = 0; i < block.size(); ++i)
+        if (local.all || local.members[block.places[i]])
+            surface_springs_.add(i, one_.surface_spring(i), block.P[i], block.own_linear[i]);
+}
+
+// Gives each point a linear part of its own.
+void BlockStep::own_linear()
+{
+    if (block.linear.stride != 0) return;
+    block.own_linear.assign(block.size(), context_.scene.uniform.linear);
+    block.linear = {block.own_linear.data(), 1};
 }
 
 void BlockStep::drift(Collisions& collisions, std::span<const double> dt, double halves_after)
 {
-    if (!context_.scene.obstacles.empty() || !context_.scene.constraints.empty())
-        drift_among_others(collisions, dt, halves_after);
-    else if (block.linear.data)
+    if (!surface_springs_.empty()) surface_springs_.advance(block, dt);
+    if (!context_.scene.obstacles.empty() || !context_.scene.constraints.empty() || context_.options.interacts)
+        return drift_among_others(collisions, dt, halves_after);
+    if (block.linear.data)
         block.drift_damped(dt);
     else
         block.drift(dt);
+    if (!surface_springs_.empty()) surface_springs_.move(block);
 }
 
 // halves_after: half sub-steps from the end of the drift to the end of the frame.
@@ -110,10 +133,12 @@ void BlockStep::drift_among_others(Collisions& collisions, std::span<const doubl
 {
     block.damped.clear();
     if (block.linear.data) block.find_damped_paths(dt);
+    if (!surface_springs_.empty()) surface_springs_.bend(block.damped);
     if (!context_.scene.obstacles.empty()) {
         after_.resize(block.size());
         for (std::size_t i = 0; i < block.size(); ++i) after_[i] = 0.5 * halves_after * block.dt[i];
         collisions.advance(block.P, block.v, {block.a, dt, after_, block.damped});
+        if (!surface_springs_.empty()) surface_springs_.limit_energy(block, shapes_move_);
     } else if (block.linear.data) {
         for (std::size_t i = 0; i < block.size(); ++i) {
             block.P[i] += block.damped[i].travel;

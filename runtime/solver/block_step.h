@@ -12,13 +12,14 @@
 
 #include "runtime/solver/point_block.h"
 #include "runtime/solver/step_context.h"
+#include "runtime/solver/surface_springs.h"
 
 namespace rapid {
 
 // One object serves many blocks, one after the other, and keeps their arrays.
 class BlockStep {
 public:
-    explicit BlockStep(StepContext& context) : context_(context) {}
+    explicit BlockStep(StepContext& context);
 
     PointBlock block;
 
@@ -40,6 +41,8 @@ private:
     void add_force_attribute();
     void add_accelerations(const StepForce& local);
     void add_linear(const StepForce& local);
+    void add_surface_springs(const StepForce& local);
+    void own_linear();
     void drift(Collisions& collisions, std::span<const double> dt, double halves_after);
     void drift_among_others(Collisions& collisions, std::span<const double> dt, double halves_after);
     void act(int substep);
@@ -51,9 +54,11 @@ private:
     }
 
     StepContext& context_;
+    const bool shapes_move_;
     std::vector<double> half_, after_, time_;  // s
     std::vector<Vec3d> middle_, kick_;         // m, N
     Forces one_;                               // of one Force
+    SurfaceSprings surface_springs_;
 };
 
 }  // namespace rapid

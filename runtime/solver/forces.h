@@ -11,6 +11,8 @@
 
 namespace rapid {
 
+class Shape;
+
 // The points of a chunk in the middle of a step. Their state is in double precision within the frame and rounded to
 // float once, at its end. All spans have shape [size].
 struct Chunk {
@@ -52,6 +54,12 @@ struct Linear {
     bool is_zero() const { return k == 0 && w2 == 0 && c == 0; }
 };
 
+// A spring to the surface of a shape: -w2 φ ∇φ (solver/surface_springs.h).
+struct SurfaceSpring {
+    double w2 = 0;  // 1/s²; 0: none
+    const Shape* shape = nullptr;
+};
+
 // A force that is the same for all points at all times of the frame: an acceleration (m/s²) and a linear part.
 struct Uniform {
     Vec3d a = Vec3d::Zero();
@@ -68,6 +76,7 @@ public:
         uniform_.setZero();
         per_point_.clear();
         linear_.clear();
+        surface_springs_.clear();
     }
 
     // Towards the velocity u (m/s) at a rate k (1/s).
@@ -86,8 +95,17 @@ public:
         linear.w2 += w2;
         linear.w2q += w2 * q;
     }
+    // Towards the surface of the shape, which outlives the step; w2 (1/s²) per metre of distance.
+    void add_surface_spring(std::size_t i, double w2, const Shape& shape)
+    {
+        if (surface_springs_.empty()) surface_springs_.resize(size_);
+        surface_springs_[i] = {w2, &shape};
+    }
     bool has_linear() const { return !linear_.empty(); }
     const Linear& linear(std::size_t i) const { return linear_[i]; }
+
+    bool has_surface_springs() const { return !surface_springs_.empty(); }
+    const SurfaceSpring& surface_spring(std::size_t i) const { return surface_springs_[i]; }
 
     // Accelerations, m/s².
     void add_uniform(const Vec3d& a) { uniform_ += a; }
@@ -121,6 +139,7 @@ private:
     Vec3d uniform_ = Vec3d::Zero();
     std::vector<Vec3d> per_point_;
     std::vector<Linear> linear_;
+    std::vector<SurfaceSpring> surface_springs_;
 };
 
 }  // namespace rapid

@@ -185,6 +185,21 @@ private:
     std::vector<double> inexact_;  // by point
 };
 
+// The angle by which the normal of the surface turns along the path of the sub-step: as omega dt of a circle. On a
+// plane the motion is exact, and the spring's omega dt is told.
+void scan_surface(const SurfaceSpring& spring, const Sample& sample, std::size_t i, StiffnessScan& found)
+{
+    if (!(spring.w2 > 0)) return;
+    const double dt = sample.dt[i];
+    if (spring.shape->half_space()) return found.add(Stiffness::Spring, i, std::sqrt(spring.w2) * dt);
+    const std::array<Vec3d, 2> at = {sample.P[i], sample.P[i] + dt * sample.v[i]};
+    std::array<double, 2> phi;
+    std::array<Vec3d, 2> gradient;
+    spring.shape->distance(at, phi, gradient);
+    found.add(Stiffness::Oscillation, i,
+              std::atan2(gradient[0].cross(gradient[1]).norm(), gradient[0].dot(gradient[1])));
+}
+
 StiffnessScan scan(const Force& force, const Sample& sample)
 {
     StiffnessScan found(sample.size());
@@ -201,6 +216,7 @@ StiffnessScan scan(const Force& force, const Sample& sample)
         found.add(Stiffness::Drag, i, linear.k * dt);
         found.add(Stiffness::Spring, i, std::sqrt(linear.w2) * dt);
         found.add(Stiffness::SquaredDrag, i, linear.c * sample.v[i].norm() * dt);
+        if (forces.has_surface_springs()) scan_surface(forces.surface_spring(i), sample, i, found);
         found.add(i, jacobians[i], linear.k, dt);
     }
     return found;
@@ -238,6 +254,7 @@ double largest_distance(const PointSet& a, const PointSet& b)
 Stiffness::Cure cure_of(const PointSet& points, const Dynamics& pulls, SolveOptions options, int substeps)
 {
     options.loads = nullptr;
+    options.interacts = false;
     const auto solved = [&](int steps) {
         PointSet set = points;
         options.substeps = steps;

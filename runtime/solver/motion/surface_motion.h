@@ -1,0 +1,51 @@
+// The motion of a point on a spring to the surface of a shape, through one step:
+//
+//   x'' = G - k x' - w2 (x - x0) - s φ ∇φ
+//
+// With the unit normal n = ∇φ and the distance d = φ(x), and u the velocity along the surface,
+//
+//   d'' = n·G + u·n' - k d' - s d                 u·n': centrifugal
+//   u'  = G - (n·G) n - k u - d' n'               in the frame that turns with n
+//
+// The first is a damped oscillator, solved exactly with n and n' of the middle of the step (0 on a plane); then the
+// point is put at the distance d, and u gets the length that the energy leaves it: without drag
+// ½v² + ½ s d² - G·x is kept to rounding at any s dt², with drag it never grows. Exact for planes; of second order
+// else. A fixed nearest point in place of this would pull points back that move along the surface.
+#pragma once
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+struct SurfaceMotion {
+    Vec3d P0, v0;  // at the beginning
+    double t;      // s
+    double k;      // 1/s
+    double w2, s;  // 1/s²: of other springs, and of this one, above 0
+    Vec3d G;       // m/s², of all but the surface spring, at rest at P0
+
+    Vec3d P, v;  // at the end
+
+    // In this order, each with the distance and its gradient where the call before it said; the first ones at P0. The
+    // gradient is zero where the shape gives no direction: the spring then does not act.
+    Vec3d begin(double phi, const Vec3d& gradient);
+    Vec3d go(const Vec3d& gradient);
+    void end(double phi, const Vec3d& gradient);
+
+    // The parabola that stands for the path: it sets out along the surface.
+    Vec3d path_v() const;
+
+    // Twice the kinetic energy, J/kg, that is left at a place of this distance: below 0 where the energy does not
+    // reach.
+    double energy_left(const Vec3d& place, double distance) const;
+
+private:
+    Vec3d at_ = Vec3d::Zero();                      // where the distance is asked last
+    Vec3d n0_ = Vec3d::Zero(), n_ = Vec3d::Zero();  // unit normals, at the beginning and of the middle
+    double d0_ = 0, d1_ = 0;                        // m
+    double normal_v_ = 0;                           // m/s, d' at the end
+    Vec3d tangential_ = Vec3d::Zero();              // m/s, at the end, perpendicular to n_
+    bool acts_ = true;
+};
+
+}  // namespace rapid

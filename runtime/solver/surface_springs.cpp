@@ -1,0 +1,133 @@
+#include "runtime/solver/surface_springs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/shapes/shape.h"
+
+namespace rapid {
+namespace {
+
+Vec3d nearest(const Vec3d& P, double phi, const Vec3d& gradient)
+{
+    const double slope2 = gradient.squaredNorm();
+    return slope2 > 0 ? Vec3d(P - phi / slope2 * gradient) : P;
+}
+
+}  // namespace
+
+void SurfaceSprings::add(std::size_t i, const SurfaceSpring& spring, const Vec3d& P, Linear& linear)
+{
+    if (!(spring.w2 > 0)) return;
+    if (indices_.empty()) springs_.assign(size_, {});
+    SurfaceSpring& own = springs_[i];
+    if (!own.shape)
+        indices_.insert(std::upper_bound(indices_.begin(), indices_.end(), i), static_cast<std::uint32_t>(i));
+    SurfaceSpring weaker = spring;
+    if (spring.w2 > own.w2) std::swap(own, weaker);
+    if (!weaker.shape) return;
+    double phi = 0;
+    Vec3d gradient = Vec3d::Zero();
+    weaker.shape->distance({&P, 1}, {&phi, 1}, {&gradient, 1});
+    linear.w2 += weaker.w2;
+    linear.w2q += weaker.w2 * nearest(P, phi, gradient);
+}
+
+void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
+{
+    Responder responder;
+    motions_.clear();
+    at_.clear();
+    for (const std::uint32_t i : indices_) {
+        const Linear& linear = block.linear[i];
+        SurfaceMotion motion;
+        motion.P0 = motion.P = block.P[i];
+        motion.v0 = motion.v = block.v[i];
+        motion.t = t[i];
+        motion.s = springs_[i].w2;
+        motion.w2 = linear.w2;
+        motion.G = acceleration_at_rest(block.P[i], block.a[i], linear);
+        motion.k = respond(block.v[i], motion.G, linear, t[i], responder).rate;
+        motions_.push_back(motion);
+        at_.push_back(motion.P0);
+    }
+    query(at_);
+    for (std::size_t m = 0; m < motions_.size(); ++m) at_[m] = motions_[m].begin(phi_[m], gradient_[m]);
+    query(at_);
+    for (std::size_t m = 0; m < motions_.size(); ++m)
+        if (motions_[m].t > 0) at_[m] = motions_[m].go(gradient_[m]);
+    query(at_);
+    for (std::size_t m = 0; m < motions_.size(); ++m)
+        if (motions_[m].t > 0) motions_[m].end(phi_[m], gradient_[m]);
+}
+
+// The distances and gradients of all points with springs, each of its own shape.
+void SurfaceSprings::query(std::span<const Vec3d> at)
+{
+    phi_.assign(at.size(), 0);
+    gradient_.assign(at.size(), Vec3d::Zero());
+    std::vector<std::uint8_t> done(at.size());
+    for (std::size_t first = 0; first < at.size(); ++first) {
+        if (done[first]) continue;
+        const Shape* shape = springs_[indices_[first]].shape;
+        asked_.clear();
+        for (std::size_t m = first; m < at.size(); ++m)
+            if (springs_[indices_[m]].shape == shape) asked_.push_back(at[m]);
+        asked_phi_.resize(asked_.size());
+        asked_gradient_.resize(asked_.size());
+        shape->distance(asked_, asked_phi_, asked_gradient_);
+        for (std::size_t m = first, k = 0; m < at.size(); ++m) {
+            if (springs_[indices_[m]].shape != shape) continue;
+            done[m] = 1;
+            phi_[m] = asked_phi_[k];
+            gradient_[m] = asked_gradient_[k++];
+        }
+    }
+}
+
+void SurfaceSprings::move(PointBlock& block) const
+{
+    for (std::size_t m = 0; m < motions_.size(); ++m) {
+        block.P[indices_[m]] = motions_[m].P;
+        block.v[indices_[m]] = motions_[m].v;
+    }
+}
+
+void SurfaceSprings::limit_energy(PointBlock& block, bool shapes_move)
+{
+    for (std::size_t m = 0; m < motions_.size(); ++m) at_[m] = block.P[indices_[m]];
+    query(at_);
+    for (std::size_t m = 0; m < motions_.size(); ++m) {
+        Vec3d &P = block.P[indices_[m]], &v = block.v[indices_[m]];
+        const SurfaceMotion& motion = motions_[m];
+        const double slope = gradient_[m].norm();
+        if ((P == motion.P && v == motion.v) || !(slope > 0)) continue;
+        double left = motion.energy_left(P, phi_[m] / slope);
+        if (left < 0) {
+            P = motion.P0;
+            left = motion.v0.squaredNorm();
+        }
+        if (!shapes_move && v.squaredNorm() > left) v *= std::sqrt(left / v.squaredNorm());
+    }
+}
+
+// What follows a contact has the mean acceleration of the step.
+void SurfaceSprings::bend(std::span<Damped> paths) const
+{
+    for (std::size_t m = 0; m < motions_.size(); ++m) {
+        const SurfaceMotion& motion = motions_[m];
+        const double t = motion.t;
+        if (!(t > 0)) continue;
+        Damped& path = paths[indices_[m]];
+        const Propagator drag = respond(motion.k, 0, t);
+        path.k = path.linear_k = motion.k;
+        path.w2 = path.c = 0;
+        path.G = (motion.v - motion.v0 * drag.v_of_v) / drag.v_of_G;
+        path.travel = motion.P - motion.P0;
+        path.v = motion.v;
+        path.path_v = motion.path_v();
+        path.path_a = (path.travel - t * path.path_v) * (2 / (t * t));
+    }
+}
+
+}  // namespace rapid

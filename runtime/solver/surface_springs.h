@@ -1,0 +1,52 @@
+// Springs to the surfaces of shapes, for the points of a block (motion/surface_motion.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solver/motion/surface_motion.h"
+#include "runtime/solver/point_block.h"
+
+namespace rapid {
+
+class SurfaceSprings {
+public:
+    // Of a block of so many points.
+    void begin(std::size_t size)
+    {
+        size_ = size;
+        indices_.clear();
+    }
+    bool empty() const { return indices_.empty(); }
+
+    // Of point i of the block. Of several the stiffest is taken as above, the others as springs to the nearest place,
+    // which are added to `linear`: they are of order 1, and give no energy either.
+    void add(std::size_t i, const SurfaceSpring& spring, const Vec3d& P, Linear& linear);
+
+    // The states of these points after the times t (s) from where the block has them.
+    void advance(const PointBlock& block, std::span<const double> t);
+    // Moves the points there.
+    void move(PointBlock& block) const;
+    // Has the damped paths of these points end there.
+    void bend(std::span<Damped> paths) const;
+    // Where contacts have kept points from there: takes the energy off that a stiff spring would give them. A place
+    // that the energy does not reach is not taken: the point waits where the step began. Shapes that move may add
+    // velocity.
+    void limit_energy(PointBlock& block, bool shapes_move);
+
+private:
+    void query(std::span<const Vec3d> at);
+
+    std::size_t size_ = 0;
+    std::vector<SurfaceSpring> springs_;  // by point of the block, once one has any
+    std::vector<std::uint32_t> indices_;  // points that have one, in order
+    std::vector<SurfaceMotion> motions_;  // of these
+    std::vector<Vec3d> at_, gradient_;
+    std::vector<double> phi_;
+
+    std::vector<Vec3d> asked_, asked_gradient_;  // of one shape
+    std::vector<double> asked_phi_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,181 @@
+-- :spring with a shape as its target: the energy at any stiffness, the path along curved surfaces, its order.
+local scene = require "testing.scene"
+
+local function run(text, last, every)
+  local frames = every and {1, last} or {last, last}
+  return scene.run(text, { frames = frames })
+end
+
+local function list(values) return "{" .. table.concat(values, ", ") .. "}" end
+local function vector(x, y, z) return ("{%.9g, %.9g, %.9g}"):format(x, y, z) end
+
+-- Lehmer's generator: the same numbers everywhere.
+local state = 20260801
+local function random()
+  state = (state * 48271) % 2147483647
+  return 2 * state / 2147483647 - 1
+end
+
+-- |φ| of the shapes below.
+local distances = {
+  ["rapid.shape.sphere { radius = 1 }"] = function(P) return P:length() - 1 end,
+  ["rapid.shape.box { size = {2, 1, 1.5} }"] = function(P)
+    local q = vec3(math.abs(P.x) - 1, math.abs(P.y) - 0.5, math.abs(P.z) - 0.75)
+    local out = vec3(math.max(q.x, 0), math.max(q.y, 0), math.max(q.z, 0)):length()
+    return out + math.min(math.max(q.x, q.y, q.z), 0)
+  end,
+  ["rapid.shape.plane { normal = {1, 2, 2}, offset = 0.3 }"] = function(P)
+    return (P.x + 2 * P.y + 2 * P.z - 0.3) / 3
+  end,
+}
+
+-- J/kg: of motion, of the spring, and of the field.
+local function energy(p, distance, k, g)
+  return 0.5 * p.v:dot(p.v) + 0.5 * k * distance(p.P) ^ 2 - g * p.P.y
+end
+
+describe("a spring to a shape", function()
+  it("keeps the energy of a point that goes along a sphere, and its path, at any stiffness", function()
+    for _, k in ipairs { 1e2, 1e4, 1e5, 1e6, 1e7, 1e8 } do
+      local result = run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 2, 0}} } }
+  :spring { target = rapid.shape.sphere { radius = 1 }, stiffness = %g } :solve {}]]):format(k), 241, true)
+      for f = 2, 241 do
+        local p = result[f][1]
+        local all = energy(p, distances["rapid.shape.sphere { radius = 1 }"], k, 0)
+        assert.near(2, all, 2e-3)
+      end
+      if k >= 1e6 then -- where it is a circle: u t / R, by 1/24 of the square of the angle of a frame
+        local P, angle = result[241][1].P, 20
+        assert.near({math.cos(angle), math.sin(angle), 0}, P, 0.01)
+      end
+    end
+  end)
+
+  it("gives no energy to points anywhere, about shapes with edges, with gravity and damping", function()
+    for shape, distance in pairs(distances) do
+      for _, case in ipairs { {0, 0}, {-9.81, 0}, {0, 3}, {-9.81, 30} } do
+        local g, damping = case[1], case[2]
+        local P, v, stiffness = {}, {}, {}
+        for i = 1, 200 do
+          local speed = 10 ^ (1.5 * random())
+          P[i] = vector(1.5 * random(), 1.5 * random(), 1.5 * random())
+          v[i] = vector(speed * random(), speed * random(), speed * random())
+          stiffness[i] = ("%.9g"):format(10 ^ (4 + 4 * random()))
+        end
+        local result = run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, k = %s } }
+  :gravity { g = {0, %g, 0} }
+  :spring { target = %s, stiffness = rapid.attr "k", damping = %g } :solve {}]]):format(list(P), list(v),
+          list(stiffness), g, shape, damping), 49, true)
+        for i = 1, 200 do
+          local first = result[1][i]
+          local start = energy(first, distance, first.k, g)
+          local size = math.abs(start) + 3 * math.abs(g)
+          for f = 2, 49 do
+            local p = result[f][i]
+            -- Places are rounded to single precision once a frame.
+            local ulp = 2 ^ -23 * (math.abs(p.P.x) + math.abs(p.P.y) + math.abs(p.P.z) + 1)
+            local rounding = (f - 1) * (ulp * math.sqrt(2 * first.k * size) + first.k * ulp ^ 2)
+            local now = energy(p, distance, first.k, g)
+            assert.truthy(now <= start + 1e-4 * size + rounding,
+              ("%s, k = %g, g = %g, damping %g, frame %d: %.9g of %.9g")
+                :format(shape, first.k, g, damping, f, now, start))
+          end
+        end
+      end
+    end
+  end)
+
+  it("of second order on a curved surface, with drag and gravity", function()
+    -- Runge and Kutta's method of order 4, at a step of 1e-4 s.
+    local s, c, g = 60, 1, vec3(0, -9.81, 0)
+    local function pull(P, v) return g - v * c - P * (s * (P:length() - 1) / P:length()) end
+    local P, v, h = vec3(1.25, 0, 0.25), vec3(0.125, 1, 0.25), 1e-4
+    for _ = 1, 10000 do
+      local k1, l1 = v, pull(P, v)
+      local k2, l2 = v + l1 * (h / 2), pull(P + k1 * (h / 2), v + l1 * (h / 2))
+      local k3, l3 = v + l2 * (h / 2), pull(P + k2 * (h / 2), v + l2 * (h / 2))
+      local k4, l4 = v + l3 * h, pull(P + k3 * h, v + l3 * h)
+      P = P + (k1 + k2 * 2 + k3 * 2 + k4) * (h / 6)
+      v = v + (l1 + l2 * 2 + l3 * 2 + l4) * (h / 6)
+    end
+    local function off(substeps)
+      local p = run(([[
+return rapid.create { fps = 4, points = rapid.points.from { P = {{1.25, 0, 0.25}}, v = {{0.125, 1, 0.25}} } }
+  :gravity {} :spring { target = rapid.shape.sphere { radius = 1 }, stiffness = %g, damping = %g }
+  :solve { substeps = %d }]]):format(s, c, substeps), 5)[5][1]
+      return (p.P - P):length()
+    end
+    local before
+    for _, substeps in ipairs { 8, 16, 32, 64 } do
+      local now = off(substeps)
+      if before then assert.near(4, before / now, 0.6) end
+      before = now
+    end
+  end)
+
+  it("is exact on a plane", function()
+    for _, k in ipairs { 1e-3, 1, 1e3, 1e7 } do
+      local p = run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0.5, 2}}, v = {{3, -1, 2}} } }
+  :spring { target = rapid.shape.plane {}, stiffness = %g } :solve {}]]):format(k), 25)[25][1]
+      local omega = math.sqrt(k)
+      assert.near(4, p.P.x, 4e-6)
+      assert.near(4, p.P.z, 4e-6)
+      if k <= 1e3 then
+        assert.near(0.5 * math.cos(omega) - math.sin(omega) / omega, p.P.y, 1e-5 * (1 + omega) / math.min(omega, 1))
+      end
+    end
+  end)
+
+  it("acts with others, of which the weaker ones give no energy either", function()
+    local result = run([[
+local P = {}
+for i = 1, 20 do P[i] = {math.cos(i), 0.5 * math.sin(3 * i), math.sin(i)} end
+return rapid.create { fps = 24, points = rapid.points.from { P = P } }
+  :spring { target = rapid.shape.sphere { radius = 1 }, stiffness = 1e5 }
+  :spring { target = rapid.shape.plane {}, stiffness = 40 }
+  :solve { substeps = 4 }]], 97, true)
+    for i = 1, 20 do
+      local function all(p)
+        return 0.5 * p.v:dot(p.v) + 0.5e5 * (p.P:length() - 1) ^ 2 + 20 * p.P.y ^ 2
+      end
+      for f = 2, 97 do assert.truthy(all(result[f][i]) <= all(result[1][i]) * 1.001 + 1e-3, f) end
+    end
+  end)
+
+  it("gives no energy at contacts with a shape that cuts the surface", function()
+    local distance = distances["rapid.shape.sphere { radius = 1 }"]
+    for _, k in ipairs { 1e2, 1e4, 1e6 } do
+      local result = run(([[
+return rapid.create { fps = 24, seed = 5, points = rapid.points.grid { size = {1.6, 1.3, 1.6}, spacing = 0.2 } }
+  :points("stir", function(p, frame)
+      if frame.number == 2 then p.v = vec3(p:rand(1) - 0.5, p:rand(2) - 0.5, p:rand(3) - 0.5) * 4 end
+    end)
+  :spring { target = rapid.shape.sphere { radius = 1 }, stiffness = %g }
+  :collide { shape = rapid.shape.plane { offset = -0.8 }, bounce = 1 }
+  :solve { substeps = 2 }]]):format(k), 73, true)
+      for i = 1, #result[73] do
+        local start = energy(result[1][i], distance, k, 0) + 6 -- of at most 12^(1/2) m/s
+        for f = 3, 73 do
+          assert.truthy(energy(result[f][i], distance, k, 0) <= start * 1.001, ("k = %g, frame %d"):format(k, f))
+        end
+      end
+    end
+  end)
+
+  it("is told as exact where it is", function()
+    local function told(shape)
+      local result = scene.command("run", ([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 20, 0}} } }
+  :spring { target = %s, stiffness = 1e6 } :solve {}]]):format(shape), "-f 1-6")
+      assert.equal(0, result.status, result.stderr)
+      return result.stderr .. result.stdout
+    end
+    assert.truthy(told("rapid.shape.plane {}"):find("spring1: omega dt = 41.7; treated exactly", 1, true))
+    local curved = told("rapid.shape.sphere { radius = 1 }")
+    assert.falsy(curved:find("treated exactly", 1, true), curved)
+    assert.truthy(curved:find("spring1: omega dt = 0.%d+ at 1 sub%-step"), curved) -- the angle about the centre
+  end)
+end)

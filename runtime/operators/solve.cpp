@@ -66,12 +66,12 @@ struct Solve {
             flow.simulation->state = flow.points;
             return flow;
         }
-        interact(flow.points, flow.dynamics, options);
+        if (!options.interacts) interact(flow.points, flow.dynamics, options);
         begin_estimates(flow, options);
         const Tolerated done = advance(flow, options);
         if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
         estimate(flow, options, now);
-        interact(flow.points, flow.dynamics, options);
+        if (!options.interacts) interact(flow.points, flow.dynamics, options);
         report(done, now);
         now.figures.died += age_points(flow.points, group, now.frame.dt);
         feed_back(flow);
@@ -118,6 +118,7 @@ private:
         options.frame = static_cast<std::int64_t>(std::ceil(now.frame.number));
         options.group = group;
         options.begins_frame = clock.is_whole(clock.step_at(now.frame) - 1);
+        options.interacts = interacts(flow);
         options.iterations = iterations;
         options.loads = &loads_;
         options.sleep = sleep;
@@ -147,7 +148,7 @@ private:
     // Of coupled points a sample alone tells nothing: their error is the residual of the constraints.
     void begin_estimates(const Flow& flow, SolveOptions& options)
     {
-        if (is_coupled(flow)) return;
+        if (is_coupled(flow) || interacts(flow)) return;
         shadows_.begin(flow.points, is_closed_form(flow.points, flow.dynamics, options));
         drift_.begin(flow.points, shadows_, flow.dynamics, options);
     }
@@ -155,7 +156,7 @@ private:
     void estimate(const Flow& flow, const SolveOptions& options, const Evaluation& now)
     {
         std::optional<std::vector<double>> drift;
-        if (!is_coupled(flow)) {
+        if (!is_coupled(flow) && !interacts(flow)) {
             const std::vector<double> errors = shadows_.advance(flow.points, [&](PointSet& shadows) {
                 SolveOptions finer = options;
                 finer.substeps *= 2;

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "runtime/solver/interaction.h"
+
 namespace rapid {
 
-CoupledStep::CoupledStep(StepContext& context)
+CoupledStep::CoupledStep(StepContext& context, const Dynamics& dynamics)
     : context_(context),
+      dynamics_(dynamics),
       at_(context.points.size()),
       v_(context.points.size()),
       start_(context.points.size()),
@@ -37,10 +40,12 @@ void CoupledStep::run()
         now_.index = substep;
         now_.time = options.time - now_.dt * (options.substeps - substep - 1);
         now_.max_acceleration = 0;
+        if (options.interacts) interact(substep == 0 ? 1 : 2);
         if (sleep_) sleep_->begin(now_, scene.obstacles);
         context_.for_each_chunk([&](std::size_t begin, std::size_t end) { advance_freely(begin, end); });
         projection.advance(now_);
     }
+    if (options.interacts) interact(1);
 
     SolveResult& result = context_.result();
     if (sleep_) sleep_->clear_loads();
@@ -82,6 +87,17 @@ void CoupledStep::begin_substeps()
         mobility_.assign(at_.size(), {now_.dt, 0.5 * now_.dt * now_.dt});
         now_.mobility = mobility_;
     }
+}
+
+// Kicks of half a sub-step. They wake sleepers.
+void CoupledStep::interact(int kicks)
+{
+    std::vector<Vec3d> P(at_.size());
+    for (std::size_t i = 0; i < P.size(); ++i) P[i] = at_[i].P;
+    rapid::interact(context_.points, dynamics_, context_.options, {P, v_, context_.dead, context_.options.substeps},
+                    kicks);
+    for (std::size_t i = 0; sleep_ && i < v_.size(); ++i)
+        if (sleep_->asleep(i) && !v_[i].isZero(0)) sleep_->wake(i);
 }
 
 // The free motion of a chunk in one sub-step.

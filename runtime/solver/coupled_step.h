@@ -17,13 +17,14 @@ namespace rapid {
 
 class CoupledStep {
 public:
-    explicit CoupledStep(StepContext& context);
+    CoupledStep(StepContext& context, const Dynamics& dynamics);
 
     void run();
 
 private:
     void read_points(std::size_t begin, std::size_t end);
     void begin_substeps();
+    void interact(int kicks);
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
     void take_point(const PointBlock& block, std::size_t k);
@@ -34,6 +35,7 @@ private:
     double inverse_mass(std::size_t i) const;
 
     StepContext& context_;
+    const Dynamics& dynamics_;
     // By point.
     std::vector<ProjectedPoint> at_;
     std::vector<Vec3d> v_, start_;

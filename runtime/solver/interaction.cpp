@@ -22,42 +22,45 @@ double exchanged(double k, double t) { return -0.5 * std::expm1(-2 * k * t); }
 
 class Neighbourhood {
 public:
-    Neighbourhood(const Interaction& interaction, PointSet& points, const SolveOptions& options)
+    Neighbourhood(const Interaction& interaction, const PointSet& points, const SolveOptions& options,
+                  const InteractingPoints& at)
         : interaction_(interaction),
           h_(options.h),
-          P_(std::as_const(points).P().read()),
-          v_(std::as_const(points).v().read()),
-          id_(std::as_const(points).id().read()),
+          steps_(at.steps),
+          P_(at.P),
+          v_(at.v),
+          id_(points.id().read()),
           separation_(interaction.separation.read(points)),
           cohesion_(interaction.cohesion.read(points)),
           alignment_(interaction.alignment.read(points)),
           drag_(interaction.drag.read(points))
     {
-        if (const auto* masses = std::as_const(points).find<float>("mass")) mass_ = masses->read();
-        if (const auto* own = std::as_const(points).find<float>("dt")) own_dt_ = own->read();
+        if (const auto* masses = points.find<float>("mass")) mass_ = masses->read();
+        if (const auto* own = points.find<float>("dt")) own_dt_ = own->read();
 
         const Strided<std::uint8_t> members = members_of(points, interaction.group);
         std::vector<Vec3f> places;
         for (std::size_t i = 0; i < points.size(); ++i) {
-            if (!members[i]) continue;
+            if (!members[i] || (!at.dead.empty() && at.dead[i])) continue;
             if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve reports it, with the point's name
                 members_.clear();
                 return;
             }
-            if (!(mass_[i] > 0 && std::isfinite(mass_[i])))
-                throw Error(fmt::format("point {}, frame {}: its mass is {:g}; with interactions it must be above 0",
+            if (!std::isfinite(mass_[i]))
+                throw Error(fmt::format("point {}, frame {}: its mass is {:g}; with interactions it must be finite",
                                         id_[i], options.frame, mass_[i]));
             members_.push_back(static_cast<std::uint32_t>(i));
-            places.push_back(P_[i]);
+            places.push_back(P_[i].template cast<float>());
         }
-        if (!members_.empty()) grid_ = index_neighbours(places, interaction.radius);
+        if (members_.empty()) return;
+        grid_ = index_neighbours(places, interaction.radius);
+        weights_.assign(members_.size(), 0);
+        for_all([&](std::size_t m, std::size_t other) { weights_[m] += weight_at(distance(m, other)); });
     }
 
     // The change of velocity of each member, m/s.
-    std::vector<Vec3d> kicks()
+    std::vector<Vec3d> kicks() const
     {
-        weights_.assign(members_.size(), 0);
-        for_all([&](std::size_t m, std::size_t other) { weights_[m] += weight_at(distance(m, other)); });
         std::vector<Vec3d> kicks(members_.size(), Vec3d::Zero());
         for_all([&](std::size_t m, std::size_t other) { kicks[m] += kick(m, other); });
         return kicks;
@@ -73,23 +76,21 @@ private:
         for_each_chunk(members_.size(), [&](std::size_t begin, std::size_t end) {
             std::vector<std::uint32_t> near;
             for (std::size_t m = begin; m < end; ++m) {
-                grid_->find(P_[members_[m]].template cast<double>(), near);
+                // Rounded as the grid has it: of two points each finds the other.
+                grid_->find(P_[members_[m]].template cast<float>().template cast<double>(), near);
                 for (const std::uint32_t other : near)
                     if (other != m) f(m, other);
             }
         });
     }
 
-    Vec3d between(std::size_t m, std::size_t other) const
-    {
-        return P_[members_[other]].cast<double>() - P_[members_[m]].cast<double>();
-    }
+    Vec3d between(std::size_t m, std::size_t other) const { return P_[members_[other]] - P_[members_[m]]; }
     double distance(std::size_t m, std::size_t other) const { return between(m, other).norm(); }
     double weight_at(double d) const { return std::max(0.0, 1 - d / interaction_.radius); }
     double time(std::size_t i) const
     {
-        if (!own_dt_.data || own_dt_[i] == static_cast<float>(h_)) return h_;
-        return own_dt_[i];
+        if (!own_dt_.data || own_dt_[i] == static_cast<float>(h_)) return h_ / steps_;
+        return own_dt_[i] / steps_;
     }
 
     // Symmetric in the two but for the sign, to the bit.
@@ -97,19 +98,19 @@ private:
     {
         const std::size_t i = members_[m], j = members_[other];
         const auto mean = [&](const Strided<float>& strength) { return 0.5 * (double(strength[i]) + strength[j]); };
-        const double frame = std::min(time(i), time(j)), t = 0.5 * frame;
+        const double step = std::min(time(i), time(j)), t = 0.5 * step;
         const Vec3d d = between(m, other);
         const double length = d.norm(), w = weight_at(length);
         const Vec3d n = length > 0 ? Vec3d(d / length) : direction(id_[i], id_[j]);
 
-        // An acceleration of at most this slope moves the two towards its zero, in a frame, and never past it: one
+        // An acceleration of at most this slope moves the two towards its zero, in a step, and never past it: one
         // Newton step of the implicit solution. The 4: the weights of a neighbourhood average to a quarter of its
         // number, by which the slopes are not shared.
-        const auto held = [&](double a, double slope) { return a / (1 + 4 * slope * t * frame); };
+        const auto held = [&](double a, double slope) { return a / (1 + 4 * slope * t * step); };
         const double push = held(mean(separation_) * w, mean(separation_) / interaction_.radius);
         const double draw = held(mean(cohesion_) * 4 * w * (1 - w), 4 * mean(cohesion_) / interaction_.radius);
 
-        const Vec3d u = v_[j].cast<double>() - v_[i].cast<double>();
+        const Vec3d u = v_[j] - v_[i];
         const double align = exchanged(mean(alignment_), t);
         const double along = exchanged(mean(alignment_) + mean(drag_), t);
         const Vec3d along_n = n * n.dot(u);
@@ -130,8 +131,8 @@ private:
     }
 
     const Interaction& interaction_;
-    double h_;
-    Strided<Vec3f> P_, v_;
+    double h_, steps_;
+    std::span<const Vec3d> P_, v_;
     Strided<std::int64_t> id_;
     Strided<float> separation_, cohesion_, alignment_, drag_;
     Strided<float> mass_{&unit_mass, 0}, own_dt_{nullptr, 0};
@@ -142,21 +143,39 @@ private:
 
 }  // namespace
 
-void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
+void interact(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options,
+              const InteractingPoints& at, int kicks)
 {
-    if (points.empty()) return;
+    const Strided<std::uint8_t> advanced = members_of(points, options.group);
     for (const std::shared_ptr<const Interaction>& interaction : dynamics.interactions())
         at_node(*interaction, [&] {
-            Neighbourhood neighbourhood(*interaction, points, options);
-            const std::vector<Vec3d> kicks = neighbourhood.kicks();
-            const Strided<std::uint8_t> advanced = members_of(points, options.group);
-            const std::span<Vec3f> v = points.v().write();
-            for (std::size_t m = 0; m < kicks.size(); ++m) {
-                const std::size_t i = neighbourhood.members()[m];
-                if (!advanced[i]) continue;
-                v[i] = (v[i].cast<double>() + kicks[m]).cast<float>();
+            const Neighbourhood neighbourhood(*interaction, points, options, at);
+            for (int kick = 0; kick < kicks; ++kick) {
+                const std::vector<Vec3d> change = neighbourhood.kicks();
+                for (std::size_t m = 0; m < change.size(); ++m) {
+                    const std::size_t i = neighbourhood.members()[m];
+                    if (advanced[i]) at.v[i] += change[m];
+                }
             }
         });
+}
+
+void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
+{
+    if (points.empty() || dynamics.interactions().empty()) return;
+    std::vector<Vec3d> P(points.size()), v(points.size());
+    const std::span<Vec3f> rounded = points.v().write();
+    const Strided<Vec3f> places = std::as_const(points).P().read();
+    for (const std::shared_ptr<const Interaction>& interaction : dynamics.interactions()) {
+        for (std::size_t i = 0; i < P.size(); ++i) {
+            P[i] = places[i].cast<double>();
+            v[i] = rounded[i].cast<double>();
+        }
+        Dynamics one;
+        one.add(interaction);
+        interact(points, one, options, {P, v, {}, 1}, 1);
+        for (std::size_t i = 0; i < v.size(); ++i) rounded[i] = v[i].cast<float>();
+    }
 }
 
 }  // namespace rapid

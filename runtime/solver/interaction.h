@@ -9,10 +9,10 @@
 // which is an average over the neighbours, as for flocks, and the same for both: it conserves momentum, and except for
 // alignment also angular momentum. Unequal masses get 2 m_j / (m_i + m_j) of it, with the mean of their strengths.
 //
-// It is applied as a kick of half the frame before the points move and one of half the frame after: second order in the
-// frame's length by position, first order in alignment and drag. Neighbours are found at the ends of the frame,
-// whatever the sub-steps: only create's subframes refine it. However strong, a kick makes velocities equal at the most,
-// and moves neighbours in a frame no farther than out to the radius, or together.
+// It is applied as a kick of half a step before the points move and one of half a step after: second order in the
+// step's length by position, first order in alignment and drag. The step is the sub-step, at whose ends neighbours are
+// found; with a tolerance, where each point has sub-steps of its own, the frame. However strong, a kick makes
+// velocities equal at the most, and moves neighbours in a step no farther than out to the radius, or together.
 #pragma once
 
 #include <span>
@@ -29,8 +29,20 @@ public:
     PerPoint<float> alignment{0.0f}, drag{0.0f};       // 1/s
 };
 
-// Applies the kicks of half the frame of all interactions to the velocities, for half of each point's own time. Points
-// that the solve does not advance act on others, and are not changed. Same bits for any number of threads.
+// Points within a frame; shapes [n].
+struct InteractingPoints {
+    std::span<const Vec3d> P;            // m
+    std::span<Vec3d> v;                  // m/s
+    std::span<const std::uint8_t> dead;  // 1: takes no part any more; empty where none can have died
+    int steps = 1;                       // of the frame
+};
+
+// Applies the kicks of half a step of all interactions to the velocities, for half of each point's own time, so many
+// times. Points that the solve does not advance act on others, and are not changed. Same bits for any number of
+// threads.
+void interact(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options,
+              const InteractingPoints& at, int kicks);
+// The same of half the frame, for velocities in single precision.
 void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 }  // namespace rapid

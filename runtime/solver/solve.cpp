@@ -14,10 +14,10 @@ SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptio
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
     StepContext context(points, dynamics, options);
-    if (context.scene.constraints.empty())
+    if (context.scene.constraints.empty() && !options.interacts)
         UncoupledStep(context, refinement).run();
     else
-        CoupledStep(context).run();
+        CoupledStep(context, dynamics).run();
     if (!refinement) context.remove_dead();
     context.sum_contact_energy();
     return context.result();

@@ -32,6 +32,9 @@ struct SolveOptions {
     std::uint8_t* met = nullptr;
     bool begins_frame = true;  // the first step of the frame: contacts are counted from 0
 
+    // Neighbours act on each other at every sub-step (interaction.h); else not at all in here.
+    bool interacts = false;
+
     int iterations = 1;           // of the constraints, per sub-step
     ShapeLoads* loads = nullptr;  // warm starts of coupled points, kept from frame to frame; null: none
 

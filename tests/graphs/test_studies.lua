@@ -54,6 +54,10 @@ describe("the study", function()
     assert.near(2, lines_of("orbit").orbit.order, 0.05)
   end)
 
+  it("interact is of second order by sub-steps", function()
+    assert.near(2, lines_of("interact").interact.order, 0.1)
+  end)
+
   it("net is stretched less by sub-steps than by as many iterations, and by more of them", function()
     local lines = lines_of "net"
     local substeps, iterations = lines["sub-steps"].errors, lines.iterations.errors
@@ -118,7 +122,7 @@ describe("the study", function()
 
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
-    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua kepler.lua net.lua " ..
-      "orbit.lua rods.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
+    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua interact.lua " ..
+      "kepler.lua net.lua orbit.lua rods.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
   end)
 end)

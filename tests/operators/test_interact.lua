@@ -27,6 +27,45 @@ describe("interact", function()
     assert.near(-9.81, points[1].v.y, 1e-5)
   end)
 
+  it("acts at every sub-step, with what else acts on each point, and keeps momentum", function()
+    for _, substeps in ipairs { 1, 2, 8 } do
+      local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2 } }
+  :points("stir", function(p, frame)
+      if frame.number == 2 then p.v = vec3(p:rand(1), p:rand(2), p:rand(3)) end
+    end)
+  :interact { radius = 0.5, separation = 5, cohesion = 3, alignment = 2, drag = 1 }
+  :drag { linear = 1.5 } :spring { target = rapid.shape.sphere { radius = 1e3, center = {0, 0, 1e3} }, stiffness = 0 }
+  :solve { substeps = %d }]]):format(substeps), { frames = {2, 26} })
+      local function momentum(points)
+        local sum = vec3(0, 0, 0)
+        for i = 1, #points do sum = sum + points[i].v end
+        return sum
+      end
+      assert.near(momentum(result[2]) * math.exp(-1.5), momentum(result[26]), 125 * 24 * 2 ^ -22)
+    end
+  end)
+
+  it("converges to the second order by its sub-steps", function()
+    local function places(substeps)
+      return scene.run(([[
+return rapid.create { fps = 4, points = rapid.points.from { P = {{-0.3, 0, 0}, {0.3, 0, 0}, {0, 0.4, 0.1}},
+    v = {{0, 0.3, 0}, {0, -0.3, 0}, {0.1, 0, 0}} } }
+  :interact { radius = 2, cohesion = 2 } :collide { shape = rapid.shape.plane { offset = -5 } }
+  :solve { substeps = %d }]]):format(substeps), { frames = {5, 5} })[5]
+    end
+    local right = places(256)
+    local function off(substeps)
+      local sum = 0
+      for i, p in ipairs { places(substeps):by_id(0), places(substeps):by_id(1), places(substeps):by_id(2) } do
+        sum = sum + (p.P - right:by_id(i - 1).P):length()
+      end
+      return sum
+    end
+    assert.near(4, off(4) / off(8), 0.5)
+    assert.near(4, off(8) / off(16), 0.5)
+  end)
+
   it("says what is wrong", function()
     assert.truthy(scene.error("return rapid.create {} :interact {} :solve {}"):find("radius", 1, true))
     assert.truthy(scene.error("return rapid.create {} :interact { radius = 1, drag = -1 } :solve {}")

@@ -17,7 +17,7 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
                        const Substep& step, Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids)
     : constraints_(constraints), sleep_(sleep), has_forces_(!step.displacement.empty()), free_(step.size())
 {
-    if (!obstacles.empty()) shapes_.emplace(obstacles, step.size(), sleep);
+    if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sleep);
     if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, ids, step.dt);
     for (const LocalConstraint& local : constraints_) local.coupling->join(sleep);
 }
@@ -36,7 +36,7 @@ bool Projection::bounces() const
 
 void Projection::advance(Substep& step)
 {
-    if (!(step.dt > 0) || (sleep_ && sleep_->all())) return;
+    if (constraints_.empty() || !(step.dt > 0) || (sleep_ && sleep_->all())) return;
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
     each([&](Coupling& coupling) { coupling.move_kinematic(step); });

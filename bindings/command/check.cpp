@@ -68,7 +68,8 @@ private:
     static std::string advice_on(const Plan& plan)
     {
         try {
-            return advice(Evaluator(plan).examine_stiffness());
+            const FrameFigures found = Evaluator(plan).examine();
+            return advice(found.stiff) + rapid::text_of(found.resolution);
         } catch (const Error&) {
             return "";
         }

@@ -56,11 +56,11 @@ FrameResult Evaluator::advance()
     return result;
 }
 
-std::vector<Stiffness> Evaluator::examine_stiffness()
+FrameFigures Evaluator::examine()
 {
     for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->trial = true;
     advance();
-    return advance().figures.stiff;
+    return advance().figures;
 }
 
 void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,

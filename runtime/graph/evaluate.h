@@ -48,9 +48,9 @@ public:
     // copy. Error: of a node, with its name and location; the evaluator can't be used afterwards.
     FrameResult advance();
 
-    // The stiffness in the first frame after the start, of a few newborn and the initial points, which Solve does not
-    // move. The evaluator can't be used afterwards. Error: as advance().
-    std::vector<Stiffness> examine_stiffness();
+    // Stiffness and resolution in the first frame after the start, of a few newborn and the initial points, which Solve
+    // does not move. The evaluator can't be used afterwards. Error: as advance().
+    FrameFigures examine();
 
 private:
     // Evaluates a sub-frame of the next frame, `left` sub-frames before its end. results: by node; readers: of each

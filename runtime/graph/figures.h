@@ -8,6 +8,7 @@
 
 #include "runtime/solver/collision/contact_energy.h"
 #include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/estimate/resolution.h"
 #include "runtime/solver/estimate/stiffness.h"
 
 namespace rapid {
@@ -26,7 +27,7 @@ struct BandFigures {
 struct FrameFigures {
     std::uint64_t born = 0, died = 0, collisions = 0;
     std::uint64_t contact_limit = 0;     // points that reached the limit of contacts in a step
-    std::uint64_t beyond_tolerance = 0;  // points that need more than max_substeps
+    std::uint64_t beyond_tolerance = 0;  // points, those that need more than max_substeps included
     std::uint64_t trapped = 0;           // points deep in a shape, beyond its distance field
     int substeps = 0;
     double penetration_max = 0;
@@ -44,6 +45,8 @@ struct FrameFigures {
     bool has_no_energy = false;
     std::vector<Stiffness> stiff;
     double script_seconds = 0, solve_seconds = 0;
+    double rounding = 0;    // m, the most by which rounding of positions has displaced a point of the sample
+    Resolution resolution;  // of a trial (Evaluator::examine)
 
     // Adds the next part of the frame: counts add up, maxima stay, and the later part gives the state at the end.
     void append(FrameFigures later);

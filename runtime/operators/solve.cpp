@@ -12,8 +12,10 @@
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/estimate/energy_drift.h"
 #include "runtime/solver/estimate/error_control.h"
+#include "runtime/solver/estimate/resolution.h"
 #include "runtime/solver/estimate/shadow.h"
 #include "runtime/solver/estimate/stiffness.h"
+#include "runtime/solver/estimate/tolerance_check.h"
 #include "runtime/solver/interaction.h"
 
 namespace rapid {
@@ -53,6 +55,7 @@ struct Solve {
         flow.simulation->state = flow.points;
         shadows_ = Shadows();
         drift_ = EnergyDrift();
+        tolerance_check_ = ToleranceCheck();
         return flow;
     }
 
@@ -63,16 +66,18 @@ struct Solve {
         SolveOptions options = begin(flow, now);
         note_stiffness(flow, options, now);
         if (flow.simulation->trial) {
+            now.figures.resolution = coarser(now.figures.resolution, resolution_of(flow.points, options.h));
             flow.simulation->state = flow.points;
             return flow;
         }
         if (!options.interacts) interact(flow.points, flow.dynamics, options);
         begin_estimates(flow, options);
         const Tolerated done = advance(flow, options);
+        const std::uint64_t beyond = check_tolerance(flow, options);
         if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
         estimate(flow, options, now);
         if (!options.interacts) interact(flow.points, flow.dynamics, options);
-        report(done, now);
+        report(done, beyond, now);
         now.figures.died += age_points(flow.points, group, now.frame.dt);
         feed_back(flow);
         return flow;
@@ -85,6 +90,9 @@ private:
     {
         return substeps > 1 && !tolerance && !flow.dynamics.interactions().empty();
     }
+
+    // Whether no point's motion within the frame depends on another's.
+    bool moves_alone(const Flow& flow) const { return !is_coupled(flow) && !interacts(flow); }
 
     // The attributes that stand for parameters are refused as constants are, by one scan of each.
     static void require_in_range(const Flow& flow, const Evaluation& now)
@@ -142,21 +150,32 @@ private:
         return solve_within(flow.points, flow.dynamics, options, allowed_error(flow), max_substeps);
     }
 
+    // Points beyond the tolerance, by a sample.
+    std::uint64_t check_tolerance(const Flow& flow, const SolveOptions& options)
+    {
+        if (!tolerance || shadows_.idle()) return 0;
+        return tolerance_check_.beyond(shadows_.before(), flow.points, flow.dynamics, options, allowed_error(flow),
+                                       2 * max_substeps);
+    }
+
     // m, in this step.
     double allowed_error(const Flow& flow) const { return *tolerance / flow.simulation->subframes; }
 
-    // Of coupled points a sample alone tells nothing: their error is the residual of the constraints.
+    // Of coupled points a sample alone tells nothing but rounding: their error is the residual of the constraints.
     void begin_estimates(const Flow& flow, SolveOptions& options)
     {
-        if (is_coupled(flow) || interacts(flow)) return;
-        shadows_.begin(flow.points, is_closed_form(flow.points, flow.dynamics, options));
+        const bool alone = moves_alone(flow);
+        shadows_.begin(flow.points, !alone || is_closed_form(flow.points, flow.dynamics, options), options.h);
+        if (!alone) return;
         drift_.begin(flow.points, shadows_, flow.dynamics, options);
     }
 
     void estimate(const Flow& flow, const SolveOptions& options, const Evaluation& now)
     {
         std::optional<std::vector<double>> drift;
-        if (!is_coupled(flow) && !interacts(flow)) {
+        if (!moves_alone(flow)) {
+            shadows_.advance(flow.points, [](PointSet&) {});
+        } else {
             const std::vector<double> errors = shadows_.advance(flow.points, [&](PointSet& shadows) {
                 SolveOptions finer = options;
                 finer.substeps *= 2;
@@ -169,13 +188,16 @@ private:
             now.figures.errors.insert(now.figures.errors.end(), errors.begin(), errors.end());
             drift = drift_.end(flow.points, shadows_, flow.dynamics);
         }
+        const double rounding = shadows_.rounding(!flow.dynamics.colliders().empty());
+        now.figures.rounding = std::max(now.figures.rounding, rounding);
         if (drift)
             now.figures.energy_drift.insert(now.figures.energy_drift.end(), drift->begin(), drift->end());
         else
             now.figures.has_no_energy = true;
     }
 
-    void report(const Tolerated& done, const Evaluation& now) const
+    // beyond: points, by the check of the tolerance.
+    void report(const Tolerated& done, std::uint64_t beyond, const Evaluation& now) const
     {
         const SolveResult& result = done.result;
         FrameFigures& figures = now.figures;
@@ -191,7 +213,7 @@ private:
         figures.constraint_residual_max = std::max(figures.constraint_residual_max, result.residual.worst);
         figures.contact_energy += result.contact_energy;
         figures.penetration_max = std::max(figures.penetration_max, result.penetration_max);
-        figures.beyond_tolerance += done.beyond;
+        figures.beyond_tolerance += std::max(done.beyond, beyond);
 
         const auto warn = [&](const std::string& text) {
             now.warnings.push_back(fmt::format("node \"{}\": {}", now.node, text));
@@ -209,6 +231,11 @@ private:
                 fmt::format("points need more than {} sub-steps for an error of {:g} m a frame; raise max_substeps "
                             "or the tolerance",
                             done.substeps, *tolerance));
+        if (beyond > done.beyond)
+            warn(
+                fmt::format("by a sample, {} points are farther than {:g} m from where other sub-steps take them: the "
+                            "forces change within a sub-step; take more substeps to begin with",
+                            beyond, *tolerance));
     }
 
     // The state keeps how long points have been still; the output does not have that column. The copy shares the other
@@ -224,6 +251,7 @@ private:
     ColliderShapes shapes_;
     Shadows shadows_;
     EnergyDrift drift_;
+    ToleranceCheck tolerance_check_;
     ShapeLoads loads_;            // of the previous frame, where points are coupled
     SleepRecords sleep_records_;  // of the previous frame
 };

@@ -58,6 +58,7 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.trapped = result.figures.trapped;
     frame.beyond_tolerance = result.figures.beyond_tolerance;
     frame.error = error_of(result.figures.errors);
+    frame.rounding = result.figures.rounding;
     frame.energy_drift = drift_of(result.figures);
     frame.substeps = result.figures.substeps;
     frame.penetration_max = result.figures.penetration_max;
@@ -105,6 +106,7 @@ ordered_json to_json(const FrameStatistics& frame)
     if (frame.error)
         json["error"] = {
             {"position_p50", frame.error->p50}, {"position_p95", frame.error->p95}, {"position_max", frame.error->max}};
+    json["rounding"] = frame.rounding;
     json["energy_drift"] = nullptr;
     if (frame.energy_drift)
         json["energy_drift"] = {{"mean", frame.energy_drift->mean}, {"max", frame.energy_drift->max}};

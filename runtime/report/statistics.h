@@ -33,6 +33,7 @@ struct FrameStatistics {
         double p50, p95, max;
     };
     std::optional<Error> error;
+    double rounding = 0;  // m, the most by which rounding of positions has displaced a point of the sample since birth
     // Change of the energy of motion of that sample by the integrator since birth, J/kg: the mean, and the largest
     // magnitude. Nothing where the energy is not defined (energy_drift.h).
     struct EnergyDrift {

@@ -122,6 +122,16 @@ std::string error_text(const RunStatistics& run)
                                  : std::string("none above rounding\n"));
 }
 
+// What rounding of positions to single precision is off by; no sub-steps change that.
+std::string rounding_text(const RunStatistics& run)
+{
+    const auto worst = std::max_element(run.frames.begin(), run.frames.end(),
+                                        [](const auto& a, const auto& b) { return a.rounding < b.rounding; });
+    if (worst == run.frames.end() || !(worst->rounding > 0)) return "";
+    return fmt::format("rounding of positions since birth: {:.1e} m at most (frame {})\n", worst->rounding,
+                       worst->frame);
+}
+
 }  // namespace
 
 std::string summary(const RunStatistics& run)
@@ -146,6 +156,7 @@ std::string summary(const RunStatistics& run)
                         s.solve, s.write);
     text += fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes));
     text += error_text(run);
+    text += rounding_text(run);
     text += energy_text(run);
     text += contact_text(run);
     text += constraint_text(run);
@@ -155,7 +166,7 @@ std::string summary(const RunStatistics& run)
     text += warning_text(run, &FrameStatistics::contact_limit, "points reached the limit of contacts");
     text += warning_text(run, &FrameStatistics::trapped, "points were deep in a shape");
     text += warning_text(run, &FrameStatistics::loose_constraints, "constraints were off by a tenth of their size");
-    text += warning_text(run, &FrameStatistics::beyond_tolerance, "points needed more than max_substeps");
+    text += warning_text(run, &FrameStatistics::beyond_tolerance, "points were beyond the tolerance");
     return text;
 }
 

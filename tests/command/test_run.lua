@@ -47,13 +47,14 @@ describe("rapid run", function()
     local result = folder:run "-f 1-4"
     assert.equal(0, result.status)
     assert.same({ "scene.lua" }, folder:list())
-    local _, _, points, frames, seconds, memory, off =
-      result.stdout:find "\n(points[^\n]+)\n([^\n]+)\n([^\n]+)\n([^\n]+)\n([^\n]+)\n$"
+    local _, _, points, frames, seconds, memory, off, rounding =
+      result.stdout:find "\n(points[^\n]+)\n([^\n]+)\n([^\n]+)\n([^\n]+)\n([^\n]+)\n([^\n]+)\n$"
     assert.equal("points   3", points)
     assert.truthy(frames:find "^frames   4 in [%d.]+ s, [%d.,]+ %a*%s?points a second$", frames)
     assert.truthy(seconds:find "^seconds  graph [%d.]+, script [%d.]+, solve [%d.]+, write 0.000$", seconds)
     assert.truthy(memory:find "^memory   [%d.]+ MiB at the peak$", memory)
     assert.equal("error    since birth, estimated: none above rounding", off)
+    assert.truthy(rounding:find "^rounding of positions since birth: %d%.%de%-0%d m at most %(frame %d%)$", rounding)
     assert.equal("", result.stderr)
   end)
 

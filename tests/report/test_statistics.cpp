@@ -94,7 +94,7 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
     CHECK(json["frames"][0] == ordered_json::parse(R"({
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },
-        "energy_drift": null, "penetration_max": 0.25, "constraint_residual_max": 0.0, "asleep": 3,
+        "rounding": 0.0, "energy_drift": null, "penetration_max": 0.25, "constraint_residual_max": 0.0, "asleep": 3,
         "collisions": 12,
         "contact_energy": { "added": 0.5, "lost": 3.0 },
         "bands": [ { "node": "collide1", "width": 0.125, "voxels": 5000, "seconds": 0.5 } ],
@@ -113,6 +113,17 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
     CHECK(error["position_max"] == 100 * 1e-4);
     CHECK_THAT(summary(run),
                Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
+}
+
+TEST_CASE("what rounding is off by is told by its largest, apart from the estimated error", "[report]")
+{
+    FrameResult result = frame_result();
+    result.figures.errors = {0};
+    result.figures.rounding = 0.25;
+    RunStatistics run = run_of({});
+    run.frames.push_back(statistics_of(result));
+    CHECK(ordered_json::parse(to_json(run))["frames"][0]["rounding"] == 0.25);
+    CHECK_THAT(summary(run), Catch::Contains("\nrounding of positions since birth: 2.5e-01 m at most (frame 7)\n"));
 }
 
 TEST_CASE("a drift of energy is told by its mean and its largest, whichever way, where there is an energy", "[report]")

@@ -1,8 +1,12 @@
 #include "runtime/solver/estimate/shadow.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <numeric>
+
+#include "runtime/shapes/path.h"
+#include "runtime/solver/estimate/resolution.h"
 
 namespace rapid {
 namespace {
@@ -97,13 +101,12 @@ void keep_found(std::vector<std::uint32_t>& indices, std::vector<T>&... lists)
 
 }  // namespace
 
-void Shadows::begin(const PointSet& points, bool is_exact)
+void Shadows::begin(const PointSet& points, bool is_exact, double h)
 {
     idle_ = is_exact && !off_;
-    if (idle_) return;
     prefetch(points, indices_);
     indices_ = indices_of(ids_, points, indices_);
-    keep_found(indices_, ids_, dP_, dv_);
+    keep_found(indices_, ids_, dP_, dv_, rounding_);
 
     const Strided<std::int64_t> id = points.id().read();
     std::vector<std::pair<std::int64_t, std::uint32_t>> born;
@@ -117,7 +120,7 @@ void Shadows::begin(const PointSet& points, bool is_exact)
         threshold_ = order[fewest];
         for (std::size_t k = 0; k < ids_.size(); ++k)
             if (rank_of(ids_[k]) >= threshold_) indices_[k] = gone;
-        keep_found(indices_, ids_, dP_, dv_);
+        keep_found(indices_, ids_, dP_, dv_, rounding_);
         std::erase_if(born, [&](const auto& point) { return rank_of(point.first) >= threshold_; });
     };
     std::int64_t next = next_id_;
@@ -136,7 +139,15 @@ void Shadows::begin(const PointSet& points, bool is_exact)
         indices_.push_back(index);
         dP_.push_back(Vec3d::Zero());
         dv_.push_back(Vec3d::Zero());
+        rounding_.emplace_back();
     }
+    const Strided<Vec3f> P0 = points.P().read(), v0 = points.v().read();
+    const auto* own = points.find<float>("dt");
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+        const std::uint32_t i = indices_[k];
+        rounding_[k] = {P0[i], v0[i], own ? (*own)[i] : h, rounding_[k].displacement};
+    }
+    if (idle_) return;
 
     before_ = points.select(indices_);
     set_ = before_;
@@ -148,15 +159,52 @@ void Shadows::begin(const PointSet& points, bool is_exact)
     }
 }
 
+// Finds the points again; those that have died are left out.
+void Shadows::find(const PointSet& solved)
+{
+    prefetch(solved, indices_);
+    indices_ = indices_of(ids_, solved, indices_);
+    keep_found(indices_, ids_, dP_, dv_, rounding_);
+    add_rounding(solved);
+}
+
+void Shadows::add_rounding(const PointSet& solved)
+{
+    const Strided<Vec3f> P = solved.P().read(), v = solved.v().read();
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+        Rounding& point = rounding_[k];
+        const Vec3f &P1 = P[indices_[k]], &v1 = v[indices_[k]];
+        for (int axis = 0; axis < 3; ++axis) {
+            const double way = 0.5 * point.dt * (double(point.v[axis]) + double(v1[axis]));
+            const double gone = double(P1[axis]) - double(point.P[axis]);
+            const double lost = std::remainder(way - gone, spacing_at(P1[axis]));
+            if (std::isfinite(lost)) point.displacement[axis] += lost;
+        }
+        point.P = P1;
+    }
+}
+
+double Shadows::rounding(bool touches) const
+{
+    double worst = 0;
+    for (const Rounding& point : rounding_) {
+        const Vec3d spacing(spacing_at(point.P.x()), spacing_at(point.P.y()), spacing_at(point.P.z()));
+        const double flush = touches ? flush_within(point.P.cast<double>(), 0, 0) : 0;
+        worst = std::max(worst, point.displacement.norm() + 0.5 * spacing.norm() + flush);
+    }
+    return worst;
+}
+
 std::vector<double> Shadows::compare(const PointSet& solved)
 {
     prefetch(solved, indices_);
     std::vector<std::uint32_t> own(ids_.size());  // indices in set_
     std::iota(own.begin(), own.end(), 0u);
     own = indices_of(ids_, set_, own);
-    keep_found(own, ids_, indices_);
+    keep_found(own, ids_, indices_, rounding_);
     indices_ = indices_of(ids_, solved, indices_);
-    keep_found(indices_, ids_, own);
+    keep_found(indices_, ids_, own, rounding_);
+    add_rounding(solved);
     dP_.resize(ids_.size());
     dv_.resize(ids_.size());
     const Strided<Vec3f> P = solved.P().read(), v = solved.v().read();

@@ -1,0 +1,92 @@
+-- What a tolerance promises, on scenes that are hard for step doubling: near singular axes and centres, at jumps, with
+-- forces that runs of n, 2n, 4n sub-steps meet at the same phase, at contacts. No more than one point in a hundred is
+-- beyond the tolerance without being told. The truth is a run of 8,192 sub-steps.
+local scene = require "testing.scene"
+local json = require "dkjson"
+
+local head = [[
+local P, v = {}, {}
+for i = 1, 400 do
+  local a, b = (i * 0.754878) % 1, (i * 0.569840) % 1
+  P[i], v[i] = {2 * a - 1, 0.5 + b, 2 * ((7 * a + 3 * b) % 1) - 1}, {3 * b - 1.5, 2 * a - 1, 4 * (b - a)}
+end
+local start = rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } }
+]]
+
+local function pushed(force)
+  return (":action('push', function(p, step) p.force = p.force + %s end)"):format(force)
+end
+
+local function hum(size, wave, frequency)
+  return pushed(("vec3(%d * math.%s(2 * math.pi * %d * step.time), 0, 0)"):format(size, wave, frequency))
+end
+
+local function over_plane(more)
+  return ":turbulence { amplitude = 50, size = 0.3 } :gravity {} " ..
+    ":collide { shape = rapid.shape.plane { offset = 0.7 }, " .. more .. " }"
+end
+
+local function box(transform)
+  return ":gravity {} :drag { linear = 1 } :collide { shape = rapid.shape.box { size = {1, 0.4, 1}, " ..
+    "center = {0, 1, 0} }, transform = function(f) return " .. transform .. " end, bounce = 0.5, friction = 0.3 }"
+end
+
+local drags = ":gravity {} :drag { linear = %g, quadratic = %g } :wind { velocity = {30, 0, 0}, drag = %g }"
+
+local scenes = {
+  { "a vortex", ":vortex { strength = 20 }", 1e-3 },
+  { "a vortex, finely", ":vortex { strength = 20 }", 1e-5 },
+  { "a strong vortex", ":vortex { strength = 200 }", 1e-3 },
+  { "a vortex and wind", ":vortex { strength = 50 } :gravity {} :wind { drag = 3 }", 1e-4 },
+  { "a centre", ":attract { center = {0.1, 0.9, 0}, strength = 5, core = 0.01 }", 1e-3 },
+  { "a centre of 1/r", ":attract { center = {0.1, 0.9, 0}, strength = 50, falloff = 1 }", 1e-3 },
+  { "a centre of equal pull", ":attract { center = {0.1, 0.9, 0}, strength = 50, falloff = 0 }", 1e-4 },
+  { "drags together", drags:format(3, 2, 2), 1e-3 },
+  { "strong drags together", drags:format(30, 20, 20), 1e-4 },
+  { "drags in turbulence", ":turbulence { amplitude = 100, size = 0.3 } :drag { linear = 3, quadratic = 2 }", 1e-4 },
+  { "a spring to a sphere",
+    ":spring { target = rapid.shape.sphere { radius = 0.8, center = {0, 1, 0} }, stiffness = 900 }", 1e-3 },
+  { "a jump at a plane", pushed "vec3(p.P.x > 0 and 400 or -400, 0, 0)", 1e-3 },
+  { "a jump in time", pushed "vec3(step.time > 0.0123 and 400 or 0, 0, 0)", 1e-3 },
+  { "a jump at a speed", pushed "vec3(0, p.v.y > 0.3 and -300 or 30, 0)", 1e-3 },
+  { "a hum of 96 Hz", hum(1000, "sin", 96), 1e-3 },
+  { "a hum of 96 Hz from its top", hum(1000, "cos", 96), 1e-3 },
+  { "a hum of 192 Hz", hum(2000, "sin", 192), 1e-4 },
+  { "fast turbulence", ":turbulence { amplitude = 200, size = 0.5, speed = 100 }", 1e-3 },
+  { "a rough floor", over_plane "bounce = 0, friction = 0.4", 1e-3 },
+  { "a rough floor, finely", over_plane "bounce = 0, friction = 0.4", 1e-4 },
+  { "a box that turns", box "rapid.rotate({0, 0, 1}, 400 * f.time)", 1e-3 },
+  { "a box that moves", box "rapid.translate(6 * f.time, 0, 0)", 1e-4 },
+}
+
+-- The part of the points that are beyond the tolerance, less those that are told.
+local function untold(nodes, tolerance)
+  local function text(solve) return head .. "return start " .. nodes .. " :solve { " .. solve .. " }" end
+  local given = ("tolerance = %g, max_substeps = 1024"):format(tolerance)
+  local truth = scene.run(text "substeps = 8192", { frames = {2, 2} })[2]
+  local found = scene.run(text(given), { frames = {2, 2} })[2]
+  local beyond = 0
+  for i = 1, #truth do
+    if (found:by_id(truth[i].id).P - truth[i].P):length() > tolerance then beyond = beyond + 1 end
+  end
+  local run = scene.command("run", text(given), "-f 1-2 --quiet --stats stats.json")
+  assert.equal(0, run.status, run.stderr)
+  local told = json.decode(scene.folder:read "stats.json").frames[2].beyond_tolerance
+  return math.max(0, beyond - told) / #truth, beyond, told
+end
+
+describe("a tolerance is kept, or told to be missed, with", function()
+  for _, one in ipairs(scenes) do
+    it(one[1], function()
+      local part, beyond, told = untold(one[2], one[3])
+      assert.truthy(part <= 0.01, ("%d points are beyond it, %d are told"):format(beyond, told))
+    end)
+  end
+
+  it("nothing told where doubling sees all", function()
+    for _, k in ipairs { 1, 3, 5, 7, 11 } do
+      local _, _, told = untold(scenes[k][2], scenes[k][3])
+      assert.truthy(told <= 4, scenes[k][1] .. ": " .. told)
+    end
+  end)
+end)

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -178,4 +179,8 @@ int run(const Arguments& arguments)
 }  // namespace
 }  // namespace rapid
 
-int main(int argc, char** argv) { return rapid::run({argv + 1, argv + argc}); }
+int main(int argc, char** argv)
+{
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
+    return rapid::run({argv + 1, argv + argc});
+}

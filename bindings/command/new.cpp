@@ -1,12 +1,8 @@
 // rapid new: makes a scene that runs, a test that passes, and the settings by which editors and luacheck know Rapid.
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -15,6 +11,7 @@
 #include "bindings/command/command.h"
 #include "bindings/host/modules.h"
 #include "bindings/host/session.h"
+#include "runtime/files/output_file.h"
 
 namespace rapid {
 namespace {
@@ -37,17 +34,15 @@ std::string fill_in(const char* file, const std::string& name)
 }
 
 // Makes a file. Returns false if it exists already. Error: it can't be written; nothing is left of it.
-bool make_file(const std::string& file, const std::string& text)
+bool make_file(const std::string& path, const std::string& text)
 {
-    const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (descriptor < 0 && errno == EEXIST) return false;
-    const bool written =
-        descriptor >= 0 && write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-    const int error = errno;
-    if (descriptor >= 0) close(descriptor);
-    if (written) return true;
-    if (descriptor >= 0) unlink(file.c_str());
-    throw Error(fmt::format("can't be written: {}", std::strerror(error))).at({file, 0});
+    try {
+        OutputFile file(path);
+        file.append(text.data(), text.size());
+        return file.finish_unless_taken();
+    } catch (Error& error) {
+        throw error.at({path, 0});
+    }
 }
 
 class New : public Command {

@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <vector>
 
-#include "runtime/io/file.h"
+#include "runtime/files/file_error.h"
 
 namespace rapid {
 namespace {

@@ -13,6 +13,7 @@
 #include "bindings/command/watch.h"
 #include "bindings/host/threads.h"
 #include "runtime/deferred.h"
+#include "runtime/files/output_file.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
@@ -34,6 +35,7 @@ public:
             ->type_name("FRAMES");
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
+        app.add_flag("--durable", durable_, "a frame has its name when it is on the disk, and outlasts a power cut");
         app.add_flag("--keep-all", keep_all_,
                      "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
                      "the same");
@@ -61,8 +63,8 @@ public:
             load_deferred();  // the sandbox forbids it
             complete_sandbox();
         }
+        if (durable_) make_files_durable();
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
-        std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
         Threads threads(common.threads);
         RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose},
                          [this] { return files_.written(); });
@@ -153,7 +155,8 @@ private:
     FrameFiles files_;
     std::optional<FrameSelection> frames_;
     std::string stats_;
-    bool keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false, sandboxed_ = false;
+    bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false,
+         sandboxed_ = false;
     std::vector<std::string> allowed_;
 };
 RAPID_COMMAND(Run);

@@ -5,7 +5,7 @@
 
 #include <chrono>
 
-#include "runtime/io/file.h"
+#include "runtime/files/output_file.h"
 #include "runtime/report/memory.h"
 
 namespace rapid {
@@ -99,12 +99,10 @@ void RunReport::write_statistics()
     if (options_.stats_file.empty()) return;
 
     try {
-        UnfinishedFile unfinished(options_.stats_file);
-        OutputFile file(unfinished.path());
+        OutputFile file(options_.stats_file);
         const std::string text = to_json(run_);
         file.append(text.data(), text.size());
-        file.close();
-        unfinished.finish();
+        file.finish();
     } catch (Error& error) {
         throw error.at({options_.stats_file, 0});
     }

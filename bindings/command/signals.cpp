@@ -19,7 +19,7 @@ SignalThread::SignalThread(std::function<void(int signal)> end)
 {
     sigset_t ours;
     sigemptyset(&ours);
-    for (const int signal : {SIGINT, SIGTERM})
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT})
         if (!is_ignored(signal)) sigaddset(&ours, signal);
     sigaddset(&ours, SIGUSR1);  // the destructor's
     pthread_sigmask(SIG_BLOCK, &ours, nullptr);

@@ -1,5 +1,5 @@
-// Ends a run on Ctrl-C or SIGTERM from an ordinary thread, which may take locks and write files; a signal handler may
-// not.
+// Ends a run on Ctrl-C, Ctrl-\, SIGTERM or SIGHUP from an ordinary thread, which may take locks and write files; a
+// signal handler may not.
 #pragma once
 
 #include <atomic>

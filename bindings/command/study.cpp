@@ -19,7 +19,7 @@
 #include "bindings/command/graph_options.h"
 #include "bindings/command/machine.h"
 #include "bindings/command/study_run.h"
-#include "runtime/io/file.h"
+#include "runtime/files/output_file.h"
 #include "runtime/report/progress.h"
 
 namespace rapid {
@@ -57,11 +57,9 @@ std::pair<std::string, std::vector<std::string>> split_setting(const std::string
 void write_text(const fs::path& path, const std::string& text)
 {
     try {
-        UnfinishedFile unfinished(path);
-        OutputFile file(unfinished.path());
+        OutputFile file(path);
         file.append(text.data(), text.size());
-        file.close();
-        unfinished.finish();
+        file.finish();
     } catch (Error& error) {
         throw error.at({path.string(), 0});
     }

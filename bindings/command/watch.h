@@ -23,7 +23,7 @@ public:
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;
 
-    // Runs this process's own command line until SIGINT or SIGTERM; 128 + the signal.
+    // Runs this process's own command line until it is ended by a signal; 128 + the signal.
     int run();
 
 private:

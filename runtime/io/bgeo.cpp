@@ -15,6 +15,7 @@
 #include <bit>
 #include <cstring>
 
+#include "runtime/files/input_file.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -103,7 +104,7 @@ std::string group_section(const PointSet& points)
     return section.text();
 }
 
-void write_bgeo(const std::filesystem::path& path, const PointSet& points, const FrameInfo&)
+void write_bgeo(OutputFile& file, const PointSet& points, const FrameInfo&)
 {
     if (points.size() > 0x7fffffff)
         throw Error(fmt::format("{} points are more than .bgeo can count; write .vdb", points.size()));
@@ -133,12 +134,10 @@ void write_bgeo(const std::filesystem::path& path, const PointSet& points, const
         for (const std::uint32_t word : default_words(column)) header.int32(word);
     }
 
-    OutputFile file(path);
     file.append(header.text().data(), header.text().size());
     records.write(file, file.appended(), points.size());
     const std::string end = groups + std::string("\x00\xff", 2);
     file.write_at(file.appended() + records.record_bytes() * points.size(), end.data(), end.size());
-    file.close();
 }
 
 class BigEndianReader {

@@ -13,8 +13,8 @@
 #include <charconv>
 #include <utility>
 
+#include "runtime/files/input_file.h"
 #include "runtime/io/attribute_names.h"
-#include "runtime/io/file.h"
 #include "runtime/io/format.h"
 #include "runtime/io/id_order.h"
 #include "runtime/parallel.h"
@@ -102,11 +102,10 @@ std::string csv_lines(const CsvTable& table, const std::vector<std::size_t>& ord
     return text;
 }
 
-void write_csv(const std::filesystem::path& path, const PointSet& points, const FrameInfo&)
+void write_csv(OutputFile& file, const PointSet& points, const FrameInfo&)
 {
     const CsvTable table = csv_table(points);
     const std::vector<std::size_t> order = id_order(points.id());
-    OutputFile file(path);
     file.append(table.header.data(), table.header.size());
 
     // Lines are formatted in parallel and written in order; the number of tokens bounds the memory.
@@ -122,7 +121,6 @@ void write_csv(const std::filesystem::path& path, const PointSet& points, const 
         }) & tbb::make_filter<std::string, void>(tbb::filter_mode::serial_in_order, [&](const std::string& text) {
             file.append(text.data(), text.size());
         }));
-    file.close();
 }
 
 // The start of each line, without the header and trailing empty lines.

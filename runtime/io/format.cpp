@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "runtime/io/file.h"
-
 namespace rapid {
 namespace {
 
@@ -65,8 +63,8 @@ void write_points(const std::filesystem::path& path, const PointSet& points, con
 {
     const Format& format = format_of(path);
     try {
-        UnfinishedFile file(path);
-        format.write(file.path(), points, frame);
+        OutputFile file(path);
+        format.write(file, points, frame);
         file.finish();
     } catch (Error& error) {
         throw error.at({path.string(), 0});

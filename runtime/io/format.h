@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/files/output_file.h"
 #include "runtime/picture/frame_info.h"
 #include "runtime/points/point_set.h"
 
@@ -15,9 +16,9 @@ namespace rapid {
 struct Format {
     std::string extension;  // with the dot, lower case: ".vdb"
     std::string doc;        // one line, for the help
-    // Writes all columns and groups of `points` to a new file; the caller gives a temporary name and renames it. Error:
-    // a full disk; values that the format can't hold (int64 ids), with the formats that can.
-    void (*write)(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame);
+    // Writes all columns and groups of `points` to a new file; the caller finishes it. Error: a full disk; values that
+    // the format can't hold (int64 ids), with the formats that can.
+    void (*write)(OutputFile& file, const PointSet& points, const FrameInfo& frame);
     // Null where the format can't be read (.png). Text and matrices are skipped; an attribute of n other numbers
     // becomes the floats or integers NAME0 ... NAMEn-1. Without an id in the file, points are numbered from 0.
     PointSet (*read)(const std::filesystem::path& path);

@@ -12,6 +12,7 @@
 #include <map>
 #include <optional>
 
+#include "runtime/files/input_file.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -36,7 +37,7 @@ std::string_view ply_type(const AnyColumn& column)
     return type == AttributeType::Int32 || type == AttributeType::Int64 ? "int" : "float";
 }
 
-void write_ply(const std::filesystem::path& path, const PointSet& points, const FrameInfo&)
+void write_ply(OutputFile& file, const PointSet& points, const FrameInfo&)
 {
     RecordWriter records(ByteOrder::Little);
     std::vector<std::string> names;
@@ -62,10 +63,8 @@ void write_ply(const std::filesystem::path& path, const PointSet& points, const 
         "ply\nformat binary_little_endian 1.0\ncomment Rapid points, metres and seconds\nelement vertex {}\n{}"
         "end_header\n",
         points.size(), properties);
-    OutputFile file(path);
     file.append(header.data(), header.size());
     records.write(file, file.appended(), points.size());
-    file.close();
 }
 
 struct PlyProperty {

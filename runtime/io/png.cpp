@@ -5,7 +5,6 @@
 #include <csetjmp>
 #include <string>
 
-#include "runtime/io/file.h"
 #include "runtime/io/format.h"
 #include "runtime/picture/picture.h"
 #include "runtime/picture/picture_fit.h"
@@ -56,7 +55,7 @@ void encode(const Picture& picture, PngOutput& output)
     png_destroy_write_struct(&png, &info);
 }
 
-void write_png(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame)
+void write_png(OutputFile& file, const PointSet& points, const FrameInfo& frame)
 {
     static const PictureOptions usual;
     static const PictureScene nothing;
@@ -69,9 +68,7 @@ void write_png(const std::filesystem::path& path, const PointSet& points, const 
     encode(render(points, options, frame.scene ? *frame.scene : nothing, view), output);
     if (!output.error.empty()) throw Error(fmt::format("can't be written: {}", output.error));
 
-    OutputFile file(path);
     file.append(output.bytes.data(), output.bytes.size());
-    file.close();
 }
 
 RAPID_FORMAT(Format{".png", "a picture, 1280 x 720, the camera fitted to the scene", write_png, nullptr});

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/io/file.h"
+#include "runtime/files/output_file.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {

@@ -18,7 +18,7 @@
 
 namespace rapid {
 
-RAPID_DEFERRED(vdb_writer, void(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame));
+RAPID_DEFERRED(vdb_writer, void(OutputFile& file, const PointSet& points, const FrameInfo& frame));
 RAPID_DEFERRED(vdb_reader, PointSet(const std::filesystem::path& path));
 
 }  // namespace rapid

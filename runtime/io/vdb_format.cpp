@@ -4,10 +4,7 @@
 namespace rapid {
 namespace {
 
-void write_vdb(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame)
-{
-    vdb_writer(path, points, frame);
-}
+void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame) { vdb_writer(file, points, frame); }
 
 PointSet read_vdb(const std::filesystem::path& path) { return vdb_reader(path); }
 

@@ -10,7 +10,7 @@
 #include <map>
 #include <numeric>
 
-#include "runtime/io/file.h"
+#include "runtime/files/input_file.h"
 #include "runtime/io/id_order.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_types.h"
@@ -171,7 +171,7 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
 PointSet read_vdb(const std::filesystem::path& path)
 {
     initialize_openvdb();
-    const InputFile exists(path);  // reports why a file can't be opened
+    check_readable(path);
     try {
         vdb::io::File file(path.string());
         file.open(/*delayed loading=*/false);

@@ -12,10 +12,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <ostream>
-#include <streambuf>
 
-#include "runtime/io/file.h"
+#include "runtime/files/output_stream.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_types.h"
 #include "runtime/io/vdb_voxel.h"
@@ -120,57 +118,6 @@ PointDataGrid::Ptr make_point_grid(const PointSet& points)
     return grid;
 }
 
-// OpenVDB does not check whether writing to its stream succeeds, so the stream throws, with the system's reason.
-class OutputBuffer : public std::streambuf {
-public:
-    explicit OutputBuffer(OutputFile& file) : file_(file), block_(std::size_t{1} << 20)
-    {
-        setp(block_.data(), block_.data() + block_.size());
-    }
-
-    void flush()
-    {
-        file_.write_at(offset_, pbase(), static_cast<std::size_t>(pptr() - pbase()));
-        offset_ += static_cast<std::uint64_t>(pptr() - pbase());
-        setp(block_.data(), block_.data() + block_.size());
-    }
-
-protected:
-    int_type overflow(int_type c) override
-    {
-        flush();
-        if (!traits_type::eq_int_type(c, traits_type::eof())) sputc(traits_type::to_char_type(c));
-        return traits_type::not_eof(c);
-    }
-    int sync() override
-    {
-        flush();
-        return 0;
-    }
-    pos_type seekoff(off_type offset, std::ios_base::seekdir direction, std::ios_base::openmode) override
-    {
-        const std::uint64_t here = offset_ + static_cast<std::uint64_t>(pptr() - pbase());
-        end_ = std::max(end_, here);
-        if (direction == std::ios_base::cur && offset == 0) return pos_type(static_cast<off_type>(here));
-        const off_type base = direction == std::ios_base::beg   ? 0
-                              : direction == std::ios_base::cur ? static_cast<off_type>(here)
-                                                                : static_cast<off_type>(end_);
-        flush();
-        offset_ = static_cast<std::uint64_t>(base + offset);
-        return pos_type(base + offset);
-    }
-    pos_type seekpos(pos_type position, std::ios_base::openmode mode) override
-    {
-        return seekoff(off_type(position), std::ios_base::beg, mode);
-    }
-
-private:
-    OutputFile& file_;
-    std::vector<char> block_;
-    std::uint64_t offset_ = 0;  // of the block in the file
-    std::uint64_t end_ = 0;
-};
-
 class Archive : public vdb::io::Archive {
 public:
     Archive()
@@ -204,7 +151,7 @@ std::string file_uuid(const PointSet& points, const FrameInfo& frame)
 // Offset of the UUID: after the magic number, three versions and a flag.
 constexpr std::uint64_t uuid_offset = 8 + 3 * 4 + 1;
 
-void write_vdb(const std::filesystem::path& path, const PointSet& points, const FrameInfo& frame)
+void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame)
 {
     initialize_openvdb();
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
@@ -213,15 +160,11 @@ void write_vdb(const std::filesystem::path& path, const PointSet& points, const 
         const PointDataGrid::Ptr grid = make_point_grid(points);
         grid->insertMeta("frame", vdb::Int32Metadata(frame.number));
         grid->insertMeta("time", vdb::DoubleMetadata(frame.time));
-        OutputFile file(path);
-        OutputBuffer buffer(file);
-        std::ostream stream(&buffer);
-        stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);  // rethrows the buffer's own error
+        OutputStream stream(file);
         Archive().write_to(stream, {grid});
-        buffer.flush();
+        stream.flush();
         const std::string uuid = file_uuid(points, frame);
         file.write_at(uuid_offset, uuid.data(), uuid.size());
-        file.close();
     } catch (const vdb::Exception& error) {
         throw Error(fmt::format("can't be written: {}", error.what()));
     }

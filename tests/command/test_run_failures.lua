@@ -180,7 +180,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
   -- The signal comes when frame 3 is there; the rest of a million frames is not.
   local function interrupt(folder, signal)
     return command.shell(([[
-env --default-signal=INT "$RAPID" run scene.lua -f 1-1000000 -o out/a.####.csv --stats stats.json &
+env --default-signal=INT,QUIT,HUP "$RAPID" run scene.lua -f 1-1000000 -o out/a.####.csv --stats stats.json &
 run=$!
 for i in $(seq 1000); do [ -e out/a.0003.csv ] && break; sleep 0.01; done
 kill -%s $run
@@ -188,8 +188,8 @@ wait $run
 ]]):format(signal), { cwd = folder.path })
   end
 
-  it("exits with 130 or 143 and leaves whole frames alone", function()
-    for signal, status in pairs { INT = 130, TERM = 143 } do
+  it("exits with 128 and the signal, and leaves whole frames alone", function()
+    for signal, status in pairs { HUP = 129, INT = 130, QUIT = 131, TERM = 143 } do
       local folder = new_folder(long)
       local result = interrupt(folder, signal)
       assert.equal(status, result.status, result.stderr)

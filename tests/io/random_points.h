@@ -1,16 +1,12 @@
 // Point sets of every kind for the tests of formats: all types, uniform and varying columns, groups, ids with gaps.
 #pragma once
 
-#include <unistd.h>
-
 #include <bit>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 
 #include "runtime/points/point_set.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 namespace rapid::test {
@@ -60,42 +56,6 @@ inline PointSet random_points(const RandomPoints& wanted)
     return points;
 }
 
-// A folder of the test's own, gone with it.
-class TemporaryFolder {
-public:
-    TemporaryFolder()
-    {
-        std::string name = (std::filesystem::temp_directory_path() / "rapid-test-XXXXXX").string();
-        path_ = mkdtemp(name.data());
-    }
-    ~TemporaryFolder()
-    {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-    const std::filesystem::path& path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
-};
-
-inline std::string file_text(const std::filesystem::path& path)
-{
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-// The names in a folder, hidden ones too, in order.
-inline std::vector<std::string> file_names(const std::filesystem::path& folder)
-{
-    std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(folder))
-        names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    return names;
-}
-
 // The names of what two sets do not have in common to the bit; empty when they are the same.
 inline std::string differing_columns(const PointSet& a, const PointSet& b)
 {
@@ -119,18 +79,6 @@ inline std::string differing_columns(const PointSet& a, const PointSet& b)
             if (!x || !y || !same_bits(*x, *y)) different += "group:" + name + " ";
         }
     return different;
-}
-
-// What f throws, as text; empty when it does not.
-template <class F>
-std::string error_of(const F& f)
-{
-    try {
-        f();
-    } catch (const Error& error) {
-        return error.what();
-    }
-    return "";
 }
 
 }  // namespace rapid::test

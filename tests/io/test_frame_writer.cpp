@@ -1,10 +1,6 @@
 #include "runtime/io/frame_writer.h"
 
-#include <sys/mount.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include "runtime/io/file.h"
+#include "tests/files/other_circumstances.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
 
@@ -12,35 +8,6 @@ using namespace rapid;
 using namespace rapid::test;
 
 namespace {
-
-// A memory file system of a megabyte, where the test may mount one.
-class SmallDisk {
-public:
-    SmallDisk() { mounted_ = ::mount("tmpfs", folder_.path().c_str(), "tmpfs", 0, "size=1m") == 0; }
-    ~SmallDisk()
-    {
-        if (mounted_) ::umount(folder_.path().c_str());
-    }
-    bool mounted() const { return mounted_; }
-    const TemporaryFolder& folder() const { return folder_; }
-
-private:
-    TemporaryFolder folder_;
-    bool mounted_;
-};
-
-// Becomes another user, whom permissions bind, for as long as it lives.
-class Unprivileged {
-public:
-    Unprivileged() { changed_ = ::geteuid() == 0 && ::seteuid(65534) == 0; }
-    ~Unprivileged()
-    {
-        if (changed_ && ::seteuid(0) != 0) std::abort();
-    }
-
-private:
-    bool changed_;
-};
 
 // Small pictures, for quick tests.
 std::shared_ptr<const PictureOptions> small_picture()
@@ -138,54 +105,6 @@ TEST_CASE("a read-only folder, a folder that is a file and a file that is a fold
     std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
     const Unprivileged someone;
     CHECK(error("locked/a.ply") == pattern(folder, "locked/a.ply") + ": can't be written: Permission denied");
-}
-
-TEST_CASE("a file has its name only when it is complete, and replaces the old one at once", "[io][writer]")
-{
-    const TemporaryFolder folder;
-    std::ofstream(folder / "a.ply") << "old";
-    {
-        UnfinishedFile file(folder / "a.ply");
-        OutputFile output(file.path());
-        output.append("half", 4);
-        CHECK(file.path().parent_path() == folder.path());
-        CHECK(file.path().filename().string()[0] == '.');
-        CHECK(file_text(folder / "a.ply") == "old");
-    }
-    CHECK(file_names(folder.path()) == std::vector<std::string>{"a.ply"});
-    CHECK(file_text(folder / "a.ply") == "old");
-
-    UnfinishedFile file(folder / "a.ply");
-    OutputFile output(file.path());
-    output.append("whole", 5);
-    output.close();
-    file.finish();
-    CHECK(file_text(folder / "a.ply") == "whole");
-    CHECK(file_names(folder.path()) == std::vector<std::string>{"a.ply"});
-}
-
-TEST_CASE("a signal handler's call removes unfinished files, and no file is begun after it", "[io][writer]")
-{
-    const TemporaryFolder folder;
-    // In a process of its own: the call is for one that ends.
-    const pid_t child = ::fork();
-    if (child == 0) {
-        UnfinishedFile file(folder / "a.ply");
-        OutputFile output(file.path());
-        output.append("half", 4);
-        remove_unfinished_files();
-        bool refused = false;
-        try {
-            UnfinishedFile another(folder / "b.ply");
-        } catch (const Error&) {
-            refused = true;
-        }
-        ::_exit(refused ? 0 : 1);
-    }
-    int status = -1;
-    ::waitpid(child, &status, 0);
-    CHECK(status == 0);
-    CHECK(file_names(folder.path()).empty());
 }
 
 TEST_CASE("pictures before the first points wait, and share the view of the first frame that has some", "[io][writer]")

@@ -18,12 +18,14 @@ namespace fs = std::filesystem;
 // numbers) are the bottom.
 const std::map<std::string, std::set<std::string>> below = {
     {"runtime", {}},
+    {"runtime/files", {"runtime"}},
     {"runtime/points", {"runtime"}},
     {"runtime/shapes", {"runtime", "runtime/points"}},
-    {"runtime/shapes/mesh", {"runtime", "runtime/shapes"}},
+    {"runtime/shapes/mesh", {"runtime", "runtime/files", "runtime/shapes"}},
     {"runtime/shapes/scatter", {"runtime", "runtime/shapes", "runtime/shapes/mesh"}},
     {"runtime/shapes/analytic", {"runtime", "runtime/shapes", "runtime/shapes/mesh", "runtime/shapes/scatter"}},
-    {"runtime/shapes/level_set", {"runtime", "runtime/shapes", "runtime/shapes/mesh", "runtime/shapes/scatter"}},
+    {"runtime/shapes/level_set",
+     {"runtime", "runtime/files", "runtime/shapes", "runtime/shapes/mesh", "runtime/shapes/scatter"}},
     {"runtime/shapes/motion",
      {"runtime", "runtime/shapes", "runtime/shapes/mesh", "runtime/shapes/scatter", "runtime/shapes/level_set"}},
     {"runtime/solver/motion", {"runtime", "runtime/points", "runtime/solver"}},
@@ -51,7 +53,7 @@ const std::map<std::string, std::set<std::string>> below = {
       "runtime/solver/collision", "runtime/solver/constraints", "runtime/solver/estimate", "runtime/graph",
       "runtime/operators/emit", "runtime/operators/solve"}},
     {"runtime/picture", {"runtime", "runtime/points", "runtime/shapes/mesh"}},
-    {"runtime/io", {"runtime", "runtime/points", "runtime/picture"}},
+    {"runtime/io", {"runtime", "runtime/files", "runtime/points", "runtime/picture"}},
     {"runtime/report", {"runtime", "runtime/graph"}},
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "runtime/error.h"
+#include "runtime/files/output_stream.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 
@@ -77,6 +78,15 @@ LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
     return level_set;
 }
 
+// As openvdb::io::File writes, to a stream.
+class Archive : public openvdb::io::Archive {
+public:
+    void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const
+    {
+        openvdb::io::Archive::write(stream, grids, /*seekable=*/true);
+    }
+};
+
 const bool defined = read_level_set.define(read);
 
 }  // namespace
@@ -84,18 +94,17 @@ const bool defined = read_level_set.define(read);
 void GridLevelSet::write(const std::filesystem::path& path, const std::string& name) const
 {
     if (name.empty()) throw Error(fmt::format("cannot write \"{}\": the grid needs a name", path.string()));
-    // The tree is shared, and only the name differs. The file appears under its name when it is complete.
+    // The tree is shared, and only the name differs.
     openvdb::MetaMap metadata(*grid_);
     metadata.removeMeta(openvdb::GridBase::META_GRID_NAME);
     metadata.insertMeta(openvdb::GridBase::META_GRID_NAME, openvdb::StringMetadata(name));
-    const std::filesystem::path unfinished = path.string() + ".unfinished";
     try {
-        if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
-        openvdb::io::File(unfinished.string()).write(openvdb::GridCPtrVec{grid_->copyGridReplacingMetadata(metadata)});
-        std::filesystem::rename(unfinished, path);
+        OutputFile file(path);
+        OutputStream stream(file);
+        Archive().write_to(stream, {grid_->copyGridReplacingMetadata(metadata)});
+        stream.flush();
+        file.finish();
     } catch (const std::exception& e) {
-        std::error_code ignored;
-        std::filesystem::remove(unfinished, ignored);
         throw Error(fmt::format("cannot write \"{}\": {}", path.string(), e.what()));
     }
 }

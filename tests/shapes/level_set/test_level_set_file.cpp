@@ -8,6 +8,7 @@
 
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/level_set.h"
+#include "tests/files/other_circumstances.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -170,6 +171,17 @@ TEST_CASE("a level set from a file is widened without moving its surface", "[lev
         if (std::abs(exact) < 0.6)
             REQUIRE(b == Approx(exact).margin(0.01));  // voxel² / (radius of curvature, at least 0.4) / 4
     }
+}
+
+TEST_CASE("a level set that a full disk has no room for is an error, and nothing of it stays", "[level set][file]")
+{
+    const test::SmallDisk disk;
+    if (!disk.mounted()) return;  // not allowed to mount: nothing to fill
+    const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.02, 6});
+    const std::string error = test::error_of([&] { sphere->write(disk.folder() / "sphere.vdb", "surface"); });
+    CHECK_THAT(error, Catch::Matchers::StartsWith("cannot write \"") &&
+                          Catch::Matchers::EndsWith("sphere.vdb\": can't be written: No space left on device"));
+    CHECK(test::file_names(disk.folder().path()).empty());
 }
 
 TEST_CASE("a level set that can't be written says where, and leaves nothing behind", "[level set][file]")

@@ -1,0 +1,35 @@
+// Errors of the file system, and a descriptor that closes itself.
+//
+// Errors have the system's reason but not the file's name, because what is written has a name only when it is complete:
+// the caller adds it (Error::at).
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+// `can't be written: No space left on device`, and the like.
+Error file_error(const std::string& what, int system_error);
+
+class Descriptor {
+public:
+    explicit Descriptor(int number = -1) : number_(number) {}
+    Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+    Descriptor& operator=(Descriptor&& other) noexcept
+    {
+        std::swap(number_, other.number_);
+        return *this;
+    }
+    ~Descriptor();
+
+    explicit operator bool() const { return number_ >= 0; }
+    int number() const { return number_; }
+
+private:
+    int number_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,59 @@
+#include "runtime/files/input_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "runtime/files/file_error.h"
+
+namespace rapid {
+namespace {
+
+struct OpenFile {
+    Descriptor descriptor;
+    std::size_t bytes;
+};
+
+OpenFile open_regular(const std::filesystem::path& path)
+{
+    // Opening a pipe would wait for its writer, were it not for O_NONBLOCK.
+    Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    if (!descriptor) throw file_error("can't be read", errno);
+    struct stat status = {};
+    if (::fstat(descriptor.number(), &status) != 0) throw file_error("can't be read", errno);
+    if (S_ISDIR(status.st_mode)) throw file_error("can't be read", EISDIR);
+    if (!S_ISREG(status.st_mode)) throw Error("can't be read: it is not a regular file");
+    return {std::move(descriptor), static_cast<std::size_t>(status.st_size)};
+}
+
+void read_block(int descriptor, unsigned char* to, std::size_t begin, std::size_t end)
+{
+    while (begin < end) {
+        const ssize_t count = ::pread(descriptor, to + begin, end - begin, static_cast<off_t>(begin));
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) throw file_error("can't be read", errno);
+        if (count == 0) throw Error("can't be read: it became shorter meanwhile");
+        begin += static_cast<std::size_t>(count);
+    }
+}
+
+}  // namespace
+
+InputFile::InputFile(const std::filesystem::path& path)
+{
+    const OpenFile file = open_regular(path);
+    bytes_ = std::make_unique_for_overwrite<unsigned char[]>(file.bytes);
+    size_ = file.bytes;
+    constexpr std::size_t block = std::size_t{4} << 20;  // large enough for a thread's trouble, small enough to share
+    tbb::parallel_for(std::size_t{0}, (size_ + block - 1) / block, [&](std::size_t i) {
+        read_block(file.descriptor.number(), bytes_.get(), i * block, std::min(size_, (i + 1) * block));
+    });
+}
+
+std::size_t check_readable(const std::filesystem::path& path) { return open_regular(path).bytes; }
+
+}  // namespace rapid

@@ -1,0 +1,277 @@
+#include "runtime/files/output_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <climits>
+#include <cstring>
+#include <mutex>
+#include <set>
+#include <string_view>
+#include <system_error>
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view hidden_prefix = ".rapid-", hidden_suffix = ".unfinished";
+
+// Set when the process is about to end: files that are opened later do not stay.
+std::atomic<bool> ending{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
+
+std::atomic<bool> durable{false};
+
+Error ending_error() { return Error("can't be written: the run is being stopped"); }
+
+void make_folder(const fs::path& folder)
+{
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) throw Error(fmt::format("can't make the folder \"{}\": {}", folder.string(), error.message()));
+}
+
+bool is_hidden_name(std::string_view name)
+{
+    return name.size() == hidden_prefix.size() + 16 + hidden_suffix.size() && name.starts_with(hidden_prefix) &&
+           name.ends_with(hidden_suffix);
+}
+
+// Removes a hidden file whose process is gone, with its lock.
+void remove_if_abandoned(const fs::path& path)
+{
+    const Descriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    struct stat opened = {}, named = {};
+    if (!file || ::flock(file.number(), LOCK_EX | LOCK_NB) != 0) return;
+    if (::fstat(file.number(), &opened) != 0 || !S_ISREG(opened.st_mode)) return;
+    if (::lstat(path.c_str(), &named) != 0 || named.st_ino != opened.st_ino || named.st_dev != opened.st_dev) return;
+    ::unlink(path.c_str());
+}
+
+// Once for each folder, or seldom where there are very many.
+void remove_abandoned_files(const fs::path& folder)
+{
+    constexpr std::size_t remembered = 1000;
+    static std::mutex mutex;
+    static std::set<fs::path> seen;
+    const std::lock_guard lock(mutex);
+    if (seen.size() == remembered) seen.clear();
+    if (!seen.insert(folder).second) return;
+    std::error_code error;  // a folder that can't be listed may still be written
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+        if (is_hidden_name(entry->path().filename().native())) remove_if_abandoned(entry->path());
+}
+
+// A file without a name is named by way of /proc, which may be missing.
+bool can_name_descriptors()
+{
+    static const bool mounted = ::access("/proc/self/fd", X_OK) == 0;
+    return mounted;
+}
+
+// The names to remove. Entries are reused but never freed: a signal handler may be traversing the list.
+struct Entry {
+    enum State { Free, Claimed, Named };
+    std::atomic<int> state{Claimed};
+    char name[PATH_MAX];
+    Entry* next = nullptr;
+};
+
+std::atomic<Entry*> entries{nullptr};
+
+Entry* claim_entry()
+{
+    for (Entry* entry = entries.load(); entry; entry = entry->next) {
+        int free = Entry::Free;
+        if (entry->state.compare_exchange_strong(free, Entry::Claimed)) return entry;
+    }
+    Entry* entry = new Entry;
+    entry->next = entries.load();
+    while (!entries.compare_exchange_weak(entry->next, entry)) {
+    }
+    return entry;
+}
+
+}  // namespace
+
+// A random name, which is removed with the object, or by remove_unfinished_files(), unless it was given away.
+class OutputFile::HiddenName {
+public:
+    explicit HiddenName(const fs::path& folder)
+    {
+        std::uint64_t random = 0;
+        if (::getrandom(&random, sizeof random, 0) != sizeof random) throw file_error("can't be written", errno);
+        path_ = folder / fmt::format("{}{:016x}{}", hidden_prefix, random, hidden_suffix);
+        if (path_.native().size() >= PATH_MAX) throw file_error("can't be written", ENAMETOOLONG);
+        if (ending) throw ending_error();
+        entry_ = claim_entry();
+        std::strcpy(entry_->name, path_.c_str());
+        entry_->state = Entry::Named;
+    }
+    ~HiddenName()
+    {
+        if (!renamed_) ::unlink(path_.c_str());
+        entry_->state = Entry::Free;
+    }
+    HiddenName(const HiddenName&) = delete;
+    HiddenName& operator=(const HiddenName&) = delete;
+
+    const char* c_str() const { return path_.c_str(); }
+    // To be called once there is a file of that name.
+    void check_not_ending() const
+    {
+        if (ending) throw ending_error();
+    }
+    void rename_to(const fs::path& path)
+    {
+        if (::rename(path_.c_str(), path.c_str()) != 0) throw file_error("can't be named when complete", errno);
+        renamed_ = true;
+    }
+
+private:
+    fs::path path_;
+    Entry* entry_;
+    bool renamed_ = false;
+};
+
+OutputFile::OutputFile(const fs::path& path, Unfinished unfinished)
+    : path_(path), folder_(path.has_parent_path() ? path.parent_path() : fs::path("."))
+{
+    make_folder(folder_);
+    std::error_code error;
+    const fs::file_status status = fs::status(path_, error);
+    if (fs::exists(status) && !fs::is_regular_file(status)) throw Error("can't be written: it is not a regular file");
+    remove_abandoned_files(folder_);
+    if (unfinished == Unfinished::Unnamed && can_name_descriptors()) open_unnamed();
+    if (!descriptor_) open_hidden();
+    if (ending) throw ending_error();
+}
+
+OutputFile::~OutputFile() = default;
+
+// Leaves the file closed where there are none without names.
+void OutputFile::open_unnamed()
+{
+    descriptor_ = Descriptor(::open(folder_.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
+    if (!descriptor_ && errno != EOPNOTSUPP && errno != EISDIR && errno != ENOENT)
+        throw file_error("can't be written", errno);
+}
+
+void OutputFile::open_hidden()
+{
+    while (true) {
+        hidden_ = std::make_unique<HiddenName>(folder_);
+        descriptor_ = Descriptor(::open(hidden_->c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+        if (!descriptor_ && errno == EEXIST) continue;
+        if (!descriptor_) throw file_error("can't be written", errno);
+        hidden_->check_not_ending();
+        lock();
+        // Another process may have taken it for abandoned before it was locked.
+        struct stat status = {};
+        if (::fstat(descriptor_.number(), &status) == 0 && status.st_nlink > 0) return;
+    }
+}
+
+// Where the file system has no locks, nobody else gets one either.
+void OutputFile::lock()
+{
+    while (::flock(descriptor_.number(), LOCK_EX) != 0 && errno == EINTR) {
+    }
+}
+
+void OutputFile::write_at(std::uint64_t offset, const void* data, std::size_t bytes)
+{
+    const char* from = static_cast<const char*>(data);
+    while (bytes > 0) {
+        const ssize_t written = ::pwrite(descriptor_.number(), from, bytes, static_cast<off_t>(offset));
+        if (written < 0) {
+            if (errno == EINTR) continue;
+            throw file_error("can't be written", errno);
+        }
+        // A full device may accept 0 bytes without an error.
+        if (written == 0) throw file_error("can't be written", ENOSPC);
+        from += written;
+        offset += static_cast<std::uint64_t>(written);
+        bytes -= static_cast<std::size_t>(written);
+    }
+}
+
+void OutputFile::append(const void* data, std::size_t bytes)
+{
+    write_at(appended_, data, bytes);
+    appended_ += bytes;
+}
+
+// All bytes have reached the file system, whatever it kept back (quotas, network). Closing any descriptor tells; a
+// duplicate's leaves the file, and its lock, open until it has its name.
+void OutputFile::complete()
+{
+    if (durable && ::fsync(descriptor_.number()) != 0) throw file_error("can't be written", errno);
+    const int duplicate = ::fcntl(descriptor_.number(), F_DUPFD_CLOEXEC, 0);
+    if (duplicate < 0 || ::close(duplicate) != 0) throw file_error("can't be written", errno);
+}
+
+// False if the name is taken.
+bool OutputFile::link_to(const fs::path& name)
+{
+    const std::string from = hidden_ ? hidden_->c_str() : fmt::format("/proc/self/fd/{}", descriptor_.number());
+    if (::linkat(AT_FDCWD, from.c_str(), AT_FDCWD, name.c_str(), hidden_ ? 0 : AT_SYMLINK_FOLLOW) == 0) return true;
+    if (errno != EEXIST) throw file_error("can't be named when complete", errno);
+    return false;
+}
+
+void OutputFile::link_to_hidden()
+{
+    lock();
+    while (true) {
+        auto name = std::make_unique<HiddenName>(folder_);
+        if (!link_to(name->c_str())) continue;
+        hidden_ = std::move(name);
+        return hidden_->check_not_ending();
+    }
+}
+
+void OutputFile::finish()
+{
+    complete();
+    // A name that is taken is replaced by renaming, which a file without a name can't be.
+    if (hidden_ || !link_to(path_)) {
+        if (!hidden_) link_to_hidden();
+        hidden_->rename_to(path_);
+    }
+    keep_name();
+}
+
+bool OutputFile::finish_unless_taken()
+{
+    complete();
+    if (!link_to(path_)) return false;
+    keep_name();
+    return true;
+}
+
+// The name outlasts a power cut when the folder does.
+void OutputFile::keep_name()
+{
+    if (!durable) return;
+    const Descriptor folder(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!folder || ::fsync(folder.number()) != 0) throw file_error("can't be written", errno);
+}
+
+void make_files_durable() { durable = true; }
+
+void remove_unfinished_files() noexcept
+{
+    ending = true;
+    for (Entry* entry = entries.load(); entry; entry = entry->next)
+        if (entry->state == Entry::Named) ::unlink(entry->name);
+}
+
+}  // namespace rapid

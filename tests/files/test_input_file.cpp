@@ -1,0 +1,41 @@
+#include "runtime/files/input_file.h"
+
+#include <sys/stat.h>
+
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+TEST_CASE("a file is read whole, however large", "[files]")
+{
+    const std::size_t size = GENERATE(0, 1, 4096, 5 << 20, 9 << 20);
+    const TemporaryFolder folder;
+    std::string text(size, '\0');
+    for (std::size_t i = 0; i < size; ++i) text[i] = static_cast<char>(i * 2654435761u >> 24);
+    std::ofstream(folder / "a", std::ios::binary) << text;
+
+    CHECK((InputFile(folder / "a").text() == text));
+    CHECK(check_readable(folder / "a") == size);
+}
+
+TEST_CASE("a file that is truncated after it was read is as it was", "[files]")
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "a") << std::string(100000, 'x');
+    const InputFile file(folder / "a");
+    std::filesystem::resize_file(folder / "a", 0);
+    CHECK((file.text() == std::string(100000, 'x')));
+}
+
+TEST_CASE("a folder, a device and a pipe that nobody writes to are no files", "[files]")
+{
+    const TemporaryFolder folder;
+    REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
+    const auto error = [](const std::filesystem::path& path) { return error_of([&] { InputFile file(path); }); };
+    CHECK(error(folder / "pipe") == "can't be read: it is not a regular file");
+    CHECK(error("/dev/zero") == "can't be read: it is not a regular file");
+    CHECK(error(folder.path()) == "can't be read: Is a directory");
+    CHECK(error(folder / "none") == "can't be read: No such file or directory");
+}

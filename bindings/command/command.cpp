@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "runtime/printable.h"
+
 namespace rapid {
 namespace {
 
@@ -42,15 +44,15 @@ void print(std::string_view text) { std::fwrite(text.data(), 1, text.size(), std
 void print_error(const Error& error, bool verbose)
 {
     std::fflush(stdout);
-    std::string text = std::string(error.what()) + '\n';
-    if (verbose && !error.trace().empty()) text += error.trace() + '\n';
+    std::string text = printable(error.what()) + '\n';
+    if (verbose && !error.trace().empty()) text += printable(error.trace()) + '\n';
     std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
 void print_warning(const std::string& warning)
 {
     std::fflush(stdout);
-    const std::string text = fmt::format("warning: {}\n", warning);
+    const std::string text = fmt::format("warning: {}\n", printable(warning));
     std::fwrite(text.data(), 1, text.size(), stderr);
 }
 

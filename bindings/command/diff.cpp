@@ -62,7 +62,8 @@ private:
     int compare_files() const
     {
         const Comparison comparison = compare(read_points(a_), read_points(b_), tolerance_);
-        print(json_ ? to_json(comparison).dump(2) + '\n' : to_text(comparison));
+        print(json_ ? to_json(comparison).dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
+                    : to_text(comparison));
         return comparison.same ? status_done : status_failed;
     }
 
@@ -90,7 +91,8 @@ private:
         }
         const bool same = different == 0 && only_a.empty() && only_b.empty();
         if (json_) {
-            print(ordered_json{{"same", same}, {"only_a", only_a}, {"only_b", only_b}, {"frames", frames}}.dump(2) +
+            print(ordered_json{{"same", same}, {"only_a", only_a}, {"only_b", only_b}, {"frames", frames}}.dump(
+                      2, ' ', false, ordered_json::error_handler_t::replace) +
                   '\n');
         } else {
             if (!only_a.empty()) print(fmt::format("only in {}: frames {}\n", a_, fmt::join(only_a, ", ")));

@@ -8,6 +8,7 @@
 #include "bindings/host/threads.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
+#include "runtime/printable.h"
 
 namespace rapid {
 namespace {
@@ -38,11 +39,13 @@ public:
                 json.update(to_json(summary));
                 all.push_back(std::move(json));
             } else {
-                if (cache.sequence) print(path.string() + "\n");
+                if (cache.sequence) print(printable(path.string()) + "\n");
                 print(to_text(summary));
             }
         }
-        if (json_) print((cache.sequence ? all : all.front()).dump(2) + '\n');
+        if (json_)
+            print((cache.sequence ? all : all.front()).dump(2, ' ', false, ordered_json::error_handler_t::replace) +
+                  '\n');
         return status_done;
     }
 

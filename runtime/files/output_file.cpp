@@ -7,10 +7,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <climits>
 #include <cstring>
+#include <deque>
 #include <mutex>
 #include <set>
 #include <string_view>
@@ -67,6 +70,38 @@ void remove_abandoned_files(const fs::path& folder)
     std::error_code error;  // a folder that can't be listed may still be written
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
         if (is_hidden_name(entry->path().filename().native())) remove_if_abandoned(entry->path());
+}
+
+// What tells a file that this process wrote from any that took its place or that another has changed.
+using Identity = std::array<std::int64_t, 5>;
+
+Identity identity_of(const struct stat& status)
+{
+    return {static_cast<std::int64_t>(status.st_dev), static_cast<std::int64_t>(status.st_ino), status.st_size,
+            status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+}
+
+// The last ones: a run that reads what it wrote does so soon.
+struct OwnFiles {
+    static constexpr std::size_t most = 256;
+    std::mutex mutex;
+    std::deque<Identity> files;
+};
+
+OwnFiles& own_files()
+{
+    static OwnFiles all;
+    return all;
+}
+
+void remember_own(int descriptor)
+{
+    struct stat status = {};
+    if (::fstat(descriptor, &status) != 0) return;
+    OwnFiles& own = own_files();
+    const std::lock_guard lock(own.mutex);
+    if (own.files.size() == OwnFiles::most) own.files.pop_front();
+    own.files.push_back(identity_of(status));
 }
 
 // A file without a name is named by way of /proc, which may be missing.
@@ -260,9 +295,19 @@ bool OutputFile::finish_unless_taken()
 // The name outlasts a power cut when the folder does.
 void OutputFile::keep_name()
 {
+    remember_own(descriptor_.number());
     if (!durable) return;
     const Descriptor folder(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (!folder || ::fsync(folder.number()) != 0) throw file_error("can't be written", errno);
+}
+
+bool is_own_file(const fs::path& path)
+{
+    struct stat status = {};
+    if (::stat(path.c_str(), &status) != 0) return false;
+    OwnFiles& own = own_files();
+    const std::lock_guard lock(own.mutex);
+    return std::find(own.files.begin(), own.files.end(), identity_of(status)) != own.files.end();
 }
 
 void make_files_durable() { durable = true; }

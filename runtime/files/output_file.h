@@ -57,6 +57,9 @@ private:
     std::uint64_t appended_ = 0;
 };
 
+// Whether this process wrote the file, among the last that it wrote, and it is as it was.
+bool is_own_file(const std::filesystem::path& path);
+
 // From now on a file is on the disk when finish() returns (fsync), so that it outlasts a power cut.
 void make_files_durable();
 

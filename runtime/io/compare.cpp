@@ -11,6 +11,7 @@
 
 #include "runtime/io/id_order.h"
 #include "runtime/parallel.h"
+#include "runtime/printable.h"
 
 namespace rapid {
 namespace {
@@ -152,6 +153,21 @@ AttributeDifference compare_group(const std::string& name, const PointSet& a, co
 
 }  // namespace
 
+namespace {
+
+void check_ids_differ(const PointSet& points, const char* set)
+{
+    const std::vector<std::size_t> order = id_order(points.id());
+    const Strided<std::int64_t> ids = points.id().read();
+    for (std::size_t i = 1; i < points.size(); ++i) {
+        const std::int64_t id = ids[order.empty() ? i : order[i]];
+        if (id == ids[order.empty() ? i - 1 : order[i - 1]])
+            throw Error(fmt::format("two points of {} have the id {}; points are compared by id", set, id));
+    }
+}
+
+}  // namespace
+
 // Merges the two sets in order of id.
 IdMatch match_by_id(const PointSet& a, const PointSet& b)
 {
@@ -181,6 +197,8 @@ IdMatch match_by_id(const PointSet& a, const PointSet& b)
 
 Comparison compare(const PointSet& a, const PointSet& b, double tolerance)
 {
+    check_ids_differ(a, "A");
+    check_ids_differ(b, "B");
     Comparison result;
     result.points_a = a.size();
     result.points_b = b.size();
@@ -225,7 +243,7 @@ std::string missing_text(const std::vector<std::int64_t>& ids, const char* set)
 
 std::string attribute_text(const AttributeDifference& d, std::size_t width)
 {
-    const std::string head = fmt::format("  {:<{}}  ", d.name, width);
+    const std::string head = fmt::format("  {:<{}}  ", printable(d.name), width);
     if (d.type_a.empty() || d.type_b.empty())
         return head +
                fmt::format("only in {} ({})\n", d.type_a.empty() ? "B" : "A", d.type_a.empty() ? d.type_b : d.type_a);
@@ -239,7 +257,7 @@ std::string attribute_text(const AttributeDifference& d, std::size_t width)
 
 std::string group_text(const AttributeDifference& d, std::size_t width)
 {
-    const std::string head = fmt::format("  {:<{}}  group  ", d.name, width);
+    const std::string head = fmt::format("  {:<{}}  group  ", printable(d.name), width);
     return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
 }
 

@@ -23,6 +23,7 @@ namespace rapid {
 namespace {
 
 constexpr std::string_view group_prefix = "group:";
+constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // spreadsheets write it
 constexpr std::size_t number_chars = 24;  // the longest is an int64 of 20; a float of 9 digits has 15
 
 char* put(char* to, float value)
@@ -218,7 +219,8 @@ Column<T> joined(const std::vector<CsvColumn>& columns, const std::vector<std::s
 PointSet read_csv(const std::filesystem::path& path)
 {
     const InputFile file(path);
-    const std::string_view text = file.text();
+    std::string_view text = file.text();
+    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     const std::size_t header_end = std::min(text.find('\n'), text.size());
     std::string_view header = text.substr(0, header_end);
     if (header.ends_with('\r')) header.remove_suffix(1);
@@ -235,6 +237,8 @@ PointSet read_csv(const std::filesystem::path& path)
     check_column_names(names, "");
 
     const std::vector<std::size_t> starts = line_starts(text, header_end + 1);
+    if (!text.ends_with('\n'))
+        throw csv_error(starts.size() + 1, "it has no end, and may be cut within its last number; every line must end");
     const std::vector<CsvColumn> columns = parse_columns(text, starts, names);
     PointSet points;
     points.append(starts.size());

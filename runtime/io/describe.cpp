@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/io/attribute_names.h"
+#include "runtime/printable.h"
 
 namespace rapid {
 namespace {
@@ -91,7 +92,7 @@ std::string to_text(const PointSummary& summary)
 
     text += "attributes\n";
     for (const AttributeSummary& a : summary.attributes) {
-        text += fmt::format("  {:<{}}  {:<5}", a.name, width, type_name(a.type));
+        text += fmt::format("  {:<{}}  {:<5}", printable(a.name), width, type_name(a.type));
         if (!a.min.empty())
             text += a.uniform ? fmt::format("  {} everywhere", number_list(a.min))
                               : fmt::format("  {}  to  {}", number_list(a.min), number_list(a.max));
@@ -99,7 +100,8 @@ std::string to_text(const PointSummary& summary)
         text += '\n';
     }
     if (!summary.groups.empty()) text += "groups\n";
-    for (const GroupSummary& g : summary.groups) text += fmt::format("  {:<{}}  {}\n", g.name, width, g.members);
+    for (const GroupSummary& g : summary.groups)
+        text += fmt::format("  {:<{}}  {}\n", printable(g.name), width, g.members);
     return text;
 }
 

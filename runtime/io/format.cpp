@@ -21,6 +21,14 @@ std::string lower_extension(const std::filesystem::path& path)
     return extension;
 }
 
+// What a file calls P, v or id may be of any type.
+void check_type(const PointSet& points, const char* name, AttributeType type)
+{
+    const AttributeType found = type_of(*points.find(name));
+    if (found != type)
+        throw Error(fmt::format("the attribute {} is {}; it must be {}", name, type_name(found), type_name(type)));
+}
+
 }  // namespace
 
 FormatRegistration::FormatRegistration(Format format)
@@ -53,7 +61,11 @@ PointSet read_points(const std::filesystem::path& path)
         throw Error(fmt::format("a {} file holds no points that could be read", format.extension))
             .at({path.string(), 0});
     try {
-        return format.read(path);
+        PointSet points = format.read(path);
+        check_type(points, "P", AttributeType::Vec3);
+        check_type(points, "v", AttributeType::Vec3);
+        check_type(points, "id", AttributeType::Int64);
+        return points;
     } catch (Error& error) {
         throw error.at({path.string(), 0});
     }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -60,41 +61,14 @@ void check_fits_int32(const std::string& name, const Column<std::int64_t>& colum
     });
 }
 
-template <class Scalar>
-Scalar load(const unsigned char* from, ByteOrder order)
-{
-    unsigned char bytes[sizeof(Scalar)];
-    for (std::size_t b = 0; b < sizeof(Scalar); ++b)
-        bytes[b] = order == ByteOrder::Little ? from[b] : from[sizeof(Scalar) - 1 - b];
-    return std::bit_cast<Scalar>(bytes);
-}
-
 // Calls f with a function that loads a number of the type.
 template <class F>
 auto with_loader(ScalarType type, ByteOrder order, const F& f)
 {
-    switch (type) {
-        case ScalarType::Int8:
-            return f([=](const unsigned char* p) { return load<std::int8_t>(p, order); });
-        case ScalarType::UInt8:
-            return f([=](const unsigned char* p) { return load<std::uint8_t>(p, order); });
-        case ScalarType::Int16:
-            return f([=](const unsigned char* p) { return load<std::int16_t>(p, order); });
-        case ScalarType::UInt16:
-            return f([=](const unsigned char* p) { return load<std::uint16_t>(p, order); });
-        case ScalarType::Int32:
-            return f([=](const unsigned char* p) { return load<std::int32_t>(p, order); });
-        case ScalarType::UInt32:
-            return f([=](const unsigned char* p) { return load<std::uint32_t>(p, order); });
-        case ScalarType::Float:
-            return f([=](const unsigned char* p) { return load<float>(p, order); });
-        case ScalarType::Double:
-            break;
-    }
-    return f([=](const unsigned char* p) { return load<double>(p, order); });
+    return with_scalar(type, [&](auto like) {
+        return f([order](const unsigned char* p) { return load_scalar<decltype(like)>(p, order); });
+    });
 }
-
-bool is_floating(ScalarType type) { return type == ScalarType::Float || type == ScalarType::Double; }
 
 struct Records {
     std::span<const unsigned char> bytes;
@@ -118,6 +92,20 @@ struct Records {
         });
     }
 
+    // Of floating numbers, which must be whole ones.
+    void check_ids(ScalarType type, std::size_t offset) const
+    {
+        with_loader(type, order, [&](const auto& loader) {
+            for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) {
+                    const auto id = static_cast<double>(loader(bytes.data() + i * stride + offset));
+                    if (!(std::abs(id) <= 0x1p53 && id == std::floor(id)))
+                        throw Error(fmt::format("point {} has the id {}; ids are whole numbers", i, id));
+                }
+            });
+        });
+    }
+
     template <class T, class Number>
     Column<T> column(const RecordAttribute& attribute, std::span<const std::size_t> offsets) const
     {
@@ -131,12 +119,6 @@ struct Records {
 };
 
 }  // namespace
-
-std::size_t scalar_bytes(ScalarType type)
-{
-    constexpr std::size_t bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-    return bytes[static_cast<std::size_t>(type)];
-}
 
 void RecordWriter::push(Part::Encoding encoding, const void* from, std::size_t stride, std::size_t words,
                         std::size_t bytes)
@@ -227,6 +209,7 @@ PointSet read_records(std::span<const unsigned char> bytes, std::size_t n, std::
         }
         const bool floating = is_floating(attribute.type) || attribute.scale != 1;
         if (attribute.name == "id" && offsets.size() == 1) {
+            if (is_floating(attribute.type)) records.check_ids(attribute.type, offsets[0]);
             points.set("id", records.column<std::int64_t, std::int64_t>(attribute, offsets));
         } else if (floating && offsets.size() == 3) {
             points.set(attribute.name, records.column<Vec3f, float>(attribute, offsets));

@@ -10,13 +10,10 @@
 #include <vector>
 
 #include "runtime/files/output_file.h"
+#include "runtime/files/scalars.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {
-
-enum class ByteOrder { Little, Big };
-enum class ScalarType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
-std::size_t scalar_bytes(ScalarType type);
 
 // Interleaves columns, in the order of the calls. The columns must outlive it.
 class RecordWriter {
@@ -61,7 +58,8 @@ struct RecordAttribute {
 };
 
 // Reads points from records of `stride` bytes. Three floats become a vec3, four a quaternion; integers become int32;
-// unsigned 32-bit integers and id become int64. Without an id, points are numbered from 0.
+// unsigned 32-bit integers and id become int64. Without an id, points are numbered from 0. Error: an id that is not
+// whole.
 PointSet read_records(std::span<const unsigned char> records, std::size_t points, std::size_t stride, ByteOrder order,
                       const std::vector<RecordAttribute>& attributes);
 

@@ -11,7 +11,9 @@
 #include <numeric>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/read_apart.h"
 #include "runtime/io/id_order.h"
+#include "runtime/io/point_message.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_types.h"
 
@@ -168,10 +170,14 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
     }
 }
 
-PointSet read_vdb(const std::filesystem::path& path)
+// The points of a file, in its order.
+struct VdbPoints {
+    PointSet points;
+    bool has_id = false;
+};
+
+VdbPoints read_grids(const std::filesystem::path& path)
 {
-    initialize_openvdb();
-    check_readable(path);
     try {
         vdb::io::File file(path.string());
         file.open(/*delayed loading=*/false);
@@ -191,22 +197,42 @@ PointSet read_vdb(const std::filesystem::path& path)
             throw Error(others.empty() ? std::string("the file holds no grids")
                                        : fmt::format("the file holds no points; its grids are {}", others));
 
-        PointSet points;
-        points.append(count);
-        bool has_id = false;
+        VdbPoints read;
+        read.points.append(count);
         std::size_t first = 0;
         for (const PointDataGrid::ConstPtr& grid : grids) {
-            read_grid(*grid, first, points, has_id);
+            read_grid(*grid, first, read.points, read.has_id);
             for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) first += leaf->getLastValue();
         }
-        if (count == 0) return points;
-        if (has_id) return reordered(points, id_order(points.id()));
-        std::span<std::int64_t> ids = points.id().overwrite();
-        std::iota(ids.begin(), ids.end(), std::int64_t{0});
-        return points;
+        return read;
     } catch (const vdb::Exception& error) {
         throw Error(fmt::format("can't be read: {}", error.what()));
     }
+}
+
+void send(const VdbPoints& read, MessageWriter& message)
+{
+    message.put(read.has_id);
+    send_points(read.points, message);
+}
+
+VdbPoints receive(MessageReader& message)
+{
+    const bool has_id = message.take<std::uint8_t>() != 0;
+    return {receive_points(message), has_id};
+}
+
+PointSet read_vdb(const std::filesystem::path& path)
+{
+    initialize_openvdb();
+    check_readable(path);
+    auto [points, has_id] = read_apart<VdbPoints>(
+        path, [&] { return read_grids(path); }, send, receive);
+    if (points.empty()) return points;
+    if (has_id) return reordered(points, id_order(points.id()));
+    std::span<std::int64_t> ids = points.id().overwrite();
+    std::iota(ids.begin(), ids.end(), std::int64_t{0});
+    return points;
 }
 
 const bool defined = vdb_reader.define(read_vdb);

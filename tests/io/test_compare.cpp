@@ -60,6 +60,15 @@ TEST_CASE("a set is the same as itself, and as itself in another order", "[io][c
     CHECK(comparison.compared == 500);
 }
 
+TEST_CASE("sets in which two points have one id can't be compared", "[io][compare]")
+{
+    const PointSet a = diagonal_points();
+    PointSet b = a;
+    b.id().write()[3] = 119;
+    CHECK(error_of([&] { compare(a, b); }) == "two points of B have the id 119; points are compared by id");
+    CHECK(error_of([&] { compare(b, a); }) == "two points of A have the id 119; points are compared by id");
+}
+
 TEST_CASE("max, rms and p95 are those of the lengths of the differences", "[io][compare]")
 {
     const PointSet a = diagonal_points();
@@ -171,6 +180,17 @@ TEST_CASE("an integer and a float of equal value are the same, a vector and a sc
     b.add({"Cd", 1.0f});
     CHECK_FALSE(compare(a, b).same);
     CHECK_THAT(to_text(compare(a, b)), Catch::Contains("vec3 / float  can't be compared"));
+}
+
+TEST_CASE("names in a description are shown without what a terminal would take for commands", "[io][describe]")
+{
+    PointSet points;
+    points.append(1);
+    points.add({"a\x1b[2J", 1.0f});
+    points.group("b\r");
+    const std::string text = to_text(describe(points));
+    CHECK_THAT(text, Catch::Contains("a\\x1b[2J") && Catch::Contains("b\\x0d"));
+    CHECK(text.find('\x1b') == std::string::npos);
 }
 
 TEST_CASE("a description has the ranges, counts and bounds of the points", "[io][describe]")

@@ -7,6 +7,7 @@
 #include "runtime/error.h"
 #include "runtime/files/output_stream.h"
 #include "runtime/shapes/level_set/grid_file.h"
+#include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 
 namespace rapid {
@@ -32,7 +33,8 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
                             grids_of(level_sets)));
 }
 
-// The metadata of all grids, and the values of the chosen one alone.
+// The metadata of all grids, and the values of the chosen one alone. All that may take as much memory as the file says
+// is done here, in the process that may.
 FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
 {
     try {
@@ -44,7 +46,15 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
             throw Error(fmt::format("grid \"{}\" of \"{}\" is {} of class \"{}\"; it must be a float level set",
                                     chosen->getName(), path, chosen->valueType(),
                                     openvdb::GridBase::gridClassToString(chosen->getGridClass())));
-        return openvdb::gridPtrCast<FloatGrid>(file.readGrid(chosen->getName()));
+        // Exactly: a rotation, a shear or unequal scales would have to be resampled.
+        if (!is_uniform(chosen->transform()))
+            throw Error(
+                fmt::format("the map of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample it "
+                            "to cubic voxels along the axes",
+                            chosen->getName(), path));
+        const auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid(chosen->getName()));
+        if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles(/*threaded=*/false);
+        return grid;
     } catch (const openvdb::Exception& e) {
         throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path, e.what()));
     }
@@ -54,21 +64,10 @@ LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
 {
     if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    FloatGrid::Ptr grid = read_grid(path.string(), name);
+    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(path, [&] { return read_grid(path.string(), name); });
     if (grid->activeVoxelCount() == 0)
         throw Error(
             fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));
-    // Exactly: a rotation, a shear or unequal scales would have to be resampled.
-    const openvdb::Mat4R map = grid->transform().baseMap()->getAffineMap()->getMat4();
-    const bool uniform = grid->transform().isLinear() && map(0, 0) > 0 && map(0, 0) == map(1, 1) &&
-                         map(1, 1) == map(2, 2) && map(0, 1) == 0 && map(0, 2) == 0 && map(1, 0) == 0 &&
-                         map(1, 2) == 0 && map(2, 0) == 0 && map(2, 1) == 0;
-    if (!uniform)
-        throw Error(
-            fmt::format("the map of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample it "
-                        "to cubic voxels along the axes",
-                        grid->getName(), path.string()));
-    if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles();
 
     auto level_set =
         std::make_shared<GridLevelSet>(grid, [grid](double half_width) { return widened(*grid, half_width); });

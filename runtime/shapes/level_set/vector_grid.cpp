@@ -6,6 +6,7 @@
 
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/grid_file.h"
+#include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 
 namespace rapid {
@@ -59,23 +60,29 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
                             grids_of(vectors)));
 }
 
-VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
+Vec3SGrid::Ptr read_grid(const std::string& path, const std::string& name)
 {
-    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
-    initialize_openvdb();
     try {
-        openvdb::io::File file(path.string());
+        openvdb::io::File file(path);
         file.open(/*delayLoad=*/false);
-        const auto chosen = choose(path.string(), name, *file.readAllGridMetadata());
+        const auto chosen = choose(path, name, *file.readAllGridMetadata());
         if (!chosen->isType<Vec3SGrid>())
             throw Error(
                 fmt::format("grid \"{}\" of \"{}\" is {}; it must be of vectors (vec3s): three grids of floats are "
                             "merged into one where they are made",
-                            chosen->getName(), path.string(), chosen->valueType()));
-        return std::make_shared<OpenVectorGrid>(openvdb::gridPtrCast<Vec3SGrid>(file.readGrid(chosen->getName())));
+                            chosen->getName(), path, chosen->valueType()));
+        return openvdb::gridPtrCast<Vec3SGrid>(file.readGrid(chosen->getName()));
     } catch (const openvdb::Exception& e) {
-        throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path.string(), e.what()));
+        throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path, e.what()));
     }
+}
+
+VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
+{
+    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
+    initialize_openvdb();
+    return std::make_shared<OpenVectorGrid>(
+        read_grid_apart<Vec3SGrid>(path, [&] { return read_grid(path.string(), name); }));
 }
 
 VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes, std::span<const Vec3f> values)

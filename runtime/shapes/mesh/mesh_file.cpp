@@ -1,25 +1,18 @@
-// Meshes from files, by Assimp.
+// Meshes from files, by Assimp: OBJ, STL and glTF.
 //
 // A mesh is its surface: normals and texture coordinates are dropped, because at a seam a vertex has several and every
 // point born on the mesh would carry them. Vertex colours become Cd, and Alpha if any is not 1.
-#include <assimp/config.h>
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <assimp/Importer.hpp>
-#include <bit>
-#include <cctype>
-#include <cmath>
-#include <fstream>
-#include <iterator>
-#include <optional>
 #include <string>
-#include <unordered_map>
+#include <utility>
 
 #include "runtime/error.h"
+#include "runtime/files/input_file.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
 namespace rapid {
@@ -47,7 +40,12 @@ void append(const aiMesh& part, const aiMatrix4x4& to_world, MeshFile& corners)
         const aiFace& face = part.mFaces[f];
         if (face.mNumIndices != 3) continue;  // lines and points, which have no surface
         Mesh::Triangle t;
-        for (int k = 0; k < 3; ++k) t[k] = static_cast<std::int32_t>(first + face.mIndices[k]);
+        for (int k = 0; k < 3; ++k) {
+            if (face.mIndices[k] >= part.mNumVertices)
+                throw Error(
+                    fmt::format("a face has the vertex {}; there are {}, from 0", face.mIndices[k], part.mNumVertices));
+            t[k] = static_cast<std::int32_t>(first + face.mIndices[k]);
+        }
         if (mirrored) std::swap(t[1], t[2]);
         corners.triangles.push_back(t);
     }
@@ -60,43 +58,22 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_pare
     for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, corners);
 }
 
-std::string lower_case(std::string text)
-{
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
-// Assimp takes a byte at the beginning of a binary file's data that could end a line for a part of the header, reads
-// everything after it from one byte too late, and fails at the faces. This returns such a file with one more element in
-// front of its own, an edge, whose bytes are unambiguous; nothing for any other file.
-std::optional<std::string> with_safe_beginning(const std::filesystem::path& path)
-{
-    std::ifstream file(path, std::ios::binary);
-    std::string header, line;
-    std::size_t elements = 0;
-    while (std::getline(file, line)) {
-        if (header.empty() && !line.starts_with("ply")) return {};
-        if (elements == 0 && line.starts_with("element ")) elements = header.size();
-        if (line.starts_with("format ascii")) return {};
-        header += line + '\n';
-        if (line.starts_with("end_header")) break;
+// A glTF file names others, which are to be files as well: reading from a pipe might never end.
+class RegularFiles : public Assimp::DefaultIOSystem {
+public:
+    Assimp::IOStream* Open(const char* file, const char* mode) override
+    {
+        check_readable(file);
+        return DefaultIOSystem::Open(file, mode);
     }
-    const int first = file.peek();
-    if (!(elements > 0 && (first == '\n' || first == '\r'))) return {};
-    header.insert(elements, "element edge 1\nproperty int vertex1\n");
-    return header + "edge" + std::string(std::istreambuf_iterator<char>(file), {});
-}
+};
 
 MeshFile import(const std::filesystem::path& path)
 {
     Assimp::Importer importer;
-    const std::optional<std::string> safe =
-        lower_case(path.extension().string()) == ".ply" ? with_safe_beginning(path) : std::nullopt;
-    const aiScene* scene = safe ? importer.ReadFileFromMemory(safe->data(), safe->size(), aiProcess_Triangulate, "ply")
-                                : importer.ReadFile(path.string(), aiProcess_Triangulate);
-    if (!scene)
-        throw Error(fmt::format("cannot read the mesh \"{}\": {}; it must be an OBJ, PLY, STL or glTF file",
-                                path.string(), importer.GetErrorString()));
+    importer.SetIOHandler(new RegularFiles);  // the importer's from here on
+    const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
+    if (!scene) throw Error(fmt::format("{}; it must be an OBJ, STL or glTF file", importer.GetErrorString()));
     MeshFile corners;
     if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), corners);
     if (!corners.colours.empty()) {
@@ -106,25 +83,7 @@ MeshFile import(const std::filesystem::path& path)
     return corners;
 }
 
-MeshFile read(const std::filesystem::path& path)
-{
-    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
-    static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
-    const std::string extension = lower_case(path.extension().string());
-    if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
-        throw Error(fmt::format(
-            "\"{}\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
-
-    MeshFile file = import(path);
-    for (std::size_t i = 0; i < file.positions.size(); ++i)
-        if (!file.positions[i].allFinite())
-            throw Error(fmt::format("vertex {} of the mesh \"{}\" is at ({}, {}, {}); coordinates must be finite", i,
-                                    path.string(), file.positions[i].x(), file.positions[i].y(),
-                                    file.positions[i].z()));
-    return file;
-}
-
-const bool defined = read_mesh_file.define(read);
+const bool defined = import_mesh.define(import);
 
 }  // namespace
 }  // namespace rapid

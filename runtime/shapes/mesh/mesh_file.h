@@ -18,8 +18,13 @@ struct MeshFile {
     std::vector<Mesh::Triangle> triangles;
 };
 
-// Error: no such file, the reader's own, a coordinate that is not finite.
-RAPID_DEFERRED(read_mesh_file, MeshFile(const std::filesystem::path& path));
+// Error: no such file, the reader's own, an index without a vertex, a coordinate that is not finite.
+MeshFile read_mesh_file(const std::filesystem::path& path);
+
+// Its readers, which name no file in their errors: of PLY, which trusts nothing; and of all else, by Assimp, which
+// trusts the file (read_apart.h).
+MeshFile read_ply_mesh(const std::filesystem::path& path);
+RAPID_DEFERRED(import_mesh, MeshFile(const std::filesystem::path& path));
 
 // The vertex of each corner: coincident corners are one vertex, numbered in the order of the file.
 std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions);

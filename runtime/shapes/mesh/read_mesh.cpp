@@ -1,15 +1,90 @@
-// Meshes from the contents of files: merges vertices by position, drops faces without area.
+// Meshes from files: chooses the reader, checks what it gives, merges vertices by position, drops faces without area.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <unordered_map>
 
 #include "runtime/error.h"
+#include "runtime/files/read_apart.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
 namespace rapid {
+namespace {
+
+std::string lower_case(std::string text)
+{
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+void send_mesh(const MeshFile& mesh, MessageWriter& message)
+{
+    for (const std::size_t count : {mesh.positions.size(), mesh.colours.size(), mesh.triangles.size()})
+        message.put(count);
+    message.put_array(std::span(mesh.positions));
+    message.put_array(std::span(mesh.colours));
+    message.put_array(std::span(mesh.alphas));
+    message.put_array(std::span(mesh.triangles));
+}
+
+MeshFile receive_mesh(MessageReader& message)
+{
+    const auto positions = message.take<std::size_t>(), colours = message.take<std::size_t>(),
+               triangles = message.take<std::size_t>();
+    if (colours != 0 && colours != positions) throw Error("its reader went wrong; it must be damaged");
+    MeshFile mesh;
+    mesh.positions = message.take_vector<Vec3f>(positions);
+    mesh.colours = message.take_vector<Vec3f>(colours);
+    mesh.alphas = message.take_vector<float>(colours);
+    mesh.triangles = message.take_vector<Mesh::Triangle>(triangles);
+    return mesh;
+}
+
+MeshFile read_any(const std::filesystem::path& path, const std::string& extension)
+{
+    if (extension == ".ply") return read_ply_mesh(path);
+    DeferredFunctions::find("import_mesh");  // loaded here, and not anew in each process that reads a file
+    return read_apart<MeshFile>(
+        path, [&] { return import_mesh(path); }, send_mesh, receive_mesh);
+}
+
+void check(const MeshFile& file)
+{
+    const auto vertices = static_cast<std::int64_t>(file.positions.size());
+    for (const Mesh::Triangle& t : file.triangles)
+        if (t.minCoeff() < 0 || t.maxCoeff() >= vertices)
+            throw Error(
+                fmt::format("a face has the vertices {}, {} and {}; there are {}, from 0", t[0], t[1], t[2], vertices));
+}
+
+}  // namespace
+
+MeshFile read_mesh_file(const std::filesystem::path& path)
+{
+    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
+    static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
+    const std::string extension = lower_case(path.extension().string());
+    if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
+        throw Error(fmt::format(
+            "\"{}\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
+
+    MeshFile file;
+    try {
+        file = read_any(path, extension);
+        check(file);
+    } catch (const Error& error) {
+        throw Error(fmt::format("cannot read the mesh \"{}\": {}", path.string(), error.message()));
+    }
+    for (std::size_t i = 0; i < file.positions.size(); ++i)
+        if (!file.positions[i].allFinite())
+            throw Error(fmt::format("vertex {} of the mesh \"{}\" is at ({}, {}, {}); coordinates must be finite", i,
+                                    path.string(), file.positions[i].x(), file.positions[i].y(),
+                                    file.positions[i].z()));
+    return file;
+}
 
 std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
 {

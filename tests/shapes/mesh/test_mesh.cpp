@@ -349,8 +349,11 @@ TEST_CASE("files that are not meshes are refused with their name and the fault",
     CHECK_THAT(refusal("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"),
                Equals("vertex 1 of the mesh \"nan.obj\" is at (nan, 0, 0); coordinates must be finite"));
     CHECK_THAT(refusal("broken.ply", "ply\nthis is no header\n"),
-               Catch::Matchers::StartsWith("cannot read the mesh \"broken.ply\": ") &&
-                   Catch::Matchers::EndsWith("; it must be an OBJ, PLY, STL or glTF file"));
+               Equals("cannot read the mesh \"broken.ply\": not a valid PLY file: line 2 of its header can't be "
+                      "understood"));
+    CHECK_THAT(refusal("broken.glb", "this is no header\n"),
+               Catch::Matchers::StartsWith("cannot read the mesh \"broken.glb\": ") &&
+                   Catch::Matchers::EndsWith("; it must be an OBJ, STL or glTF file"));
 }
 
 TEST_CASE("a scanned mesh and an animated one are read as their makers describe them", "[mesh][read]")

@@ -1,0 +1,173 @@
+#include "runtime/files/read_apart.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <new>
+
+#include "runtime/files/file_error.h"
+#include "runtime/files/input_file.h"
+
+namespace rapid {
+namespace {
+
+// Of what a file may take: what the libraries need for any, and what they make of its bytes (a packed one may hold many
+// times its size).
+struct Limits {
+    std::size_t memory;  // bytes
+    unsigned seconds;    // of the processor
+};
+
+Limits limits_of(std::size_t file_bytes)
+{
+    constexpr std::size_t base = std::size_t{1} << 30, factor = 64, bytes_a_second = 2'000'000;
+    constexpr unsigned base_seconds = 5;
+    return {base + factor * file_bytes, base_seconds + static_cast<unsigned>(file_bytes / bytes_a_second)};
+}
+
+enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
+
+// Memory that both processes see; pages that nobody writes cost nothing.
+class SharedMemory {
+public:
+    explicit SharedMemory(std::size_t bytes) : bytes_(bytes)
+    {
+        start_ = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+        if (start_ == MAP_FAILED && errno != EPERM) throw file_error("can't be read, for want of shared memory", errno);
+    }
+    ~SharedMemory()
+    {
+        if (is_allowed()) ::munmap(start_, bytes_);
+    }
+    SharedMemory(const SharedMemory&) = delete;
+    SharedMemory& operator=(const SharedMemory&) = delete;
+
+    bool is_allowed() const { return start_ != MAP_FAILED; }
+    Outcome& outcome() const { return *static_cast<Outcome*>(start_); }
+    std::span<unsigned char> message() const
+    {
+        return {static_cast<unsigned char*>(start_) + sizeof(Outcome), bytes_ - sizeof(Outcome)};
+    }
+
+private:
+    void* start_;
+    std::size_t bytes_;
+};
+
+void limit(__rlimit_resource resource, rlim_t most)
+{
+    rlimit value;
+    if (::getrlimit(resource, &value) != 0) ::_exit(1);
+    value.rlim_cur = value.rlim_max = std::min(value.rlim_max, most);
+    if (::setrlimit(resource, &value) != 0) ::_exit(1);
+}
+
+// The address space of this process, which the copy begins with.
+std::size_t address_space()
+{
+    std::size_t pages = 0;
+    std::FILE* file = std::fopen("/proc/self/statm", "re");
+    if (!file || std::fscanf(file, "%zu", &pages) != 1) ::_exit(1);
+    std::fclose(file);
+    return pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+void confine(pid_t parent, const Limits& limits)
+{
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(1);  // it ended before the line above
+    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM, SIGXCPU, SIGTERM})
+        ::signal(signal, SIG_DFL);
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
+    // The libraries' last words are for nobody.
+    const int nowhere = ::open("/dev/null", O_WRONLY);
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+    limit(RLIMIT_CORE, 0);
+    limit(RLIMIT_CPU, limits.seconds);
+    ::alarm(6 * limits.seconds);  // it may wait for something, too
+    limit(RLIMIT_AS, address_space() + limits.memory);
+}
+
+Outcome outcome_of(const std::function<void(MessageWriter&)>& read, const SharedMemory& shared)
+{
+    const auto refused = [&](const char* why) {
+        MessageWriter(shared.message()).put_text(why);
+        return Outcome::Refused;
+    };
+    try {
+        MessageWriter writer(shared.message());
+        read(writer);
+        return Outcome::Read;
+    } catch (const std::bad_alloc&) {
+        return Outcome::OutOfMemory;
+    } catch (const std::exception& error) {
+        return refused(error.what());
+    } catch (...) {
+        return refused("can't be read");
+    }
+}
+
+std::string text_of_end(int status, const Limits& limits)
+{
+    if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGALRM))
+        return fmt::format("takes its reader longer than {} s", limits.seconds);
+    if (WIFSIGNALED(status))
+        return fmt::format("ends its reader with signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+    return "ends its reader";
+}
+
+}  // namespace
+
+bool read_in_process(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
+                     const std::function<void(MessageReader&)>& receive)
+{
+    const Limits limits = limits_of(check_readable(path));
+    const SharedMemory shared(limits.memory);
+    if (!shared.is_allowed()) return false;
+    // The copy has one thread. In an arena without workers TBB asks for no others, and takes no lock that one of this
+    // process's threads, of which the copy has none, may hold.
+    tbb::task_arena alone(1);
+    alone.initialize();
+    const pid_t parent = ::getpid(), child = ::fork();
+    if (child < 0 && errno == EPERM) return false;
+    if (child < 0) throw file_error("can't be read, for want of a process to read it in", errno);
+    if (child == 0) {
+        confine(parent, limits);
+        alone.execute([&] {
+            shared.outcome() = outcome_of(read, shared);
+            ::_exit(0);
+        });
+    }
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    MessageReader reader(shared.message());
+    switch (shared.outcome()) {
+        case Outcome::Read:
+            receive(reader);
+            return true;
+        case Outcome::Refused:
+            throw Error(reader.take_text());
+        case Outcome::OutOfMemory:
+            throw Error(fmt::format("can't be read: it takes more than {} MB of memory, and must be damaged",
+                                    limits.memory >> 20));
+        case Outcome::None:
+            break;
+    }
+    throw Error(fmt::format("can't be read: it {}, and must be damaged", text_of_end(status, limits)));
+}
+
+}  // namespace rapid

@@ -1,0 +1,13 @@
+// Points in a message between processes (files/read_apart.h).
+#pragma once
+
+#include "runtime/files/message.h"
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+void send_points(const PointSet& points, MessageWriter& message);
+// Error: what the message holds is no set of points.
+PointSet receive_points(MessageReader& message);
+
+}  // namespace rapid

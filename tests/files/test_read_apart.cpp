@@ -1,0 +1,106 @@
+#include "runtime/files/read_apart.h"
+
+#include <sys/mman.h>
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+namespace {
+
+using Numbers = std::vector<std::int32_t>;
+
+void send(const Numbers& numbers, MessageWriter& message)
+{
+    message.put(numbers.size());
+    message.put_array(std::span<const std::int32_t>(numbers));
+}
+
+Numbers receive(MessageReader& message) { return message.take_vector<std::int32_t>(message.take<std::size_t>()); }
+
+Numbers read(const std::filesystem::path& path, const std::function<Numbers()>& reader)
+{
+    return read_apart<Numbers>(path, reader, send, receive);
+}
+
+std::string error_in(const std::function<Numbers()>& reader)
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "file") << "bytes";
+    return error_of([&] { read(folder / "file", reader); });
+}
+
+}  // namespace
+
+TEST_CASE("what is read in another process comes back, and nothing else of it does", "[files]")
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "file") << "bytes";
+    const Numbers many(1000000, 7);
+    bool touched = false;
+    const Numbers back = read(folder / "file", [&] {
+        touched = true;
+        return many;
+    });
+    CHECK((back == many));
+    CHECK_FALSE(touched);
+}
+
+TEST_CASE("a file that this process wrote is read in it, until another changes it", "[files]")
+{
+    const TemporaryFolder folder;
+    OutputFile file(folder / "file");
+    file.append("bytes", 5);
+    file.finish();
+    const pid_t here = ::getpid();
+    const auto reads_here = [&] { return read(folder / "file", [] { return Numbers{::getpid()}; })[0] == here; };
+    CHECK(reads_here());
+    std::ofstream(folder / "file") << "other bytes";
+    CHECK_FALSE(reads_here());
+}
+
+TEST_CASE("the end of a reader is an error of its file", "[files]")
+{
+    CHECK(error_in([]() -> Numbers { throw Error("it is no file of mine"); }) == "it is no file of mine");
+    CHECK(error_in([]() -> Numbers {
+              ::raise(SIGSEGV);
+              return {};
+          }) == "can't be read: it ends its reader with signal 11 (Segmentation fault), and must be damaged");
+    CHECK_THAT(error_in([]() -> Numbers { std::abort(); }), Catch::Contains("signal 6 (Aborted)"));
+    CHECK(error_in([]() -> Numbers { ::_exit(0); }) == "can't be read: it ends its reader, and must be damaged");
+    CHECK(error_in([]() -> Numbers { return Numbers(std::size_t{1} << 30); }) ==
+          "can't be read: it takes more than 1024 MB of memory, and must be damaged");
+}
+
+TEST_CASE("a message that promises more than it holds is an error", "[files]")
+{
+    const std::size_t promised = GENERATE(as<std::size_t>{}, 1, 1000, std::size_t{1} << 62, ~std::size_t{0});
+    std::vector<unsigned char> memory(sizeof promised);
+    std::memcpy(memory.data(), &promised, sizeof promised);
+    MessageReader numbers(memory), text(memory);
+    CHECK_FALSE(error_of([&] { receive(numbers); }).empty());
+    CHECK_FALSE(error_of([&] { text.take_text(); }).empty());
+}
+
+TEST_CASE("a reader may use parallel loops while the other threads of this process are in theirs", "[files]")
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "file") << "bytes";
+    std::atomic<int> right = 0;
+    tbb::parallel_for(0, 64, [&](int i) {
+        const Numbers sum = read(folder / "file", [i] {
+            std::atomic<int> total = 0;
+            tbb::parallel_for(0, 1000, [&](int k) { total += k * i; });
+            return Numbers{total};
+        });
+        right += sum[0] == 499500 * i;
+    });
+    CHECK(right == 64);
+}

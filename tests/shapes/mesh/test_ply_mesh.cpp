@@ -1,0 +1,103 @@
+#include "runtime/shapes/mesh/mesh.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+namespace {
+
+const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
+
+class PlyFolder {
+public:
+    MeshPtr read(const std::string& text) const
+    {
+        std::ofstream(folder_ / "a.ply", std::ios::binary) << text;
+        return read_mesh(folder_ / "a.ply");
+    }
+    // Without the text that names the file.
+    std::string error(const std::string& text) const
+    {
+        std::string message = error_of([&] { read(text); });
+        const std::string start = "cannot read the mesh \"" + (folder_ / "a.ply").string() + "\": ";
+        REQUIRE(message.starts_with(start));
+        return message.substr(start.size());
+    }
+
+private:
+    TemporaryFolder folder_;
+};
+
+std::string square(const std::string& faces, const std::string& body)
+{
+    return "ply\nformat ascii 1.0\nelement vertex 4\n" + xyz + "element face " + faces +
+           "\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n" + body;
+}
+
+}  // namespace
+
+TEST_CASE("an index without a vertex is an error that names the face", "[mesh][ply]")
+{
+    const PlyFolder folder;
+    CHECK(folder.error(square("1", "3 0 1 1000000\n")) == "face 0 has the vertex 1000000; there are 4, from 0");
+    CHECK(folder.error(square("2", "3 0 1 2\n3 0 1 4\n")) == "face 1 has the vertex 4; there are 4, from 0");
+    CHECK(folder.error(square("1", "3 0 1 -1\n")) == "face 0 has the vertex -1; there are 4, from 0");
+}
+
+TEST_CASE("elements before and behind the vertices are passed over", "[mesh][ply]")
+{
+    const PlyFolder folder;
+    const MeshPtr mesh = folder.read(
+        "ply\nformat ascii 1.0\nelement camera 1\nproperty list uchar float lens\nproperty int shots\nelement vertex "
+        "3\n" +
+        xyz + "element edge 1\nproperty int vertex1\nproperty int vertex2\nelement face 1\nproperty uchar red\n" +
+        "property list uchar uint vertex_index\nend_header\n2 0.5 0.25 9\n0 0 0\n1 0 0\n0 1 0\n0 1\n255 3 0 1 2\n");
+    CHECK(mesh->positions.size() == 3);
+    CHECK(mesh->triangles.size() == 1);
+}
+
+TEST_CASE("a damaged mesh .ply is an error that says how", "[mesh][ply]")
+{
+    const PlyFolder folder;
+    CHECK(folder.error(square("3", "3 0 1 2\n3 0 2 3\n")) ==
+          "face 2 of 3: there is no vertex_indices; the file ends early or is damaged");
+    CHECK_THAT(folder.error(square("1000000", "3 0 1 2\n")),
+               Catch::StartsWith("the file ends early: its header promises"));
+    CHECK(folder.error(
+              "ply\nformat ascii 1.0\nelement face 0\nproperty list uchar int vertex_indices\nelement vertex 0\n" +
+              xyz + "end_header\n") == "the faces are before the vertices");
+    CHECK(folder.error("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n") ==
+          "the vertices have no x y z");
+    CHECK(folder.error("ply\nformat ascii 1.0\nelement vertex 0\n" + xyz +
+                       "element face 0\nproperty int kind\nend_header\n") == "the faces have no list vertex_indices");
+}
+
+TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[mesh][ply]")
+{
+    const PlyFolder folder;
+    const MeshPtr quad = folder.read(square("1", "4 0 1 2 3\n"));
+    REQUIRE(quad->triangles.size() == 2);
+    CHECK((quad->triangles[0] == Mesh::Triangle(0, 1, 2) && quad->triangles[1] == Mesh::Triangle(0, 2, 3)));
+
+    // A comb: nine corners, of which three are concave; 2 x 1 m without two teeth of 0.5 x 0.5 m.
+    const int start = GENERATE(range(0, 12));
+    const std::vector<Vec3f> comb = {{0, 0, 0},        {2, 0, 0},        {2, 1, 0},     {1.75f, 1, 0},
+                                     {1.75f, 0.5f, 0}, {1.25f, 0.5f, 0}, {1.25f, 1, 0}, {0.75f, 1, 0},
+                                     {0.75f, 0.5f, 0}, {0.25f, 0.5f, 0}, {0.25f, 1, 0}, {0, 1, 0}};
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 12\n" + xyz +
+                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    std::string face = "12";
+    for (int i = 0; i < 12; ++i) {
+        const Vec3f& P = comb[static_cast<std::size_t>((start + i) % 12)];
+        text += std::to_string(P.x()) + " " + std::to_string(P.y()) + " 0\n";
+        face += " " + std::to_string(i);
+    }
+    const MeshPtr mesh = folder.read(text + face + "\n");
+    CHECK(mesh->triangles.size() == 10);
+    CHECK(mesh->area() == Approx(1.5));
+    for (const Mesh::Triangle& t : mesh->triangles) {
+        const Vec3f a = mesh->positions[t[0]], b = mesh->positions[t[1]], c = mesh->positions[t[2]];
+        CHECK((b - a).cross(c - a).z() > 0);
+    }
+}

@@ -182,5 +182,10 @@ int run(const Arguments& arguments)
 int main(int argc, char** argv)
 {
     std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
-    return rapid::run({argv + 1, argv + argc});
+    try {
+        return rapid::run({argv + 1, argv + argc});
+    } catch (const std::bad_alloc&) {  // to tell it as any other error takes memory
+        std::fputs("out of memory\n", stderr);
+        return rapid::status_failed;
+    }
 }

@@ -43,7 +43,10 @@ class SharedMemory {
 public:
     explicit SharedMemory(std::size_t bytes) : bytes_(bytes)
     {
-        start_ = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+        // Some systems promise no more than they have.
+        constexpr std::size_t least = std::size_t{64} << 20;
+        do start_ = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+        while (start_ == MAP_FAILED && errno == ENOMEM && (bytes_ /= 2) >= least);
         if (start_ == MAP_FAILED && errno != EPERM) throw file_error("can't be read, for want of shared memory", errno);
     }
     ~SharedMemory()

@@ -1,5 +1,6 @@
 #include "runtime/io/frame_writer.h"
 
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -71,7 +72,7 @@ void FrameWriter::run()
     while (true) {
         changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
         if (jobs_.empty()) return;
-        Job job = std::move(jobs_.front());
+        std::optional<Job> job(std::move(jobs_.front()));
         jobs_.pop_front();
         busy_ = true;
         changed_.notify_all();
@@ -79,11 +80,11 @@ void FrameWriter::run()
 
         std::exception_ptr error;
         try {
-            write(job);
+            write(*job);
         } catch (...) {
             error = std::current_exception();
         }
-        job = {};  // releases its columns before a blocked submit() continues
+        job.reset();  // releases its columns before a blocked submit() continues
 
         lock.lock();
         busy_ = false;

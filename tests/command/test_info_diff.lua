@@ -49,6 +49,22 @@ describe("rapid info", function()
     assert.truthy(rapid("info one.####.csv").stdout:find("one.0002.csv\n", 1, true))
   end)
 
+  it("does not wait for the writer of a pipe", function()
+    os.execute("mkfifo " .. folder:file "pipe.csv")
+    local result = rapid "info pipe.csv"
+    os.remove(folder:file "pipe.csv")
+    assert.equal(2, result.status)
+    assert.equal("pipe.csv: can't be read: it is not a regular file\n", result.stderr)
+  end)
+
+  it("prints a name that holds commands for the terminal without them", function()
+    folder:write("name.csv", "Px,Py,Pz,a\27]0;b\7\n0,0,0,1\n")
+    local result = rapid "info name.csv"
+    assert.equal(0, result.status, result.stderr)
+    assert.truthy(result.stdout:find("  a\\x1b]0;b\\x07 ", 1, true), result.stdout)
+    assert.equal("a\27]0;b\7", json.decode(rapid("info name.csv --json").stdout).attributes[4].name)
+  end)
+
   it("says what it can't read, with 2", function()
     for name, message in pairs {
       ["no.csv"] = "no.csv: no such file\n",
@@ -70,6 +86,15 @@ describe("rapid diff", function()
   it("is done with 0 where two files are the same", function()
     assert.equal(0, rapid("diff a.csv a.csv").status)
     assert.equal(0, rapid("diff a.csv near.csv").status)
+  end)
+
+  it("can't tell points apart that have one id, and ends with 2", function()
+    csv("twice.csv", { "0,0,0,0,0,0,0,1", "1,3,4,0,0,1,0,2", "1,0,0,12,0,0,0,3" })
+    for _, files in ipairs { "a.csv twice.csv", "twice.csv a.csv", "twice.csv twice.csv" } do
+      local result = rapid("diff " .. files)
+      assert.equal(2, result.status)
+      assert.truthy(result.stderr:find "^two points of [AB] have the id 1; points are compared by id\n$", result.stderr)
+    end
   end)
 
   it("ends with 1 where they differ, and says how much", function()

@@ -110,6 +110,7 @@ struct Records {
     Column<T> column(const RecordAttribute& attribute, std::span<const std::size_t> offsets) const
     {
         Column<T> column;
+        if (points == 0) return column;
         std::span<T> values = column.append_for_writing(points);
         Number* numbers = reinterpret_cast<Number*>(values.data());
         for (std::size_t c = 0; c < offsets.size(); ++c)

@@ -18,10 +18,11 @@ namespace {
 class Property {
 public:
     Property(const PlyElement& vertex, const PlyRecords& records, std::string_view name, bool colour)
-        : records_(records), from_(records.bytes.data())
+        : records_(records)
     {
         for (const PlyProperty& property : vertex.properties) {
             if (property.name == name) {
+                found_ = true;
                 type_ = property.type;
                 if (colour && !is_floating(property.type))
                     scale_ = with_scalar(property.type, [](auto like) {
@@ -29,23 +30,24 @@ public:
                     });
                 return;
             }
-            from_ += scalar_bytes(property.type);
+            offset_ += scalar_bytes(property.type);
         }
-        from_ = nullptr;
     }
 
-    explicit operator bool() const { return from_; }
+    explicit operator bool() const { return found_; }
     float operator[](std::size_t i) const
     {
         return with_scalar(type_, [&](auto like) {
-            const auto number = load_scalar<decltype(like)>(from_ + i * records_.stride, records_.order);
+            const unsigned char* from = records_.bytes.data() + i * records_.stride + offset_;
+            const auto number = load_scalar<decltype(like)>(from, records_.order);
             return static_cast<float>(scale_ * static_cast<double>(number));
         });
     }
 
 private:
     const PlyRecords& records_;
-    const unsigned char* from_;
+    bool found_ = false;
+    std::size_t offset_ = 0;  // in a record
     ScalarType type_ = ScalarType::Float;
     double scale_ = 1;
 };

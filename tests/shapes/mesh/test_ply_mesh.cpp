@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "runtime/shapes/mesh/mesh.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
@@ -90,8 +92,8 @@ TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[
     std::string face = "12";
     for (int i = 0; i < 12; ++i) {
         const Vec3f& P = comb[static_cast<std::size_t>((start + i) % 12)];
-        text += std::to_string(P.x()) + " " + std::to_string(P.y()) + " 0\n";
-        face += " " + std::to_string(i);
+        text += fmt::format("{} {} 0\n", P.x(), P.y());
+        face += fmt::format(" {}", i);
     }
     const MeshPtr mesh = folder.read(text + face + "\n");
     CHECK(mesh->triangles.size() == 10);

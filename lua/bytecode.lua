@@ -19,6 +19,7 @@
 -- they are when the graph file has run. Their arguments and results are followed, too. Values in tables that a
 -- kernel makes are not followed: `rapid check --races` finds these by running it.
 local bit = require "bit"
+local protected = require "protected"
 local util = require "jit.util"
 local vmdef = require "jit.vmdef"
 
@@ -86,7 +87,8 @@ end
 
 -- Functions of Lua that write into an argument, by its place from 1.
 local writers = {
-  [table.insert] = { "table.insert", 1 }, [table.remove] = { "table.remove", 1 }, [table.sort] = { "table.sort", 1 },
+  [table.insert] = { "table.insert", 1 }, [table.remove] = { "table.remove", 1 }, 
+  [protected.sort] = { "table.sort", 1 },
   [table.move] = { "table.move", 5 },
 }
 
@@ -307,7 +309,7 @@ local function call_shared(at, called, given, arguments)
       analyse_inside(argument.value, found)
       result = shared
     end
-  elseif found.resumes(called, given[0]) or not library[called] and not util.funcinfo(called).bytecodes then
+  elseif protected.resumes(called, given[0]) or not library[called] and not util.funcinfo(called).bytecodes then
     at:refuse_store "resumes a coroutine, or an iterator, that was made outside of it"
   end
   return result
@@ -485,18 +487,18 @@ local to_remember = {
     "points.detail.NAME = value",
 }
 
--- env: the environment in which the kernel's globals live; resumes(f, first): whether calling f goes on with a
--- coroutine; of_a_point: the kernel's first parameter is a point; point_names: the table of the host.
-local function analyse(kernel, env, resumes, of_a_point, point_names)
+-- env: the environment in which the kernel's globals live; of_a_point: the kernel's first parameter is a point;
+-- point_names: the table of the host.
+local function analyse(kernel, env, of_a_point, point_names)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
-    inside = {}, env = env, resumes = resumes, remedy = of_a_point and to_remember.point or to_remember.set,
+    inside = {}, env = env, remedy = of_a_point and to_remember.point or to_remember.set,
     methods = {},
   }
   for _, name in ipairs(point_names.methods) do found.methods[name] = true end
   -- Behind the point and the frame come the parameters of a Lua node, which all points share.
   analyse_function(kernel, found, of_a_point and { [0] = point, [2] = parameters } or { [2] = parameters })
-  for _, own in ipairs { "calls_of", "inside", "env", "resumes", "remedy", "methods" } do found[own] = nil end
+  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "methods" } do found[own] = nil end
   return found
 end
 

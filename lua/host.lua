@@ -89,7 +89,7 @@ function entry.load_node(name)
 end
 
 function entry.analyse(f, of_a_point)
-  return bytecode.analyse(f, env, sandbox.resumes, of_a_point, native.point_names)
+  return bytecode.analyse(f, env, of_a_point, native.point_names)
 end
 
 entry.fingerprint = bytecode.fingerprint

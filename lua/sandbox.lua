@@ -5,8 +5,11 @@
 -- Rapid's own.
 local ffi = require "ffi"
 local describe = require "describe"
+local protected = require "protected"
 
 local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
+
+local weak = "a table can't be weak (__mode): what it holds would depend on when memory is collected"
 
 local function copy(library, without)
   local result = {}
@@ -27,6 +30,8 @@ end
 -- Keys in an order that does not depend on the hash: numbers, then strings, then false, true. Of other keys (tables,
 -- functions, nodes) there may be one: their order would be that of their addresses.
 local function sorted_keys(map, what)
+  local meta = debug.getmetatable(map)
+  if meta and rawget(meta, "__mode") ~= nil then error(weak, 3) end
   local numbers, strings, others = {}, {}, {}
   for key in raw_pairs(map) do
     local kind = type(key)
@@ -91,68 +96,13 @@ local function safe_format(format, ...)
 end
 jit.off(safe_format) -- unpack is not compiled: its loop would be, in vain
 
--- Nested coroutines, and C functions that call Lua, use the C stack, whose depth Lua does not limit.
-local most_nested = 100
-local nested = 0
-
-local function enter(what)
-  if nested == most_nested then
-    error(("stack overflow: %s inside of each other, more than %d deep"):format(what, most_nested), 3)
-  end
-  nested = nested + 1
-end
-
-local function leave(...)
-  nested = nested - 1
-  return ...
-end
-
-local function safe_gsub(text, pattern, replacement, count)
-  if type(replacement) ~= "function" and type(replacement) ~= "table" then
-    return string.gsub(text, pattern, replacement, count)
-  end
-  enter "string.gsub"
-  local ok, result, replaced = leave(pcall(string.gsub, text, pattern, replacement, count))
-  if not ok then error(result, 0) end
-  return result, replaced
-end
-
-local function safe_resume(thread, ...)
-  if type(thread) ~= "thread" then error("coroutine.resume takes a coroutine, not " .. describe.kind(thread), 2) end
-  enter "coroutines"
-  return leave(coroutine.resume(thread, ...))
-end
-
-local wrapped = setmetatable({}, { __mode = "k" }) -- results of coroutine.wrap
-
-local function result_of(ok, ...)
-  if not ok then error((...), 0) end
-  return ...
-end
-
-local function safe_wrap(f)
-  if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. describe.kind(f), 2) end
-  local thread = coroutine.create(f)
-  local function run(...)
-    enter "coroutines"
-    return result_of(leave(coroutine.resume(thread, ...)))
-  end
-  wrapped[run] = true
-  return run
-end
-
--- Whether a call of f with these arguments resumes a coroutine.
-local function resumes(f, first)
-  return wrapped[f] or (f == safe_resume and first ~= nil)
-end
-
 -- native.read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and
 -- where it was looked for; native.outside_kernels(what, remedy) is an error while a kernel runs. In a quiet environment
 -- (a worker's) print does nothing: the first state has printed.
 local function make(native, run)
   local env = {}
   local strings = copy(string, { "dump" })
-  strings.format, strings.gsub = safe_format, safe_gsub
+  strings.format, strings.gsub = safe_format, protected.gsub
 
   -- The methods of strings are a copy that graph code can't reach, since Rapid's own modules call them, too.
   local of_strings = debug.getmetatable("")
@@ -161,18 +111,21 @@ local function make(native, run)
 
   env._G = env
   env._VERSION = _VERSION
-  env.assert, env.error, env.ipairs, env.pcall, env.xpcall = assert, error, ipairs, pcall, xpcall
+  env.assert, env.error, env.ipairs = assert, error, ipairs
+  env.pcall, env.xpcall = protected.pcall, protected.xpcall
   env.select, env.tonumber, env.type, env.unpack = select, tonumber, type, unpack
   env.pairs, env.next, env.tostring = sorted_pairs, sorted_next, safe_tostring
   env.rawequal = rawequal
   env.string, env.bit = strings, copy(require "bit")
   env.math = copy(math, { "random", "randomseed" })
   env.table = copy(table, { "foreach", "foreachi", "getn" })
+  env.table.sort = protected.sort
   env.coroutine = copy(coroutine)
-  env.coroutine.resume, env.coroutine.wrap = safe_resume, safe_wrap
+  env.coroutine.resume, env.coroutine.wrap = protected.resume, protected.wrap
 
   function env.setmetatable(object, meta)
     if type(object) ~= "table" then error("setmetatable takes a table", 2) end
+    if type(meta) == "table" and rawget(meta, "__mode") ~= nil then error(weak, 2) end
     return setmetatable(object, meta)
   end
   function env.getmetatable(object)
@@ -223,4 +176,4 @@ end
 
 assert(ffi.abi "gc64", "the host counts on frames of two slots")
 
-return { make = make, resumes = resumes }
+return { make = make }

@@ -151,7 +151,10 @@ ObjectPtr to_object(State& state, int index)
     luaL_getmetatable(L, object_metatable);
     const bool ours = lua_rawequal(L, -1, -2) != 0;
     lua_pop(L, 2);
-    return ours ? *static_cast<ObjectPtr*>(lua_touserdata(L, index)) : nullptr;
+    if (!ours) return nullptr;
+    const ObjectPtr& object = *static_cast<ObjectPtr*>(lua_touserdata(L, index));
+    if (!object) throw Error("the object is gone: the collector has been through with it");
+    return object;
 }
 
 void push(State& state, const Value& value)
@@ -194,7 +197,7 @@ void register_objects(lua_State* L)
 {
     luaL_newmetatable(L, object_metatable);
     lua_pushcfunction(L, [](lua_State* of_object) -> int {
-        static_cast<ObjectPtr*>(lua_touserdata(of_object, 1))->~ObjectPtr();
+        static_cast<ObjectPtr*>(lua_touserdata(of_object, 1))->reset();  // a handle that comes back holds nothing
         return 0;
     });
     lua_setfield(L, -2, "__gc");

@@ -1,0 +1,109 @@
+-- The functions of Lua that call a script's functions, as scripts see them. LuaJIT's own can end the process:
+--
+--   pcall, xpcall   called by each other they do not check the size of the stack; here each call has a frame of Lua,
+--                   which does
+--   memory          an error for want of memory that is caught in compiled code leaves a broken state; no protected
+--                   call is compiled, and this error passes through all of them
+--   C functions     that call Lua, and coroutines, nest on the C stack, whose depth Lua does not limit; here it is
+local describe = require "describe"
+
+local out_of_memory = "not enough memory" -- LuaJIT's own text
+
+local most_nested = 100
+local nested = 0
+
+local function enter(what)
+  if nested == most_nested then
+    error(("stack overflow: %s inside of each other, more than %d deep"):format(what, most_nested), 3)
+  end
+  nested = nested + 1
+end
+
+local function leave(...)
+  nested = nested - 1
+  return ...
+end
+
+-- The results of a protected call, unless it failed for want of memory.
+local function caught(ok, message, ...)
+  if not ok and message == out_of_memory then error(message, 0) end
+  return ok, message, ...
+end
+
+local function result_of(ok, ...)
+  if not ok then error((...), 0) end
+  return ...
+end
+
+local protected = {}
+
+function protected.pcall(f, ...)
+  return caught(pcall(f, ...))
+end
+
+local function handled(handler, ok, ...)
+  if ok then return ok, ... end
+  return false, select(2, caught(pcall(handler, (...))))
+end
+
+-- The handler is called when the stack is unwound: scripts have no means to look at it.
+function protected.xpcall(f, handler, ...)
+  if type(handler) ~= "function" then
+    error("xpcall takes a function and a handler of errors, not " .. describe.kind(handler), 2)
+  end
+  return handled(handler, caught(pcall(f, ...)))
+end
+
+function protected.gsub(text, pattern, replacement, count)
+  if type(replacement) ~= "function" and type(replacement) ~= "table" then
+    return string.gsub(text, pattern, replacement, count)
+  end
+  enter "string.gsub"
+  return result_of(leave(pcall(string.gsub, text, pattern, replacement, count)))
+end
+
+function protected.sort(list, before)
+  if type(list) ~= "table" then
+    error(("bad argument #1 to 'sort' (table expected, got %s)"):format(type(list)), 2)
+  end
+  enter "table.sort"
+  return result_of(leave(pcall(table.sort, list, before)))
+end
+
+function protected.resume(thread, ...)
+  if type(thread) ~= "thread" then error("coroutine.resume takes a coroutine, not " .. describe.kind(thread), 2) end
+  enter "coroutines"
+  return caught(leave(coroutine.resume(thread, ...)))
+end
+
+local wrapped = setmetatable({}, { __mode = "k" }) -- the coroutines of what coroutine.wrap has returned
+
+function protected.wrap(f)
+  if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. describe.kind(f), 2) end
+  local thread = coroutine.create(f)
+  local function run(...)
+    enter "coroutines"
+    return result_of(leave(coroutine.resume(thread, ...)))
+  end
+  wrapped[run] = thread
+  return run
+end
+
+-- The coroutine that a result of coroutine.wrap resumes; nil for any other function.
+function protected.thread_of(f)
+  return wrapped[f]
+end
+
+-- Whether a call of f with these arguments resumes a coroutine.
+function protected.resumes(f, first)
+  return wrapped[f] ~= nil or (f == protected.resume and first ~= nil)
+end
+
+-- Of a function that calls its first argument with further ones: the place of the first of these, from 0; else nil.
+function protected.place_of_arguments(f)
+  return f == protected.pcall and 1 or f == protected.xpcall and 2 or nil
+end
+
+for _, f in ipairs { "pcall", "xpcall", "gsub", "sort", "resume", "wrap" } do jit.off(protected[f]) end
+
+return protected

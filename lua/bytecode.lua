@@ -87,13 +87,19 @@ end
 
 -- Functions of Lua that write into an argument, by its place from 1.
 local writers = {
-  [table.insert] = { "table.insert", 1 }, [table.remove] = { "table.remove", 1 }, 
+  [table.insert] = { "table.insert", 1 }, [table.remove] = { "table.remove", 1 },
   [protected.sort] = { "table.sort", 1 },
   [table.move] = { "table.move", 5 },
 }
 
 -- Native functions that return their arguments, or elements of them. `pairs` and `next` are the sandbox's.
 local handing_on = { [ipairs] = true, [unpack] = true, [select] = true, [assert] = true, [setmetatable] = true }
+
+-- What a call of f writes into: a name and the place of that argument from 1; nil for other functions.
+local function writer_of(f, env)
+  if f == rawget(env, "setmetatable") then return { "setmetatable", 1 } end
+  return writers[f]
+end
 
 -- All other native functions that graph code finds; any further one is an iterator that it has made.
 local library = {}
@@ -232,8 +238,11 @@ function effects.TGETR(at)
 end
 
 function effects.TSETS(at)
-  local object, key = at.regs[at.b], at:string_constant(at.c)
+  local object, key, value = at.regs[at.b], at:string_constant(at.c), at.regs[at.a]
   local found = at.found
+  if key == "__newindex" and value and value.kind == "shared" and type(value.value) ~= "function" then
+    at:refuse_store "makes a table that all points share the __newindex of another"
+  end
   if object == point then
     at:mention(found.writes, key)
   elseif object == parameters then
@@ -300,9 +309,10 @@ end
 -- A shared function, called with these shared values. Returns its result, if all points share it.
 local function call_shared(at, called, given, arguments)
   local found = at.found
-  local writer = writers[called]
+  local writer = writer_of(called, found.env)
   local result = analyse_function(called, found, given)
-  if writer and given[arguments >= writer[2] and writer[2] - 1 or 0] then
+  local written = writer and given[arguments >= writer[2] and writer[2] - 1 or 0]
+  if written and (written.value == nil or type(written.value) == "table") then
     at:refuse_store(("changes a table that all points share by %s"):format(writer[1]))
   elseif hands_on(called, found.env) then
     for _, argument in pairs(given) do
@@ -315,25 +325,32 @@ local function call_shared(at, called, given, arguments)
   return result
 end
 
-local function call_function(at, arguments)
-  local regs, first = at.regs, at.a + 2 -- two slots a frame
-  local callee = regs[at.a]
+-- A call of `callee`, whose arguments lie in registers from `first` on. Returns its result, if all points share it.
+local function call_value(at, callee, first, arguments)
+  local regs = at.regs
   local given = {} -- arguments that all points share, by place from 0
   for place = 0, arguments - 1 do
     local argument = regs[first + place]
     if argument and argument.kind == "shared" then given[place] = argument end
   end
-  local result
-  if callee and callee.kind == "method" then
+  if not callee then return nil end
+  if callee.kind == "method" then
     local of_group = group_calls[callee.value]
     if of_group then of_group(at, callee, regs[first + 1]) end
-  elseif callee and callee.kind == "attribute" then
+  elseif callee.kind == "attribute" then
     at:mention(at.found.calls, callee.value)
-  elseif callee and callee.kind == "closure" then
-    result = analyse_function(callee.value, at.found, given, callee.outer)
-  elseif callee and callee.kind == "shared" and type(callee.value) == "function" then
-    result = call_shared(at, callee.value, given, arguments)
+  elseif callee.kind == "closure" then
+    return analyse_function(callee.value, at.found, given, callee.outer)
+  elseif callee.kind == "shared" and type(callee.value) == "function" then
+    local behind = protected.place_of_arguments(callee.value)
+    if behind then return call_value(at, regs[first], first + behind, arguments - behind) end
+    return call_shared(at, callee.value, given, arguments)
   end
+end
+
+local function call_function(at, arguments)
+  local regs = at.regs
+  local result = call_value(at, regs[at.a], at.a + 2, arguments) -- two slots a frame
   at:forget(at.a, at.a + 250)
   if result then
     for slot = at.a, at.a + math.max(at.b - 2, 0) do regs[slot] = shared end
@@ -480,19 +497,24 @@ function analyse_function(f, found, given, outer)
   return call.returned
 end
 
-local to_remember = {
+local remedies = {
   point = "kernels run in parallel, in states of their own: keep it in an attribute of the point, or do it once for " ..
     "the whole set in :detail",
   set = "a frame depends on the points that enter it, and nothing else: keep it in a detail value, " ..
     "points.detail.NAME = value",
 }
 
+-- Where a kernel may keep what it has kept in a wrong place.
+local function to_remember(of_a_point)
+  return of_a_point and remedies.point or remedies.set
+end
+
 -- env: the environment in which the kernel's globals live; of_a_point: the kernel's first parameter is a point;
 -- point_names: the table of the host.
 local function analyse(kernel, env, of_a_point, point_names)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
-    inside = {}, env = env, remedy = of_a_point and to_remember.point or to_remember.set,
+    inside = {}, env = env, remedy = to_remember(of_a_point),
     methods = {},
   }
   for _, name in ipairs(point_names.methods) do found.methods[name] = true end
@@ -525,4 +547,6 @@ local function tail_call_line(f)
   end
 end
 
-return { analyse = analyse, fingerprint = fingerprint, tail_call_line = tail_call_line }
+return {
+  analyse = analyse, fingerprint = fingerprint, tail_call_line = tail_call_line, to_remember = to_remember,
+}

@@ -5,6 +5,7 @@
 local native = ...
 
 local bytecode = require "bytecode"
+local describe = require "describe"
 local detail = require "detail"
 local engine_errors = require "engine_errors"
 local kernel = require "kernel"
@@ -13,6 +14,7 @@ local language = require "rapid"
 local numeric = require "numeric"
 local ramp = require "ramp"
 local shape = require "shape"
+local shared_state = require "shared_state"
 local study = require "study"
 local vector = require "vec3"
 local ffi = require "ffi"
@@ -95,14 +97,38 @@ end
 entry.fingerprint = bytecode.fingerprint
 entry.engine_errors = engine_errors(native.memory_limit_text)
 
-function entry.runner(f, layout, memory)
-  return engine.runner(f, layout, memory)
+-- A function that runs the kernel f, with what all points share compared before and after some of its calls: the first,
+-- the second, the fourth, ... Error: the kernel has changed it.
+local function watched(f, runner, of_a_point)
+  local calls = 0
+  return function(...)
+    calls = calls + 1
+    local before = bit.band(calls, calls - 1) == 0 and shared_state.walk(f, env)
+    if not before then return runner(...) end
+    local a, b = runner(...)
+    local name = shared_state.difference(before, shared_state.walk(f, env))
+    if name ~= nil then
+      error(("the kernel changes what all points share (%s); %s"):format(describe.name(name),
+        bytecode.to_remember(of_a_point)), 0)
+    end
+    return a, b
+  end
 end
+jit.off(watched) -- makes a function, which is not compiled
+
+function entry.runner(f, layout, memory)
+  local runner, set_params = engine.runner(f, layout, memory)
+  return watched(f, runner, true), set_params
+end
+
+local details_of = {} -- by function: run_detail() for it
 
 -- A :detail function; random: points to the key of the node's random numbers.
 function entry.detail(f, number, time, dt, params, size, random, details)
   local key = ffi.cast("const uint64_t*", random)[0]
-  return run_detail(f, engine.frame(number, time, dt, details), params, size, key, details)
+  local runner = details_of[f] or watched(f, run_detail, false)
+  details_of[f] = runner
+  return runner(f, engine.frame(number, time, dt, details), params, size, key, details)
 end
 
 function entry.study()

@@ -229,7 +229,7 @@ end)
 describe("a value kept for later", function()
   local keep = [[
 local keeper = coroutine.wrap(function(kept) while true do kept = coroutine.yield(kept) or kept end end)
-local held = { keeper }
+local held = { keeper } ballast = {} for i = 1, 20000 do ballast[i] = i end
 ]]
   -- Uses in frame 3, outside, what a node before has kept in frame 2.
   local function message_of(chain, use)

@@ -125,6 +125,7 @@ return rapid.create { points = two } :attribute { heat = 0 }
   it("can't use a point outside its kernel", function()
     local message = scene.error([[
 local later = coroutine.wrap(function(p) while true do coroutine.yield(p.P) end end)
+many = {} for i = 1, 20000 do many[i] = i end -- more than is compared
 return rapid.create { points = two }
   :points("k", function(p) local held = { later } p.P = held[1](p) end)
   :attribute { heat = function(frame) return frame.number < 3 and 0 or later().x end } :solve {}]], { threads = 1 })

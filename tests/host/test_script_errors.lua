@@ -71,13 +71,14 @@ end) :solve {}]])
     end
   end)
 
-  it("leaves memory for the next frame when it is caught", function()
+  it("of runaway memory is not caught by the script", function()
     local text = scene.kernel_text [[
 local ok = pcall(function() local t = {} for i = 1, 1e9 do t[i] = i end end)
 if not ok then p.v = vec3(0, 24, 0) end]]
-    local result = scene.command("run", text, "-f 1-3 -o a.####.csv --script-memory 32M --quiet")
-    assert.equal("", result.stderr)
-    assert.truthy(scene.folder:read("a.0003.csv"):find "\n0,0,3,0,")
+    local result = scene.command("run", text, "-f 1-3 --script-memory 32M --quiet")
+    assert.equal('scene.lua:2: node "kernel": the script needs more than 32 MiB of Lua memory; ' ..
+      "--script-memory sets the limit" .. at .. "\n", result.stderr)
+    assert.equal(1, result.status)
   end)
 end)
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "runtime/shapes/motion/deforming.h"
 
@@ -37,7 +38,10 @@ void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen:
     const auto shape = std::dynamic_pointer_cast<const Shape>(object);
     if (!shape) return;
     const auto [entry, fresh] = surfaces_.try_emplace(object);
-    if (fresh) entry->second = shape->surface();
+    if (fresh) {
+        const auto before = surfaces_before_.find(object);
+        entry->second = before != surfaces_before_.end() ? before->second : shape->surface();
+    }
     if (entry->second) {
         scene.bodies.push_back({moved ? transformed(entry->second, place) : entry->second, role});
     } else if (std::optional<PictureScene::Plane> plane = plane_of(*shape)) {
@@ -51,6 +55,7 @@ void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen:
 std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
 {
     if (still_) return still_;
+    surfaces_before_ = std::exchange(surfaces_, {});
     auto scene = std::make_shared<PictureScene>();
     bool moves = false;
     for (const PlannedNode& planned : plan_.nodes) {

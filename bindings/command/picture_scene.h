@@ -13,16 +13,16 @@ class SceneOfPlan {
 public:
     explicit SceneOfPlan(const Plan& plan) : plan_(plan) {}
 
-    // Functions of the frame and motions are evaluated at the frame's time. Each level set is turned into a mesh, once
-    // only.
+    // Functions of the frame and motions are evaluated at the frame's time. A level set is turned into a mesh once, and
+    // again where it was not in the frame before.
     std::shared_ptr<const PictureScene> at(std::int64_t frame);
 
 private:
     void add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place, PictureScene::Body::Role role);
 
     const Plan& plan_;
-    std::map<ObjectPtr, MeshPtr> surfaces_;
-    std::shared_ptr<const PictureScene> still_;  // if nothing moves
+    std::map<ObjectPtr, MeshPtr> surfaces_, surfaces_before_;  // of this frame, and of the one before
+    std::shared_ptr<const PictureScene> still_;                // if nothing moves
 };
 
 }  // namespace rapid

@@ -28,9 +28,11 @@ void RunReport::begin(std::int64_t first, std::int64_t last)
 void RunReport::frame(const FrameResult& result)
 {
     const std::lock_guard lock(mutex_);
-    run_.frames.push_back(statistics_of(result));
+    const FrameStatistics frame = statistics_of(result);
+    totals_.add(frame);
+    if (!options_.stats_file.empty()) run_.frames.push_back(frame);
     keep_worst(run_.stiff, result.figures.stiff);
-    progress_->frame(run_.frames.back(), now());
+    progress_->frame(frame, now());
 }
 
 void RunReport::line(const std::string& text)
@@ -52,7 +54,9 @@ void RunReport::finish()
     const std::lock_guard lock(mutex_);
     if (progress_) progress_->finish();
     write_statistics();
-    if (!options_.quiet) print(summary(run_));
+    if (options_.quiet) return;
+    for (const FrameWriter::Written& file : written_()) totals_.add_writing(file.seconds);
+    print(summary(run_, totals_));
 }
 
 int RunReport::fail(const Error& error)
@@ -88,6 +92,7 @@ void RunReport::write_statistics()
 {
     run_.seconds = now();
     run_.peak_bytes = peak_memory();
+    if (options_.stats_file.empty()) return;
     std::map<std::int64_t, FrameStatistics*> by_frame;
     for (FrameStatistics& frame : run_.frames) {
         frame.seconds.write = 0;
@@ -96,8 +101,6 @@ void RunReport::write_statistics()
     for (const FrameWriter::Written& file : written_())
         if (const auto found = by_frame.find(file.frame); found != by_frame.end())
             found->second->seconds.write += file.seconds;
-    if (options_.stats_file.empty()) return;
-
     try {
         OutputFile file(options_.stats_file);
         const std::string text = to_json(run_);

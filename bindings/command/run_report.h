@@ -12,7 +12,7 @@
 #include "bindings/command/command.h"
 #include "runtime/io/frame_writer.h"
 #include "runtime/report/progress.h"
-#include "runtime/report/statistics.h"
+#include "runtime/report/totals.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -52,7 +52,8 @@ private:
     const Stopwatch stopwatch_;
 
     std::timed_mutex mutex_;
-    RunStatistics run_;
+    RunStatistics run_;  // with its frames where they are written to a file
+    RunTotals totals_;
     std::optional<Progress> progress_;
     std::set<std::string> warned_;
 };

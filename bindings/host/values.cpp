@@ -4,6 +4,7 @@
 
 #include <lua.hpp>
 
+#include "bindings/host/handle_memory.h"
 #include "bindings/host/lua_text.h"
 #include "bindings/host/objects.h"
 #include "bindings/host/ramp.h"
@@ -188,6 +189,7 @@ void push(State& state, std::map<std::string, Value> entries) { push_table(state
 void push_object(State& state, const ObjectPtr& object)
 {
     lua_State* L = state.lua();
+    hold(L, *object);
     new (lua_newuserdata(L, sizeof(ObjectPtr))) ObjectPtr(object);
     luaL_getmetatable(L, object_metatable);
     lua_setmetatable(L, -2);
@@ -195,9 +197,12 @@ void push_object(State& state, const ObjectPtr& object)
 
 void register_objects(lua_State* L)
 {
+    count_handles(L);
     luaL_newmetatable(L, object_metatable);
     lua_pushcfunction(L, [](lua_State* of_object) -> int {
-        static_cast<ObjectPtr*>(lua_touserdata(of_object, 1))->reset();  // a handle that comes back holds nothing
+        ObjectPtr& object = *static_cast<ObjectPtr*>(lua_touserdata(of_object, 1));
+        release(of_object, *object);
+        object.reset();  // a handle that comes back holds nothing
         return 0;
     });
     lua_setfield(L, -2, "__gc");

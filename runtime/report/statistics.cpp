@@ -76,20 +76,6 @@ FrameStatistics statistics_of(const FrameResult& result)
     return frame;
 }
 
-StageSeconds RunStatistics::by_stage() const
-{
-    StageSeconds sum;
-    for (const FrameStatistics& frame : frames) sum += frame.seconds;
-    return sum;
-}
-
-std::uint64_t RunStatistics::point_frames() const
-{
-    std::uint64_t sum = 0;
-    for (const FrameStatistics& frame : frames) sum += frame.points;
-    return sum;
-}
-
 namespace {
 
 ordered_json to_json(const FrameStatistics& frame)

@@ -62,16 +62,15 @@ struct RunStatistics {
     double seconds = 0;  // wall time from loading the graph to the last file
     std::vector<FrameStatistics> frames;
     std::vector<Stiffness> stiff;  // the worst of each node
-
-    StageSeconds by_stage() const;
-    std::uint64_t point_frames() const;  // the sum of all frames' points
 };
 
 // A line for each frame. A run that ended early has the frames that it completed.
 std::string to_json(const RunStatistics& run);
 
 // A line each for points, frames, seconds by stage, memory, errors and other figures; and one for each stiff node and
-// each warning of Solve.
+// each warning of Solve. totals: of the frames, where `run` has not kept them.
+class RunTotals;
+std::string summary(const RunStatistics& run, const RunTotals& totals);
 std::string summary(const RunStatistics& run);
 
 // A line for each stiff node.

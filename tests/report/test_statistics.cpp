@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/report/number_text.h"
-#include "runtime/report/statistics.h"
+#include "runtime/report/totals.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -200,6 +200,28 @@ TEST_CASE("the summary of an empty scene is one of no points, not of none run", 
 {
     CHECK(summary(run_of({0, 0})).starts_with("points   0\nframes   2 in 0.500 s\n"));
     CHECK(summary(run_of({})).starts_with("points   none: no frame was run\n"));
+}
+
+TEST_CASE("the totals of a run tell what its frames tell, and writing is added behind them", "[report]")
+{
+    FrameResult result = frame_result();
+    for (int i = 0; i <= 100; ++i) result.figures.errors.push_back(i * 1e-4);
+    result.figures.energy_drift = {0.5, -2, 0};
+    result.figures.constraint_rows = 3;
+    RunStatistics run = run_of({5, 1, 9, 2});
+    for (int k = 0; k < 4; ++k) {
+        result.frame = 10 + k;
+        result.figures.constraint_residual_max = k == 2 ? 0.5 : 0.25;
+        run.frames.push_back(statistics_of(result));
+    }
+    RunTotals totals;
+    for (const FrameStatistics& frame : run.frames) totals.add(frame);
+    CHECK(summary(run, totals) == summary(run));
+    CHECK_THAT(summary(run), Catch::Contains("residual of constraints: 5.0e-01 m at most (frame 12)"));
+
+    totals.add_writing(0.75);
+    run.frames.back().seconds.write += 0.75;
+    CHECK(summary(run, totals) == summary(run));
 }
 
 TEST_CASE("numbers read as people write them", "[report]")

@@ -1,0 +1,68 @@
+#include "bindings/host/handle_memory.h"
+
+#include <algorithm>
+#include <lua.hpp>
+
+#include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set/level_set.h"
+#include "runtime/shapes/level_set/vector_grid.h"
+#include "runtime/shapes/mesh/mesh.h"
+
+namespace rapid {
+namespace {
+
+constexpr char counts_field[] = "rapid.handle_memory";  // in the registry
+
+constexpr std::size_t least = std::size_t{16} << 20;  // bytes that are not worth a collection
+
+struct Counts {
+    std::size_t held = 0, most = least;
+};
+
+Counts& counts_of(lua_State* L)
+{
+    lua_getfield(L, LUA_REGISTRYINDEX, counts_field);
+    Counts& counts = *static_cast<Counts*>(lua_touserdata(L, -1));
+    lua_pop(L, 1);
+    return counts;
+}
+
+// Bytes of an object's arrays, roughly.
+std::size_t weight_of(const Object& object)
+{
+    // A level set is two grids of floats, OpenVDB's and the one for queries, whose blocks are about half full.
+    constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
+    constexpr std::size_t bytes_a_vector_grid = std::size_t{4} << 20;  // which does not tell its size
+    if (const auto* level_set = dynamic_cast<const LevelSet*>(&object))
+        return static_cast<std::size_t>(level_set->active_voxels()) * bytes_a_voxel;
+    if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
+        return mesh->positions.size() * sizeof(Vec3f) + mesh->triangles.size() * sizeof(Mesh::Triangle);
+    if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
+    return dynamic_cast<const VectorGrid*>(&object) ? bytes_a_vector_grid : 0;
+}
+
+}  // namespace
+
+void count_handles(lua_State* L)
+{
+    new (lua_newuserdata(L, sizeof(Counts))) Counts;
+    lua_setfield(L, LUA_REGISTRYINDEX, counts_field);
+}
+
+void hold(lua_State* L, const Object& object)
+{
+    const std::size_t bytes = weight_of(object);
+    if (bytes == 0) return;
+    Counts& counts = counts_of(L);
+    counts.held += bytes;
+    if (counts.held <= counts.most) return;
+    lua_gc(L, LUA_GCCOLLECT, 0);
+    counts.most = std::max(least, 2 * counts.held);
+}
+
+void release(lua_State* L, const Object& object)
+{
+    if (const std::size_t bytes = weight_of(object)) counts_of(L).held -= bytes;
+}
+
+}  // namespace rapid

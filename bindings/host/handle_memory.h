@@ -1,0 +1,20 @@
+// What the handles of a state hold: level sets, meshes and points, whose bytes Lua's collector does not see. It runs
+// when they have doubled, so that a script which makes another one in each frame keeps a few, not all.
+#pragma once
+
+#include <cstddef>
+
+#include "runtime/object.h"
+
+struct lua_State;
+
+namespace rapid {
+
+// Of a new state: keeps the counts in its registry.
+void count_handles(lua_State* L);
+
+// A handle holds an object, or has let it go. The first may run the collector.
+void hold(lua_State* L, const Object& object);
+void release(lua_State* L, const Object& object);
+
+}  // namespace rapid

@@ -1,0 +1,171 @@
+#include "runtime/report/totals.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "runtime/report/number_text.h"
+
+namespace rapid {
+
+void RunTotals::Warning::add(std::int64_t frame, std::uint64_t count)
+{
+    if (count == 0) return;
+    if (frames == 0) first = frame;
+    last = frame;
+    points += count;
+    ++frames;
+}
+
+// "warning  points did so 5 times, in 3 frames from 7 to 48"; empty where no frame counted any.
+std::string RunTotals::Warning::text(const char* what) const
+{
+    if (frames == 0) return "";
+    const std::string where = frames == 1 ? fmt::format("in frame {}", first)
+                                          : fmt::format("in {} frames from {} to {}", frames, first, last);
+    return fmt::format("warning  {} {}, {}\n", what, points == 1 ? "once" : with_separators(points) + " times", where);
+}
+
+void RunTotals::add(const FrameStatistics& frame)
+{
+    if (frames_ == 0 || frame.points > most_points_) {
+        most_points_ = frame.points;
+        most_points_frame_ = frame.frame;
+    }
+    if (frame.error && (!worst_error_ || frame.error->max > worst_error_->max)) {
+        worst_error_ = frame.error;
+        worst_error_frame_ = frame.frame;
+    }
+    if (frame.rounding > worst_rounding_) {
+        worst_rounding_ = frame.rounding;
+        worst_rounding_frame_ = frame.frame;
+    }
+    if (frames_ == 0 || frame.constraint_residual_max > worst_residual_) {
+        worst_residual_ = frame.constraint_residual_max;
+        worst_residual_frame_ = frame.frame;
+        constrained_at_worst_ = frame.constraint_rows > 0;
+    }
+    ++frames_;
+    point_frames_ += frame.points;
+    seconds_ += frame.seconds;
+    contacts_ += frame.collisions;
+    deepest_ = std::max(deepest_, frame.penetration_max);
+    contact_energy_ += frame.contact_energy;
+    search_seconds_ += frame.contact_search ? frame.contact_search->seconds : 0;
+    add_bands(frame);
+    contact_limit_.add(frame.frame, frame.contact_limit);
+    trapped_.add(frame.frame, frame.trapped);
+    loose_constraints_.add(frame.frame, frame.loose_constraints);
+    beyond_tolerance_.add(frame.frame, frame.beyond_tolerance);
+    last_ = frame;
+}
+
+void RunTotals::add_bands(const FrameStatistics& frame)
+{
+    for (const BandFigures& band : frame.bands) {
+        BandFigures& sum = bands_[band.node];
+        sum.width = std::max(sum.width, band.width);
+        sum.voxels = std::max(sum.voxels, band.voxels);
+        sum.seconds += band.seconds;
+    }
+}
+
+std::string RunTotals::points_text() const
+{
+    if (frames_ == 0) return "points   none: no frame was run\n";
+    std::string text = fmt::format("points   {}", with_separators(last_.points));
+    if (most_points_ > last_.points)
+        text += fmt::format(" (most: {} in frame {})", with_separators(most_points_), most_points_frame_);
+    return text + '\n';
+}
+
+std::string RunTotals::frames_text(double run_seconds) const
+{
+    std::string text = fmt::format("frames   {} in {}", frames_, duration_text(run_seconds));
+    if (point_frames_ > 0 && run_seconds > 0)
+        text += fmt::format(", {} points a second", in_millions(static_cast<double>(point_frames_) / run_seconds));
+    return text + fmt::format("\nseconds  graph {:.3f}, script {:.3f}, solve {:.3f}, write {:.3f}\n", seconds_.graph,
+                              seconds_.script, seconds_.solve, seconds_.write);
+}
+
+// The estimated errors of the frame with the largest one.
+std::string RunTotals::error_text() const
+{
+    if (!worst_error_) return "";
+    const FrameStatistics::Error& error = *worst_error_;
+    const auto within = [](double e, std::string_view unit) {
+        return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : "within rounding";
+    };
+    const std::string text = "error    since birth, estimated: ";
+    return text + (error.max > 0
+                       ? fmt::format("half of the points {}, 95 % {}, the worst {:.1e} (frame {})\n",
+                                     within(error.p50, " m"), within(error.p95, ""), error.max, worst_error_frame_)
+                       : std::string("none above rounding\n"));
+}
+
+// What rounding of positions to single precision is off by; no sub-steps change that.
+std::string RunTotals::rounding_text() const
+{
+    if (!(worst_rounding_ > 0)) return "";
+    return fmt::format("rounding of positions since birth: {:.1e} m at most (frame {})\n", worst_rounding_,
+                       worst_rounding_frame_);
+}
+
+// The change of the energy of motion by the integrator; empty where it is 0 or not defined.
+std::string RunTotals::energy_text() const
+{
+    if (!last_.energy_drift || last_.energy_drift->max == 0) return "";
+    return fmt::format("energy   of motion, collisions aside: {:+.1e} J/kg since birth on average, {:.1e} at most\n",
+                       last_.energy_drift->mean, last_.energy_drift->max);
+}
+
+// The audit of all collisions; empty where there were none.
+std::string RunTotals::contact_text() const
+{
+    if (contacts_ == 0 && !(deepest_ > 0)) return "";
+    return fmt::format("contacts {}, deepest {} at a frame's end; they took {:.3g} J, and added {:.3g} J\n",
+                       with_separators(contacts_), deepest_ > 0 ? fmt::format("{:.1e} m", deepest_) : "0 m",
+                       contact_energy_.lost, contact_energy_.added);
+}
+
+// The residual of the constraints, where there are any, and the grids of the contact search.
+std::string RunTotals::constraint_text() const
+{
+    if (!constrained_at_worst_) return "";
+    std::string text = fmt::format("residual of constraints: {:.1e} m at most (frame {}), {:.1e} m in the last\n",
+                                   worst_residual_, worst_residual_frame_, last_.constraint_residual_max);
+    if (const auto& search = last_.contact_search)
+        text += fmt::format("contacts in {} {} of {} points, cells {:.2g} times too large, searched in {:.3f} s\n",
+                            search->grids.size(), search->grids.size() == 1 ? "grid" : "grids",
+                            fmt::join(search->grids, ", "), search->excess, search_seconds_);
+    return text;
+}
+
+std::string RunTotals::sleep_text() const
+{
+    if (last_.asleep == 0) return "";
+    return fmt::format("asleep   {} of {} points in the last frame\n", with_separators(last_.asleep),
+                       with_separators(last_.points));
+}
+
+// The cost of building narrow bands: a line for each node.
+std::string RunTotals::band_text() const
+{
+    std::string text;
+    for (const auto& [node, band] : bands_)
+        if (band.seconds > 0)
+            text += fmt::format("band     of {}: {:.3g} m, {} voxels at most, {} to build\n", node, band.width,
+                                with_separators(band.voxels), duration_text(band.seconds));
+    return text;
+}
+
+std::string RunTotals::warning_text() const
+{
+    return contact_limit_.text("points reached the limit of contacts") + trapped_.text("points were deep in a shape") +
+           loose_constraints_.text("constraints were off by a tenth of their size") +
+           beyond_tolerance_.text("points were beyond the tolerance");
+}
+
+}  // namespace rapid

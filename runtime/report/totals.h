@@ -1,0 +1,58 @@
+// What the summary of a run tells, added up frame by frame: its size does not depend on their number.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "runtime/report/statistics.h"
+
+namespace rapid {
+
+class RunTotals {
+public:
+    void add(const FrameStatistics& frame);
+    void add_writing(double seconds) { seconds_.write += seconds; }
+
+    // A line for each subject that there is.
+    std::string points_text() const;
+    std::string frames_text(double run_seconds) const;  // with the seconds by stage
+    std::string error_text() const;
+    std::string rounding_text() const;
+    std::string energy_text() const;
+    std::string contact_text() const;
+    std::string constraint_text() const;
+    std::string sleep_text() const;
+    std::string band_text() const;
+    std::string warning_text() const;
+
+private:
+    struct Warning {  // points that a frame counts, and the frames that counted any
+        std::uint64_t points = 0, frames = 0;
+        std::int64_t first = 0, last = 0;
+
+        void add(std::int64_t frame, std::uint64_t count);
+        std::string text(const char* what) const;
+    };
+    void add_bands(const FrameStatistics& frame);
+
+    std::uint64_t frames_ = 0, point_frames_ = 0;
+    StageSeconds seconds_;
+    FrameStatistics last_;
+    std::uint64_t most_points_ = 0;
+    std::int64_t most_points_frame_ = 0;
+    std::optional<FrameStatistics::Error> worst_error_;
+    std::int64_t worst_error_frame_ = 0;
+    double worst_rounding_ = 0;  // m
+    std::int64_t worst_rounding_frame_ = 0;
+    std::uint64_t contacts_ = 0;
+    double deepest_ = 0;  // m
+    ContactEnergy contact_energy_;
+    double worst_residual_ = 0;  // m
+    std::int64_t worst_residual_frame_ = 0;
+    bool constrained_at_worst_ = false;
+    double search_seconds_ = 0;
+    std::map<std::string, BandFigures> bands_;  // by node
+    Warning contact_limit_, trapped_, loose_constraints_, beyond_tolerance_;
+};
+
+}  // namespace rapid

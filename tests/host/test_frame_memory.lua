@@ -1,0 +1,35 @@
+-- What a run of many frames keeps: nothing that grows with their number.
+local scene = require "testing.scene"
+
+-- The peak of a run's memory in MiB, after so many frames.
+local function peak(text, frames, arguments)
+  local result = scene.command("run", text, ("-f 1-%d --threads 2 %s"):format(frames, arguments or ""))
+  assert.equal("", result.stderr)
+  return tonumber(result.stdout:match "memory   ([%d.]+) MiB at the peak"), result.stdout
+end
+
+-- A ball that is another level set in each frame, of about 400 kB.
+local ball = [[return rapid.create { points = two } :collide { shape = function(frame)
+  return rapid.levelset.sphere { radius = 0.5 + 0.001 * (frame.number % 97), voxel = 0.05 }
+end } :gravity {} :solve {}]]
+
+describe("the memory of a run", function()
+  it("does not grow with its frames where they are small", function()
+    local text = "return rapid.create { points = two } :points('k', function(p) p.v = p.v * 0.5 end) :gravity {} " ..
+      ":solve {}"
+    local few, many = peak(text, 1000), peak(text, 20000)
+    assert.truthy(many - few < 1, ("%g MiB after 1,000 frames, %g after 20,000"):format(few, many))
+  end)
+
+  it("does not grow where a function of the frame makes a level set in each", function()
+    local few, many = peak(ball, 150), peak(ball, 450)
+    assert.truthy(many - few < 1, ("%g MiB after 150 frames, %g after 450"):format(few, many))
+  end)
+
+  -- The peak of the threads' allocators varies by a few MiB; 300 surfaces are hundreds.
+  it("holds no surface of earlier frames where pictures show it", function()
+    local small = "--size 32x18 -o picture.####.png"
+    local few, many = peak(ball, 150, small), peak(ball, 450, small)
+    assert.truthy(many - few < 20, ("%g MiB after 150 pictures, %g after 450"):format(few, many))
+  end)
+end)

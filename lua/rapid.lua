@@ -183,7 +183,8 @@ local function make(native, load_node, numeric, shapes, studies)
       if definition and definition.expand then
         local expand = definition.expand
         method = function(input, options)
-          return expand(input, native.complete(type_name, options or {}))
+          local node = expand(input, native.complete(type_name, options or {}))
+          return node -- no tail call: one that expands into itself must end, by the size of the stack
         end
       else
         method = function(input, options, ...)

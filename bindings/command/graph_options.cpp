@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "runtime/memory_budget.h"
+
 namespace rapid {
 
 void GraphOptions::declare(CLI::App& app)
@@ -33,6 +35,10 @@ void GraphOptions::declare(CLI::App& app)
            [this](const std::string& text) { session_.script_memory = read_bytes("--script-memory", text); },
            fmt::format("memory that a script's state may take: bytes, or 512M, 1G [default {}G]",
                        session_.script_memory >> 30))
+        ->type_name("BYTES");
+    app.add_option_function<std::string>(
+           "--memory", [](const std::string& text) { set_memory_budget(read_bytes("--memory", text)); },
+           "memory that the run may take: bytes, or 512M, 16G [default: what is free]")
         ->type_name("BYTES");
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <lua.hpp>
 
 #include "bindings/host/construct.h"
@@ -65,11 +64,23 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
     return kernels;
 }
 
-std::string first_name(const Graph& graph, const NodeType& type)
+// The nodes of a type in the graph, and so many more.
+int count_nodes(lua_State* L, const NodeType& type, int more)
 {
-    const auto same = std::count_if(graph.nodes.begin(), graph.nodes.end(),
-                                    [&](const NodePtr& other) { return other->type == &type; });
-    return fmt::format("{}{}", type.name, same + 1);
+    constexpr char counts[] = "rapid.node_counts";  // in the registry, by type
+    lua_getfield(L, LUA_REGISTRYINDEX, counts);
+    if (lua_isnil(L, -1)) {
+        lua_pop(L, 1);
+        lua_newtable(L);
+        lua_pushvalue(L, -1);
+        lua_setfield(L, LUA_REGISTRYINDEX, counts);
+    }
+    lua_getfield(L, -1, type.name.c_str());
+    const int count = static_cast<int>(lua_tointeger(L, -1)) + more;
+    lua_pushinteger(L, count);
+    lua_setfield(L, -3, type.name.c_str());
+    lua_pop(L, 2);
+    return count;
 }
 
 // Sets the arguments and, where they have one, the name.
@@ -118,13 +129,14 @@ int make_node(State& state)
         node->type = &type;
         node->location = where(state);
         node->serial = host.graph.nodes.size();
-        node->name = first_name(host.graph, type);
+        node->name = fmt::format("{}{}", type.name, count_nodes(state.lua(), type, 0) + 1);
         name_errors(node->name, node->location, [&] {
             take_options(*node, *table_at(state, 2));
             for (const auto& [param, kernel] : kernels) node->arguments[param] = Value(kernel);
             take_inputs(state, *node);
         });
         host.graph.nodes.push_back(node);
+        count_nodes(state.lua(), type, 1);
         return std::make_shared<NodeHandle>(node);
     });
 }

@@ -18,6 +18,7 @@
 
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
+#include "runtime/memory_budget.h"
 #include "runtime/operators/emit/birth_age.h"
 #include "runtime/operators/emit/birth_source.h"
 #include "runtime/operators/emit/birth_velocity.h"
@@ -35,6 +36,9 @@ constexpr std::size_t batch_size = 256;
 
 constexpr double most_births = 2147483647;  // in a frame
 constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness is examined
+
+// Of a point with the attributes that most have, in the state and in what is made of it within a frame.
+constexpr double bytes_a_birth = 2 * 64;
 
 struct EmitSource {
     static constexpr std::string_view param_type = "mesh, level set, shape or points";
@@ -267,6 +271,16 @@ private:
     void move_source(const Simulation& simulation, const Evaluation& now);
     void emit(Flow& flow, const Births& births, const Evaluation& now);
 
+    // Error: no memory for so many newborn, with a copy of those that are there.
+    void require_room(const PointSet& points, std::size_t n) const
+    {
+        const double bytes = static_cast<double>(n) * bytes_a_birth + static_cast<double>(points.bytes());
+        if (fits_in_memory(bytes)) return;
+        const char* amount = rate ? "rate" : count ? "count" : "impulse";
+        throw beyond_memory(fmt::format("{} births in a frame, behind {} points,", n, points.size()), bytes,
+                            fmt::format("give a smaller {}", amount));
+    }
+
     // The steps of emit(), in their order.
     void make_columns(PointSet& points, const BirthAges& ages, const Evaluation& now) const;
     void append(PointSet& points, std::size_t n, const BirthAges& ages, const BirthVelocity& velocity,
@@ -310,6 +324,7 @@ void Emit::emit(Flow& flow, const Births& births, const Evaluation& now)
                           : flow.simulation->trial ? std::min(births.count, trial_births)
                                                    : births.count;
     if (n == 0) return;
+    require_room(points, n);
 
     const BirthVelocity velocities(velocity, speed, spread, inherit, source_);
     append(points, n, ages, velocities, now);

@@ -4,6 +4,7 @@
 #include "bindings/host/maker.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/io/format.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -50,6 +51,11 @@ struct GridPoints {
         if (!(size.minCoeff() >= 0) || !(nx * ny * nz <= 2147483648.0))
             throw Error(fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
                                     describe(Value(size)), spacing, nx * ny * nz));
+        constexpr double bytes_a_point = 2 * (sizeof(Vec3f) + sizeof(Vec3f) + sizeof(std::int64_t));  // with the state
+        if (const double bytes = nx * ny * nz * bytes_a_point; !fits_in_memory(bytes))
+            throw beyond_memory(
+                fmt::format("size {} at spacing {}: {:.3g} points", describe(Value(size)), spacing, nx * ny * nz),
+                bytes, "give a larger spacing");
         PointSet points;
         points.append(static_cast<std::size_t>(nx * ny * nz));
         const std::span<Vec3f> P = points.P().overwrite();

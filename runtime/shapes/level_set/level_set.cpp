@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 #include <openvdb/tools/VolumeToMesh.h>
-#include <unistd.h>
 
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/memory_budget.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 
 namespace rapid {
@@ -48,12 +47,10 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
             fmt::format("{} with voxel = {:g} m would make about {:.3g} voxels and an index of {:.3g} blocks, and "
                         "2147483648 of each can be held; a voxel of at least {:.3g} m stays below that",
                         what, options.voxel, voxels, indexed, larger(voxels / most, indexed / most)));
-    const double memory = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-    if (bytes > memory)
-        throw Error(
-            fmt::format("{} with voxel = {:g} m would take about {:.1f} GiB, and this machine has {:.1f} GiB; a "
-                        "voxel of at least {:.3g} m fits",
-                        what, options.voxel, bytes / 0x1p30, memory / 0x1p30, larger(bytes / memory, bytes / memory)));
+    if (fits_in_memory(bytes)) return;
+    const double memory = static_cast<double>(memory_budget());
+    throw beyond_memory(fmt::format("{} with voxel = {:g} m", what, options.voxel), bytes,
+                        fmt::format("a voxel of at least {:.3g} m fits", larger(bytes / memory, bytes / memory)));
 }
 
 openvdb::math::Transform::Ptr make_transform(double voxel, const Box3d& bounds)

@@ -1,0 +1,108 @@
+#include "runtime/memory_budget.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <optional>
+
+namespace rapid {
+namespace {
+
+constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
+
+std::atomic<std::uint64_t> budget{0};  // 0: not yet known
+
+// The first number of a file; none where there is none, as in "max".
+std::optional<std::uint64_t> number_in(const std::filesystem::path& file)
+{
+    std::uint64_t number = 0;
+    std::ifstream in(file);
+    return in >> number ? std::optional(number) : std::nullopt;
+}
+
+// Resident now.
+std::uint64_t own_memory()
+{
+    std::uint64_t pages = 0;
+    std::ifstream in("/proc/self/statm");
+    in >> pages >> pages;  // of the address space; resident
+    return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+std::uint64_t free_in_machine()
+{
+    std::ifstream info("/proc/meminfo");
+    for (std::string word; info >> word;) {
+        if (word != "MemAvailable:") continue;
+        std::uint64_t kibibytes = 0;
+        info >> kibibytes;
+        return kibibytes * 1024;
+    }
+    return unlimited;
+}
+
+// Of the control group of the process and those around it, in either version.
+std::uint64_t free_in_groups()
+{
+    std::uint64_t least = unlimited;
+    const auto take = [&](const std::filesystem::path& folder, const char* limit, const char* used) {
+        const auto most = number_in(folder / limit), now = number_in(folder / used);
+        if (most && now) least = std::min(least, *most > *now ? *most - *now : 0);
+    };
+    std::ifstream groups("/proc/self/cgroup");  // ID:CONTROLLERS:PATH
+    for (std::string line; std::getline(groups, line);) {
+        const std::size_t first = line.find(':'), second = line.find(':', first + 1);
+        if (second == std::string::npos) continue;
+        const std::string controllers = line.substr(first + 1, second - first - 1);
+        for (std::filesystem::path path = line.substr(second + 1);; path = path.parent_path()) {
+            const std::filesystem::path below = path.relative_path();
+            if (controllers.empty())
+                take(std::filesystem::path("/sys/fs/cgroup") / below, "memory.max", "memory.current");
+            else if (controllers.find("memory") != std::string::npos)
+                take(std::filesystem::path("/sys/fs/cgroup/memory") / below, "memory.limit_in_bytes",
+                     "memory.usage_in_bytes");
+            if (below.empty()) break;
+        }
+    }
+    return least;
+}
+
+std::string gibibytes(double bytes)
+{
+    return bytes < 0x1p30 ? fmt::format("{:.0f} MiB", bytes / 0x1p20) : fmt::format("{:.1f} GiB", bytes / 0x1p30);
+}
+
+}  // namespace
+
+std::uint64_t memory_budget()
+{
+    std::uint64_t bytes = budget;
+    if (bytes != 0) return bytes;
+    const std::uint64_t free = std::min(free_in_machine(), free_in_groups());
+    bytes = free == unlimited ? unlimited : own_memory() + free;
+    budget = bytes;
+    return bytes;
+}
+
+void set_memory_budget(std::uint64_t bytes) { budget = bytes; }
+
+bool fits_in_memory(double bytes)
+{
+    constexpr double negligible = 64 << 20;
+    if (bytes < negligible) return true;
+    return static_cast<double>(own_memory()) + bytes <= static_cast<double>(memory_budget());
+}
+
+Error beyond_memory(const std::string& what, double bytes, const std::string& remedy)
+{
+    const double most = static_cast<double>(memory_budget()), used = static_cast<double>(own_memory());
+    return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set --memory", what,
+                             gibibytes(bytes), gibibytes(std::max(0.0, most - used)), gibibytes(most), remedy));
+}
+
+}  // namespace rapid

@@ -1,0 +1,22 @@
+// The memory that a run may take. What needs much is estimated before it is begun, and refused with numbers where it
+// does not fit: the kernel would end the process without a word.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+// Bytes that the process may have in all. At first: what it has, and what the machine and its control group have free.
+std::uint64_t memory_budget();
+void set_memory_budget(std::uint64_t bytes);
+
+// Whether the process may have so many bytes more. Below 64 MiB that is not asked.
+bool fits_in_memory(double bytes);
+
+// "WHAT would take about 119.2 GiB, and 21.3 GiB are free; REMEDY, or set --memory"
+Error beyond_memory(const std::string& what, double bytes, const std::string& remedy);
+
+}  // namespace rapid

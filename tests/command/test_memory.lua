@@ -1,0 +1,82 @@
+-- --memory: what would need more is refused before it is begun, with numbers and the parameter that would mend it.
+local scene = require "testing.scene"
+
+local grid = "rapid.points.grid { size = {40, 40, 40}, spacing = 1 }"
+
+-- By the node and the message, what scenes need that is too much.
+local needs = {
+  ["return rapid.create {} :emit { source = rapid.mesh.box {}, count = 1e9 } :solve {}"] =
+    '^scene%.lua:1: node "emit1": 1000000000 births in a frame, behind 0 points, would take about 119%.2 GiB, and ' ..
+    "[%d.]+ [GM]iB are free of 1%.0 GiB; give a smaller count, or set %-%-memory\n$",
+  ["return rapid.create {} :emit { source = rapid.mesh.box {}, rate = 2e10 } :solve {}"] =
+    "give a smaller rate, or set",
+  ["return rapid.create {} :emit { source = rapid.mesh.box {}, impulse = { [1] = 2e9 } } :solve {}"] =
+    "give a smaller impulse, or set",
+  ["return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1e-3 } } :solve {}"] =
+    "^scene%.lua:1: rapid%.points%.grid: size {1, 1, 1} at spacing 0%.001: 1e%+09 points would take about 59%.6 " ..
+    "GiB, .* give a larger spacing, or set %-%-memory\n$",
+  ["local s = rapid.levelset.sphere { radius = 10, voxel = 0.003 } return rapid.create {} :collide { shape = s } " ..
+    ":solve {}"] = "a voxel of at least [%d.]+ m fits, or set %-%-memory\n$",
+  ["return rapid.create { points = " .. grid .. " } :distance { within = 1e9 } :solve {}"] =
+    '^scene%.lua:1: node "distance1": within = 1e%+09: about 2e%+09 pairs of 64000 points would take about 488%.3 ' ..
+    "GiB, .* give a smaller within, or set %-%-memory",
+}
+
+describe("--memory", function()
+  it("refuses what needs more, with numbers, the node and the parameter", function()
+    for text, expected in pairs(needs) do
+      local result = scene.command("run", text, "-f 1-3 --quiet --memory 1G")
+      assert.truthy(result.status == 1 or result.status == 2, text)
+      assert.match(expected, result.stderr)
+    end
+  end)
+
+  it("is what is free where it is not given", function()
+    local result = scene.command("run", "return rapid.create {} :emit { source = rapid.mesh.box {}, count = 2e9 } " ..
+      ":solve {}", "-f 1-3 --quiet")
+    assert.match("2000000000 births in a frame, .* are free of [%d.]+ [GM]iB; give a smaller count", result.stderr)
+    assert.equal(1, result.status)
+  end)
+
+  it("lets pass what fits, and what is small whatever it is", function()
+    for _, memory in ipairs { "1", "1G" } do
+      local result = scene.command("run", "return rapid.create { points = " .. grid .. " } :gravity {} :solve {}",
+        "-f 1-3 --quiet --memory " .. memory)
+      assert.equal("", result.stderr)
+      assert.equal(0, result.status)
+    end
+  end)
+end)
+
+describe("a graph without end", function()
+  it("of a node that expands into itself is an error", function()
+    scene.folder:write("selfish.lua", [[
+return require "rapid".node { name = "selfish", doc = "Asks itself.", expand = function(input)
+  return input:selfish {}
+end }]])
+    assert.match("stack overflow: a function calls itself without end",
+      scene.error "return rapid.create { points = two } :selfish {} :solve {}")
+  end)
+
+  it("of 30,000 nodes is named in a time that grows with their number", function()
+    local result = scene.command("check", "local n = rapid.create { points = two } for i = 1, 30000 do " ..
+      "n = n:gravity {} end return n:solve {}")
+    assert.equal(0, result.status)
+    assert.match("30002 of 30002 nodes", result.stdout)
+    assert.match('node "gravity30001"', scene.error("local n = rapid.create { points = two } for i = 1, 30000 do " ..
+      "n = n:gravity {} end return n:gravity { wrong = 1 }"))
+  end)
+
+  it("is told in a message of bounded length", function()
+    for _, text in ipairs {
+      "return rapid.create {} :gravity { [('x'):rep(1e6)] = 1 } :solve {}",
+      "return rapid.create {} :gravity { name = ('ä'):rep(5e5), wrong = 1 } :solve {}",
+      "error(('x'):rep(1e6))", "require(('x'):rep(1e6))", "return rapid.create {} [('x'):rep(1e6)] {}",
+    } do
+      local message = scene.command("check", text).stderr
+      assert.truthy(#message > 20 and #message < 5000, #message)
+      assert.match("%[%.%.%. %d+ bytes %.%.%.%]", message)
+      assert.falsy(message:find "[\192-\255][ \"]", "half of a character") -- of UTF-8
+    end
+  end)
+end)

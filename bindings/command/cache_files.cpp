@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "bindings/command/untrusted.h"
 #include "runtime/io/frame_pattern.h"
 
 namespace rapid {
@@ -19,6 +20,17 @@ CacheFiles find_cache(const std::string& text)
         throw Error(fmt::format("no frame of this sequence is there; the first would be {}", pattern.expand(1)))
             .at({text, 0});
     return found;
+}
+
+SandboxAccess access_to_caches(const std::vector<std::string>& texts)
+{
+    SandboxAccess access;
+    for (const std::string& text : texts) {
+        const std::filesystem::path path =
+            std::filesystem::exists(text) ? std::filesystem::path(text) : folder_of(text);
+        if (std::filesystem::exists(path)) access.readable.push_back(path);
+    }
+    return access;
 }
 
 }  // namespace rapid

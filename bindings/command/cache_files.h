@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
+
+#include "bindings/command/process_sandbox.h"
 
 namespace rapid {
 
@@ -15,5 +18,9 @@ struct CacheFiles {
 
 // Error: no such file, or it is a folder.
 CacheFiles find_cache(const std::string& text);
+
+// What a process behind walls reads of them: a file, or the folder of a sequence. A name that is not there is left to
+// find_cache().
+SandboxAccess access_to_caches(const std::vector<std::string>& texts);
 
 }  // namespace rapid

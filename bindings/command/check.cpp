@@ -7,13 +7,14 @@
 #include "bindings/command/frame_files.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/races.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
 #include "runtime/report/statistics.h"
 
 namespace rapid {
 namespace {
 
-class Check : public Command {
+class Check : public Command, public Confined {
 public:
     std::string name() const override { return "check"; }
     std::string doc() const override { return "finds what is wrong with a graph, without running it"; }
@@ -24,6 +25,12 @@ public:
         files_.declare(app);
         app.add_flag("--races", races_,
                      "runs two frames in other orders of the points and in two states, and compares the bits");
+        untrusted_.declare(app, "graph");
+    }
+
+    void confine(const CommonOptions& common) override
+    {
+        untrusted_.confine([&] { return SandboxAccess{{folder_of(graph_.file())}, {}}; }, common);
     }
 
     int run(const CommonOptions& common) override
@@ -97,6 +104,7 @@ private:
 
     GraphOptions graph_;
     FrameFiles files_;
+    UntrustedOptions untrusted_;
     bool races_ = false;
 };
 RAPID_COMMAND(Check);

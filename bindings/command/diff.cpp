@@ -8,6 +8,7 @@
 
 #include "bindings/command/cache_files.h"
 #include "bindings/command/command.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/format.h"
@@ -17,7 +18,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-class Diff : public Command {
+class Diff : public Command, public Confined {
 public:
     std::string name() const override { return "diff"; }
     std::string doc() const override { return "compares two cache files or sequences by id"; }
@@ -32,6 +33,12 @@ public:
                            default_tolerance))
             ->type_name("X");
         app.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(app, "file");
+    }
+
+    void confine(const CommonOptions& common) override
+    {
+        untrusted_.confine([&] { return access_to_caches({a_, b_}); }, common);
     }
 
     int run(const CommonOptions& common) override
@@ -105,6 +112,7 @@ private:
     std::string a_, b_;
     double tolerance_ = read_tolerance(default_tolerance);
     bool json_ = false;
+    UntrustedOptions untrusted_;
 };
 RAPID_COMMAND(Diff);
 

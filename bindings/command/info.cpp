@@ -5,6 +5,7 @@
 
 #include "bindings/command/cache_files.h"
 #include "bindings/command/command.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
@@ -15,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-class Info : public Command {
+class Info : public Command, public Confined {
 public:
     std::string name() const override { return "info"; }
     std::string doc() const override { return "tells what a cache file or sequence holds"; }
@@ -24,6 +25,12 @@ public:
     {
         app.add_option("FILE", file_, "a file, or a sequence such as cache.####.vdb")->type_name("")->required();
         app.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(app, "file");
+    }
+
+    void confine(const CommonOptions& common) override
+    {
+        untrusted_.confine([&] { return access_to_caches({file_}); }, common);
     }
 
     int run(const CommonOptions& common) override
@@ -52,6 +59,7 @@ public:
 private:
     std::string file_;
     bool json_ = false;
+    UntrustedOptions untrusted_;
 };
 RAPID_COMMAND(Info);
 

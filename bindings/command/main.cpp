@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "bindings/command/command.h"
+#include "bindings/command/untrusted.h"
 #include "runtime/graph/plugin.h"
 
 namespace rapid {
@@ -137,8 +138,12 @@ std::optional<int> read_arguments(CLI::App& app, Arguments arguments)
 int run_command(Command& command, const CommonOptions& common)
 {
     try {
-        if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
-        for (const std::string& file : common.plugins) load_plugin(file);
+        auto* const confined = dynamic_cast<Confined*>(&command);
+        if (confined) confined->confine(common);
+        if (!confined || confined->takes_plugins()) {
+            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
+            for (const std::string& file : common.plugins) load_plugin(file);
+        }
         return finish(command.run(common));
     } catch (const Error& error) {
         print_error(error, common.verbose);

@@ -4,8 +4,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/landlock.h>
-#include <sched.h>
-#include <seccomp.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -26,7 +24,7 @@ namespace {
 
 Error refused(const std::string& what, int error)
 {
-    return Error(fmt::format("--untrusted: {} ({}); the graph was not run", what, std::strerror(error)));
+    return Error(fmt::format("--untrusted: {} ({}); nothing was run", what, std::strerror(error)));
 }
 
 class File {
@@ -83,7 +81,8 @@ std::vector<std::filesystem::path> own_files()
     Dl_info library;
     if (dladdr(reinterpret_cast<void*>(&known_attribute), &library) != 0)
         files.push_back(std::filesystem::path(library.dli_fname).parent_path());
-    for (const char* path : {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null"})
+    for (const char* path : {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null",
+                             "/proc/cpuinfo", "/proc/meminfo"})
         if (std::filesystem::exists(path)) files.push_back(path);
     for (const auto& entry : std::filesystem::directory_iterator("/usr/share"))  // LuaJIT's own modules
         if (entry.path().filename().string().starts_with("lua")) files.push_back(entry.path());
@@ -108,59 +107,20 @@ void restrict_files(const SandboxAccess& access)
     if (syscall(SYS_landlock_restrict_self, int(ruleset), 0) != 0) throw refused("Landlock refuses", errno);
 }
 
-void restrict_system_calls()
+void restrict_system_calls(Processes processes)
 {
-    const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(seccomp_init(SCMP_ACT_ALLOW), seccomp_release);
-    if (!filter) throw refused("this system has no seccomp", ENOSYS);
-    const auto check = [](int status) {
-        if (status != 0) throw refused("seccomp refuses a rule", -status);
-    };
-    check(seccomp_attr_set(filter.get(), SCMP_FLTATR_CTL_TSYNC, 1));  // all threads
-    // io_uring would bypass the filter.
-    for (const int call : {SCMP_SYS(socket),
-                           SCMP_SYS(socketpair),
-                           SCMP_SYS(connect),
-                           SCMP_SYS(bind),
-                           SCMP_SYS(listen),
-                           SCMP_SYS(accept),
-                           SCMP_SYS(accept4),
-                           SCMP_SYS(execve),
-                           SCMP_SYS(execveat),
-                           SCMP_SYS(fork),
-                           SCMP_SYS(vfork),
-                           SCMP_SYS(ptrace),
-                           SCMP_SYS(process_vm_readv),
-                           SCMP_SYS(process_vm_writev),
-                           SCMP_SYS(pidfd_open),
-                           SCMP_SYS(pidfd_getfd),
-                           SCMP_SYS(io_uring_setup),
-                           SCMP_SYS(io_uring_enter),
-                           SCMP_SYS(io_uring_register),
-                           SCMP_SYS(bpf),
-                           SCMP_SYS(perf_event_open),
-                           SCMP_SYS(userfaultfd),
-                           SCMP_SYS(keyctl),
-                           SCMP_SYS(add_key),
-                           SCMP_SYS(request_key),
-                           SCMP_SYS(mount),
-                           SCMP_SYS(umount2),
-                           SCMP_SYS(pivot_root),
-                           SCMP_SYS(chroot),
-                           SCMP_SYS(setns),
-                           SCMP_SYS(unshare),
-                           SCMP_SYS(open_by_handle_at),
-                           SCMP_SYS(init_module),
-                           SCMP_SYS(finit_module),
-                           SCMP_SYS(kexec_load),
-                           SCMP_SYS(memfd_create)})
-        check(seccomp_rule_add(filter.get(), SCMP_ACT_ERRNO(EPERM), call, 0));
-    // Threads are made by clone; a filter can't see clone3's flags, and the C library then falls back.
-    check(seccomp_rule_add(filter.get(), SCMP_ACT_ERRNO(EPERM), SCMP_SYS(clone), 1,
-                           SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, 0)));
-    check(seccomp_rule_add(filter.get(), SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0));
-    check(seccomp_rule_add(filter.get(), SCMP_ACT_ERRNO(EPERM), SCMP_SYS(kill), 1,
-                           SCMP_A0(SCMP_CMP_NE, static_cast<scmp_datum_t>(getpid()))));
-    check(seccomp_load(filter.get()));
+    const int status = load_system_call_filter(processes);
+    if (status == -ENOSYS) throw refused("this system has no seccomp", ENOSYS);
+    if (status != 0) throw refused("seccomp refuses the filter", -status);
+}
+
+// Descriptors that whoever started the process has left open reach files that Landlock would not open.
+void close_inherited(int first)
+{
+    if (close_range(static_cast<unsigned>(first), ~0U, CLOSE_RANGE_CLOEXEC) != 0)
+        throw refused("inherited descriptors can't be closed", errno);
+    const File nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
+    if (nothing < 0 || dup2(nothing, STDIN_FILENO) < 0) throw refused("standard input can't be closed", errno);
 }
 
 void limit(__rlimit_resource resource, rlim_t most)
@@ -178,24 +138,25 @@ void enter_sandbox(const SandboxAccess& access)
     std::ifstream command("/proc/self/cmdline", std::ios::binary);
     std::vector<std::string> words;
     for (std::string word; std::getline(command, word, '\0');) words.push_back(word);
-    words.push_back(sandboxed_option);
+    words.insert(words.begin() + 1, sandboxed_option);
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     const std::string program = std::filesystem::read_symlink("/proc/self/exe");
 
+    close_inherited(access.first_closed);
     restrict_files(access);
     execv(program.c_str(), arguments.data());
     throw refused("can't begin anew behind the walls", errno);
 }
 
-void complete_sandbox()
+void complete_sandbox(Processes processes)
 {
     const File root(open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; the graph was not run");
+    if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; nothing was run");
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_DATA, static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)));
-    restrict_system_calls();
+    restrict_system_calls(processes);
 }
 
 }  // namespace rapid

@@ -7,19 +7,18 @@
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
-#include "bindings/command/process_sandbox.h"
 #include "bindings/command/run_report.h"
 #include "bindings/command/signals.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/command/watch.h"
 #include "bindings/host/threads.h"
-#include "runtime/deferred.h"
 #include "runtime/files/output_file.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
 namespace {
 
-class Run : public Command {
+class Run : public Command, public Confined {
 public:
     std::string name() const override { return "run"; }
     std::string doc() const override { return "computes the frames of a graph and writes them"; }
@@ -40,29 +39,23 @@ public:
                      "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
                      "the same");
         app.add_flag("--quiet", quiet_, "no progress and no summary");
-        app.add_flag(
-            "--untrusted", untrusted_,
-            "keeps the process from all files but the graph's folder, --allow-read and the outputs' folders, from "
-            "sockets and from other processes");
-        app.add_flag(sandboxed_option, sandboxed_)->group("");  // internal: the restarted process
-        app.add_option("--allow-read", allowed_, "a file or folder that an --untrusted graph may read, too")
-            ->type_name("PATH")
-            ->allow_extra_args(false);
+        untrusted_.declare(app, "graph");
         app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
         app.add_flag(Watch::tell_option, tell_)->group("");  // internal: a run of --watch
     }
 
+    void confine(const CommonOptions& common) override
+    {
+        if (watch_ && untrusted_.asked())
+            throw Error("--watch starts processes, which --untrusted forbids; give one of them");
+        untrusted_.confine([&] { return access(); }, common);
+    }
+    // --watch runs the graph in processes of its own.
+    bool takes_plugins() const override { return !watch_ || tell_; }
+
     int run(const CommonOptions& common) override
     {
-        if (!allowed_.empty() && !untrusted_)
-            throw Error("--allow-read is for --untrusted; a graph reads what it names");
-        if (watch_ && untrusted_) throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
-        if (untrusted_ && !sandboxed_) enter_sandbox(sandbox_access());
-        if (untrusted_) {
-            load_deferred();  // the sandbox forbids it
-            complete_sandbox();
-        }
         if (durable_) make_files_durable();
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
         Threads threads(common.threads);
@@ -88,16 +81,9 @@ public:
     }
 
 private:
-    // The run's own needs, and --allow-read.
-    SandboxAccess sandbox_access() const
+    SandboxAccess access() const
     {
-        const auto folder_of = [](const std::filesystem::path& file) {
-            return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-        };
-        SandboxAccess access;
-        access.readable = {folder_of(graph_.file())};
-        access.readable.insert(access.readable.end(), allowed_.begin(), allowed_.end());
-        access.writable = files_.folders();
+        SandboxAccess access{{folder_of(graph_.file())}, files_.folders()};
         if (!stats_.empty()) {
             access.writable.push_back(folder_of(stats_));
             std::filesystem::create_directories(access.writable.back());
@@ -155,9 +141,8 @@ private:
     FrameFiles files_;
     std::optional<FrameSelection> frames_;
     std::string stats_;
-    bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false, untrusted_ = false,
-         sandboxed_ = false;
-    std::vector<std::string> allowed_;
+    UntrustedOptions untrusted_;
+    bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false;
 };
 RAPID_COMMAND(Run);
 

@@ -19,6 +19,7 @@
 #include "bindings/command/graph_options.h"
 #include "bindings/command/machine.h"
 #include "bindings/command/study_run.h"
+#include "bindings/command/untrusted.h"
 #include "runtime/files/output_file.h"
 #include "runtime/report/progress.h"
 
@@ -122,7 +123,7 @@ Outcome outcome_of(const std::function<void(const TellParent& tell)>& work,
     return outcome;
 }
 
-class StudyCommand : public Command {
+class StudyCommand : public Command, public Confined {
 public:
     std::string name() const override { return "study"; }
     std::string doc() const override { return "shows the error of a scene against its run time, at many settings"; }
@@ -163,6 +164,17 @@ public:
             ->type_name("DIR");
         app.add_flag("--json", json_, "prints what study.json holds, in place of the table");
         app.add_flag("--quiet", quiet_, "no progress");
+        untrusted_.declare(app, "graph");
+    }
+
+    // Each scene runs in a copy of this process.
+    void confine(const CommonOptions& common) override
+    {
+        const auto access = [&] {
+            open_folder();
+            return SandboxAccess{{folder_of(graph_.file())}, {folder_}};
+        };
+        untrusted_.confine(access, common, Processes::Copies);
     }
 
     int run(const CommonOptions& common) override
@@ -314,6 +326,7 @@ private:
     }
 
     GraphOptions graph_;
+    UntrustedOptions untrusted_;
     std::vector<std::string> sweep_, reference_, lines_;
     std::optional<FrameSelection> frames_;
     std::optional<std::string> error_, error_frames_;

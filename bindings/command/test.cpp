@@ -15,6 +15,7 @@
 #include "bindings/command/child.h"
 #include "bindings/command/command.h"
 #include "bindings/command/test_report.h"
+#include "bindings/command/untrusted.h"
 
 namespace rapid {
 namespace {
@@ -64,7 +65,7 @@ int run_child(const std::string& file, const TestOptions& options)
     return status_done;
 }
 
-class Test : public Command {
+class Test : public Command, public Confined {
 public:
     std::string name() const override { return "test"; }
     std::string doc() const override { return "runs script-level tests"; }
@@ -77,10 +78,20 @@ public:
             ->type_name("")
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(TestReport::formats), std::end(TestReport::formats))));
+        untrusted_.declare(app, "test");
         // Internal: the process of one file.
         app.add_option("--child-of", parent_)->group("");
         app.add_option("--already-run", already_run_)->group("");
     }
+
+    // The processes that run the files are behind walls; this one runs no script and no plugin.
+    void confine(const CommonOptions& common) override
+    {
+        if (!parent_) return;
+        const auto access = [&] { return SandboxAccess{{folder_of(files_.front())}, {}, report_descriptor + 1}; };
+        untrusted_.confine(access, common);
+    }
+    bool takes_plugins() const override { return parent_.has_value(); }
 
     int run(const CommonOptions& common) override
     {
@@ -155,6 +166,8 @@ private:
                                           fmt::format("--already-run={}", already_run),
                                           fmt::format("--threads={}", common.threads)};
         if (!filter_.empty()) words.push_back("--filter=" + filter_);
+        for (const std::string& plugin : common.plugins) words.push_back("--plugin=" + plugin);
+        for (std::string& word : untrusted_.words()) words.push_back(std::move(word));
         words.insert(words.end(), {"--", file.string()});
         std::vector<char*> arguments;
         for (std::string& word : words) arguments.push_back(word.data());
@@ -206,6 +219,7 @@ private:
         report_->add(result);
     }
 
+    UntrustedOptions untrusted_;
     std::vector<std::string> files_;
     std::string filter_, format_ = "text";
     std::unique_ptr<TestReport> report_;

@@ -1,4 +1,4 @@
--- rapid run --untrusted: the sandbox of the system around a run.
+-- --untrusted: the sandbox of the system around a run, and around other commands.
 local command = require "testing.command"
 
 local triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -90,6 +90,40 @@ kill -9 $pid]], { cwd = folder.path }).stdout
     assert.truthy(threads >= 2)
   end)
 
+  it("closes the descriptors that it inherits, and standard input", function()
+    local folder = new_folder("local n = 0 for i = 1, 3e8 do n = n + i % 7 end " .. plain)
+    local seen = command.shell([[
+echo secret >outside/secret
+"$RAPID" run inside/scene.lua --untrusted --quiet -f 1 7<outside/secret <outside/secret & pid=$!
+for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
+  grep -qs 'Seccomp:.2' /proc/$pid/status && break
+  sleep 0.05
+done
+grep -h Seccomp: /proc/$pid/status
+for fd in /proc/$pid/fd/*; do readlink $fd; done
+kill -9 $pid]], { cwd = folder.path }).stdout
+    assert.match("Seccomp:%s*2", seen)
+    assert.match("/dev/null", seen)
+    assert.falsy(seen:find "secret", seen)
+  end)
+
+  it("reads modules on RAPID_PATH", function()
+    local folder = new_folder("require 'depth' " .. plain)
+    folder:write("outside/depth.lua", "return 5")
+    assert.equal(2, folder:run().status)
+    local found = command.rapid("run inside/scene.lua -f 1-3 --quiet --untrusted",
+      { cwd = folder.path, environment = { RAPID_PATH = "/nowhere:" .. folder:file "outside" } })
+    assert.equal("", found.stderr)
+    assert.equal(0, found.status)
+  end)
+
+  it("takes its arguments behind -- as well", function()
+    local folder = new_folder(plain)
+    local result = command.rapid("run --untrusted --quiet -f 1-3 -- inside/scene.lua", { cwd = folder.path })
+    assert.equal("", result.stderr)
+    assert.equal(0, result.status)
+  end)
+
   it("is refused where it would promise what it can't keep", function()
     local folder = new_folder(plain)
     local watched = folder:run("--watch")
@@ -104,5 +138,76 @@ kill -9 $pid]], { cwd = folder.path }).stdout
     local feigned = folder:run("--within-walls")
     assert.equal(2, feigned.status)
     assert.match("not inside of Landlock", feigned.stderr)
+  end)
+end)
+
+describe("--untrusted of other commands", function()
+  local read = "rapid.mesh.read '../outside/mesh.obj' " .. plain
+
+  it("keeps a graph that is checked in its folder", function()
+    local folder = new_folder(read)
+    local function check(arguments)
+      return command.rapid("check inside/scene.lua " .. arguments, { cwd = folder.path })
+    end
+    assert.equal(0, check("").status)
+    local refused = check "--untrusted"
+    assert.equal(2, refused.status)
+    assert.match("inside/scene.lua:3: rapid.mesh.read: .*outside/mesh.obj", refused.stderr)
+    assert.equal(0, check("--untrusted --allow-read outside").status)
+    assert.equal(check("").stdout, check("--untrusted --allow-read outside").stdout)
+    assert.equal(0, check("--untrusted --allow-read outside --races").status)
+  end)
+
+  it("keeps a graph that is studied in its folder, and writes the study", function()
+    local folder = new_folder(plain:gsub("gravity {}", "gravity {} :attract { strength = 1 }"))
+    local function study(arguments)
+      return command.rapid("study inside/scene.lua --sweep solve.substeps=1,2 --reference 8 -f 1-3 --quiet " ..
+        "--repeat 1 -o out " .. arguments, { cwd = folder.path })
+    end
+    local result = study "--untrusted"
+    assert.equal("", result.stderr)
+    assert.equal(0, result.status)
+    assert.match("%d", folder:read "out/study.json")
+    folder:write("inside/scene.lua", graph(read))
+    local refused = study "--untrusted"
+    assert.not_equal(0, refused.status)
+    assert.match("outside/mesh.obj", refused.stdout .. refused.stderr)
+  end)
+
+  it("describes and compares files, one or a sequence, as ever", function()
+    local folder = new_folder(plain)
+    assert.equal(0, folder:run("-o out/a.####.csv -o out/b.####.vdb").status)
+    for _, arguments in ipairs {
+      "info out/a.0002.csv", "info out/b.####.vdb", "info --json out/b.0001.vdb", "diff out/a.####.csv out/b.####.vdb",
+      "diff out/a.0001.csv out/a.0002.csv", "info out/missing.csv", "info out/c.####.csv",
+    } do
+      local open = command.rapid(arguments, { cwd = folder.path })
+      local closed = command.rapid(arguments .. " --untrusted", { cwd = folder.path })
+      assert.equal(open.stdout, closed.stdout)
+      assert.equal(open.stderr, closed.stderr)
+      assert.equal(open.status, closed.status)
+    end
+    command.shell("ln -s ../outside/mesh.obj out/link.csv", { cwd = folder.path })
+    assert.not_equal(0, command.rapid("info --untrusted out/link.csv", { cwd = folder.path }).status)
+  end)
+
+  it("runs tests that can neither write nor start anything", function()
+    local folder = new_folder(plain)
+    folder:write("inside/test_walls.lua", [[
+describe("walls", function()
+  it("let a scene run", function()
+    local result = require("rapid").run("inside/scene.lua", { frames = {1, 3} })
+    assert.equal(2, #result[3])
+  end)
+  it("let nothing be written, read elsewhere, or started", function()
+    assert.is_nil(io.open("inside/new", "w"))
+    assert.is_nil(io.open("outside/mesh.obj"))
+    assert.not_equal(0, os.execute "touch outside/new")
+  end)
+end)]])
+    local result = command.rapid("test --untrusted inside/test_walls.lua", { cwd = folder.path })
+    assert.equal("2 passed, 0 failed, 0 skipped\n", result.stdout)
+    assert.is_nil(folder:read "outside/new")
+    assert.not_equal(0, command.rapid("test inside/test_walls.lua", { cwd = folder.path }).status)
   end)
 end)

@@ -1,0 +1,122 @@
+#include "bindings/command/system_call_filter.h"
+
+#include <fcntl.h>
+#include <sched.h>
+#include <seccomp.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <initializer_list>
+#include <memory>
+
+namespace rapid {
+namespace {
+
+// Files (Landlock decides which), memory, threads, time; and of this process itself what can't reach another one.
+constexpr int allowed[] = {
+    // files that are open
+    SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(preadv), SCMP_SYS(preadv2), SCMP_SYS(write),
+    SCMP_SYS(writev), SCMP_SYS(pwrite64), SCMP_SYS(pwritev), SCMP_SYS(pwritev2), SCMP_SYS(lseek), SCMP_SYS(close),
+    SCMP_SYS(close_range), SCMP_SYS(dup), SCMP_SYS(dup2), SCMP_SYS(dup3), SCMP_SYS(fstat), SCMP_SYS(fstatfs),
+    SCMP_SYS(ftruncate), SCMP_SYS(fallocate), SCMP_SYS(fsync), SCMP_SYS(fdatasync), SCMP_SYS(sync_file_range),
+    SCMP_SYS(flock), SCMP_SYS(fadvise64), SCMP_SYS(readahead), SCMP_SYS(copy_file_range), SCMP_SYS(sendfile),
+    SCMP_SYS(poll), SCMP_SYS(ppoll), SCMP_SYS(select), SCMP_SYS(pselect6), SCMP_SYS(pipe), SCMP_SYS(pipe2),
+    // files by name
+    SCMP_SYS(open), SCMP_SYS(openat), SCMP_SYS(stat), SCMP_SYS(lstat), SCMP_SYS(newfstatat), SCMP_SYS(statx),
+    SCMP_SYS(statfs), SCMP_SYS(access), SCMP_SYS(faccessat), SCMP_SYS(faccessat2), SCMP_SYS(readlink),
+    SCMP_SYS(readlinkat), SCMP_SYS(getdents64), SCMP_SYS(getcwd), SCMP_SYS(mkdir), SCMP_SYS(mkdirat), SCMP_SYS(rmdir),
+    SCMP_SYS(unlink), SCMP_SYS(unlinkat), SCMP_SYS(link), SCMP_SYS(linkat), SCMP_SYS(rename), SCMP_SYS(renameat),
+    SCMP_SYS(renameat2), SCMP_SYS(umask),
+    // memory
+    SCMP_SYS(brk), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(mprotect), SCMP_SYS(madvise), SCMP_SYS(mincore),
+    SCMP_SYS(membarrier),
+    // threads and signals of the process
+    SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(get_robust_list), SCMP_SYS(rseq), SCMP_SYS(set_tid_address),
+    SCMP_SYS(arch_prctl), SCMP_SYS(gettid), SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(getpgrp), SCMP_SYS(exit),
+    SCMP_SYS(exit_group), SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity), SCMP_SYS(sched_getparam),
+    SCMP_SYS(sched_getscheduler), SCMP_SYS(sched_get_priority_min), SCMP_SYS(sched_get_priority_max), SCMP_SYS(getcpu),
+    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(rt_sigtimedwait),
+    SCMP_SYS(rt_sigpending), SCMP_SYS(rt_sigsuspend), SCMP_SYS(sigaltstack), SCMP_SYS(restart_syscall), SCMP_SYS(pause),
+    // time, and what the system tells of itself
+    SCMP_SYS(clock_gettime), SCMP_SYS(clock_getres), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
+    SCMP_SYS(gettimeofday), SCMP_SYS(time), SCMP_SYS(times), SCMP_SYS(getrusage), SCMP_SYS(uname), SCMP_SYS(sysinfo),
+    SCMP_SYS(getrandom), SCMP_SYS(getrlimit), SCMP_SYS(getuid), SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getegid)};
+
+class Filter {
+public:
+    Filter() : context_(seccomp_init(SCMP_ACT_ERRNO(EPERM)), seccomp_release)
+    {
+        status_ = context_ ? seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1) : -ENOSYS;  // all threads
+    }
+
+    void allow(int call) { add(SCMP_ACT_ALLOW, call, {}); }
+    void allow_if(int call, std::initializer_list<scmp_arg_cmp> arguments) { add(SCMP_ACT_ALLOW, call, arguments); }
+    // Where one of its values is allowed, the argument being the second.
+    void allow_commands(int call, std::initializer_list<unsigned> commands)
+    {
+        for (const unsigned command : commands) allow_if(call, {SCMP_A1_32(SCMP_CMP_EQ, command)});
+    }
+    void fail(int call, int error) { add(SCMP_ACT_ERRNO(static_cast<std::uint32_t>(error)), call, {}); }
+    int load() { return status_ == 0 ? seccomp_load(context_.get()) : status_; }
+
+private:
+    void add(std::uint32_t action, int call, std::initializer_list<scmp_arg_cmp> arguments)
+    {
+        if (status_ != 0) return;
+        status_ = seccomp_rule_add_array(context_.get(), action, call, static_cast<unsigned>(arguments.size()),
+                                         arguments.begin());
+    }
+
+    std::unique_ptr<void, void (*)(scmp_filter_ctx)> context_;
+    int status_ = 0;
+};
+
+// Calls that depend on their arguments.
+void add_by_arguments(Filter& filter, Processes processes)
+{
+    const auto own = static_cast<scmp_datum_t>(getpid());
+
+    // Shared memory without a file is outside of the limits of memory.
+    const scmp_datum_t kind = MAP_SHARED | MAP_ANONYMOUS;
+    for (const scmp_datum_t allowed_kind : {scmp_datum_t{0}, scmp_datum_t{MAP_SHARED}, scmp_datum_t{MAP_ANONYMOUS}})
+        filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, allowed_kind)});
+
+    // No owner of a descriptor's signals, no leases, no notification.
+    filter.allow_commands(SCMP_SYS(fcntl), {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_GETLK,
+                                            F_SETLK, F_SETLKW, F_OFD_GETLK, F_OFD_SETLK, F_OFD_SETLKW});
+    filter.allow_commands(SCMP_SYS(ioctl), {TCGETS, TIOCGWINSZ});  // whether it is a terminal, and how wide
+
+    for (const int call : {SCMP_SYS(kill), SCMP_SYS(tgkill)}) filter.allow_if(call, {SCMP_A0(SCMP_CMP_EQ, own)});
+    filter.allow_if(SCMP_SYS(prlimit64), {SCMP_A0(SCMP_CMP_EQ, 0)});  // its own limits, which it can only lower
+    filter.allow_if(SCMP_SYS(sched_setaffinity), {SCMP_A0(SCMP_CMP_EQ, 0)});
+    for (const int option : {PR_SET_NAME, PR_GET_NAME})
+        filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, static_cast<scmp_datum_t>(option))});
+
+    // A filter can't see the flags of clone3; the C library then takes clone.
+    filter.fail(SCMP_SYS(clone3), ENOSYS);
+    if (processes == Processes::Copies) {
+        constexpr scmp_datum_t spaces =
+            CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNET;
+        filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, spaces, 0)});
+        filter.allow(SCMP_SYS(wait4));
+        filter.allow(SCMP_SYS(memfd_create));  // the frames of a reference, for all copies
+        filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, PR_SET_PDEATHSIG)});
+    } else {
+        filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD)});
+    }
+}
+
+}  // namespace
+
+int load_system_call_filter(Processes processes)
+{
+    Filter filter;
+    for (const int call : allowed) filter.allow(call);
+    add_by_arguments(filter, processes);
+    return filter.load();
+}
+
+}  // namespace rapid

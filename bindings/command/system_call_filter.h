@@ -1,0 +1,15 @@
+// The system calls that a process behind walls may make: a list of those that Rapid needs (seccomp). All others fail
+// with EPERM.
+#pragma once
+
+namespace rapid {
+
+enum class Processes {
+    None,    // threads alone
+    Copies,  // it may fork, and wait for the copies, which have the same walls; it starts no other program
+};
+
+// Returns a status of seccomp's: 0, or a negative errno. Holds all threads, and those that they start.
+int load_system_call_filter(Processes processes);
+
+}  // namespace rapid

@@ -1,0 +1,46 @@
+// --untrusted and --allow-read, of the commands that run a graph or read files.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bindings/command/command.h"
+#include "bindings/command/process_sandbox.h"
+
+namespace rapid {
+
+// A command that can run behind walls.
+class Confined {
+public:
+    virtual ~Confined() = default;
+    // Puts the process behind walls where an option asks for it; called before plugins are loaded, and before run().
+    virtual void confine(const CommonOptions& common) = 0;
+    // Whether this process loads plugins; not where others do the work.
+    virtual bool takes_plugins() const { return true; }
+};
+
+class UntrustedOptions {
+public:
+    // whose: what --allow-read is for, "graph" or "file".
+    void declare(CLI::App& app, const std::string& whose);
+    bool asked() const { return untrusted_; }
+
+    // Puts the process behind walls, if that is asked for. access: what the command itself reads and writes, besides
+    // --allow-read and plugins. Before plugins are loaded: their first code runs behind the walls, too.
+    void confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,
+                 Processes processes = Processes::None) const;
+
+    // These options again, for a process of its own.
+    std::vector<std::string> words() const;
+
+private:
+    bool untrusted_ = false, sandboxed_ = false;
+    std::vector<std::string> allowed_;
+};
+
+// The folder that a file lies in.
+std::filesystem::path folder_of(const std::filesystem::path& file);
+
+}  // namespace rapid

@@ -1,0 +1,187 @@
+// What a process behind walls can't do, each tried in a process of its own.
+#include "bindings/command/system_call_filter.h"
+
+#include <fcntl.h>
+#include <linux/keyctl.h>
+#include <linux/perf_event.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+#include <sys/ipc.h>
+#include <sys/mman.h>
+#include <sys/msg.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/sem.h>
+#include <sys/shm.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <sys/xattr.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <thread>
+
+#include "tests/test.h"
+
+using namespace rapid;
+
+namespace {
+
+constexpr int not_loaded = 254;
+
+// The errno of a call that returns -1, in a process with the filter; 0 where it succeeds.
+int error_behind_walls(Processes processes, const std::function<long()>& call)
+{
+    const pid_t child = fork();
+    if (child == 0) {
+        if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 || load_system_call_filter(processes) != 0) _exit(not_loaded);
+        errno = 0;
+        _exit(call() == -1 ? errno : 0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+// A file of this process, which it could change in every way.
+class OwnFile {
+public:
+    OwnFile() : path_(std::filesystem::temp_directory_path() / ("rapid_walls_" + std::to_string(getpid())))
+    {
+        descriptor_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    }
+    ~OwnFile()
+    {
+        close(descriptor_);
+        std::filesystem::remove(path_);
+    }
+    const char* path() const { return path_.c_str(); }
+    int descriptor() const { return descriptor_; }
+
+private:
+    std::filesystem::path path_;
+    int descriptor_;
+};
+
+}  // namespace
+
+TEST_CASE("behind walls no other process is reached", "[untrusted]")
+{
+    const pid_t other = getpid();  // of the child that tries: its parent
+    const std::map<std::string, std::function<long()>> calls = {
+        {"kill", [=] { return kill(other, 0); }},
+        {"kill of all", [] { return kill(-1, 0); }},
+        {"tgkill", [=] { return syscall(SYS_tgkill, other, other, 0); }},
+        {"tkill", [=] { return syscall(SYS_tkill, other, 0); }},
+        {"rt_sigqueueinfo", [=] { return syscall(SYS_rt_sigqueueinfo, other, 0, nullptr); }},
+        {"pidfd_open", [=] { return syscall(SYS_pidfd_open, other, 0); }},
+        {"prlimit",
+         [=] {
+             const rlimit lower{8, 8};
+             return syscall(SYS_prlimit64, other, RLIMIT_NOFILE, &lower, nullptr);
+         }},
+        {"setpriority", [=] { return setpriority(PRIO_PROCESS, static_cast<id_t>(other), 19); }},
+        {"sched_setaffinity",
+         [=] {
+             cpu_set_t one;
+             CPU_ZERO(&one);
+             CPU_SET(0, &one);
+             return sched_setaffinity(other, sizeof one, &one);
+         }},
+        {"process_vm_readv", [=] { return syscall(SYS_process_vm_readv, other, nullptr, 0, nullptr, 0, 0); }},
+        {"ptrace", [=] { return syscall(SYS_ptrace, 16 /* attach */, other, 0, 0); }},
+        {"signals of a descriptor", [=] { return fcntl(STDOUT_FILENO, F_SETOWN, other); }},
+        {"typing on a terminal", [] { return ioctl(STDOUT_FILENO, TIOCSTI, "x"); }},
+        {"setpgid", [=] { return setpgid(0, 0); }},
+    };
+    for (const Processes processes : {Processes::None, Processes::Copies})
+        for (const auto& [name, call] : calls) {
+            CAPTURE(name);
+            CHECK(error_behind_walls(processes, call) == EPERM);
+        }
+}
+
+TEST_CASE("behind walls no file's mode, owner, time or attribute is changed", "[untrusted]")
+{
+    const OwnFile file;
+    const std::map<std::string, std::function<long()>> calls = {
+        {"chmod", [&] { return chmod(file.path(), 0777); }},
+        {"fchmod", [&] { return fchmod(file.descriptor(), 0777); }},
+        {"chown", [&] { return chown(file.path(), getuid(), getgid()); }},
+        {"utimensat", [&] { return utimensat(AT_FDCWD, file.path(), nullptr, 0); }},
+        {"futimens", [&] { return futimens(file.descriptor(), nullptr); }},
+        {"setxattr", [&] { return setxattr(file.path(), "user.x", "x", 1, 0); }},
+        {"removexattr", [&] { return removexattr(file.path(), "user.x"); }},
+        {"mknod", [&] { return mknod((std::string(file.path()) + ".fifo").c_str(), S_IFIFO | 0600, 0); }},
+        {"symlink", [&] { return symlink("/etc/passwd", (std::string(file.path()) + ".link").c_str()); }},
+    };
+    for (const auto& [name, call] : calls) {
+        CAPTURE(name);
+        CHECK(error_behind_walls(Processes::None, call) == EPERM);
+    }
+}
+
+TEST_CASE("behind walls there is no memory outside of the limits", "[untrusted]")
+{
+    const auto map_shared = [] {
+        return reinterpret_cast<long>(
+            mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+    };
+    CHECK(error_behind_walls(Processes::None, map_shared) == EPERM);
+    CHECK(error_behind_walls(Processes::None, [] { return memfd_create("x", 0); }) == EPERM);
+    CHECK(error_behind_walls(Processes::None, [] { return shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600); }) == EPERM);
+    CHECK(error_behind_walls(Processes::None, [] { return semget(IPC_PRIVATE, 1, IPC_CREAT | 0600); }) == EPERM);
+    CHECK(error_behind_walls(Processes::None, [] { return msgget(IPC_PRIVATE, IPC_CREAT | 0600); }) == EPERM);
+}
+
+TEST_CASE("behind walls there is no socket, no program, and no way around the filter", "[untrusted]")
+{
+    const std::map<std::string, std::function<long()>> calls = {
+        {"socket", [] { return socket(AF_INET, SOCK_STREAM, 0); }},
+        {"a local socket", [] { return socket(AF_UNIX, SOCK_STREAM, 0); }},
+        {"execve", [] { return execl("/bin/true", "true", nullptr); }},
+        {"unshare", [] { return unshare(CLONE_NEWUSER); }},
+        {"io_uring", [] { return syscall(SYS_io_uring_setup, 1, nullptr); }},
+        {"bpf", [] { return syscall(SYS_bpf, 0, nullptr, 0); }},
+        {"perf_event_open", [] { return syscall(SYS_perf_event_open, nullptr, 0, -1, -1, 0); }},
+        {"userfaultfd", [] { return syscall(SYS_userfaultfd, 0); }},
+        {"keyctl", [] { return syscall(SYS_keyctl, KEYCTL_GET_KEYRING_ID, KEY_SPEC_SESSION_KEYRING, 0); }},
+        {"a debugger's access", [] { return prctl(PR_SET_PTRACER, -1, 0, 0, 0); }},
+    };
+    for (const Processes processes : {Processes::None, Processes::Copies})
+        for (const auto& [name, call] : calls) {
+            CAPTURE(name);
+            CHECK(error_behind_walls(processes, call) == EPERM);
+        }
+    CHECK(error_behind_walls(Processes::None, [] { return fork(); }) == EPERM);
+}
+
+TEST_CASE("behind walls threads, files and memory are as ever", "[untrusted]")
+{
+    const OwnFile file;
+    CHECK(error_behind_walls(Processes::None, [&] {
+              int seen = 0;
+              std::thread([&] { seen = 1; }).join();
+              char* const memory = new char[1 << 24];
+              memory[0] = 1;
+              delete[] memory;
+              void* const mapped = mmap(nullptr, 4096, PROT_READ, MAP_SHARED, file.descriptor(), 0);
+              const bool all = seen == 1 && mapped != MAP_FAILED && write(file.descriptor(), "x", 1) == 1 &&
+                               ftruncate(file.descriptor(), 0) == 0 && raise(SIGURG) == 0;
+              return all ? 0L : -1L;
+          }) == 0);
+    CHECK(error_behind_walls(Processes::Copies, [] {
+              const pid_t copy = fork();
+              if (copy == 0) _exit(7);
+              int status = 0;
+              return waitpid(copy, &status, 0) == copy && WEXITSTATUS(status) == 7 ? 0L : -1L;
+          }) == 0);
+}

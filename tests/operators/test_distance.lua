@@ -20,6 +20,22 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.
     end
   end)
 
+  it("has what rests on a compliant pin stretch it by its weight", function()
+    for _, case in ipairs { {1e-4, 12, 4}, {1e-3, 12, 4}, {1e-3, 12, 50}, {5e-3, 24, 2} } do
+      local give, substeps, iterations = unpack(case)
+      local result = scene.run(([[
+local pin = rapid.points.from { P = {{0, 0, 0}, {0, 0.02, 0}}, pscale = {0.01, 0.01}, mass = {0.01, 0.02} }
+return rapid.create { fps = 24, points = pin }
+  :group { name = "floor", where = function(p) return p.id == 0 end }
+  :gravity {} :drag { linear = 5 } :pin { group = "floor", compliance = %g }
+  :contact {} :solve { substeps = %d, iterations = %d, sleep = math.huge }]]):format(give, substeps, iterations),
+        { frames = {1, 120} })
+      local sag, count = 0, 0
+      for f = 73, 120 do sag, count = sag - points_of(result, f)[1].P.y, count + 1 end
+      assert.near(give * 0.03 * 9.81, sag / count, 0.005 * give * 0.03 * 9.81)
+    end
+  end)
+
   it("holds a chain of 1,000 links that swings to a strain of a thousandth by 4 sub-steps", function()
     local result = scene.run([[
 local places, links = {}, {}

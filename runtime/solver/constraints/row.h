@@ -49,7 +49,9 @@ struct Row {
     double impulse = 0;          // N s along the gradient, of the last sub-step; at least 0 where it is one-sided
     double first = 0;            // C where the sub-step begins
     double reference = 0;        // C that its points are kept at, once the row's own force has acted
-    double added = 0;            // N s, the part of the impulse that is due to others
+    double added = 0;            // N s, the part of the impulse that is due to others, as far as it moves positions
+    bool is_resolved = false;    // by the sub-step: velocities along the row stay
+    double softness = 0;         // 1/kg: what C - reference gives way by, times dt, for each N s of `added`
     Vectors direction = zero();  // the gradient that it acts along
     bool active = true, was_active = false;
     bool asleep = false;  // in this sub-step: none of its points moves, as one of them sleeps
@@ -91,12 +93,15 @@ struct Row {
         for (int k = 0; k < arity; ++k) P[k] = step.start[points[k]];
         first = function.residual(P, gradient);
     }
-    // From here on the row keeps its points as they are now.
+    // From here on the row keeps its points as they are now. What others do to them changes its force throughout the
+    // sub-step, as the force itself goes by C: α ΔF = -θ ΔC (tree_motion.h). Of the impulse ΔF dt half moves positions.
     void keep(const Substep& step)
     {
         Vectors gradient;
         reference = residual(step, gradient);
         added = 0;
+        is_resolved = !is_stiff(inverse_mass(step, gradient), step.dt);
+        softness = (is_resolved ? 4 : 2) * compliance / (step.dt * step.dt);
     }
 
     // The rate of the residual, 1/s.
@@ -124,6 +129,7 @@ struct Row {
         Vectors P;
         for (int k = 0; k < arity; ++k) P[k] = step.start[points[k]];
         reference = compliance > 0 ? 0 : std::min(0.0, function.residual(P, direction));
+        softness = compliance / (step.dt * step.dt);
         residual(step, direction);
         added = 0.5 * impulse;  // what the velocities get with the positions (Projection::advance)
         for (int k = 0; k < arity; ++k) {
@@ -140,19 +146,25 @@ struct Row {
         Vectors gradient;
         const double C = function.residual(P, gradient) - reference;
         if (!Traits::one_sided) direction = gradient;
-        const double softness = compliance / (step.dt * step.dt);
         double stiffness = softness;
         for (int k = 0; k < arity; ++k) stiffness += step.points[points[k]].w * gradient[k].dot(direction[k]);
         if (!(stiffness > 0)) return;
         const double total = Traits::one_sided ? impulse : added;
-        double change = (-C / step.dt - softness * step.dt * total) / stiffness;
+        double change = (-C / step.dt - softness * total) / stiffness;
         if (Traits::one_sided) change = std::max(change, -added);
-        added += change;
-        impulse += change;
+        take(change);
         for (int k = 0; k < arity; ++k) {
             ProjectedPoint& point = step.points[points[k]];
-            point.P += point.w * step.dt * change * direction[k];
+            const Vec3d shift = point.w * change * direction[k];
+            point.P += step.dt * shift;
+            if (is_resolved) step.v[points[k]] += shift;
         }
+    }
+    // Counts an impulse that moves positions.
+    void take(double change)
+    {
+        added += change;
+        impulse += !Traits::one_sided && compliance > 0 ? 2 * change : change;
     }
 
     // Takes off the velocity that is left along a rigid row.
@@ -184,7 +196,7 @@ struct Row {
     double error(double residual, double dt) const
     {
         if (Traits::one_sided) return std::min(residual + compliance * impulse / dt, 0.0);
-        return compliance > 0 ? residual - reference + compliance * added / dt : residual;
+        return compliance > 0 ? residual - reference + softness * dt * added : residual;
     }
 
 private:

@@ -63,22 +63,23 @@ public:
     // Keeps C at the rows' reference where others have pushed the points since.
     void project(Substep& step)
     {
-        const double per_dt2 = 1 / (step.dt * step.dt);
         for (Forest::Link& link : tree_) {
             const Row& row = rows_[link.row];
             typename Row::Vectors gradient;
-            const double softness = row.compliance * per_dt2;
-            link.e = row.residual(step, gradient) - row.reference + softness * step.dt * row.added;
-            link.s = softness;
+            link.e = row.residual(step, gradient) - row.reference + row.softness * step.dt * row.added;
+            link.s = row.softness;
             orient(link, gradient);
         }
         const Vec3d root = solve(step);
         step.points[tree_.front().parent].P += root;
         for (const Forest::Link& link : tree_) {
             Row& row = rows_[link.row];
-            row.added += link.lambda / step.dt;
-            row.impulse += link.lambda / step.dt;
+            const double change = link.lambda / step.dt;
+            row.take(change);
             step.points[link.child].P += link.shift;
+            if (!row.is_resolved) continue;
+            step.v[link.child] += step.points[link.child].w * change * link.gradient;
+            step.v[link.parent] += step.points[link.parent].w * change * link.gradient_above;
         }
     }
 

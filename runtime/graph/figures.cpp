@@ -15,6 +15,11 @@ void FrameFigures::append(FrameFigures later)
     later.trapped = std::max(later.trapped, trapped);
     later.substeps = std::max(later.substeps, substeps);
     later.contact_energy += contact_energy;
+    if (ledger) {
+        Ledger sum = *ledger;
+        if (later.ledger) sum.append(*later.ledger);
+        later.ledger = sum;
+    }
     for (const BandFigures& band : bands) {
         const auto same = std::find_if(later.bands.begin(), later.bands.end(),
                                        [&](const BandFigures& other) { return other.node == band.node; });

@@ -10,6 +10,7 @@
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/estimate/resolution.h"
 #include "runtime/solver/estimate/stiffness.h"
+#include "runtime/solver/ledger.h"
 
 namespace rapid {
 
@@ -33,6 +34,7 @@ struct FrameFigures {
     double penetration_max = 0;
     double constraint_residual_max = 0;  // m
     ContactEnergy contact_energy;
+    std::optional<Ledger> ledger;         // of constrained points
     std::uint64_t constraint_rows = 0;    // active at the end of the frame
     std::uint64_t loose_constraints = 0;  // of these, with an error above a tenth of their size
     std::uint64_t asleep = 0;             // sleeping points at the end of the frame

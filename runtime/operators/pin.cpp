@@ -78,6 +78,12 @@ public:
             if (rigid_) sleep->make_kinematic(static_cast<std::uint32_t>(i));
     }
     bool has_forces() const override { return !rigid_; }
+    void add_stored_energy(const Substep& step, std::span<const Vec3d> at, double factor,
+                           std::span<double> energy) const override
+    {
+        pins_->springs.add_stored_energy(step, at, factor, energy);
+    }
+    void link(EnergyIslands& islands) const override { pins_->springs.link(islands); }
     void move_kinematic(Substep& step) override
     {
         pins_->springs.move_kinematic(step);  // with the targets of before

@@ -212,6 +212,10 @@ private:
         if (result.residual.search) figures.contact_search = result.residual.search;
         figures.constraint_residual_max = std::max(figures.constraint_residual_max, result.residual.worst);
         figures.contact_energy += result.contact_energy;
+        if (result.ledger && figures.ledger)
+            figures.ledger->append(*result.ledger);
+        else if (result.ledger)
+            figures.ledger = result.ledger;
         figures.penetration_max = std::max(figures.penetration_max, result.penetration_max);
         figures.beyond_tolerance += std::max(done.beyond, beyond);
 
@@ -222,6 +226,10 @@ private:
             warn("points reached the limit of contacts in a step, and the rest of it was dropped; take more substeps");
         if (result.residual.loose > 0)
             warn("constraints are off by more than a tenth of their size; take more substeps, or more iterations");
+        if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())
+            warn(
+                "constraints gave energy or momentum that nothing accounts for; take more substeps, or more "
+                "iterations");
         if (result.trapped > 0)
             warn(
                 "points are deep in a shape, where its field shows no way out; a level set of a larger half_width "

@@ -68,6 +68,7 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.contact_search = result.figures.contact_search;
     frame.constraint_residual_max = result.figures.constraint_residual_max;
     frame.contact_energy = result.figures.contact_energy;
+    frame.ledger = result.figures.ledger;
     frame.bands = result.figures.bands;
     frame.seconds.script = result.figures.script_seconds;
     frame.seconds.solve = result.figures.solve_seconds;
@@ -77,6 +78,25 @@ FrameStatistics statistics_of(const FrameResult& result)
 }
 
 namespace {
+
+ordered_json to_json(const Ledger& ledger)
+{
+    const auto list = [](const Vec3d& v) { return ordered_json{v.x(), v.y(), v.z()}; };
+    ordered_json json = {{"kinetic", ledger.kinetic},
+                         {"potential", ledger.potential},
+                         {"elastic", ledger.elastic},
+                         {"by_rods", ledger.by_rods},
+                         {"by_contacts", ledger.by_contacts},
+                         {"by_motion", ledger.by_motion},
+                         {"momentum", list(ledger.momentum)},
+                         {"angular_momentum", list(ledger.angular_momentum)},
+                         {"residue", nullptr}};
+    if (ledger.residue)
+        json["residue"] = {{"energy", ledger.residue->energy},
+                           {"momentum", ledger.residue->momentum},
+                           {"angular_momentum", ledger.residue->angular_momentum}};
+    return json;
+}
 
 ordered_json to_json(const FrameStatistics& frame)
 {
@@ -108,6 +128,7 @@ ordered_json to_json(const FrameStatistics& frame)
                                  {"search_seconds", frame.contact_search->seconds}};
     json["collisions"] = frame.collisions;
     json["contact_energy"] = {{"added", frame.contact_energy.added}, {"lost", frame.contact_energy.lost}};
+    if (frame.ledger) json["ledger"] = to_json(*frame.ledger);
     for (const BandFigures& band : frame.bands)
         json["bands"].push_back(
             {{"node", band.node}, {"width", band.width}, {"voxels", band.voxels}, {"seconds", band.seconds}});

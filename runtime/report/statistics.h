@@ -43,6 +43,7 @@ struct FrameStatistics {
     std::uint64_t beyond_tolerance = 0;
     double penetration_max = 0;  // m
     ContactEnergy contact_energy;
+    std::optional<Ledger> ledger;
     std::vector<BandFigures> bands;
     double constraint_residual_max = 0;   // m; 0 where nothing is constrained
     std::uint64_t constraint_rows = 0;    // active at the frame's end

@@ -22,15 +22,16 @@ void CoupledStep::run()
 {
     const SolveOptions& options = context_.options;
     const StepScene& scene = context_.scene;
-    const Column<std::int64_t>& ids = std::as_const(context_.points).id();
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { read_points(begin, end); });
     begin_substeps();
     if (options.sleep_records && std::isfinite(options.sleep) && context_.points.has("still")) {
         sleep_.emplace(context_.points, inverse_mass_, options.sleep);
         skips_sleepers_ = scene.is_ballistic() && scene.uniform.linear.is_zero();
     }
-    Projection projection(scene.constraints, scene.obstacles, now_, sleep_ ? &*sleep_ : nullptr, options.loads, ids);
+    Projection projection(scene.constraints, scene.obstacles, now_, sleep_ ? &*sleep_ : nullptr, options.loads,
+                          context_.errors);
     if (sleep_) sleep_->open(*options.sleep_records);
+    const LedgerState before = LedgerState::of(now_, projection.elastic_energy(now_));
     if (projection.bounces()) {
         paths_.resize(at_.size());
         now_.paths = paths_;
@@ -49,12 +50,26 @@ void CoupledStep::run()
 
     SolveResult& result = context_.result();
     if (sleep_) sleep_->clear_loads();
-    result.residual = projection.close(now_, options.loads, ids);
+    result.residual = projection.close(now_, options.loads);
+    result.contact_energy += projection.energy();
+    if (!scene.constraints.empty())
+        result.ledger = ledger_of(before, LedgerState::of(now_, projection.elastic_energy(now_)), projection.by_rods(),
+                                  projection.by_contacts(), is_isolated(projection), now_.acceleration, options.h);
     if (sleep_) sleep_->close(now_, context_.P, context_.v, context_.time);
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { store(begin, end); });
     if (!sleep_) return;
     sleep_->remember(*options.sleep_records, now_, scene.obstacles);
     result.asleep = options.sleep_records->records.size();
+}
+
+// Whether nothing acts on the points but an acceleration that is the same for all, and they on each other.
+bool CoupledStep::is_isolated(const Projection& projection) const
+{
+    const StepScene& scene = context_.scene;
+    return projection.keeps_momentum() && scene.is_ballistic() && scene.uniform.linear.is_zero() &&
+           scene.actions.empty() && !context_.options.interacts && !(sleep_ && sleep_->any()) &&
+           !context_.time.own.data && now_.dt > 0 &&
+           std::all_of(inverse_mass_.begin(), inverse_mass_.end(), [](double w) { return w > 0; });
 }
 
 void CoupledStep::read_points(std::size_t begin, std::size_t end)
@@ -78,14 +93,19 @@ void CoupledStep::begin_substeps()
     now_.dead = context_.dead;
     now_.dt = context_.options.h / context_.options.substeps;
     now_.iterations = context_.options.iterations;
+    now_.acceleration = scene.uniform.a;
     if (!scene.uniform.a.isZero(0)) now_.up = -scene.uniform.a.normalized();
     const bool has_forces = std::any_of(scene.constraints.begin(), scene.constraints.end(),
                                         [](const LocalConstraint& local) { return local.coupling->has_forces(); });
     if (has_forces) displacement_.resize(at_.size());
     now_.displacement = displacement_;
+    if (has_forces && !scene.obstacles.empty()) born_.resize(at_.size());
+    now_.born = born_;
     if (!scene.forces.empty() || !scene.uniform.linear.is_zero()) {
         mobility_.assign(at_.size(), {now_.dt, 0.5 * now_.dt * now_.dt});
         now_.mobility = mobility_;
+        energy_.resize(at_.size());
+        now_.energy = energy_;
     }
 }
 
@@ -114,6 +134,7 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         places.clear();
         for (std::size_t i = first; i < last; ++i) {
             start_[i] = at_[i].P;
+            if (!born_.empty()) born_[i] = at_[i].P;
             if (!skips_sleepers_ || !leaves_out(i)) places.push_back(static_cast<std::uint32_t>(i));
         }
         if (places.empty()) {
@@ -154,6 +175,10 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     ProjectedPoint& at = at_[i];
     at.w = inverse_mass_[i];
     if (!paths_.empty()) paths_[i] = free_path(block, k);
+    if (!mobility_.empty() && inverse_mass_[i] > 0) {
+        mobility_[i] = mobility_of(block, k);
+        energy_[i] = 0.5 * v_[i].squaredNorm() / inverse_mass_[i] + potential_energy(now_, i, start_[i]);
+    }
     if (sleep_ && !skips_sleepers_) {
         const bool asleep = sleep_->asleep(i);
         sleep_->check_acceleration(i, acceleration_of(block, k, asleep));
@@ -172,10 +197,15 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
         displacement_[i] =
             block.linear.data ? Vec3d(at.P - start_[i]) : Vec3d(block.dt[k] * (v_[i] - 0.5 * block.dt[k] * block.a[k]));
     if (!block.linear.data) return;
-    const Propagator by = respond(block.damped[k].k, block.damped[k].w2, now_.dt);
-    mobility_[i] = {by.v_of_G, by.x_of_G, block.a[k] + block.linear[k].w2q, block.linear[k].w2};
     // Of a spring that swings through in the sub-step v_of_G is of any sign.
-    at.w *= std::max(by.v_of_G, by.x_of_G / now_.dt) / now_.dt;
+    at.w *= std::max(mobility_[i].v, mobility_[i].x / now_.dt) / now_.dt;
+}
+
+Mobility CoupledStep::mobility_of(const PointBlock& block, std::size_t k) const
+{
+    if (!block.linear.data) return {now_.dt, 0.5 * now_.dt * now_.dt, block.a[k]};
+    const Propagator by = respond(block.damped[k].k, block.damped[k].w2, now_.dt);
+    return {by.v_of_G, by.x_of_G, block.a[k] + block.linear[k].w2q, block.linear[k].w2};
 }
 
 // Whether a sleeper under uniform forces stays asleep, and out of the blocks.

@@ -24,12 +24,14 @@ public:
 private:
     void read_points(std::size_t begin, std::size_t end);
     void begin_substeps();
+    bool is_isolated(const Projection& projection) const;
     void interact(int kicks);
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
     void take_point(const PointBlock& block, std::size_t k);
     bool leaves_out(std::size_t i);
     void store(std::size_t begin, std::size_t end);
+    Mobility mobility_of(const PointBlock& block, std::size_t k) const;
     FreePath free_path(const PointBlock& block, std::size_t k) const;
     Vec3d acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const;
     double inverse_mass(std::size_t i) const;
@@ -41,6 +43,8 @@ private:
     std::vector<Vec3d> v_, start_;
     std::vector<double> inverse_mass_;  // 1/kg
     std::vector<Mobility> mobility_;    // empty where no force has a linear part
+    std::vector<Vec3d> born_;           // Substep::born
+    std::vector<double> energy_;        // Substep::energy
     std::vector<Vec3d> displacement_;   // Substep::displacement; empty where no constraint needs it
     std::vector<FreePath> paths_;       // empty where nothing bounces
 

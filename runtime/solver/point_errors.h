@@ -13,12 +13,17 @@ class PointErrors {
 public:
     PointErrors(const PointSet& points, std::int64_t frame) : points_(points), frame_(frame) {}
 
+    const Column<std::int64_t>& ids() const { return points_.id(); }
+
     // When a value was found, as the message puts it.
     struct Occasion {
         const char *verb, *when, *had;
     };
     static constexpr Occasion before_step{"is", "before the step; a node before this one made it so", "it has"};
     static constexpr Occasion in_step{"became", "in the step; the frame was not written", "it had"};
+    static constexpr Occasion in_substep{
+        "became", "in a sub-step; the frame was not written; weaker forces or more sub-steps would keep it finite",
+        "it had"};
     // The point has been overwritten by the result.
     static constexpr Occasion in_step_overwritten{"became", "in the step; the frame was not written", "it has"};
 

@@ -16,6 +16,7 @@
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/sleep_records.h"
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/ledger.h"
 
 namespace rapid {
 
@@ -49,9 +50,10 @@ struct SolveResult {
     std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
     double penetration_max = 0;       // m, the deepest at the end of the frame
     ContactEnergy contact_energy;
-    std::uint64_t died = 0;    // points that actions killed
-    Residual residual;         // of the constraints, at the end of the frame
-    std::uint64_t asleep = 0;  // points, at the end of the frame
+    std::optional<Ledger> ledger;  // where points are constrained
+    std::uint64_t died = 0;        // points that actions killed
+    Residual residual;             // of the constraints, at the end of the frame
+    std::uint64_t asleep = 0;      // points, at the end of the frame
 };
 
 // Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age

@@ -315,8 +315,7 @@ local set = rapid.points.from { P = {{0, 1, 0}, {2, 1, 0}}, heat = {1, 7}, mass 
         { 'node "gravity1": g', "frame 4" },
       [':distance { within = 3 } ' ..
         ':attract { falloff = -60, strength = function(f) return f.number == 4 and 3e38 or 0 end } :solve {}'] =
-        { 'node "solve1": point 0, frame 4: P became {-inf, -inf, 0}',
-          "it had P = {0, 1, 0}, v = {0, 0, 0}, heat = 1, mass = 1" },
+        { 'node "solve1": point 1, frame 4: P became {-inf, -inf, 0} in a sub-step', had },
     } do
       local result, folder = failing(chain)
       assert.equal(1, result.status, chain)

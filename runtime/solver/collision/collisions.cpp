@@ -22,12 +22,25 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     block_.dt = drift.dt;
     block_.after = drift.after;
     motion_.begin(drift);
+    const std::size_t displaced = ejection_.displacements().size();
     if (discrete_.is_used()) discrete_.begin_substep();
     stuck_.advance();
     move_along_free_paths();
     rounds_.run();
-    if (discrete_.is_used()) discrete_.correct();
-    if (!motion_.is_damped()) audit_.add_energy(touched_, stuck_, motion_);
+    if (discrete_.is_used()) correct();
+    if (motion_.is_damped())
+        audit_.add_displacements(ejection_.displacements().subspan(displaced), motion_);
+    else
+        audit_.add_energy(touched_, stuck_, motion_);
+}
+
+// By the paper's methods, which correct after the sub-step.
+void Collisions::correct()
+{
+    if (!motion_.is_damped()) return discrete_.correct();
+    const std::vector<Vec3d> P(block_.P.begin(), block_.P.end()), v(block_.v.begin(), block_.v.end());
+    discrete_.correct();
+    audit_.add_corrections(P, v, motion_);
 }
 
 // Points that meet nothing are then at the end of the sub-step.

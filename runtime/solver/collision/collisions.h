@@ -58,6 +58,7 @@ public:
 
 private:
     void move_along_free_paths();
+    void correct();
     void find_first_contacts(std::size_t obstacle);
 
     CollisionBlock block_;

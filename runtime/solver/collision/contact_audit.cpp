@@ -26,4 +26,22 @@ void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& s
     }
 }
 
+void ContactAudit::add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion)
+{
+    for (const auto& [i, by] : displacements) {
+        const double mass = block_.context.mass[block_.indices[i]];
+        if (!std::isinf(mass)) counts_.energy.take(mass * motion.potential(i, motion.initial_P(i) + by));
+    }
+}
+
+void ContactAudit::add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion)
+{
+    for (std::size_t i = 0; i < P.size(); ++i) {
+        const double mass = block_.context.mass[block_.indices[i]];
+        if (std::isinf(mass) || (P[i] == block_.P[i] && v[i] == block_.v[i])) continue;
+        const double kinetic = 0.5 * (block_.v[i] - v[i]).dot(block_.v[i] + v[i]);
+        counts_.energy.take(mass * (kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i])));
+    }
+}
+
 }  // namespace rapid

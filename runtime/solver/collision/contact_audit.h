@@ -5,6 +5,7 @@
 
 #include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/collision/ejection.h"
 #include "runtime/solver/collision/free_motion.h"
 #include "runtime/solver/collision/stuck_points.h"
 #include "runtime/solver/collision/touched_points.h"
@@ -15,7 +16,7 @@ struct ContactCounts {
     std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
     std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
     std::uint64_t trapped = 0;   // points that are in a shape at the end of the frame, with no way out
-    ContactEnergy energy;        // of points without linear forces, which take energy all the time
+    ContactEnergy energy;        // of points under linear forces, which take energy all the time, by displacements only
 };
 
 class ContactAudit {
@@ -28,6 +29,9 @@ public:
     void add_trapped(std::size_t points) { counts_.trapped += points; }
     // At the end of a sub-step.
     void add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion);
+    // Under linear forces: the work of displacements alone, and of corrections after the sub-step from P and v.
+    void add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion);
+    void add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion);
 
     const ContactCounts& counts() const { return counts_; }
 

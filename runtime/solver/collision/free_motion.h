@@ -28,6 +28,12 @@ public:
 
     // m/s², without the forces of surfaces; under damping the mean of what is left of the sub-step.
     const Vec3d& acceleration(std::size_t i) const { return a_[i]; }
+    // J/kg, of a damped point: the potential energy of what draws it, at P and where its path begins.
+    double potential(std::size_t i, const Vec3d& P) const
+    {
+        const Vec3d d = P - initial_P(i);
+        return 0.5 * damped_[i].w2 * d.squaredNorm() - damped_[i].G.dot(d);
+    }
     // Sets that mean, from the velocity of the point now.
     void update_acceleration(std::size_t i, double left)
     {

@@ -33,6 +33,7 @@
 
 namespace rapid {
 
+class EnergyIslands;
 class Sleep;
 
 // The coupled points of a set in one sub-step; shapes [size].
@@ -40,19 +41,22 @@ struct Substep {
     std::span<ProjectedPoint> points;      // from the end of their free motion on
     std::span<Vec3d> v;                    // m/s, at the end of the sub-step
     std::span<Vec3d> start;                // positions at its beginning; moved by what corrects positions alone
+    std::span<const Vec3d> born;           // the same before anything was moved out of shapes; empty where none can be
+    std::span<const double> energy;        // J, of motion and forces at its beginning; empty as mobility is
     std::span<const std::uint8_t> dead;    // 1: takes no part any more; empty where none can have died
     std::span<const double> inverse_mass;  // 1/kg; 0 of points that do not move by themselves
     std::span<const Mobility> mobility;    // empty where no force has a linear part
     // m: of each point that moves, by its acceleration up to its velocity at the end; collisions aside. Empty unless
     // some constraint has forces.
     std::span<Vec3d> displacement;
-    std::span<FreePath> paths;    // empty where nothing bounces
-    bool is_shared = false;       // contacts, shapes or other constraints act, too, beside a constraint
-    double dt = 0;                // s, of a point that lives through the whole frame
-    double time = 0;              // s since the start, at its end
-    double max_acceleration = 0;  // m/s², by forces
-    Vec3d up = Vec3d::Zero();     // unit, against the acceleration that is the same for all; 0 where that is 0
-    int index = 0;                // from 0
+    std::span<FreePath> paths;           // empty where nothing bounces
+    bool is_shared = false;              // contacts, shapes or other constraints act, too, beside a constraint
+    double dt = 0;                       // s, of a point that lives through the whole frame
+    double time = 0;                     // s since the start, at its end
+    double max_acceleration = 0;         // m/s², by forces
+    Vec3d acceleration = Vec3d::Zero();  // m/s², that is the same for all
+    Vec3d up = Vec3d::Zero();            // unit, against the acceleration that is the same for all; 0 where that is 0
+    int index = 0;                       // from 0
     int iterations = 1;
 
     // How directly a shape supports each point: 255 where it touches one, one less for each point between, 0 without
@@ -93,6 +97,16 @@ public:
     virtual bool has_forces() const { return false; }
     // Whether it has impacts to solve.
     virtual bool bounces() const { return false; }
+
+    // Whether all that it does to points takes energy from them.
+    virtual bool only_dissipates() const { return false; }
+    // Whether what it does to points are impulses between them alone.
+    virtual bool keeps_momentum() const { return false; }
+    // Adds the energy that its rows have stored, J times the factor, to that of one of their points each; at the
+    // beginning of the sub-step, or where points are now.
+    virtual void add_stored_energy(const Substep&, std::span<const Vec3d>, double, std::span<double>) const {}
+    // Links the points between which energy has gone to and fro in the sub-step.
+    virtual void link(EnergyIslands&) const {}
 
     // In the order of the calls; see above.
     virtual void move_kinematic(Substep&) {}

@@ -10,6 +10,7 @@
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/solver/constraints/contact_solver.h"
+#include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/resting_speed.h"
 #include "runtime/stopwatch.h"
 
@@ -305,6 +306,14 @@ void Contacts::store(const ContactPack& pack)
         impulses_.normal[pack.pair[l]] = pack.normal_impulse[l];
         impulses_.tangential[pack.pair[l]] = pack.tangential_impulse[l].cast<float>();
     }
+}
+
+void Contacts::link(EnergyIslands& islands) const
+{
+    packs_.for_each([&](const PairContact& contact) {
+        if (impulses_.normal[contact.pair] > 0 || contact.initial_gap < 0)
+            islands.link(std::array{contact.i, contact.j});
+    });
 }
 
 void Contacts::correct_penetration(Substep& step)

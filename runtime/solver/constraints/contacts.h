@@ -34,6 +34,9 @@ public:
 
     void join(Sleep* sleep) override;
     bool bounces() const override { return material_.bounces; }
+    bool only_dissipates() const override { return true; }  // but for mass scaling, whose gain is told
+    bool keeps_momentum() const override { return !scaling_.is_set(); }
+    void link(EnergyIslands& islands) const override;
     void detect(Substep& step) override;
     bool solve_impacts(Substep& step, std::uint32_t sweep) override;
     void warm_start(Substep& step) override;

@@ -21,6 +21,7 @@ class MassScaling {
 public:
     // k, at least 0.
     void set(double k) { k_ = k; }
+    bool is_set() const { return k_ > 0; }
     void begin(const Substep& step) { active_ = k_ > 0 && !step.up.isZero(0); }
 
     void apply(ContactPack& pack, const PointPack& a, const PointPack& b, const Substep& step) const

@@ -1,6 +1,7 @@
 #include "runtime/solver/constraints/projection.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "runtime/parallel.h"
 #include "runtime/solver/constraints/sleep.h"
@@ -14,11 +15,18 @@ constexpr std::uint32_t most_impact_sweeps = 32;
 }  // namespace
 
 Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
-                       const Substep& step, Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids)
-    : constraints_(constraints), sleep_(sleep), has_forces_(!step.displacement.empty()), free_(step.size())
+                       const Substep& step, Sleep* sleep, const ShapeLoads* loads, const PointErrors& errors)
+    : constraints_(constraints),
+      sleep_(sleep),
+      errors_(errors),
+      has_forces_(!step.displacement.empty()),
+      may_gain_(!step.mobility.empty() ||
+                !std::all_of(constraints.begin(), constraints.end(),
+                             [](const LocalConstraint& local) { return local.coupling->only_dissipates(); })),
+      free_(step.size())
 {
     if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sleep);
-    if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, ids, step.dt);
+    if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, errors_.ids(), step.dt);
     for (const LocalConstraint& local : constraints_) local.coupling->join(sleep);
 }
 
@@ -51,10 +59,11 @@ void Projection::advance(Substep& step)
     };
     // Shapes are asked about where the free motion of each point alone has ended, which is outside of them; but moved
     // by what has only been corrected since, which is to give no velocity.
+    require_finite(step);
     if (has_forces_) {
         free_.resize(step.size());
         each_point([&](std::size_t i) { free_[i] = step.points[i].P - step.start[i]; });
-        each([&](Coupling& coupling) { coupling.advance(step); });
+        advance_linked(step);
         each_point([&](std::size_t i) { free_[i] += step.start[i]; });
         keep_positions(linked_);
     }
@@ -65,6 +74,11 @@ void Projection::advance(Substep& step)
     else
         keep_positions(free_);
     if (shapes_) shapes_->detect(step, free_);
+    bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); });
+    if (has_forces_ && !step.energy.empty()) {
+        add_stored(step, step.start, 1, bound_.credit());
+        add_stored(step, {}, -1, bound_.credit());
+    }
     if (!step.paths.empty()) solve_impacts(step);
     const bool moved = has_forces_ || !step.paths.empty();  // since the free motion
     if (moved) keep_positions(linked_);
@@ -82,6 +96,76 @@ void Projection::advance(Substep& step)
         if (shapes_) shapes_->solve_velocities(step);
     }
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
+    const ContactEnergy change = close_bound(step, false);
+    energy_ += change;
+    by_contacts_ += change.added - change.lost;
+    require_finite(step);
+}
+
+// Rods and springs act.
+void Projection::advance_linked(Substep& step)
+{
+    if (!step.born.empty()) {
+        std::vector<double> stored(step.size());
+        add_stored(step, step.start, 1, stored);
+        add_stored(step, step.born, -1, stored);
+        const double work = std::accumulate(stored.begin(), stored.end(), 0.0);
+        energy_.added += std::max(0.0, work);
+        by_contacts_ += work;
+    }
+    bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, step.start, factor, energy); });
+    each([&](Coupling& coupling) {
+        coupling.advance(step);
+        if (coupling.has_forces()) require_finite(step);
+    });
+    const ContactEnergy change = close_bound(step, true);
+    energy_.added += change.added;
+    by_rods_ += change.added - change.lost;
+}
+
+double Projection::elastic_energy(const Substep& step) const
+{
+    std::vector<double> stored(step.size());
+    add_stored(step, {}, 1, stored);
+    return std::accumulate(stored.begin(), stored.end(), 0.0);
+}
+
+bool Projection::keeps_momentum() const
+{
+    return !shapes_ && std::all_of(constraints_.begin(), constraints_.end(),
+                                   [](const LocalConstraint& local) { return local.coupling->keeps_momentum(); });
+}
+
+// What rows store, at these positions or, where there are none, where points are.
+void Projection::add_stored(const Substep& step, std::span<const Vec3d> at, double factor,
+                            std::span<double> energy) const
+{
+    for (const LocalConstraint& local : constraints_) local.coupling->add_stored_energy(step, at, factor, energy);
+}
+
+// of_rods: where only rods and springs have acted.
+ContactEnergy Projection::close_bound(Substep& step, bool of_rods)
+{
+    const auto stored = [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); };
+    if (!may_gain_) return bound_.measure(step, stored);
+    return bound_.close(step, stored, [&](EnergyIslands& islands) {
+        for (const LocalConstraint& local : constraints_)
+            if (!of_rods || local.coupling->has_forces()) local.coupling->link(islands);
+        if (shapes_ && !of_rods) shapes_->drive(islands);
+    });
+}
+
+// As single precision holds them, in which they are stored. What is found here would be looked up in grids next.
+void Projection::require_finite(const Substep& step) const
+{
+    constexpr double surely_finite = 1e38;
+    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Vec3d &P = step.points[i].P, &v = step.v[i];
+            if (!(P.squaredNorm() + v.squaredNorm() < surely_finite * surely_finite))
+                errors_.require_finite(i, P.cast<float>(), v.cast<float>(), PointErrors::in_substep);
+        }
+    });
 }
 
 // One impact leads to others: what is still closing after so many sweeps is left to the rows, which let nothing bounce.
@@ -119,7 +203,7 @@ void Projection::begin_support(Substep& step)
     step.next_support = next_support_;
 }
 
-Residual Projection::close(Substep& step, ShapeLoads* loads, const Column<std::int64_t>& ids)
+Residual Projection::close(Substep& step, ShapeLoads* loads)
 {
     Residual all;
     if (!(step.dt > 0)) return all;
@@ -130,7 +214,7 @@ Residual Projection::close(Substep& step, ShapeLoads* loads, const Column<std::i
         all.loose += residual.loose;
         if (residual.search) all.search = residual.search;
     });
-    if (shapes_ && loads) shapes_->remember(*loads, ids, step.dt);
+    if (shapes_ && loads) shapes_->remember(*loads, errors_.ids(), step.dt);
     return all;
 }
 

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/shape_contacts.h"
+#include "runtime/solver/point_errors.h"
 
 namespace rapid {
 
@@ -21,22 +23,42 @@ class Projection {
 public:
     // sleep: null where no point may sleep; the constraints join it. loads: of the frame before; null for none.
     Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles, const Substep& step,
-               Sleep* sleep, const ShapeLoads* loads, const Column<std::int64_t>& ids);
+               Sleep* sleep, const ShapeLoads* loads, const PointErrors& errors);
 
     // Whether it has impacts to solve; Substep::paths are needed then.
     bool bounces() const;
+    // Error: a point's P or v is not finite any more.
     void advance(Substep& step);
-    Residual close(Substep& step, ShapeLoads* loads, const Column<std::int64_t>& ids);
+    Residual close(Substep& step, ShapeLoads* loads);
+
+    // What has been added so far, by corrections of positions where no velocity paid for it (energy_bound.h) and by
+    // what moves by itself; and what contacts, shapes and rows have taken after rods and springs.
+    const ContactEnergy& energy() const { return energy_; }
+    // J: by rods and springs; by all that follows them.
+    double by_rods() const { return by_rods_; }
+    double by_contacts() const { return by_contacts_; }
+    // J, in rows, where points are now.
+    double elastic_energy(const Substep& step) const;
+    bool keeps_momentum() const;
 
 private:
     template <class F>
     void each(const F& f);
+    void advance_linked(Substep& step);
+    void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;
+    ContactEnergy close_bound(Substep& step, bool of_rods);
+    void require_finite(const Substep& step) const;
     void begin_support(Substep& step);
     void solve_impacts(Substep& step);
 
     std::span<const LocalConstraint> constraints_;
     Sleep* sleep_;
+    const PointErrors& errors_;
     bool has_forces_;  // some constraint (Coupling::has_forces)
+    bool may_gain_;    // some constraint does not only take energy, or springs draw points
+    EnergyBound bound_;
+    ContactEnergy energy_;
+    double by_rods_ = 0, by_contacts_ = 0;  // J
     std::optional<ShapeContacts> shapes_;
     std::vector<Vec3d> free_;                           // where the points' free motion has ended
     std::vector<Vec3d> linked_;                         // where the projection begins, if elsewhere

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "runtime/points/members.h"
+#include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/row.h"
 #include "runtime/solver/constraints/row_schedule.h"
 #include "runtime/solver/constraints/row_sleep.h"
@@ -105,6 +106,29 @@ public:
     }
 
     bool has_forces() const override { return !Traits::one_sided; }
+
+    bool keeps_momentum() const override { return arity > 1; }
+    // at: positions; where these are empty, of the points as they are.
+    void add_stored_energy(const Substep& step, std::span<const Vec3d> at, double factor,
+                           std::span<double> energy) const override
+    {
+        typename Row::Vectors P, gradient;
+        for (const Row& row : rows_) {
+            if (!(row.compliance > 0) || !row.active || row.asleep) continue;
+            const auto moves = [&](std::uint32_t i) { return step.points[i].w > 0; };
+            const auto one = std::find_if(row.points.begin(), row.points.end(), moves);
+            if (one == row.points.end()) continue;
+            for (int k = 0; k < arity; ++k) P[k] = at.empty() ? step.points[row.points[k]].P : at[row.points[k]];
+            double C = row.function.residual(P, gradient);
+            if (Traits::one_sided) C = std::min(C, 0.0);
+            energy[*one] += factor * 0.5 * C * C / row.compliance;
+        }
+    }
+    void link(EnergyIslands& islands) const override
+    {
+        for (const Row& row : rows_)
+            if (row.active && !row.asleep) islands.link(row.points);
+    }
 
     void move_kinematic(Substep& step) override
     {

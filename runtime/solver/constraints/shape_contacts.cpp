@@ -212,6 +212,13 @@ void ShapeContacts::solve_velocities(Substep& step)
     });
 }
 
+void ShapeContacts::drive(EnergyIslands& islands) const
+{
+    for (const Batch& contacts : contacts_)
+        for (const ShapeContact& contact : contacts)
+            if (contact.normal_impulse > 0 && !contact.vc.isZero(0)) islands.drive(contact.i);
+}
+
 // The velocity that is left into the shape is taken off; then Coulomb friction acts by the whole normal impulse.
 // Friction acts throughout the sub-step, and so half of it on the position: else a point that is held would creep.
 void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)

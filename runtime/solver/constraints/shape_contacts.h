@@ -15,6 +15,7 @@
 
 #include "runtime/solver/collision/obstacle.h"
 #include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/shape_clearance.h"
 
 namespace rapid {
@@ -45,6 +46,8 @@ public:
     void warm_start(Substep& step);
     void project(Substep& step);
     void solve_velocities(Substep& step);
+    // Shapes that move drive the points that they bear.
+    void drive(EnergyIslands& islands) const;
 
 private:
     struct ShapeContact {

@@ -1,0 +1,66 @@
+#include "runtime/solver/ledger.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rapid {
+
+void Ledger::append(const Ledger& later)
+{
+    const Ledger before = *this;
+    *this = later;
+    by_rods += before.by_rods;
+    by_contacts += before.by_contacts;
+    by_motion += before.by_motion;
+    if (!before.residue || !residue) return residue.reset();
+    residue->energy = std::max(residue->energy, before.residue->energy);
+    residue->momentum = std::max(residue->momentum, before.residue->momentum);
+    residue->angular_momentum = std::max(residue->angular_momentum, before.residue->angular_momentum);
+}
+
+LedgerState LedgerState::of(const Substep& step, double elastic)
+{
+    LedgerState state;
+    state.elastic = elastic;
+    const auto each = [&](const auto& f) {
+        for (std::size_t i = 0; i < step.size(); ++i)
+            if (step.inverse_mass[i] > 0 && step.lives(i)) f(1 / step.inverse_mass[i], step.points[i].P, step.v[i]);
+    };
+    each([&](double mass, const Vec3d& P, const Vec3d& v) {
+        state.mass += mass;
+        state.kinetic += 0.5 * mass * v.squaredNorm();
+        state.potential -= mass * step.acceleration.dot(P);
+        state.center += mass * P;
+        state.momentum += mass * v;
+        state.angular_momentum += mass * P.cross(v);
+        state.speed += mass * v.norm();
+    });
+    if (!(state.mass > 0)) return state;
+    const Vec3d center = state.center / state.mass;
+    each([&](double mass, const Vec3d& P, const Vec3d& v) { state.turning += mass * (P - center).norm() * v.norm(); });
+    return state;
+}
+
+Ledger ledger_of(const LedgerState& before, const LedgerState& after, double by_rods, double by_contacts,
+                 bool is_isolated, const Vec3d& a, double h)
+{
+    Ledger ledger;
+    ledger.kinetic = after.kinetic, ledger.potential = after.potential, ledger.elastic = after.elastic;
+    ledger.by_rods = by_rods, ledger.by_contacts = by_contacts;
+    ledger.by_motion = after.energy() - before.energy() - by_rods - by_contacts;
+    ledger.momentum = after.momentum, ledger.angular_momentum = after.angular_momentum;
+    if (!is_isolated) return ledger;
+    const auto part = [](double residue, double whole) { return whole > 0 ? residue / whole : 0; };
+    const double speed = std::max(before.speed, after.speed) + before.mass * a.norm() * h;
+    const Vec3d pull = before.mass * h * a, torque = (h * before.center + 0.5 * h * h * before.momentum).cross(a);
+    const double energy = std::max(before.kinetic, after.kinetic) + std::max(before.elastic, after.elastic) +
+                          std::abs(after.potential - before.potential);
+    // Rows that break take what they have stored with them.
+    ledger.residue = {part(std::max(0.0, ledger.by_motion), energy),
+                      part((after.momentum - before.momentum - pull).norm(), speed),
+                      part((after.angular_momentum - before.angular_momentum - torque).norm(),
+                           std::max(before.turning, after.turning) + torque.norm())};
+    return ledger;
+}
+
+}  // namespace rapid

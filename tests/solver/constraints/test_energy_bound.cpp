@@ -1,0 +1,117 @@
+// The bound on energy, whatever constraints have made of velocities and places.
+#include "runtime/solver/constraints/energy_bound.h"
+
+#include <rapidcheck.h>
+
+#include <random>
+
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+// Points in free space, of random masses and velocities; links between neighbours in pairs.
+struct Pairs {
+    std::vector<ProjectedPoint> points;
+    std::vector<Vec3d> v, start;
+    std::vector<double> inverse_mass;
+    Substep step;
+
+    explicit Pairs(unsigned seed, std::size_t n = 8) : random_(seed)
+    {
+        for (std::size_t i = 0; i < n; ++i) {
+            const double w = std::pow(10, 3 * number_(random_));
+            points.push_back({any(), w});
+            v.push_back(any());
+            start.push_back(points[i].P);
+            inverse_mass.push_back(w);
+        }
+        step.points = points, step.v = v, step.start = start, step.inverse_mass = inverse_mass;
+        step.acceleration = {0, -10, 0};
+        step.dt = 0.01;
+    }
+
+    Vec3d any() { return {number_(random_), number_(random_), number_(random_)}; }
+    // An impulse between the two of each pair, and a shift of both.
+    void push(double size, double shift)
+    {
+        for (std::size_t i = 0; i + 1 < v.size(); i += 2) {
+            const Vec3d p = size * any(), d = shift * any();
+            v[i] += points[i].w * p, v[i + 1] -= points[i + 1].w * p;
+            points[i].P += points[i].w * d, points[i + 1].P -= points[i + 1].w * d;
+        }
+    }
+    double energy(std::size_t pair) const
+    {
+        double sum = 0;
+        for (const std::size_t i : {pair, pair + 1})
+            sum += (0.5 * v[i].squaredNorm() - step.acceleration.dot(points[i].P)) / inverse_mass[i];
+        return sum;
+    }
+    Vec3d momentum(std::size_t pair) const
+    {
+        return v[pair] / inverse_mass[pair] + v[pair + 1] / inverse_mass[pair + 1];
+    }
+
+    ContactEnergy close(EnergyBound& bound)
+    {
+        return bound.close(step, nothing, [&](EnergyIslands& islands) {
+            for (std::uint32_t i = 0; i + 1 < v.size(); i += 2) islands.link(std::array{i, i + 1});
+        });
+    }
+    static void nothing(double, std::span<double>) {}
+
+private:
+    std::mt19937 random_;
+    std::uniform_real_distribution<double> number_{-1, 1};
+};
+
+TEST_CASE("no pair has more energy than before, but for what is told, and each keeps its momentum", "[energy_bound]")
+{
+    rc::prop("", [](unsigned seed) {
+        Pairs pairs(seed);
+        EnergyBound bound;
+        bound.begin(pairs.step, Pairs::nothing);
+        std::vector<double> before;
+        std::vector<Vec3d> momentum;
+        for (std::size_t i = 0; i < pairs.v.size(); i += 2)
+            before.push_back(pairs.energy(i)), momentum.push_back(pairs.momentum(i));
+        pairs.push(3, *rc::gen::elementOf(std::vector<double>{0, 1e-3, 1}));
+        const double told = pairs.close(bound).added;
+        double gained = 0;
+        for (std::size_t i = 0; i < pairs.v.size(); i += 2) {
+            gained += std::max(0.0, pairs.energy(i) - before[i / 2]);
+            RC_ASSERT((pairs.momentum(i) - momentum[i / 2]).norm() <= 1e-9 * (1 + momentum[i / 2].norm() + 3));
+        }
+        RC_ASSERT(gained <= told + 1e-9 * (1 + told));
+    });
+}
+
+TEST_CASE("a change that takes energy stays as it is, and is told", "[energy_bound]")
+{
+    Pairs pairs(1, 2);
+    EnergyBound bound;
+    bound.begin(pairs.step, Pairs::nothing);
+    const double before = pairs.energy(0);
+    const Vec3d mean = pairs.momentum(0) / (1 / pairs.inverse_mass[0] + 1 / pairs.inverse_mass[1]);
+    pairs.v[0] = pairs.v[1] = mean;
+    const ContactEnergy told = pairs.close(bound);
+    CHECK(pairs.v[0] == mean);
+    CHECK(told.added == 0);
+    CHECK(told.lost == Approx(before - pairs.energy(0)));
+}
+
+TEST_CASE("what a moving point drives may gain", "[energy_bound]")
+{
+    Pairs pairs(1, 2);
+    pairs.points[1].w = 0;
+    pairs.v[1] = {5, 0, 0};
+    EnergyBound bound;
+    bound.begin(pairs.step, Pairs::nothing);
+    pairs.v[0] = {5, 0, 0};
+    CHECK(pairs.close(bound).added > 0);
+    CHECK(pairs.v[0] == Vec3d(5, 0, 0));
+}
+
+}  // namespace
+}  // namespace rapid

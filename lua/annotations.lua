@@ -150,17 +150,6 @@ function Grid:sample(P) end
 local rapid = {}
 rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
 
----@class rapid.options.grid_from
----@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once
----@field size? rapid.Place    full edge lengths [m, default 1]
----@field center? rapid.Place  its middle [m, default 0]
----@field voxel? number        between nodes [m, default 0.1]
-
----A grid of vectors by a function of the place.
----@param options rapid.options.grid_from
----@return rapid.Grid
-function rapid.grid.from(options) end
-
 ---A value that --set can replace.
 ---@generic T
 ---@param name string
@@ -255,7 +244,7 @@ function rapid.math.rotation(axis, degrees) end
 ---@param to rapid.Vec3
 ---@return rapid.Quat
 function rapid.math.rotation_between(from, to) end
---@makers except grid.of_values levelset.combine levelset.write motion.product motion.translate points.from transform
+--@makers except levelset.combine levelset.write motion.product motion.translate points.from transform
 
 ---The point that a kernel sees. Other attributes are those that the scene makes.
 ---@class rapid.Point

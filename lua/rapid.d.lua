@@ -146,17 +146,6 @@ function Grid:sample(P) end
 local rapid = {}
 rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
 
----@class rapid.options.grid_from
----@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once
----@field size? rapid.Place    full edge lengths [m, default 1]
----@field center? rapid.Place  its middle [m, default 0]
----@field voxel? number        between nodes [m, default 0.1]
-
----A grid of vectors by a function of the place.
----@param options rapid.options.grid_from
----@return rapid.Grid
-function rapid.grid.from(options) end
-
 ---A value that --set can replace.
 ---@generic T
 ---@param name string
@@ -251,6 +240,17 @@ function rapid.math.rotation(axis, degrees) end
 ---@param to rapid.Vec3
 ---@return rapid.Quat
 function rapid.math.rotation_between(from, to) end
+
+---@class rapid.options.grid_from
+---@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once [function of a place, required]
+---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
+---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
+---@field voxel? number  between nodes [number, m, above 0, default 0.1]
+
+---A grid of vectors by a function of the place.
+---@param options? rapid.options.grid_from
+---@return rapid.Grid
+function rapid.grid.from(options) end
 
 ---@class rapid.options.grid_read
 ---@field grid? string  its name; the only grid of vectors, when not given [string]

@@ -23,8 +23,6 @@ local function names_of(map)
   return names
 end
 
-local grid_options = { size = true, center = true, voxel = true, at = true }
-
 -- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil;
 -- numeric: what rapid.math holds; shapes: what can be asked of shapes (lua/shape.lua); studies: lua/study.lua.
 local function make(native, load_node, numeric, shapes, studies)
@@ -64,16 +62,20 @@ local function make(native, load_node, numeric, shapes, studies)
   -- Evaluates the function at each node of the lattice, z fastest.
   local function grid_from(options)
     options = options_of("rapid.grid.from", options)
+    local defaults = native.defaults "grid.from"
+    local known = { at = true }
+    for name in pairs(defaults) do known[name] = true end
     local function fault(name, what)
       error(("rapid.grid.from: %s = %s; it must be %s"):format(name, tostring(options[name]), what), 3)
     end
     for name in pairs(options) do
-      if not grid_options[name] then
+      if not known[name] then
         error(("rapid.grid.from: unknown parameter %q%s"):format(tostring(name),
-          native.did_you_mean(tostring(name), names_of(grid_options))), 2)
+          native.did_you_mean(tostring(name), names_of(known))), 2)
       end
     end
-    local voxel, at = options.voxel or 0.1, options.at
+    for name, value in pairs(defaults) do options[name] = options[name] or value end
+    local voxel, at = options.voxel, options.at
     if type(voxel) ~= "number" or voxel ~= voxel or voxel <= 0 then fault("voxel", "above 0 m") end
     if type(at) ~= "function" then fault("at", "a function of a place that returns a vec3") end
     local function place(name, value)
@@ -81,8 +83,8 @@ local function make(native, load_node, numeric, shapes, studies)
       if not ffi.istype(vector.type, value) then fault(name, "a vec3 or {x, y, z}") end
       return value
     end
-    local size = place("size", options.size or {1, 1, 1})
-    local center = place("center", options.center or {0, 0, 0})
+    local size = place("size", options.size)
+    local center = place("center", options.center)
     local nodes, origin = {}, center - size * 0.5
     for i, length in ipairs { size.x, size.y, size.z } do
       nodes[i] = math.floor(length / voxel + 1.5)
@@ -99,7 +101,7 @@ local function make(native, load_node, numeric, shapes, studies)
         end
       end
     end
-    return native.make("grid.of_values", { origin = origin, voxel = voxel, nodes = nodes, values = values })
+    return native.make("grid.from", { at = values, voxel = voxel, origin = origin, nodes = nodes })
   end
 
   rapid.grid = {

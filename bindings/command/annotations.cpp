@@ -39,6 +39,7 @@ std::string lua_type(const Param& param)
         {"attribute value", "number|number[]|rapid.Vec3"},
         {"attributes", "table<string, number|number[]|rapid.Vec3>"},
         {"boolean", "boolean"},
+        {"function of a place", "fun(P: rapid.Vec3): rapid.Vec3"},
         {"function of a point", "fun(p: rapid.Point, frame: rapid.Frame): any"},
         {"integer", "integer"},
         {"list", "any[]"},
@@ -157,8 +158,7 @@ std::string maker_of(const Maker& maker)
     const std::string family = maker.name.substr(0, dot), own = maker.name.substr(dot + 1);
     const std::string called = family == "motion" ? own : maker.name;
     std::vector<Param> first, named;
-    for (const Param& param : maker.params)
-        (param.required && maker.name != "mesh.from" ? first : named).push_back(param);
+    for (const Param& param : maker.params) (param.required && own != "from" ? first : named).push_back(param);
 
     // levelset:offset(metres): a tool of the value that it takes first.
     const bool tool = !first.empty() && first.front().name == family;

@@ -63,6 +63,8 @@ public:
         return *this;
     }
     MakerDeclaration& required() { return maker_.params.back().required = true, *this; }
+    // Given by Rapid's own Lua files, not by users.
+    MakerDeclaration& internal() { return maker_.params.back().internal = true, *this; }
 
     operator Maker() const { return maker_; }
 

@@ -99,6 +99,16 @@ int maker_names(State& state)
     return 1;
 }
 
+// native.defaults(maker): its parameters that have a default, with that, by name.
+int push_defaults(State& state)
+{
+    std::map<std::string, Value> defaults;
+    for (const Param& param : find_maker(text_at(state.lua(), 1)).params)
+        if (!param.fallback.is_nil()) defaults[param.name] = param.fallback;
+    push(state, std::move(defaults));
+    return 1;
+}
+
 // native.point_names: { fields = { names }, methods = { names }, read_only = { NAME = true } }.
 void push_point_names(lua_State* L)
 {
@@ -129,6 +139,7 @@ void push_natives(State& state, const std::string& chunk_header)
     lua_State* L = state.lua();
     constexpr luaL_Reg functions[] = {{"make", native<make_object>},
                                       {"maker_names", native<maker_names>},
+                                      {"defaults", native<push_defaults>},
                                       {"attribute", native<make_attribute>},
                                       {"param", native<declare_parameter>},
                                       {"node", native<make_node>},

@@ -9,6 +9,7 @@
 #include "runtime/graph/plugin.h"
 #include "runtime/io/format.h"
 #include "tests/docs/document.h"
+#include "tests/files/temporary_folder.h"
 
 namespace rapid {
 namespace {
@@ -17,30 +18,13 @@ namespace fs = std::filesystem;
 
 const fs::path examples = RAPID_EXAMPLES;  // where the build has written them
 
-class Folder {
-public:
-    Folder()
-    {
-        std::string name = (fs::temp_directory_path() / "rapid-XXXXXX").string();
-        REQUIRE(mkdtemp(name.data()));
-        path_ = name;
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    ~Folder() { fs::remove_all(path_); }
-    const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-};
-
 // The points of a chain of nodes after so many frames of 1/24 s. The example in Lua lies beside the scene.
 PointSet run(const std::string& chain, int frames)
 {
-    const Folder folder;
-    fs::copy_file(examples / "lua/nodes/breathe.lua", folder.path() / "breathe.lua");
-    std::ofstream(folder.path() / "scene.lua") << "local rapid = require \"rapid\"\nreturn " << chain << '\n';
-    const Session session(folder.path() / "scene.lua", {});
+    const test::TemporaryFolder folder;
+    fs::copy_file(examples / "lua/nodes/breathe.lua", folder / "breathe.lua");
+    const fs::path scene = folder.write("scene.lua", "local rapid = require \"rapid\"\nreturn " + chain + "\n");
+    const Session session(scene, {});
     const Plan plan(session.graph(), {});
     Evaluator evaluator(plan);
     PointSet points = evaluator.advance().outputs.at("main");
@@ -52,8 +36,8 @@ PointSet run(const std::string& chain, int frames)
 template <class F>
 std::string printed_by(const F& f)
 {
-    const Folder folder;
-    const fs::path file = folder.path() / "out";
+    const test::TemporaryFolder folder;
+    const fs::path file = folder / "out";
     std::fflush(stdout);
     const int kept = dup(STDOUT_FILENO);
     REQUIRE(std::freopen(file.c_str(), "w", stdout));
@@ -116,10 +100,10 @@ TEST_CASE("the example of a shape is hit where its edge is", "[docs]")
 
 TEST_CASE("the example of a format is read as it was written", "[docs]")
 {
-    const Folder folder;
+    const test::TemporaryFolder folder;
     const PointSet points = test::points({{1, 2, 3}, {-4, 5e-7f, 6e8f}});
-    write_points(folder.path() / "some.raw", points);
-    const PointSet read = read_points(folder.path() / "some.raw");
+    write_points(folder / "some.raw", points);
+    const PointSet read = read_points(folder / "some.raw");
     REQUIRE(read.size() == 2);
     CHECK(read.P()[0] == points.P()[0]);
     CHECK(read.P()[1] == points.P()[1]);
@@ -148,8 +132,8 @@ TEST_CASE("the example of a plugin is loaded, and stops points", "[docs]")
 
 TEST_CASE("the example of a command counts points", "[docs]")
 {
-    const Folder folder;
-    const fs::path file = folder.path() / "some.csv";
+    const test::TemporaryFolder folder;
+    const fs::path file = folder / "some.csv";
     write_points(file, test::points({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));
     for (const std::unique_ptr<Command>& command : make_commands()) {
         if (command->name() != "count") continue;

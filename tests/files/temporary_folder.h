@@ -1,12 +1,13 @@
 // A folder for the files of a test, and what tests ask about files.
 #pragma once
 
-#include <unistd.h>
+#include <stdlib.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -20,8 +21,11 @@ public:
     TemporaryFolder()
     {
         std::string name = (std::filesystem::temp_directory_path() / "rapid-test-XXXXXX").string();
-        path_ = mkdtemp(name.data());
+        if (!mkdtemp(name.data())) throw std::runtime_error("can't make a folder " + name);
+        path_ = name;
     }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
     ~TemporaryFolder()
     {
         std::error_code ignored;
@@ -29,6 +33,13 @@ public:
     }
     std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
     const std::filesystem::path& path() const { return path_; }
+
+    // Returns the path of the new file.
+    std::filesystem::path write(const std::string& name, const std::string& text) const
+    {
+        std::ofstream(path_ / name, std::ios::binary) << text;
+        return path_ / name;
+    }
 
 private:
     std::filesystem::path path_;

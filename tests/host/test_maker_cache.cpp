@@ -1,11 +1,11 @@
-// Functions of the frame that return what they have made: an equal input is not built again.
+// Functions of the frame that return an object: with equal arguments it is not built again.
 #include "bindings/host/maker_cache.h"
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
 #include "bindings/host/session.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -13,21 +13,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A graph file in a folder of its own, which goes with it.
+// A graph file in a folder of its own.
 class GraphFile {
 public:
-    explicit GraphFile(const std::string& text)
-    {
-        std::string name = (fs::temp_directory_path() / "rapid-XXXXXX").string();
-        REQUIRE(mkdtemp(name.data()));
-        folder_ = name;
-        std::ofstream(path()) << text;
-    }
-    ~GraphFile() { fs::remove_all(folder_); }
-    fs::path path() const { return folder_ / "scene.lua"; }
+    explicit GraphFile(const std::string& text) : path_(folder_.write("scene.lua", text)) {}
+    const fs::path& path() const { return path_; }
 
 private:
-    fs::path folder_;
+    test::TemporaryFolder folder_;
+    fs::path path_;
 };
 
 // What the first function among the nodes' arguments returns at a frame.

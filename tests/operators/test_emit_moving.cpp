@@ -3,12 +3,11 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
-#include <random>
 
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/motion/animated.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/operators/node_test.h"
 
 namespace rapid {
@@ -46,13 +45,11 @@ Value moved(const MeshPtr& mesh, const MotionPtr& motion)
 
 // A mesh whose files are written for it: its vertices are those of `rest` times the factor of the frame.
 struct GrowingMesh {
-    std::filesystem::path folder;
+    TemporaryFolder folder;
     std::shared_ptr<const AnimatedMesh> mesh;
 
     GrowingMesh(const Mesh& rest, int first, int last, const std::function<double(int)>& factor)
     {
-        folder = std::filesystem::temp_directory_path() / ("rapid_emit_" + std::to_string(std::random_device()()));
-        std::filesystem::create_directories(folder);
         std::map<int, std::filesystem::path> files;
         for (int frame = first; frame <= last; ++frame) {
             std::string text;
@@ -62,12 +59,10 @@ struct GrowingMesh {
             }
             for (const Mesh::Triangle& t : rest.triangles)
                 text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
-            files[frame] = folder / fmt::format("{}.obj", frame);
-            std::ofstream(files[frame]) << text;
+            files[frame] = folder.write(fmt::format("{}.obj", frame), text);
         }
         mesh = std::make_shared<AnimatedMesh>(std::make_shared<MeshSequence>(files, "#.obj"), constant_motion({}));
     }
-    ~GrowingMesh() { std::filesystem::remove_all(folder); }
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/files/other_circumstances.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -16,17 +17,8 @@ using Catch::Matchers::Equals;
 
 namespace {
 
-// A folder of its own, removed at the end. Messages are compared without its name.
-struct Folder {
-    std::filesystem::path path;
-
-    Folder()
-    {
-        path = std::filesystem::temp_directory_path() / ("rapid_level_set_" + std::to_string(std::random_device()()));
-        std::filesystem::create_directories(path);
-    }
-    ~Folder() { std::filesystem::remove_all(path); }
-
+// Messages are compared without its name.
+struct Folder : test::TemporaryFolder {
     template <class F>
     std::string message_of(const F& f) const
     {
@@ -36,14 +28,14 @@ struct Folder {
         } catch (const Error& e) {
             message = e.what();
         }
-        const std::string in = path.string() + "/";
+        const std::string in = path().string() + "/";
         for (auto at = message.find(in); at != std::string::npos; at = message.find(in)) message.erase(at, in.size());
         return message;
     }
 
-    void write(const char* name, const openvdb::GridPtrVec& grids) const
+    void write_grids(const char* name, const openvdb::GridPtrVec& grids) const
     {
-        openvdb::io::File((path / name).string()).write(grids);
+        openvdb::io::File((*this / name).string()).write(grids);
     }
 };
 
@@ -72,7 +64,7 @@ TEST_CASE("a level set read back from its file is the same to the bit", "[level 
 {
     const Folder folder;
     const auto torus = level_set_torus(0.8, 0.3, {0.1, 0.2, 0.3}, {0.05, 3});
-    const auto path = folder.path / "made/on/the/way/torus.vdb";
+    const auto path = folder / "made/on/the/way/torus.vdb";
     torus->write(path, "ring");
     for (const char* grid : {"ring", ""}) {
         const auto back = read_level_set(path, grid);
@@ -91,8 +83,8 @@ TEST_CASE("a file's other grids are left alone, and a grid is found by its name"
     fog->setName("density");
     fog->setGridClass(openvdb::GRID_FOG_VOLUME);
     fog->tree().setValue({0, 0, 0}, 1.0f);
-    folder.write("both.vdb", {fog, sphere_grid("surface")});
-    const auto file = folder.path / "both.vdb";
+    folder.write_grids("both.vdb", {fog, sphere_grid("surface")});
+    const auto file = folder / "both.vdb";
 
     CHECK(read_level_set(file, "")->voxel() == Approx(0.1));
     CHECK(read_level_set(file, "surface")->active_voxels() == sphere_grid("surface")->activeVoxelCount());
@@ -109,15 +101,15 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
 {
     const Folder folder;
     const auto refusal = [&](const char* name, const char* grid) {
-        return folder.message_of([&] { read_level_set(folder.path / name, grid); });
+        return folder.message_of([&] { read_level_set(folder / name, grid); });
     };
     CHECK_THAT(refusal("none.vdb", ""), Equals("there is no file \"none.vdb\""));
 
-    std::ofstream(folder.path / "text.vdb") << "this is no grid, and long enough to hold a header that is not there";
+    std::ofstream(folder / "text.vdb") << "this is no grid, and long enough to hold a header that is not there";
     CHECK_THAT(refusal("text.vdb", ""), Catch::Matchers::StartsWith("cannot read \"text.vdb\": ") &&
                                             Catch::Matchers::EndsWith("; it must be an OpenVDB file"));
 
-    folder.write("two.vdb", {sphere_grid("a"), sphere_grid("b")});
+    folder.write_grids("two.vdb", {sphere_grid("a"), sphere_grid("b")});
     CHECK_THAT(refusal("two.vdb", ""),
                Equals("there are 2 level sets in \"two.vdb\": \"a\" (level set of float), \"b\" "
                       "(level set of float); name one by grid"));
@@ -125,29 +117,29 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
     auto empty = openvdb::FloatGrid::create(0.3f);
     empty->setName("empty");
     empty->setGridClass(openvdb::GRID_LEVEL_SET);
-    folder.write("empty.vdb", {empty});
+    folder.write_grids("empty.vdb", {empty});
     CHECK_THAT(refusal("empty.vdb", ""),
                Equals("grid \"empty\" of \"empty.vdb\" is empty; a level set needs a surface"));
 
     auto positive = empty->deepCopy();
     positive->tree().setValue({0, 0, 0}, 0.1f);
-    folder.write("positive.vdb", {positive});
+    folder.write_grids("positive.vdb", {positive});
     CHECK_THAT(refusal("positive.vdb", ""),
                Equals("grid \"empty\" of \"positive.vdb\" has 1 active voxels and no surface; "
                       "a level set changes sign"));
 
     auto turned = sphere_grid("turned");
     turned->transform().postRotate(0.5, openvdb::math::Y_AXIS);
-    folder.write("turned.vdb", {turned});
+    folder.write_grids("turned.vdb", {turned});
     CHECK_THAT(refusal("turned.vdb", ""),
                Equals("the map of grid \"turned\" of \"turned.vdb\" is not a uniform scale and a "
                       "translation; resample it to cubic voxels along the axes"));
 
-    folder.write("fog.vdb", {[] {
-                     auto fog = openvdb::FloatGrid::create(0);
-                     fog->setName("density");
-                     return fog;
-                 }()});
+    folder.write_grids("fog.vdb", {[] {
+                           auto fog = openvdb::FloatGrid::create(0);
+                           fog->setName("density");
+                           return fog;
+                       }()});
     CHECK_THAT(refusal("fog.vdb", ""),
                Equals("there is no level set in \"fog.vdb\"; its grids are \"density\" (float)"));
 }
@@ -155,8 +147,8 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
 TEST_CASE("a level set from a file is widened without moving its surface", "[level set][file]")
 {
     const Folder folder;
-    folder.write("sphere.vdb", {sphere_grid("surface")});
-    const auto narrow = read_level_set(folder.path / "sphere.vdb", "");
+    folder.write_grids("sphere.vdb", {sphere_grid("surface")});
+    const auto narrow = read_level_set(folder / "sphere.vdb", "");
     const auto wide = narrow->with_band(0.8);
     CHECK(wide->band() >= 0.8);
     std::mt19937_64 random(4);
@@ -188,11 +180,11 @@ TEST_CASE("a level set that can't be written says where, and leaves nothing behi
 {
     const Folder folder;
     const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.2, 3});
-    std::ofstream(folder.path / "file") << "in the way";
-    const auto below_a_file = folder.path / "file/sphere.vdb";
+    std::ofstream(folder / "file") << "in the way";
+    const auto below_a_file = folder / "file/sphere.vdb";
     CHECK_THAT(folder.message_of([&] { sphere->write(below_a_file, "surface"); }),
                Catch::Matchers::StartsWith("cannot write \"file/sphere.vdb\": "));
-    CHECK_THAT(folder.message_of([&] { sphere->write(folder.path / "sphere.vdb", ""); }),
+    CHECK_THAT(folder.message_of([&] { sphere->write(folder / "sphere.vdb", ""); }),
                Equals("cannot write \"sphere.vdb\": the grid needs a name"));
-    CHECK(std::distance(std::filesystem::directory_iterator(folder.path), {}) == 1);
+    CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 1);
 }

@@ -1,12 +1,11 @@
 #include "runtime/shapes/level_set/level_set_tools.h"
 
 #include <cmath>
-#include <filesystem>
 #include <numbers>
-#include <random>
 
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/placed.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -177,12 +176,11 @@ TEST_CASE("a level set of points is the union of their balls", "[level_set]")
 
 TEST_CASE("a moved level set is written and read at its new position", "[level_set]")
 {
-    const auto path =
-        std::filesystem::temp_directory_path() / ("rapid_tools_" + std::to_string(std::random_device()()) + ".vdb");
+    const test::TemporaryFolder folder;
+    const auto path = folder / "turned.vdb";
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.5, Vec3d(1, 1, 0).normalized()));
     move_level_set(level_set_box({1, 0.5, 0.7}, {0, 0, 0}, {0.03, 3}), {{3, 2, 1}, turn})->write(path, "turned");
     const LevelSetPtr back = read_level_set(path, "turned");
-    std::filesystem::remove(path);
     // Its edges, 8.8 m in all, are cut by a part of a voxel when it is resampled.
     CHECK(volume_of(back) == Approx(0.35).margin(8.8 * 0.03 * 0.03));
     CHECK(distance(*back, Vec3d(3, 2, 1) + turn * Vec3d(0.55, 0, 0)) == Approx(0.05).margin(2e-3));

@@ -4,9 +4,9 @@
 #include <openvdb/openvdb.h>
 
 #include <filesystem>
-#include <random>
 
 #include "runtime/error.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -14,21 +14,13 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-struct Folder {
-    std::filesystem::path path;
+struct Folder : test::TemporaryFolder {
+    Folder() { openvdb::initialize(); }
 
-    Folder()
+    std::filesystem::path write_grids(const openvdb::GridPtrVec& grids) const
     {
-        openvdb::initialize();
-        path = std::filesystem::temp_directory_path() / ("rapid_vector_grid_" + std::to_string(std::random_device()()));
-        std::filesystem::create_directories(path);
-    }
-    ~Folder() { std::filesystem::remove_all(path); }
-
-    std::filesystem::path write(const openvdb::GridPtrVec& grids) const
-    {
-        openvdb::io::File((path / "grids.vdb").string()).write(grids);
-        return path / "grids.vdb";
+        openvdb::io::File((*this / "grids.vdb").string()).write(grids);
+        return *this / "grids.vdb";
     }
 };
 
@@ -86,7 +78,7 @@ TEST_CASE("a field that is linear is read exactly between voxels, staggered or n
     auto transform = openvdb::math::Transform::createLinearTransform(0.25);
     if (turned) transform->preRotate(0.3, openvdb::math::Z_AXIS);
     transform->postTranslate({0.1, -0.2, 0.3});
-    const VectorGridPtr grid = read_vector_grid(folder.write({linear_grid("v", transform, staggered)}), "");
+    const VectorGridPtr grid = read_vector_grid(folder.write_grids({linear_grid("v", transform, staggered)}), "");
 
     for (const Vec3d& P : {Vec3d(0.1, -0.2, 0.3), Vec3d(0.33, 0.1, 0.777), Vec3d(-0.5, 0.4, -0.21)})
         CHECK((sample(*grid, P) - linear(P)).norm() < 2e-6);
@@ -97,7 +89,7 @@ TEST_CASE("where a grid has no values it is its background, however far", "[vect
     const Folder folder;
     auto grid = openvdb::Vec3SGrid::create({1, 2, 3});
     grid->setName("v");
-    const VectorGridPtr read = read_vector_grid(folder.write({grid}), "v");
+    const VectorGridPtr read = read_vector_grid(folder.write_grids({grid}), "v");
     CHECK(sample(*read, {5, 5, 5}) == Vec3d(1, 2, 3));
     CHECK(sample(*read, {1e30, -1e300, 0}) == Vec3d(1, 2, 3));
 }
@@ -121,13 +113,13 @@ TEST_CASE("a file without the requested grid is refused with the grids that it h
     auto vel = openvdb::Vec3SGrid::create(), rest = openvdb::Vec3SGrid::create();
     vel->setName("vel");
     rest->setName("rest");
-    const auto path = folder.write({density, vel, rest});
+    const auto path = folder.write_grids({density, vel, rest});
     const auto refused = [&](const char* name) { return message_of([&] { read_vector_grid(path, name); }); };
     CHECK_THAT(refused(""), Contains("there are 2 grids of vectors") && Contains("name one by grid"));
     CHECK_THAT(refused("vle"), Contains("there is no grid \"vle\"") && Contains("did you mean \"vel\"?"));
     CHECK_THAT(refused("density"), Contains("is float; it must be of vectors (vec3s)"));
-    const auto only = folder.write({density});
+    const auto only = folder.write_grids({density});
     CHECK_THAT(message_of([&] { read_vector_grid(only, ""); }),
                Contains("there is no grid of vectors (vec3s) in") && Contains("\"density\" (float)"));
-    CHECK_THAT(message_of([&] { read_vector_grid(folder.path / "none.vdb", ""); }), Contains("there is no file"));
+    CHECK_THAT(message_of([&] { read_vector_grid(folder / "none.vdb", ""); }), Contains("there is no file"));
 }

@@ -2,17 +2,17 @@
 #include <bit>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
-#include <random>
 
 #include "runtime/error.h"
 #include "runtime/shapes/mesh/mesh.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
 using Catch::Matchers::Equals;
 using rapid::test::close_to;
+using rapid::test::TemporaryFolder;
 
 namespace {
 
@@ -29,24 +29,6 @@ std::string message_of(const F& f)
     }
     return "nothing was thrown";
 }
-
-// A folder of its own, removed at the end.
-struct Folder {
-    std::filesystem::path path;
-
-    Folder()
-    {
-        path = std::filesystem::temp_directory_path() / ("rapid_mesh_" + std::to_string(std::random_device()()));
-        std::filesystem::create_directories(path);
-    }
-    ~Folder() { std::filesystem::remove_all(path); }
-
-    std::filesystem::path file(const std::string& name, const std::string& text) const
-    {
-        std::ofstream(path / name, std::ios::binary) << text;
-        return path / name;
-    }
-};
 
 std::filesystem::path asset(const std::string& name)
 {
@@ -242,9 +224,9 @@ TEST_CASE("wrong arguments of built-in meshes are refused with their value", "[m
 
 TEST_CASE("vertices that a file splits or repeats are merged by position", "[mesh][read]")
 {
-    const Folder folder;
-    for (const auto& path :
-         {folder.file("cube.obj", cube_obj), folder.file("cube.stl", as_stl(*make_box({1, 1, 1}, {0.5, 0.5, 0.5})))}) {
+    const TemporaryFolder folder;
+    for (const auto& path : {folder.write("cube.obj", cube_obj),
+                             folder.write("cube.stl", as_stl(*make_box({1, 1, 1}, {0.5, 0.5, 0.5})))}) {
         CAPTURE(path);
         const MeshPtr cube = read_mesh(path);
         CHECK(cube->positions.size() == 8);
@@ -258,7 +240,7 @@ TEST_CASE("vertices that a file splits or repeats are merged by position", "[mes
 
 TEST_CASE("a binary PLY may begin with any byte", "[mesh][read]")
 {
-    const Folder folder;
+    const TemporaryFolder folder;
     for (int byte = 0; byte < 256; ++byte) {
         std::array<float, 9> P{0, 0, 0, 1, 0, 0, 0, 1, 0};
         P[0] = std::bit_cast<float>(0xBE969600u + byte);
@@ -270,7 +252,7 @@ TEST_CASE("a binary PLY may begin with any byte", "[mesh][read]")
         const std::array<std::int32_t, 3> face{0, 1, 2};
         text += '\3';
         text.append(reinterpret_cast<const char*>(face.data()), sizeof face);
-        const MeshPtr mesh = read_mesh(folder.file("byte.ply", text));
+        const MeshPtr mesh = read_mesh(folder.write("byte.ply", text));
         CAPTURE(byte);
         REQUIRE(mesh->positions.size() == 3);
         CHECK(mesh->positions[0].x() == P[0]);
@@ -280,8 +262,8 @@ TEST_CASE("a binary PLY may begin with any byte", "[mesh][read]")
 
 TEST_CASE("vertex colours of a PLY become Cd, in the order of the file", "[mesh][read]")
 {
-    const Folder folder;
-    const MeshPtr mesh = read_mesh(folder.file("coloured.ply", R"(ply
+    const TemporaryFolder folder;
+    const MeshPtr mesh = read_mesh(folder.write("coloured.ply", R"(ply
 format ascii 1.0
 element vertex 4
 property float x
@@ -314,16 +296,16 @@ TEST_CASE("a glTF mesh stands where its node puts it", "[mesh][read]")
 {
     const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const std::string buffer = base64(std::string(reinterpret_cast<const char*>(corners), sizeof corners));
-    const Folder folder;
-    const MeshPtr mesh = read_mesh(folder.file("triangle.gltf",
-                                               R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+    const TemporaryFolder folder;
+    const MeshPtr mesh = read_mesh(folder.write("triangle.gltf",
+                                                R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
             "nodes": [{"mesh": 0, "translation": [5, 0, 0], "scale": [2, 2, 2]}],
             "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
             "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
                            "min": [0, 0, 0], "max": [1, 1, 0]}],
             "bufferViews": [{"buffer": 0, "byteLength": 36}],
             "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,)" +
-                                                   buffer + "\"}]}"));
+                                                    buffer + "\"}]}"));
     REQUIRE(mesh->positions.size() == 3);
     CHECK_THAT(mesh->positions[0], close_to(Vec3f{5, 0, 0}, 0));
     CHECK_THAT(mesh->positions[1], close_to(Vec3f{7, 0, 0}, 0));
@@ -332,12 +314,12 @@ TEST_CASE("a glTF mesh stands where its node puts it", "[mesh][read]")
 
 TEST_CASE("files that are not meshes are refused with their name and the fault", "[mesh][read]")
 {
-    const Folder folder;
+    const TemporaryFolder folder;
     // The error of reading a file of this name and content, without the folder's name.
     const auto refusal = [&](const char* name, const char* content) {
-        const auto path = content ? folder.file(name, content) : folder.path / name;
+        const auto path = content ? folder.write(name, content) : folder / name;
         std::string message = message_of([&] { read_mesh(path); });
-        const std::string in = folder.path.string() + "/";
+        const std::string in = folder.path().string() + "/";
         if (const auto at = message.find(in); at != std::string::npos) message.erase(at, in.size());
         return message;
     };

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
-#include <random>
 
 #include "runtime/error.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -15,31 +14,18 @@ using rapid::test::close_to;
 
 namespace {
 
-// A folder of its own, removed at the end.
-struct Folder {
-    std::filesystem::path path;
-
-    Folder()
-    {
-        path = std::filesystem::temp_directory_path() / ("rapid_sequence_" + std::to_string(std::random_device()()));
-        std::filesystem::create_directories(path);
-    }
-    ~Folder() { std::filesystem::remove_all(path); }
-
+struct Folder : test::TemporaryFolder {
     // A tetrahedron with its apex at this height.
     void tetrahedron(int frame, double apex) const
     {
         file(frame, fmt::format("v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 {} 0\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n", apex));
     }
-    void file(int frame, const std::string& text) const
-    {
-        std::ofstream(path / fmt::format("body.{:04}.obj", frame)) << text;
-    }
+    void file(int frame, const std::string& text) const { write(fmt::format("body.{:04}.obj", frame), text); }
     MeshSequence sequence(int first, int last) const
     {
         std::map<int, std::filesystem::path> files;
         for (int frame = first; frame <= last; ++frame)
-            if (const auto name = path / fmt::format("body.{:04}.obj", frame); std::filesystem::exists(name))
+            if (const auto name = *this / fmt::format("body.{:04}.obj", frame); std::filesystem::exists(name))
                 files[frame] = name;
         return {files, "body.####.obj"};
     }
@@ -82,7 +68,7 @@ TEST_CASE("only the files that are needed are read, and the last few are kept", 
     const MeshSequence sequence = folder.sequence(1, 20);
     const MeshPtr first = sequence.at(2);
     for (int frame = 3; frame <= 8; ++frame) sequence.at(frame);
-    std::filesystem::remove(folder.path / "body.0002.obj");
+    std::filesystem::remove(folder / "body.0002.obj");
     CHECK(sequence.at(2) == first);
     CHECK_THAT(message_of([&] { sequence.at(15); }), Contains("frame 15"));
 }

@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <numbers>
 #include <random>
 
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -23,13 +23,11 @@ constexpr double h = 1.0 / 24;
 
 // A mesh whose files are written for it: each vertex of `rest` is where `place` has it at the frame.
 struct Body {
-    std::filesystem::path folder;
+    test::TemporaryFolder folder;
     std::shared_ptr<const AnimatedMesh> mesh;
 
     Body(const Mesh& rest, int last, const std::function<Vec3d(const Vec3d&, int)>& place)
     {
-        folder = std::filesystem::temp_directory_path() / ("rapid_deforming_" + std::to_string(std::random_device()()));
-        std::filesystem::create_directories(folder);
         std::map<int, std::filesystem::path> files;
         for (int frame = 1; frame <= last; ++frame) {
             std::string text;
@@ -39,12 +37,10 @@ struct Body {
             }
             for (const Mesh::Triangle& t : rest.triangles)
                 text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
-            files[frame] = folder / fmt::format("{}.obj", frame);
-            std::ofstream(files[frame]) << text;
+            files[frame] = folder.write(fmt::format("{}.obj", frame), text);
         }
         mesh = std::make_shared<AnimatedMesh>(std::make_shared<MeshSequence>(files, "body.#.obj"), constant_motion({}));
     }
-    ~Body() { std::filesystem::remove_all(folder); }
 
     DeformingLevelSetPtr level_set(double voxel) const
     {

@@ -85,11 +85,8 @@ struct Solve {
 
 private:
     static bool is_coupled(const Flow& flow) { return !flow.dynamics.constraints().empty(); }
-    // Whether neighbours act on each other within the frame.
-    bool interacts(const Flow& flow) const
-    {
-        return substeps > 1 && !tolerance && !flow.dynamics.interactions().empty();
-    }
+    // Whether neighbours act on each other at the ends of sub-steps.
+    bool interacts(const Flow& flow) const { return !tolerance && !flow.dynamics.interactions().empty(); }
 
     // Whether no point's motion within the frame depends on another's.
     bool moves_alone(const Flow& flow) const { return !is_coupled(flow) && !interacts(flow); }
@@ -126,7 +123,7 @@ private:
         options.frame = static_cast<std::int64_t>(std::ceil(now.frame.number));
         options.group = group;
         options.begins_frame = clock.is_whole(clock.step_at(now.frame) - 1);
-        options.interacts = interacts(flow);
+        options.interacts = interacts(flow) && substeps > 1;
         options.iterations = iterations;
         options.loads = &loads_;
         options.sleep = sleep;

@@ -34,6 +34,7 @@ void RunTotals::add(const FrameStatistics& frame)
         most_points_ = frame.points;
         most_points_frame_ = frame.frame;
     }
+    is_solved_ |= frame.points > 0 && frame.substeps > 0;
     if (frame.error && (!worst_error_ || frame.error->max > worst_error_->max)) {
         worst_error_ = frame.error;
         worst_error_frame_ = frame.frame;
@@ -93,7 +94,9 @@ std::string RunTotals::frames_text(double run_seconds) const
 // The estimated errors of the frame with the largest one.
 std::string RunTotals::error_text() const
 {
-    if (!worst_error_) return "";
+    if (!worst_error_ && !is_solved_) return "";
+    if (!worst_error_)
+        return "error    not estimated: points act on one another, and a sample of them would move differently\n";
     const FrameStatistics::Error& error = *worst_error_;
     const auto within = [](double e, std::string_view unit) {
         return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : "within rounding";

@@ -40,6 +40,7 @@ private:
     FrameStatistics last_;
     std::uint64_t most_points_ = 0;
     std::int64_t most_points_frame_ = 0;
+    bool is_solved_ = false;  // some points
     std::optional<FrameStatistics::Error> worst_error_;
     std::int64_t worst_error_frame_ = 0;
     double worst_rounding_ = 0;  // m

@@ -115,6 +115,21 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
                Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
 }
 
+TEST_CASE("where no error is estimated, that is told; unless nothing was solved", "[report]")
+{
+    FrameResult result = frame_result();
+    result.figures.errors.clear();
+    RunStatistics run = run_of({});
+    run.frames = {statistics_of(result)};
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    not estimated: points act on one another"));
+    CHECK_THAT(summary(run), !Catch::Contains("none above rounding"));
+    CHECK_FALSE(ordered_json::parse(to_json(run))["frames"][0].contains("error"));
+
+    result.figures.substeps = 0;
+    run.frames = {statistics_of(result)};
+    CHECK_THAT(summary(run), !Catch::Contains("error  "));
+}
+
 TEST_CASE("what rounding is off by is told by its largest, apart from the estimated error", "[report]")
 {
     FrameResult result = frame_result();

@@ -132,3 +132,20 @@ return rapid.create { seed = 3 } :emit { source = rapid.mesh.sphere { radius = 1
     end
   end)
 end)
+
+describe("where points act on one another, a run says that no error is estimated, by", function()
+  for _, nodes in ipairs {
+    ":distance { within = 2 }", ":contact { radius = 0.1 }", ":clump { radius = 0.1 }", ":pin { compliance = 0.01 }",
+    ":interact { radius = 2, separation = 5 }",
+  } do
+    for _, substeps in ipairs { 1, 4 } do
+      it(("%s at %d sub-steps"):format(nodes, substeps), function()
+        local text = "return rapid.create { points = two } :gravity {} %s :solve { substeps = %d }"
+        local run = scene.command("run", text:format(nodes, substeps), "-f 1-12 --stats stats.json")
+        assert.equal(0, run.status, run.stderr)
+        assert.truthy(run.stdout:find("\nerror    not estimated: points act on one another, ", 1, true), run.stdout)
+        for _, frame in ipairs(json.decode(scene.folder:read "stats.json").frames) do assert.falsy(frame.error) end
+      end)
+    end
+  end
+end)

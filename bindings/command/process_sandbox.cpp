@@ -17,6 +17,7 @@
 
 #include "bindings/host/modules.h"
 #include "runtime/error.h"
+#include "runtime/files/read_apart.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {
@@ -100,6 +101,7 @@ void restrict_files(const SandboxAccess& access)
     if (ruleset < 0) throw refused("Landlock refuses a set of rules", errno);
     for (const std::filesystem::path& path : own_files())
         allow(ruleset, path, read_rights | LANDLOCK_ACCESS_FS_EXECUTE);
+    allow(ruleset, "/dev/null", LANDLOCK_ACCESS_FS_WRITE_FILE);
     for (const std::filesystem::path& path : access.readable)
         allow(ruleset, path, read_rights & attributes.handled_access_fs);
     for (const std::filesystem::path& path : access.writable)
@@ -147,7 +149,7 @@ void enter_sandbox(const SandboxAccess& access)
     close_inherited(access.first_closed);
     restrict_files(access);
     execv(program.c_str(), arguments.data());
-    throw refused("can't begin anew behind the walls", errno);
+    throw refused("can't restart in the sandbox", errno);
 }
 
 void complete_sandbox(Processes processes)
@@ -156,6 +158,9 @@ void complete_sandbox(Processes processes)
     if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; nothing was run");
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_DATA, static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)));
+    // What a hostile file may take over has no rights but to read: whoever forks such a copy, it forks none.
+    confine_copies([] { restrict_system_calls(Processes::None); });
+    if (processes == Processes::None) start_reader_process([] { restrict_system_calls(Processes::Copies); });
     restrict_system_calls(processes);
 }
 

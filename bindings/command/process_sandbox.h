@@ -10,6 +10,8 @@
 //               process, reaches no other process, and changes no mode, owner, time or attribute of a file
 //   limits      no core file; no more memory of its own than the machine has, and none that is shared
 //   descriptors those that it inherited are closed, but for standard output and standard error
+//   files       of formats whose libraries trust them are read by a process that is started before (reader_process.h),
+//               in the same sandbox: each in a copy of it, which may start nothing
 //
 // Not promised: that it ends (see --script-timeout), that it leaves the processor to others, or that it does not fill
 // the disk of a folder that it may write to.
@@ -30,7 +32,7 @@ struct SandboxAccess {
 // Landlock holds the calling thread alone, and linked libraries start threads before main: so the process restarts
 // inside of it, with `sandboxed_option` before its arguments. Returns only to throw. Error: the kernel has no
 // Landlock, or a path does not exist.
-inline constexpr const char* sandboxed_option = "--within-walls";
+inline constexpr const char* sandboxed_option = "--sandboxed";
 [[noreturn]] void enter_sandbox(const SandboxAccess& access);
 
 // In the restarted process: the other limits, for all threads. Error: the process is not inside of Landlock, or the

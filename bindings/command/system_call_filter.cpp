@@ -79,7 +79,7 @@ void add_by_arguments(Filter& filter, Processes processes)
 {
     const auto own = static_cast<scmp_datum_t>(getpid());
 
-    // Shared memory without a file is outside of the limits of memory.
+    // Shared memory without a file is outside of the limits of memory; between copies results go through it.
     const scmp_datum_t kind = MAP_SHARED | MAP_ANONYMOUS;
     for (const scmp_datum_t allowed_kind : {scmp_datum_t{0}, scmp_datum_t{MAP_SHARED}, scmp_datum_t{MAP_ANONYMOUS}})
         filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, allowed_kind)});
@@ -103,7 +103,11 @@ void add_by_arguments(Filter& filter, Processes processes)
         filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, spaces, 0)});
         filter.allow(SCMP_SYS(wait4));
         filter.allow(SCMP_SYS(memfd_create));  // the frames of a reference, for all copies
-        filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, PR_SET_PDEATHSIG)});
+        filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, kind)});
+        filter.allow(SCMP_SYS(alarm));  // of a copy that reads a file
+        for (const int option : {PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS})
+            filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, static_cast<scmp_datum_t>(option))});
+        filter.allow(SCMP_SYS(seccomp));  // a further filter only forbids
     } else {
         filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD)});
     }

@@ -1,12 +1,12 @@
-// The system calls that a process behind walls may make: a list of those that Rapid needs (seccomp). All others fail
-// with EPERM.
+// The system calls that a sandboxed process may make: a list of those that Rapid needs (seccomp). All others fail with
+// EPERM.
 #pragma once
 
 namespace rapid {
 
 enum class Processes {
     None,    // threads alone
-    Copies,  // it may fork, and wait for the copies, which have the same walls; it starts no other program
+    Copies,  // it may fork, and wait for the copies, which have the same filter; it starts no other program
 };
 
 // Returns a status of seccomp's: 0, or a negative errno. Holds all threads, and those that they start.

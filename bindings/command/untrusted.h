@@ -11,11 +11,11 @@
 
 namespace rapid {
 
-// A command that can run behind walls.
+// A command that can run in the sandbox.
 class Confined {
 public:
     virtual ~Confined() = default;
-    // Puts the process behind walls where an option asks for it; called before plugins are loaded, and before run().
+    // Sandboxes the process where an option asks for it; called before plugins are loaded, and before run().
     virtual void confine(const CommonOptions& common) = 0;
     // Whether this process loads plugins; not where others do the work.
     virtual bool takes_plugins() const { return true; }
@@ -27,8 +27,8 @@ public:
     void declare(CLI::App& app, const std::string& whose);
     bool asked() const { return untrusted_; }
 
-    // Puts the process behind walls, if that is asked for. access: what the command itself reads and writes, besides
-    // --allow-read and plugins. Before plugins are loaded: their first code runs behind the walls, too.
+    // Sandboxes the process, if that is asked for. access: what the command itself reads and writes, besides
+    // --allow-read and plugins. Before plugins are loaded: their first code runs in the sandbox, too.
     void confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,
                  Processes processes = Processes::None) const;
 

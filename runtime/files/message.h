@@ -66,6 +66,8 @@ public:
         return values;
     }
     std::string take_text();
+    // All that has not been taken yet.
+    std::span<const unsigned char> left() const { return memory_.subspan(at_); }
     // Error: fewer than `count` values of that many bytes are left.
     void check_left(std::size_t count, std::size_t bytes) const;
 

@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdio>
 #include <cstring>
 #include <new>
 
@@ -38,6 +37,17 @@ Limits limits_of(std::size_t file_bytes)
 
 enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
 
+struct Header {
+    Outcome outcome;
+    std::size_t bytes;  // of the message
+};
+
+std::function<void()>& further_limits()
+{
+    static std::function<void()> limits;
+    return limits;
+}
+
 // Memory that both processes see; pages that nobody writes cost nothing.
 class SharedMemory {
 public:
@@ -47,20 +57,17 @@ public:
         constexpr std::size_t least = std::size_t{64} << 20;
         do start_ = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
         while (start_ == MAP_FAILED && errno == ENOMEM && (bytes_ /= 2) >= least);
-        if (start_ == MAP_FAILED && errno != EPERM) throw file_error("can't be read, for want of shared memory", errno);
+        if (start_ == MAP_FAILED) throw file_error("can't be read, for want of shared memory", errno);
     }
-    ~SharedMemory()
-    {
-        if (is_allowed()) ::munmap(start_, bytes_);
-    }
+    ~SharedMemory() { ::munmap(start_, bytes_); }
     SharedMemory(const SharedMemory&) = delete;
     SharedMemory& operator=(const SharedMemory&) = delete;
 
-    bool is_allowed() const { return start_ != MAP_FAILED; }
-    Outcome& outcome() const { return *static_cast<Outcome*>(start_); }
+    Header& header() const { return *static_cast<Header*>(start_); }
+    // All that there is room for.
     std::span<unsigned char> message() const
     {
-        return {static_cast<unsigned char*>(start_) + sizeof(Outcome), bytes_ - sizeof(Outcome)};
+        return {static_cast<unsigned char*>(start_) + sizeof(Header), bytes_ - sizeof(Header)};
     }
 
 private:
@@ -76,14 +83,26 @@ void limit(__rlimit_resource resource, rlim_t most)
     if (::setrlimit(resource, &value) != 0) ::_exit(1);
 }
 
-// The address space of this process, which the copy begins with.
+// The address space of this process, which the copy begins with: the least limit with which a page more is mapped.
+// /proc tells it, too, but may be out of reach (Landlock).
 std::size_t address_space()
 {
-    std::size_t pages = 0;
-    std::FILE* file = std::fopen("/proc/self/statm", "re");
-    if (!file || std::fscanf(file, "%zu", &pages) != 1) ::_exit(1);
-    std::fclose(file);
-    return pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    // A stack that had to grow meanwhile would end the process.
+    volatile char room[1 << 14];
+    for (std::size_t i = 0; i < sizeof room; i += 1 << 10) room[i] = 0;
+
+    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    rlimit value;
+    if (::getrlimit(RLIMIT_AS, &value) != 0) ::_exit(1);
+    std::size_t low = 0, high = std::min<std::size_t>(value.rlim_max, std::size_t{1} << 47);
+    while (high - low > page) {
+        value.rlim_cur = low + (high - low) / 2;
+        if (::setrlimit(RLIMIT_AS, &value) != 0) ::_exit(1);
+        void* const mapped = ::mmap(nullptr, page, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        (mapped == MAP_FAILED ? low : high) = value.rlim_cur;
+        if (mapped != MAP_FAILED) ::munmap(mapped, page);
+    }
+    return high;
 }
 
 void confine(pid_t parent, const Limits& limits)
@@ -98,24 +117,27 @@ void confine(pid_t parent, const Limits& limits)
     // The libraries' last words are for nobody.
     const int nowhere = ::open("/dev/null", O_WRONLY);
     for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+    // Through what it inherits a process that goes wrong would reach others.
+    ::close_range(STDERR_FILENO + 1, ~0U, 0);
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_CPU, limits.seconds);
     ::alarm(6 * limits.seconds);  // it may wait for something, too
     limit(RLIMIT_AS, address_space() + limits.memory);
 }
 
-Outcome outcome_of(const std::function<void(MessageWriter&)>& read, const SharedMemory& shared)
+Header outcome_of(const std::function<void(MessageWriter&)>& read, const SharedMemory& shared)
 {
     const auto refused = [&](const char* why) {
-        MessageWriter(shared.message()).put_text(why);
-        return Outcome::Refused;
+        MessageWriter writer(shared.message());
+        writer.put_text(why);
+        return Header{Outcome::Refused, writer.bytes()};
     };
     try {
         MessageWriter writer(shared.message());
         read(writer);
-        return Outcome::Read;
+        return {Outcome::Read, writer.bytes()};
     } catch (const std::bad_alloc&) {
-        return Outcome::OutOfMemory;
+        return {Outcome::OutOfMemory, 0};
     } catch (const std::exception& error) {
         return refused(error.what());
     } catch (...) {
@@ -134,34 +156,40 @@ std::string text_of_end(int status, const Limits& limits)
 
 }  // namespace
 
-bool read_in_process(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
-                     const std::function<void(MessageReader&)>& receive)
+void confine_copies(std::function<void()> further) { further_limits() = std::move(further); }
+
+void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
+                  const std::function<void(MessageReader&)>& receive)
 {
     const Limits limits = limits_of(check_readable(path));
     const SharedMemory shared(limits.memory);
-    if (!shared.is_allowed()) return false;
     // The copy has one thread. In an arena without workers TBB asks for no others, and takes no lock that one of this
     // process's threads, of which the copy has none, may hold.
     tbb::task_arena alone(1);
     alone.initialize();
     const pid_t parent = ::getpid(), child = ::fork();
-    if (child < 0 && errno == EPERM) return false;
     if (child < 0) throw file_error("can't be read, for want of a process to read it in", errno);
     if (child == 0) {
         confine(parent, limits);
         alone.execute([&] {
-            shared.outcome() = outcome_of(read, shared);
+            shared.header() = outcome_of(
+                [&](MessageWriter& message) {
+                    if (further_limits()) further_limits()();
+                    read(message);
+                },
+                shared);
             ::_exit(0);
         });
     }
     int status = 0;
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
-    MessageReader reader(shared.message());
-    switch (shared.outcome()) {
+    const Header header = shared.header();  // of a process that may have gone wrong
+    const std::span<unsigned char> room = shared.message();
+    MessageReader reader(room.first(std::min(header.bytes, room.size())));
+    switch (header.outcome) {
         case Outcome::Read:
-            receive(reader);
-            return true;
+            return receive(reader);
         case Outcome::Refused:
             throw Error(reader.take_text());
         case Outcome::OutOfMemory:

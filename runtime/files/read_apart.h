@@ -2,34 +2,59 @@
 // ends that process, beyond its limits or by a signal, and is an error of that file here.
 //
 // The process is a copy of this one (fork) with limits of memory and time by the file's size. What it has read comes
-// back in shared memory, and is checked. A file that this process wrote is read here. So is any behind the walls of
-// --untrusted, which allow no processes: a hostile file may end such a run.
+// back in shared memory, and is checked. A file that this process wrote is read here. Where this process may start no
+// others (--untrusted), the reader process forks the copy (reader_process.h).
 //
 // It costs a few milliseconds and a copy of the result.
 #pragma once
 
 #include <filesystem>
 #include <functional>
+#include <string>
 
 #include "runtime/files/message.h"
 #include "runtime/files/output_file.h"
+#include "runtime/files/reader_process.h"
 
 namespace rapid {
 
-// Calls `read` in the other process and `receive` in this one. Returns false where the system allows this process no
-// others (--untrusted). Error: what `read` throws; the process ended otherwise.
-bool read_in_process(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
-                     const std::function<void(MessageReader&)>& receive);
+// Calls `read` in another process, a copy of this one, and `receive` here. Error: what `read` throws; the process ended
+// otherwise.
+void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
+                  const std::function<void(MessageReader&)>& receive);
 
+// Called in each such process before it reads: what further confines it.
+void confine_copies(std::function<void()> further);
+
+// What a library reads from files. `what` is a part of the file, as the reader understands it: the name of a grid. An
+// object is made while the program starts, and lives as long.
 template <class T>
-T read_apart(const std::filesystem::path& path, const std::function<T()>& read, void (*send)(const T&, MessageWriter&),
-             T (*receive)(MessageReader&))
-{
-    T result;
-    const bool apart = !is_own_file(path) && read_in_process(
-                                                 path, [&](MessageWriter& writer) { send(read(), writer); },
-                                                 [&](MessageReader& reader) { result = receive(reader); });
-    return apart ? result : read();
-}
+class ApartReader {
+public:
+    using Read = T (*)(const std::filesystem::path& path, const std::string& what);
+    using Send = void (*)(const T&, MessageWriter&);
+    using Receive = T (*)(MessageReader&);
+
+    // name: of its own among all readers.
+    ApartReader(const char* name, Read read, Send send, Receive receive) : name_(name), read_(read), receive_(receive)
+    {
+        define_reader(name, [=](const ReadRequest& request, MessageWriter& message) {
+            send(read(request.path, request.what), message);
+        });
+    }
+
+    T operator()(const std::filesystem::path& path, const std::string& what = "") const
+    {
+        if (is_own_file(path)) return read_(path, what);
+        T result;
+        read_by_name({name_, path.string(), what}, [&](MessageReader& message) { result = receive_(message); });
+        return result;
+    }
+
+private:
+    const char* name_;
+    Read read_;
+    Receive receive_;
+};
 
 }  // namespace rapid

@@ -176,8 +176,9 @@ struct VdbPoints {
     bool has_id = false;
 };
 
-VdbPoints read_grids(const std::filesystem::path& path)
+VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
 {
+    initialize_openvdb();
     try {
         vdb::io::File file(path.string());
         file.open(/*delayed loading=*/false);
@@ -222,12 +223,12 @@ VdbPoints receive(MessageReader& message)
     return {receive_points(message), has_id};
 }
 
+const ApartReader<VdbPoints> reader("points of .vdb", read_grids, send, receive);
+
 PointSet read_vdb(const std::filesystem::path& path)
 {
-    initialize_openvdb();
     check_readable(path);
-    auto [points, has_id] = read_apart<VdbPoints>(
-        path, [&] { return read_grids(path); }, send, receive);
+    auto [points, has_id] = reader(path);
     if (points.empty()) return points;
     if (has_id) return reordered(points, id_order(points.id()));
     std::span<std::int64_t> ids = points.id().overwrite();

@@ -27,8 +27,16 @@ Numbers receive(MessageReader& message) { return message.take_vector<std::int32_
 
 Numbers read(const std::filesystem::path& path, const std::function<Numbers()>& reader)
 {
-    return read_apart<Numbers>(path, reader, send, receive);
+    Numbers numbers;
+    read_in_copy(
+        path, [&](MessageWriter& message) { send(reader(), message); },
+        [&](MessageReader& message) { numbers = receive(message); });
+    return numbers;
 }
+
+const ApartReader<Numbers> process_number(
+    "test: number of the process", [](const std::filesystem::path&, const std::string&) { return Numbers{::getpid()}; },
+    send, receive);
 
 std::string error_in(const std::function<Numbers()>& reader)
 {
@@ -60,7 +68,7 @@ TEST_CASE("a file that this process wrote is read in it, until another changes i
     file.append("bytes", 5);
     file.finish();
     const pid_t here = ::getpid();
-    const auto reads_here = [&] { return read(folder / "file", [] { return Numbers{::getpid()}; })[0] == here; };
+    const auto reads_here = [&] { return process_number(folder / "file")[0] == here; };
     CHECK(reads_here());
     std::ofstream(folder / "file") << "other bytes";
     CHECK_FALSE(reads_here());

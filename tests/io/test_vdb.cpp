@@ -209,7 +209,7 @@ TEST_CASE("a position that is not finite can't be written to .vdb, and the error
     CHECK(file_names(folder.path()).empty());
 }
 
-TEST_CASE("the bytes of a .vdb do not depend on the number of threads", "[io][vdb]")
+TEST_CASE("the bytes of a .vdb do not depend on the number of threads", "[io][vdb][threads]")
 {
     const TemporaryFolder folder;
     const PointSet points = random_points({.size = 60000});

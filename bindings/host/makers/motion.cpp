@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "bindings/host/maker.h"
+#include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/motion/deforming.h"
@@ -78,8 +79,8 @@ struct Transform {
 
     static Maker declare()
     {
-        return maker<Transform>("transform", "A mesh or a shape, moved.")
-            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh or a shape")
+        return maker<Transform>("transform", "A mesh, a shape or points, moved.")
+            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh, a shape or points")
             .required()
             .param(&Transform::motion, "motion", Value(), any_number(), "",
                    "rapid.translate, .rotate, .scale, or a product; a function of the frame that returns one; keys")
@@ -104,7 +105,13 @@ struct Transform {
                 return move_level_set(level_set, motion->at({}));
             return placed(shape, motion->at({}));
         }
-        throw Error(fmt::format("{} can't be moved; it must be a mesh or a shape", describe(object)));
+        if (const auto moving = std::dynamic_pointer_cast<const AnimatedPoints>(object))
+            return moving->transformed(motion);
+        if (const auto points = std::dynamic_pointer_cast<const PointsObject>(object)) {
+            if (motion->varies()) return std::make_shared<AnimatedPoints>(points, motion);
+            return transformed(*points, motion->at({}));
+        }
+        throw Error(fmt::format("{} can't be moved; it must be a mesh, a shape or points", describe(object)));
     }
 };
 RAPID_MAKER(Transform);

@@ -1,6 +1,8 @@
 // rapid.points: point sets that are read or made.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "bindings/host/maker.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/io/format.h"
@@ -28,7 +30,24 @@ struct ReadPoints {
             .param(&ReadPoints::path, "path", Value(), any_number(), "", "relative to the graph file")
             .required();
     }
-    ObjectPtr make(MakeContext& context) const { return numbered(read_points(context.resolve(path))); }
+    // The file's ids say which points are the same in another file; without any the places do.
+    ObjectPtr make(MakeContext& context) const
+    {
+        PointSet points = read_points(context.resolve(path));
+        if (!has_ids(points)) return numbered(std::move(points));
+        auto object = std::make_shared<PointsObject>();
+        object->points = std::move(points);
+        return object;
+    }
+
+    // Whether each point has an id of its own.
+    static bool has_ids(const PointSet& points)
+    {
+        std::vector<std::int64_t> ids(points.size());
+        for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = points.id()[i];
+        std::sort(ids.begin(), ids.end());
+        return !ids.empty() && ids.front() >= 0 && std::adjacent_find(ids.begin(), ids.end()) == ids.end();
+    }
 };
 RAPID_MAKER(ReadPoints);
 

@@ -106,10 +106,11 @@ typename Grid::Ptr receive_grid(MessageReader& message)
 
 // Errors name the file.
 template <class Grid>
-typename Grid::Ptr read_grid_apart(const std::filesystem::path& path, const std::function<typename Grid::Ptr()>& read)
+typename Grid::Ptr read_grid_apart(const ApartReader<typename Grid::Ptr>& reader, const std::filesystem::path& path,
+                                   const std::string& name)
 {
     try {
-        return read_apart<typename Grid::Ptr>(path, read, send_grid<Grid>, receive_grid<Grid>);
+        return reader(path, name);
     } catch (Error& error) {
         if (error.message().find(path.string()) != std::string::npos) throw;
         throw Error(fmt::format("cannot read \"{}\": {}", path.string(), error.message()));

@@ -35,8 +35,10 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
 
 // The metadata of all grids, and the values of the chosen one alone. All that may take as much memory as the file says
 // is done here, in the process that may.
-FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
+FloatGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::string& name)
 {
+    initialize_openvdb();
+    const std::string path = file_path.string();
     try {
         openvdb::io::File file(path);
         file.open(/*delayLoad=*/false);
@@ -60,11 +62,13 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name)
     }
 }
 
+const ApartReader<FloatGrid::Ptr> reader("level set", read_grid, send_grid<FloatGrid>, receive_grid<FloatGrid>);
+
 LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
 {
     if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(path, [&] { return read_grid(path.string(), name); });
+    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(reader, path, name);
     if (grid->activeVoxelCount() == 0)
         throw Error(
             fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));

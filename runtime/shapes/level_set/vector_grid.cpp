@@ -60,8 +60,10 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
                             grids_of(vectors)));
 }
 
-Vec3SGrid::Ptr read_grid(const std::string& path, const std::string& name)
+Vec3SGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::string& name)
 {
+    initialize_openvdb();
+    const std::string path = file_path.string();
     try {
         openvdb::io::File file(path);
         file.open(/*delayLoad=*/false);
@@ -77,12 +79,13 @@ Vec3SGrid::Ptr read_grid(const std::string& path, const std::string& name)
     }
 }
 
+const ApartReader<Vec3SGrid::Ptr> reader("vector grid", read_grid, send_grid<Vec3SGrid>, receive_grid<Vec3SGrid>);
+
 VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
 {
     if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    return std::make_shared<OpenVectorGrid>(
-        read_grid_apart<Vec3SGrid>(path, [&] { return read_grid(path.string(), name); }));
+    return std::make_shared<OpenVectorGrid>(read_grid_apart<Vec3SGrid>(reader, path, name));
 }
 
 VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes, std::span<const Vec3f> values)

@@ -43,12 +43,15 @@ MeshFile receive_mesh(MessageReader& message)
     return mesh;
 }
 
+const ApartReader<MeshFile> importer(
+    "mesh", [](const std::filesystem::path& path, const std::string&) { return import_mesh(path); }, send_mesh,
+    receive_mesh);
+
 MeshFile read_any(const std::filesystem::path& path, const std::string& extension)
 {
     if (extension == ".ply") return read_ply_mesh(path);
-    DeferredFunctions::find("import_mesh");  // loaded here, and not anew in each process that reads a file
-    return read_apart<MeshFile>(
-        path, [&] { return import_mesh(path); }, send_mesh, receive_mesh);
+    DeferredFunctions::find("import_mesh");  // loaded here, and not again in each process that reads a file
+    return importer(path);
 }
 
 void check(const MeshFile& file)

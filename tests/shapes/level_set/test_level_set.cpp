@@ -185,7 +185,7 @@ TEST_CASE("distances alone have the same bits as distances with gradients", "[le
     CHECK(alone == together);
 }
 
-TEST_CASE("a level set is built and queried with the same bits on any number of threads", "[level set]")
+TEST_CASE("a level set is built and queried with the same bits on any number of threads", "[level set][threads]")
 {
     std::vector<double> phi[2];
     const auto points = random_points(20'000, cube(1.3));

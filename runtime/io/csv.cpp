@@ -238,7 +238,9 @@ PointSet read_csv(const std::filesystem::path& path)
 
     const std::vector<std::size_t> starts = line_starts(text, header_end + 1);
     if (!text.ends_with('\n'))
-        throw csv_error(starts.size() + 1, "it has no end, and may be cut within its last number; every line must end");
+        throw csv_error(starts.size() + 1,
+                        "there is no newline at its end, so that its last number may be cut short; if the file is "
+                        "whole, append a newline (echo >> FILE)");
     const std::vector<CsvColumn> columns = parse_columns(text, starts, names);
     PointSet points;
     points.append(starts.size());

@@ -41,6 +41,8 @@ describe("what is left out", function()
     ["an attribute that a node behind solve makes"] = emit .. "} :solve {} :attribute { pscale = 0.5 }",
     ["an attribute of merged points"] = emit .. '} :merge(rapid.create { seed = 4 }' .. emit ..
       "life = 0.2, attributes = { heat = 1 }, name = \"other\" } ) :gravity {} :solve {}",
+    ["the age of points that are merged with mortal ones"] = emit .. '} :solve {} :merge(rapid.create { seed = 4 }' ..
+      emit .. 'life = 0.2, name = "other" } :solve { name = "last" })',
   }
   for what, chain in pairs(cases) do
     it("changes nothing that is asked for: " .. what, function()

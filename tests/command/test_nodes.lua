@@ -73,7 +73,7 @@ describe("rapid nodes", function()
     local committed = file:read "*a"
     file:close()
     assert.is_true(committed == written.stdout,
-      "lua/rapid.d.lua is old; write it anew: rapid nodes --annotations >lua/rapid.d.lua")
+      "lua/rapid.d.lua is out of date; rapid nodes --annotations >lua/rapid.d.lua writes it")
     assert(loadstring(committed))
     assert.equal("---@meta rapid\n", committed:match "^[^\n]*\n")
     for _, node in ipairs(all) do

@@ -3,6 +3,7 @@
 --
 --   RAPID_FAULTS=10000 rapid test tests/faults      as many faults (300)
 local command = require "testing.command"
+local lehmer = require "tests.lehmer"
 
 local faults = tonumber(os.getenv "RAPID_FAULTS" or 300)
 
@@ -34,12 +35,7 @@ local kinds = {
   { call = "read", errors = { "EIO", "short" }, calls = 2 },
 }
 
--- A generator of its own, so that the faults are the same in each run.
-local state = 1
-local function below(n)
-  state = (state * 48271) % 2147483647
-  return state % n
-end
+local below = lehmer.new(1).below
 
 local library = command.binary():match "^(.*)/bin/[^/]*$" .. "/lib/librapid_fault.so"
 

@@ -420,7 +420,7 @@ TEST_CASE("a node that changes says why, and one that does not has no reason to"
     const Plan plan(scene.returning({{"a", behind}, {"b", scene.node("post", {inside})}}), {});
     CHECK(planned(plan, "still").changes.empty());
     CHECK(planned(plan, "moving").changes == "its by changes with the frame");
-    CHECK(planned(plan, "behind").changes == "\"moving\" before it is evaluated anew");
+    CHECK(planned(plan, "behind").changes == "\"moving\" before it is evaluated again");
     CHECK(planned(plan, "inside").changes == "its points are fed back from frame to frame");
     CHECK(planned(plan, "moving").reached_from == NameSet{"a"});
     CHECK(planned(plan, "inside").reached_from == NameSet{"b"});

@@ -2,14 +2,14 @@
 -- nothing expects. The text depends on the seed alone.
 --
 --   local text = require "tests.hostile.scripts".make(seed)
+local lehmer = require "tests.lehmer"
 
 local Script = {}
 Script.__index = Script
 
--- From 1 to n: Park and Miller's generator.
+-- From 1 to n.
 function Script:random(n)
-  self.state = self.state * 16807 % 2147483647
-  return self.state % n + 1
+  return self.draw.below(n) + 1
 end
 
 function Script:one_of(list)
@@ -144,8 +144,8 @@ local chains = {
 }
 
 local function make(seed)
-  local self = setmetatable({ state = seed * 7919 % 2147483646 + 1 }, Script)
-  for _ = 1, 5 do self:random(1) end
+  local self = setmetatable({ draw = lehmer.new() }, Script)
+  self.draw.start(seed, 0)
   local text = head .. self:block(self:random(3) - 1, 3) .. "\nreturn rapid.create { points = two } "
   for place = 1, self:random(3) do
     -- The text of a block may hold per cents.

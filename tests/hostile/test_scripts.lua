@@ -7,7 +7,8 @@ local scripts = require "tests.hostile.scripts"
 local count = tonumber(os.getenv "HOSTILE_SCRIPTS" or 100)
 local first = tonumber(os.getenv "HOSTILE_SEED" or 1)
 
-local limits = "--script-timeout 2 --script-memory 48M --memory 1G --threads 2"
+-- The limit of time is for each stretch of script, of which a run has a few dozen.
+local limits = "--script-timeout 0.5 --script-memory 48M --memory 1G --threads 2"
 
 describe("a hostile script", function()
   it("ends with a status, neither by a signal nor never", function()

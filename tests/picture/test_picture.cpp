@@ -171,7 +171,7 @@ TEST_CASE("points without colour are coloured by speed, faster ones lighter", "[
     CHECK(light(160) + 20 < light(190));
 }
 
-TEST_CASE("a picture has the same bits on any number of threads", "[io][picture]")
+TEST_CASE("a picture has the same bits on any number of threads", "[io][picture][threads]")
 {
     PictureScene scene;
     scene.bodies.push_back({make_torus(1, 0.3, 24, {0, 0, 0})});

@@ -228,7 +228,7 @@ TEMPLATE_TEST_CASE("a column of any type does what a vector does", "[column]", f
     });
 }
 
-TEST_CASE("a column is written in place only after a reader in another thread has let go of it", "[column]")
+TEST_CASE("a column is written in place only after a reader in another thread has let go of it", "[column][threads]")
 {
     // Under the thread sanitizer this fails when letting go does not order the reads before the writes.
     Column<float> column = column_of(std::vector<float>(1000, 1.0f));

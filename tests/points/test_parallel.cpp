@@ -37,7 +37,7 @@ TEST_CASE("chunks cover every point once, and only the last is short", "[paralle
           Chunks{{0, chunk_size}, {chunk_size, 2 * chunk_size}, {2 * chunk_size, 2 * chunk_size + 5}});
 }
 
-TEST_CASE("chunks do not depend on the number of threads", "[parallel]")
+TEST_CASE("chunks do not depend on the number of threads", "[parallel][threads]")
 {
     const Chunks expected = chunks_of(50 * chunk_size + 1);
     const int threads = GENERATE(1, 2, 7);
@@ -46,7 +46,7 @@ TEST_CASE("chunks do not depend on the number of threads", "[parallel]")
     CHECK(chunks_of(50 * chunk_size + 1) == expected);
 }
 
-TEST_CASE("an exception in a chunk ends the loop and reaches the caller", "[parallel]")
+TEST_CASE("an exception in a chunk ends the loop and reaches the caller", "[parallel][threads]")
 {
     const std::size_t n = GENERATE(as<std::size_t>{}, 1, 10 * chunk_size);
     CHECK_THROWS_WITH(for_each_chunk(n, [](std::size_t, std::size_t) { throw std::runtime_error("from a chunk"); }),

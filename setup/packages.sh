@@ -10,4 +10,6 @@ build_packages=(
 )
 
 # What its tests need besides.
-test_packages=(catch2 clang-format-14 libbenchmark-dev librapidcheck-dev lua-check python3 universal-ctags)
+test_packages=(
+    catch2 clang-14 clang-format-14 libbenchmark-dev libclang-rt-14-dev librapidcheck-dev lua-check python3 universal-ctags
+)

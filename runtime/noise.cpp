@@ -17,7 +17,6 @@ namespace {
 // The same code computes one point, or eight in SIMD vectors (types of g++ and clang; a machine without vectors of that
 // length gets several short ones).
 struct One {
-    static constexpr std::size_t size = 1;
     using Real = double;
     using Bits = std::uint32_t;
     using Words = std::uint64_t;
@@ -65,7 +64,7 @@ struct Axis {
         corner = Lane::low(std::bit_cast<typename Lane::Words>(below + whole));
         f = x - below;
         // 1 just below a corner, where the fraction rounds to it. Beyond 2⁵¹ numbers have no fractions; NaN stays.
-        f = (f >= 0.0) & (f <= 1.0) ? f : f - f;
+        f = ((f >= 0.0) & (f <= 1.0)) ? f : f - f;
         s = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
         slope = f * f * (f * (f * 30.0 - 60.0) + 30.0);
     }

@@ -80,4 +80,14 @@ std::string varying_argument(const Node& node)
     return found == node.arguments.end() ? std::string() : found->first;
 }
 
+std::vector<std::string> functions_of_the_frame(const Node& node)
+{
+    std::vector<std::string> names;
+    for (const auto& [name, value] : node.arguments) {
+        const Param* param = node.type->find(name);
+        if (param && value.function() && !param->keeps_function) names.push_back(name);
+    }
+    return names;
+}
+
 }  // namespace rapid

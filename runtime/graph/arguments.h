@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "runtime/graph/node.h"
 
@@ -18,5 +19,8 @@ double constant_argument(const Node& node, std::string_view param);
 // The name of an argument whose value changes from frame to frame: a function, a motion, a moving object, or a table
 // that holds one. Empty where there is none.
 std::string varying_argument(const Node& node);
+
+// The parameters of a node whose values are functions that are called once a frame.
+std::vector<std::string> functions_of_the_frame(const Node& node);
 
 }  // namespace rapid

@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 
+#include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {
@@ -221,9 +222,16 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
 {
     check_attribute_name(param.name);
     const AttributeSpec* known = known_attribute(param.name);
+    if (!known) known = conventional_attribute(param.name);
 
     // Lua has one type of number: that of an unknown name is a float, so that 1 and 1.5 give the same column.
-    if (const double* number = value.get<double>(); number && (!known || known->fallback.index() != 1)) {
+    const bool is_scalar =
+        !known || (!std::holds_alternative<Vec3f>(known->fallback) && !std::holds_alternative<Quatf>(known->fallback));
+    if (const double* number = value.get<double>(); number && is_scalar) {
+        if (known && std::holds_alternative<std::int64_t>(known->fallback)) {
+            field = static_cast<std::int64_t>(whole(param, *number, -0x1p53, 0x1p53));
+            return;
+        }
         if (known && std::holds_alternative<std::int32_t>(known->fallback)) {
             field = to_int<std::int32_t>(param, *number);
             return;
@@ -240,7 +248,7 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
             return;
         }
     }
-    if (const auto xyzw = numbers<4>(value); xyzw && !known) {
+    if (const auto xyzw = numbers<4>(value); xyzw && (!known || std::holds_alternative<Quatf>(known->fallback))) {
         for (const double component : *xyzw) checked(param, component);
         const auto at = [&](int i) { return to_float(param, (*xyzw)[i]); };
         field = Quatf(at(3), at(0), at(1), at(2));  // Eigen's arguments begin with w
@@ -249,6 +257,7 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
 
     const std::string right = !known ? "a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}"
                               : std::holds_alternative<Vec3f>(known->fallback) ? "a vec3 or {x, y, z}"
+                              : std::holds_alternative<Quatf>(known->fallback) ? "a quaternion {x, y, z, w}"
                                                                                : "a number";
     throw Error(fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right));
 }

@@ -20,6 +20,14 @@ local needs = {
   ["return rapid.create { points = " .. grid .. " } :distance { within = 1e9 } :solve {}"] =
     '^scene%.lua:1: node "distance1": within = 1e%+09: about 2e%+09 pairs of 64000 points would take about 488%.3 ' ..
     "GiB, .* give a smaller within, or set %-%-memory",
+  ["return rapid.create { points = " .. grid .. " } :contact { radius = 1e9 } :solve {}"] =
+    '^scene%.lua:1: node "contact1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would take about 305%.2 ' ..
+    "GiB, .* give a smaller radius, or set %-%-memory",
+  ["return rapid.create { points = " .. grid .. " } :contact { radius = 3 } :solve {}"] =
+    'node "contact1": radius = 3 m: about 4%.[4-9]e%+07 pairs of 64000 points would take about [67]%.%d GiB',
+  ["return rapid.create { points = " .. grid .. " } :clump { radius = 1e9 } :solve {}"] =
+    'node "clump1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would take about 610%.%d GiB, .* give a ' ..
+    "smaller radius, or set %-%-memory",
 }
 
 describe("--memory", function()
@@ -45,6 +53,23 @@ describe("--memory", function()
       assert.equal("", result.stderr)
       assert.equal(0, result.status)
     end
+  end)
+end)
+
+describe("a number of steps", function()
+  it("that no run would end with is refused, with the most", function()
+    for text, expected in pairs {
+      [":solve { substeps = 1e9 }"] = "substeps = 1000000000 is out of range; it must be from 1 to 1048576",
+      [":solve { iterations = 1e9 }"] = "iterations = 1000000000 is out of range; it must be from 1 to 10000",
+      [":solve { tolerance = 1, max_substeps = 1e9 }"] =
+        "max_substeps = 1000000000 is out of range; it must be from 1 to 1048576",
+    } do
+      local message = scene.error("return rapid.create { points = two } " .. text)
+      assert.truthy(message:find('^scene.lua:1: .*node "solve1": ' .. expected) or message:find(expected, 1, true),
+        message)
+    end
+    local message = scene.error "return rapid.create { points = two, subframes = 1e9 } :solve {}"
+    assert.truthy(message:find("subframes = 1000000000 is out of range; it must be from 1 to 10000", 1, true), message)
   end)
 end)
 

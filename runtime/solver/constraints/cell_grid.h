@@ -45,8 +45,10 @@ public:
     Run row(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const;
 
     // Cells in memory, the empty ones left out where the grid is sparse: the key of each, and its spheres.
+    std::size_t cells() const { return begin_.empty() ? 0 : begin_.size() - 1; }
     std::size_t cell_of_sphere(std::size_t sphere) const;
     std::uint64_t key(std::size_t cell) const { return dense_ ? cell : key_[cell]; }
+    std::uint32_t begin(std::size_t cell) const { return begin_[cell]; }
     std::uint32_t end(std::size_t cell) const { return begin_[cell + 1]; }
     // Keys from one row to the next, and from one layer to the next.
     std::uint64_t row_step() const { return static_cast<std::uint64_t>(count_[0]); }

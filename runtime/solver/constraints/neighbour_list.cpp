@@ -1,5 +1,7 @@
 #include "runtime/solver/constraints/neighbour_list.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -16,6 +18,9 @@ constexpr double least_slack = 0.25, most_slack = 1, slack_substeps = 3;
 // Blocks whose points are handed to a thread together.
 constexpr std::size_t blocks_a_task = 16;
 
+// What a pair takes: in the search, the blocks, two sets of impulses, and packs that are full.
+constexpr double bytes_a_pair = 160;
+
 }  // namespace
 
 void NeighbourList::build(const Substep& step, std::span<const float> radius, const RadiusGrids& grids)
@@ -24,7 +29,9 @@ void NeighbourList::build(const Substep& step, std::span<const float> radius, co
     cut_blocks(radius);
     predict_motion(step);
     choose_slack(step, radius);
-    search_.find(at_, {reach_.data(), 1}, grids, pairs_);
+    const double largest = grids.grids.empty() ? 0 : grids.grids.front().radius;
+    search_.find(at_, {reach_.data(), 1}, grids, pairs_,
+                 {fmt::format("radius = {:g} m", largest), "give a smaller radius", bytes_a_pair});
 }
 
 void NeighbourList::store_positions(const Substep& step, std::span<const float> radius)

@@ -19,6 +19,8 @@ public:
         indices_.clear();
     }
     bool empty() const { return indices_.empty(); }
+    // That of point i of the block which is not in its `linear`.
+    SurfaceSpring of(std::size_t i) const { return indices_.empty() ? SurfaceSpring() : springs_[i]; }
 
     // Of point i of the block. Of several the stiffest is taken as above, the others as springs to the nearest place,
     // which are added to `linear`: they are of order 1, and give no energy either.

@@ -1,5 +1,6 @@
 -- :spring with a shape as its target: the energy at any stiffness, the path along curved surfaces, its order.
 local scene = require "testing.scene"
+local lehmer = require "tests.lehmer"
 
 local function run(text, last, every)
   local frames = every and {1, last} or {last, last}
@@ -9,12 +10,8 @@ end
 local function list(values) return "{" .. table.concat(values, ", ") .. "}" end
 local function vector(x, y, z) return ("{%.9g, %.9g, %.9g}"):format(x, y, z) end
 
--- Lehmer's generator: the same numbers everywhere.
-local state = 20260801
-local function random()
-  state = (state * 48271) % 2147483647
-  return 2 * state / 2147483647 - 1
-end
+local draw = lehmer.new(20260801)
+local function random() return draw.between(-1, 1) end
 
 -- |φ| of the shapes below.
 local distances = {

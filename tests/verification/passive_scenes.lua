@@ -8,22 +8,12 @@
 --   passive_scenes.simpler(scene)                          a list of scenes with one thing less each
 --
 -- Masses, radii, speeds and compliances are drawn over decades. Points are born inside shapes and in each other.
+local lehmer = require "tests.lehmer"
+
 local passive_scenes = {}
 
--- Lehmer's generator: the same numbers everywhere.
-local state
-local function random()
-  state = (state * 48271) % 2147483647
-  return state / 2147483647
-end
-local function start(seed, number)
-  state = (seed * 1000003 + number * 7919) % 2147483646 + 1
-  for _ = 1, 3 do random() end
-end
-local function pick(list) return list[math.floor(random() * #list) + 1] end
-local function chance(part) return random() < part end
-local function between(low, high) return low + (high - low) * random() end
-local function magnitude(low, high) return 10 ^ between(low, high) end
+local drawn = lehmer.new()
+local random, pick, chance, between, magnitude = drawn.random, drawn.pick, drawn.chance, drawn.between, drawn.magnitude
 -- As the text has it, so that the energy is that of the scene that runs.
 local function short(x) return tonumber(("%.6g"):format(x)) end
 local function vector(size)
@@ -146,7 +136,7 @@ function draw.collide(scene)
 end
 
 function passive_scenes.scene(seed, number)
-  start(seed, number)
+  drawn.start(seed, number)
   local radius = short(magnitude(-2, -0.5))
   local scene = { fps = pick { 24, 24, 60 }, frames = 25, substeps = pick { 1, 2, 4, 8, 16, 32 },
     iterations = pick { 1, 1, 2, 4, 8 }, sleep = pick { 0.25, "math.huge" },

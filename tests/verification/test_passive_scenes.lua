@@ -63,42 +63,53 @@ local function nodes_of(description)
   return has
 end
 
--- Goes through so many of the scenes that are wanted; all that gain are told.
-local function none_gains(count, wanted)
-  local faults, number = {}, 0
-  while count > 0 do
-    number = number + 1
-    local description = passive_scenes.scene(seed, number)
-    if wanted(nodes_of(description)) then
-      count = count - 1
-      local fault, part = fault_of(description)
-      if fault then
-        description, fault = simplest(description, fault, part)
-        faults[#faults + 1] = ('scene %d of seed %d: %s\nlocal rapid = require "rapid"\n%s'):format(number, seed, fault,
-          passive_scenes.text(description))
-      end
+-- All of the scenes that gain are told. list: {seed, number} of each.
+local function none_gains(list)
+  local faults = {}
+  for _, one in ipairs(list) do
+    local seed_of, number = unpack(one)
+    local description = passive_scenes.scene(seed_of, number)
+    local fault, part = fault_of(description)
+    if fault then
+      description, fault = simplest(description, fault, part)
+      faults[#faults + 1] = ('scene %d of seed %d: %s\nlocal rapid = require "rapid"\n%s'):format(number, seed_of,
+        fault, passive_scenes.text(description))
     end
   end
   assert.equal("", table.concat(faults, "\n\n"))
 end
 
+-- The first scenes of the seed that are wanted.
+local function drawn(wanted)
+  local list, number = {}, 0
+  while #list < scenes do
+    number = number + 1
+    if wanted(nodes_of(passive_scenes.scene(seed, number))) then list[#list + 1] = {seed, number} end
+  end
+  return list
+end
+
 describe(("random passive scenes (%d of seed %d)"):format(scenes, seed), function()
   it("of rods, bonds and pins gain no energy", function()
-    none_gains(scenes, function(has) return not (has.contact or has.spring or has.collide) end)
+    none_gains(drawn(function(has) return not (has.contact or has.spring or has.collide) end))
   end)
 
   it("of contacts too gain no energy", function()
-    none_gains(scenes, function(has) return has.contact and not (has.spring or has.collide) end)
+    none_gains(drawn(function(has) return has.contact and not (has.spring or has.collide) end))
   end)
 
-  -- Rods and compliant pins on a point that a surface draws through itself gain up to 7 % still.
   it("with springs gain no energy", function()
-    none_gains(scenes, function(has)
-      return has.spring and not has.collide and not (has.surface_spring and (has.distance or has.pin or has.clump))
-    end)
+    none_gains(drawn(function(has) return has.spring and not has.collide end))
   end)
 
   it("among solids gain no energy", function()
-    none_gains(scenes, function(has) return has.collide end)
+    none_gains(drawn(function(has) return has.collide end))
+  end)
+
+  -- Rods that found no solution, springs to surfaces beside rods, springs that turn a point several times in a sub-step
+  -- among shapes, pins inside of shapes, bonds that have turned away from their impulse.
+  it("that gained on earlier code gain none", function()
+    none_gains { {11, 58}, {11, 19}, {11, 480}, {11, 150}, {11, 892}, {11, 113}, {11, 169}, {11, 219}, {11, 249},
+      {13, 283}, {13, 538} }
   end)
 end)

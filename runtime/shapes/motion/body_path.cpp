@@ -189,21 +189,6 @@ PathOptions in_steps(PathOptions options, const FrameClock& clock)
     return options;
 }
 
-FramePath path_of_rigid(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
-                        const PathOptions& options)
-{
-    const auto travel = [&](std::int64_t i) {
-        const Map step = map_at(motion, clock, i) - map_at(motion, clock, i - 1);
-        double sum = 0;
-        for (int k = 0; k < 8; ++k)
-            sum += (step * Vec3d(rest.corner(static_cast<Box3d::CornerType>(k))).homogeneous()).squaredNorm();
-        return std::sqrt(sum / 8);
-    };
-    const double scale = motion.at(clock.at_step(frame)).scale;
-    return FramePath::find(frame, in_steps(motion.range(), clock), in_steps(options, clock),
-                           scale * rest.diagonal().norm(), travel);
-}
-
 double root_mean_square(const Mesh& a, const Mesh& b)
 {
     double sum = 0;
@@ -282,10 +267,25 @@ BodyPathPtr part_of(BodyPathPtr path, double begin, double length)
     return std::make_shared<PartOfPath>(std::move(path), begin, length);
 }
 
+FramePath path_of(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
+                  const PathOptions& options)
+{
+    const auto travel = [&](std::int64_t i) {
+        const Map step = map_at(motion, clock, i) - map_at(motion, clock, i - 1);
+        double sum = 0;
+        for (int k = 0; k < 8; ++k)
+            sum += (step * Vec3d(rest.corner(static_cast<Box3d::CornerType>(k))).homogeneous()).squaredNorm();
+        return std::sqrt(sum / 8);
+    };
+    const double scale = motion.at(clock.at_step(frame)).scale;
+    return FramePath::find(frame, in_steps(motion.range(), clock), in_steps(options, clock),
+                           scale * rest.diagonal().norm(), travel);
+}
+
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options)
 {
     const Box3d rest = mesh.rest()->bounds().cast<double>();
-    if (!mesh.deforms()) return path_of_rigid(*mesh.motion(), rest, clock, frame, options);
+    if (!mesh.deforms()) return path_of(*mesh.motion(), rest, clock, frame, options);
     const auto travel = [&](std::int64_t i) { return root_mean_square(*mesh.at(clock, i - 1), *mesh.at(clock, i)); };
     return FramePath::find(frame, in_steps(mesh.range(), clock), in_steps(options, clock),
                            mesh.at(clock, frame)->bounds().diagonal().norm(), travel);
@@ -293,7 +293,7 @@ FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_
 
 FramePath path_of(const AnimatedShape& shape, const FrameClock& clock, std::int64_t frame, const PathOptions& options)
 {
-    return path_of_rigid(*shape.motion(), shape.rest()->bounds(), clock, frame, options);
+    return path_of(*shape.motion(), shape.rest()->bounds(), clock, frame, options);
 }
 
 }  // namespace rapid

@@ -131,6 +131,8 @@ BodyPathPtr part_of(BodyPathPtr path, double begin, double length);
 
 // How a body travels in the interval of a frame. On one thread, as it evaluates the motions.
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options);
+FramePath path_of(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
+                  const PathOptions& options);
 FramePath path_of(const AnimatedShape& shape, const FrameClock& clock, std::int64_t frame, const PathOptions& options);
 
 }  // namespace rapid

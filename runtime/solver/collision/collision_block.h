@@ -6,6 +6,7 @@
 
 #include "runtime/solver/collision/hits.h"
 #include "runtime/solver/collision/obstacle.h"
+#include "runtime/solver/step_log.h"
 
 namespace rapid {
 
@@ -17,6 +18,14 @@ struct CollisionContext {
     Strided<float> mass;           // kg
     double time = 0;               // s since the start, at the end of the frame
     double h = 0;                  // s, the frame's length
+    StepLog* log = nullptr;        // of all contacts and deaths; null where nobody asks
+
+    // A collider kills a point. time: s since the start.
+    void kill(std::size_t point, double at) const
+    {
+        dead[point] = 1;
+        if (log) log->kill(point, at);
+    }
 };
 
 struct CollisionBlock {

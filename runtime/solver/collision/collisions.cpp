@@ -1,5 +1,8 @@
 #include "runtime/solver/collision/collisions.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace rapid {
 
 void Collisions::begin(std::span<const std::uint32_t> indices)
@@ -27,11 +30,38 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     stuck_.advance();
     move_along_free_paths();
     rounds_.run();
+    if (motion_.is_damped()) limit_energy(displaced);
     if (discrete_.is_used()) correct();
     if (motion_.is_damped())
         audit_.add_displacements(ejection_.displacements().subspan(displaced), motion_);
     else
         audit_.add_energy(touched_, stuck_, motion_);
+}
+
+// Between contacts the mean acceleration stands for springs: where these turn a point several times in the sub-step it
+// may come out with any energy. It keeps what it had, and what displacements have given it; a place that this does not
+// reach is not taken, and the point waits where the sub-step began.
+void Collisions::limit_energy(std::size_t displaced)
+{
+    constexpr double rounding = 1e-12;
+    if (std::any_of(block_.obstacles.begin(), block_.obstacles.end(), [](const Obstacle& o) { return o.moves; }))
+        return;
+    const auto moved = ejection_.displacements().subspan(displaced);
+    for (const std::uint32_t i : touched_.list()) {
+        if (stuck_.has(i) || !motion_.is_drawn(i)) continue;
+        Vec3d &P = block_.P[i], &v = block_.v[i], by = Vec3d::Zero();
+        for (const Ejection::Displacement& one : moved)
+            if (one.i == i) by += one.by;
+        const Vec3d from = motion_.initial_P(i) + by, v0 = motion_.initial_v(i);
+        const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from), potential = motion_.potential(i, P);
+        double kinetic = energy - potential;
+        if (kinetic < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
+            P = from, v = v0;
+            continue;
+        }
+        kinetic = std::max(0.0, kinetic);
+        if (0.5 * v.squaredNorm() > kinetic) v *= std::sqrt(2 * kinetic / v.squaredNorm());
+    }
 }
 
 // By the paper's methods, which correct after the sub-step.

@@ -58,6 +58,7 @@ public:
 
 private:
     void move_along_free_paths();
+    void limit_energy(std::size_t displaced);
     void correct();
     void find_first_contacts(std::size_t obstacle);
 

@@ -8,9 +8,16 @@ void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
 {
     ++counts_.contacts;
     const std::optional<double>& record = block_.obstacles[obstacle].record;
-    if (!record || !(impact.speed >= *record)) return;
+    const bool records = record && impact.speed >= *record;
+    if (!records && !block_.context.log) return;
     const std::uint32_t index = block_.indices[i];
-    block_.context.hits->record(index, obstacle, impact, block_.context.mass[index] * impact.change.norm());
+    const double impulse = block_.context.mass[index] * impact.change.norm();
+    if (records) block_.context.hits->record(index, obstacle, impact, impulse);
+    if (block_.context.log)
+        block_.context.log->add({index, obstacle, impact.time, impact.P.cast<float>(), impact.n.cast<float>(),
+                                 impact.vc.cast<float>(), impact.v.cast<float>(),
+                                 (impact.v + impact.change).cast<float>(), static_cast<float>(impact.speed),
+                                 static_cast<float>(impulse)});
 }
 
 // A free path keeps v²/2 - a·P, so any change of it is the work of contacts.

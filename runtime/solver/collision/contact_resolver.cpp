@@ -71,9 +71,9 @@ void ContactResolver::capture(CollidingPoint& point, const Contact& contact, int
     const double when = block_.time(i, point.left);
     if (contact.depth > 0) block_.P[i] += contact.depth * contact.n;
     block_.v[i] = contact.vc;
-    audit_.add(i, o, {P, contact.n, contact.vc, -(v - contact.vc).dot(contact.n), contact.vc - v, when});
+    audit_.add(i, o, {P, contact.n, contact.vc, -(v - contact.vc).dot(contact.n), v, contact.vc - v, when});
     if (obstacle.response == Response::Die)
-        block_.context.dead[block_.indices[i]] = 1;
+        block_.context.kill(block_.indices[i], when);
     else
         block_.P[i] += point.left * contact.vc;
     point.left = 0;
@@ -110,7 +110,7 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
         rest(point, support, contact_response(v, contact.vc, n, 0, friction));
     else
         bounce(point, support, epsilon);
-    if (hits) audit_.add(i, o, {P, n, contact.vc, -vn, block_.v[i] - v, when});
+    if (hits) audit_.add(i, o, {P, n, contact.vc, -vn, v, block_.v[i] - v, when});
 }
 
 // The point touches the surface, and is pulled off it.

@@ -62,7 +62,7 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
     if (obstacle.response == Response::Die || obstacle.response == Response::Stick) {
         v = vc;
         P = slope > 0 ? Vec3d(P0 + depth * n) : initial_P_[i];
-        if (obstacle.response == Response::Die) block_.context.dead[block_.indices[i]] = 1;
+        if (obstacle.response == Response::Die) block_.context.kill(block_.indices[i], block_.time(i, 0));
     } else if (!(slope > 0)) {
         P = initial_P_[i];
         v = contact_response(v0, vc, n, bounce, friction);
@@ -75,7 +75,7 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
         query_.P[j] = P;
         backtracked = true;
     }
-    if (vn < 0) audit_.add(static_cast<std::size_t>(i), o, {P0, n, vc, -vn, v - v0, block_.time(i, 0)});
+    if (vn < 0) audit_.add(static_cast<std::size_t>(i), o, {P0, n, vc, -vn, v0, v - v0, block_.time(i, 0)});
     return backtracked;
 }
 

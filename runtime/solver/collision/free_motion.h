@@ -28,6 +28,8 @@ public:
 
     // m/s², without the forces of surfaces; under damping the mean of what is left of the sub-step.
     const Vec3d& acceleration(std::size_t i) const { return a_[i]; }
+    // Whether a spring to a place draws a damped point.
+    bool is_drawn(std::size_t i) const { return damped_[i].w2 > 0; }
     // J/kg, of a damped point: the potential energy of what draws it, at P and where its path begins.
     double potential(std::size_t i, const Vec3d& P) const
     {

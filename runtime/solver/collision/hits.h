@@ -18,6 +18,7 @@ namespace rapid {
 struct Impact {
     Vec3d P, n, vc;  // where, m; the surface's normal, unit, and velocity, m/s
     double speed;    // of approach, m/s
+    Vec3d v;         // of the point before, m/s
     Vec3d change;    // of the velocity, m/s
     double time;     // s since the start
 };

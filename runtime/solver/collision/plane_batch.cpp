@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/path_extent.h"
 #include "runtime/shapes/first_contact.h"
 
 namespace rapid {
@@ -107,16 +108,13 @@ void PlaneBatch::solve(const HalfSpace& plane)
 // may_reach(), of all paths.
 void PlaneBatch::leave_out_near(const Box3d& box, double radius)
 {
+    const Box3d wide = widened(box, radius);
     std::int64_t far[capacity] = {};
     for (int axis = 0; axis < 3; ++axis) {
-        const double lowest = box.min()[axis] - radius, highest = box.max()[axis] + radius;
+        const double lowest = wide.min()[axis], highest = wide.max()[axis];
         const double *from = contact_[axis], *end = end_[axis], *sagging = sagging_[axis];
-        for (std::size_t j = 0; j < size_; ++j) {
-            const double margin = sagging[j] + 0x1p-21 * (std::abs(from[j]) + radius);
-            const bool below = std::max(from[j], end[j]) < lowest - margin;
-            const bool above = std::min(from[j], end[j]) > highest + margin;
-            far[j] |= below | above;
-        }
+        for (std::size_t j = 0; j < size_; ++j)
+            far[j] |= PathExtent<double>::of(from[j], end[j], sagging[j]).misses(lowest, highest);
     }
     for (std::size_t j = 0; j < size_; ++j)
         outcome_[j] = (outcome_[j] == Misses) | (far[j] != 0) ? outcome_[j] : Undecided;

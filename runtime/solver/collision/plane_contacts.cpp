@@ -37,7 +37,8 @@ void PlaneContacts::take(std::size_t j, std::size_t o)
     const Vec3d n = obstacle.plane->n;
     if (outcome == PlaneBatch::Bounces)
         audit_.add(i, plane,
-                   {batch_.contact(j), n, Vec3d::Zero(), batch_.approach(j), batch_.change(j),
+                   {batch_.contact(j), n, Vec3d::Zero(), batch_.approach(j),
+                    motion_.velocity_after(i, block_.dt[i] - batch_.left(j)), batch_.change(j),
                     block_.time(i, batch_.left(j))});
     else
         touched_.set_surface(i, {plane, n});

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
@@ -23,6 +24,8 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
       may_gain_(!step.mobility.empty() ||
                 !std::all_of(constraints.begin(), constraints.end(),
                              [](const LocalConstraint& local) { return local.coupling->only_dissipates(); })),
+      is_driven_(std::any_of(constraints.begin(), constraints.end(),
+                             [](const LocalConstraint& local) { return local.coupling->is_driven(); })),
       free_(step.size())
 {
     if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sleep);
@@ -47,7 +50,7 @@ void Projection::advance(Substep& step)
     if (constraints_.empty() || !(step.dt > 0) || (sleep_ && sleep_->all())) return;
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
-    each([&](Coupling& coupling) { coupling.move_kinematic(step); });
+    move_kinematic(step);
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) f(i);
@@ -68,6 +71,7 @@ void Projection::advance(Substep& step)
         keep_positions(linked_);
     }
     begin_support(step);
+    if (step.forces) step.forces->begin(step, sleep_);
     each([&](Coupling& coupling) { coupling.detect(step); });
     if (has_forces_)
         each_point([&](std::size_t i) { free_[i] += step.points[i].P - linked_[i]; });  // of woken sleepers
@@ -95,11 +99,42 @@ void Projection::advance(Substep& step)
         each([&](Coupling& coupling) { coupling.solve_velocities(step); });
         if (shapes_) shapes_->solve_velocities(step);
     }
+    if (shapes_ && step.forces) shapes_->add_forces(step);
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
     const ContactEnergy change = close_bound(step, false);
     energy_ += change;
-    by_contacts_ += change.added - change.lost;
+    changes_.contacts += change.added - change.lost + credited();
     require_finite(step);
+}
+
+// J: what changes are told without, as drag has taken it before.
+double Projection::credited()
+{
+    if (!may_gain_) return 0;
+    const std::span<const double> credit = bound_.credit();
+    return std::accumulate(credit.begin(), credit.end(), 0.0);
+}
+
+// What pins move gains what they do.
+void Projection::move_kinematic(Substep& step)
+{
+    const double before = is_driven_ ? driven_energy(step) : 0;
+    each([&](Coupling& coupling) { coupling.move_kinematic(step); });
+    if (is_driven_) changes_.pins += driven_energy(step) - before;
+}
+
+// J, of the points, and in rows where the sub-step begins.
+double Projection::driven_energy(const Substep& step) const
+{
+    std::vector<double> energy(step.size());
+    add_stored(step, step.start, 1, energy);
+    double sum = 0;
+    for (std::size_t i = 0; i < step.size(); ++i) {
+        sum += energy[i];
+        if (step.inverse_mass[i] > 0)
+            sum += (0.5 * step.v[i].squaredNorm() - step.acceleration.dot(step.points[i].P)) / step.inverse_mass[i];
+    }
+    return sum;
 }
 
 // Rods and springs act.
@@ -111,16 +146,19 @@ void Projection::advance_linked(Substep& step)
         add_stored(step, step.born, -1, stored);
         const double work = std::accumulate(stored.begin(), stored.end(), 0.0);
         energy_.added += std::max(0.0, work);
-        by_contacts_ += work;
+        changes_.contacts += work;
     }
     bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, step.start, factor, energy); });
+    fallback_.begin(step);
     each([&](Coupling& coupling) {
         coupling.advance(step);
         if (coupling.has_forces()) require_finite(step);
     });
     const ContactEnergy change = close_bound(step, true);
     energy_.added += change.added;
-    by_rods_ += change.added - change.lost;
+    const double driven = may_gain_ ? bound_.driven() : 0;
+    changes_.pins += driven;
+    changes_.rods += change.added - change.lost + credited() - driven;
 }
 
 double Projection::elastic_energy(const Substep& step) const
@@ -148,11 +186,26 @@ ContactEnergy Projection::close_bound(Substep& step, bool of_rods)
 {
     const auto stored = [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); };
     if (!may_gain_) return bound_.measure(step, stored);
-    return bound_.close(step, stored, [&](EnergyIslands& islands) {
+    const auto link = [&](EnergyIslands& islands) {
         for (const LocalConstraint& local : constraints_)
             if (!of_rods || local.coupling->has_forces()) local.coupling->link(islands);
-        if (shapes_ && !of_rods) shapes_->drive(islands);
-    });
+        if (shapes_ && !of_rods) shapes_->drive(islands, step);
+    };
+    ContactEnergy change = bound_.close(step, stored, link, of_rods ? &fallback_ : nullptr);
+    if (bound_.stalled().empty()) return change;
+    const double before = energy_of_places(step);
+    each([&](Coupling& coupling) { coupling.yield(step, bound_.stalled()); });
+    change.take(energy_of_places(step) - before);
+    return change;
+}
+
+// J: what rows store, and the potential energy of points that have yielded.
+double Projection::energy_of_places(const Substep& step) const
+{
+    double sum = elastic_energy(step);
+    for (std::size_t i = 0; i < step.size(); ++i)
+        if (bound_.stalled()[i]) sum += potential_energy(step, i, step.points[i].P);
+    return sum;
 }
 
 // As single precision holds them, in which they are stored. What is found here would be looked up in grids next.
@@ -214,7 +267,7 @@ Residual Projection::close(Substep& step, ShapeLoads* loads)
         all.loose += residual.loose;
         if (residual.search) all.search = residual.search;
     });
-    if (shapes_ && loads) shapes_->remember(*loads, errors_.ids(), step.dt);
+    if (shapes_ && loads) shapes_->remember(*loads, errors_.ids(), step);
     return all;
 }
 

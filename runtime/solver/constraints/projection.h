@@ -9,6 +9,7 @@
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/shape_contacts.h"
+#include "runtime/solver/ledger.h"
 #include "runtime/solver/point_errors.h"
 
 namespace rapid {
@@ -34,9 +35,8 @@ public:
     // What has been added so far, by corrections of positions where no velocity paid for it (energy_bound.h) and by
     // what moves by itself; and what contacts, shapes and rows have taken after rods and springs.
     const ContactEnergy& energy() const { return energy_; }
-    // J: by rods and springs; by all that follows them.
-    double by_rods() const { return by_rods_; }
-    double by_contacts() const { return by_contacts_; }
+    // J: by rods and springs; by all that follows them; by what pins move.
+    const EnergyChanges& changes() const { return changes_; }
     // J, in rows, where points are now.
     double elastic_energy(const Substep& step) const;
     bool keeps_momentum() const;
@@ -46,7 +46,11 @@ private:
     void each(const F& f);
     void advance_linked(Substep& step);
     void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;
+    double driven_energy(const Substep& step) const;
+    double credited();
+    void move_kinematic(Substep& step);
     ContactEnergy close_bound(Substep& step, bool of_rods);
+    double energy_of_places(const Substep& step) const;
     void require_finite(const Substep& step) const;
     void begin_support(Substep& step);
     void solve_impacts(Substep& step);
@@ -57,8 +61,10 @@ private:
     bool has_forces_;  // some constraint (Coupling::has_forces)
     bool may_gain_;    // some constraint does not only take energy, or springs draw points
     EnergyBound bound_;
+    RigidFallback fallback_;
     ContactEnergy energy_;
-    double by_rods_ = 0, by_contacts_ = 0;  // J
+    bool is_driven_;  // some constraint moves points by itself
+    EnergyChanges changes_;
     std::optional<ShapeContacts> shapes_;
     std::vector<Vec3d> free_;                           // where the points' free motion has ended
     std::vector<Vec3d> linked_;                         // where the projection begins, if elsewhere

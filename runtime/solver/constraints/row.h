@@ -50,6 +50,7 @@ struct Row {
     double first = 0;            // C where the sub-step begins
     double reference = 0;        // C that its points are kept at, once the row's own force has acted
     double added = 0;            // N s, the part of the impulse that is due to others, as far as it moves positions
+    bool has_yielded = false;    // in a sub-step of this frame
     bool is_resolved = false;    // by the sub-step: velocities along the row stay
     double softness = 0;         // 1/kg: what C - reference gives way by, times dt, for each N s of `added`
     Vectors direction = zero();  // the gradient that it acts along
@@ -146,9 +147,11 @@ struct Row {
         Vectors gradient;
         const double C = function.residual(P, gradient) - reference;
         if (!Traits::one_sided) direction = gradient;
-        double stiffness = softness;
-        for (int k = 0; k < arity; ++k) stiffness += step.points[points[k]].w * gradient[k].dot(direction[k]);
-        if (!(stiffness > 0)) return;
+        double along = 0;
+        for (int k = 0; k < arity; ++k) along += step.points[points[k]].w * gradient[k].dot(direction[k]);
+        if (!(along + softness > 0)) return;
+        // What its direction has turned away from needs a larger impulse along it, up to any size: never above twice.
+        const double stiffness = softness + std::max(along, 0.5 * inverse_mass(step, gradient));
         const double total = Traits::one_sided ? impulse : added;
         double change = (-C / step.dt - softness * total) / stiffness;
         if (Traits::one_sided) change = std::max(change, -added);
@@ -189,7 +192,12 @@ struct Row {
         Vectors gradient;
         const double C = residual(step, gradient), W = inverse_mass(step, gradient);
         if (!(W > 0) || (Traits::one_sided && !(C < 0))) return;
-        for (int k = 0; k < arity; ++k) step.points[points[k]].P -= step.points[points[k]].w * (C / W) * gradient[k];
+        for (int k = 0; k < arity; ++k) {
+            const std::uint32_t i = points[k];
+            const Vec3d shift = -step.points[i].w * (C / W) * gradient[k];
+            step.points[i].P += shift;
+            if (!Traits::one_sided) step.start[i] += shift;
+        }
     }
 
     // How far it is off, m, where C is `residual`: a spring from what its own force has come to.

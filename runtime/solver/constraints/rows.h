@@ -45,6 +45,13 @@ public:
         known_is_complete_ = false;
     }
 
+    // Calls f(ids, function) for each row.
+    template <class F>
+    void for_each(const F& f)
+    {
+        for (Row& row : rows_) f(std::as_const(row.ids), row.function);
+    }
+
     std::size_t size() const { return rows_.size(); }
     // Whether there is a row of these points, in this order. Of rows that follow() has seen.
     bool has(const Ids& ids) const { return std::binary_search(known_.begin(), known_.end(), ids); }
@@ -57,6 +64,7 @@ public:
         const Strided<std::uint8_t> members = members_of(points, group);
         sleep_.begin();
         for (Row& row : rows_) {
+            row.has_yielded = false;
             changed_ |= row.find_points(index, members);
             const bool acts_otherwise = row.active != row.was_active;
             changed_ |= acts_otherwise;
@@ -128,6 +136,21 @@ public:
     {
         for (const Row& row : rows_)
             if (row.active && !row.asleep) islands.link(row.points);
+    }
+
+    void yield(Substep& step, std::span<const std::uint8_t> points) override
+    {
+        std::vector<Row*> yielding;
+        for (Row& row : rows_) {
+            const auto has = [&](std::uint32_t i) { return points[i] != 0; };
+            if (!row.active || row.asleep || !std::any_of(row.points.begin(), row.points.end(), has)) continue;
+            row.impulse = 0;
+            row.has_yielded = true;
+            yielding.push_back(&row);
+        }
+        constexpr int corrections = 10;
+        for (int k = 0; k < corrections * step.iterations; ++k)
+            for (const Row* row : yielding) row->correct_position(step);
     }
 
     void move_kinematic(Substep& step) override
@@ -220,7 +243,8 @@ public:
             const double error = std::abs(row.error(residual, step.dt));
             result.worst = std::max(result.worst, error);
             if constexpr (arity > 1)
-                result.loose += error > 0.1 * (step.points[row.points[0]].P - step.points[row.points[1]].P).norm();
+                result.loose += row.has_yielded ||
+                                error > 0.1 * (step.points[row.points[0]].P - step.points[row.points[1]].P).norm();
         }
         return result;
     }

@@ -63,20 +63,23 @@ public:
     // Keeps C at the rows' reference where others have pushed the points since.
     void project(Substep& step)
     {
+        double residuals = 0;
         for (Forest::Link& link : tree_) {
             const Row& row = rows_[link.row];
             typename Row::Vectors gradient;
             link.e = row.residual(step, gradient) - row.reference + row.softness * step.dt * row.added;
             link.s = row.softness;
             orient(link, gradient);
+            residuals += std::abs(link.e);
         }
         const Vec3d root = solve(step);
-        step.points[tree_.front().parent].P += root;
+        const double part = reasonable_part(residuals, root);
+        step.points[tree_.front().parent].P += part * root;
         for (const Forest::Link& link : tree_) {
             Row& row = rows_[link.row];
-            const double change = link.lambda / step.dt;
+            const double change = part * link.lambda / step.dt;
             row.take(change);
-            step.points[link.child].P += link.shift;
+            step.points[link.child].P += part * link.shift;
             if (!row.is_resolved) continue;
             step.v[link.child] += step.points[link.child].w * change * link.gradient;
             step.v[link.parent] += step.points[link.parent].w * change * link.gradient_above;
@@ -259,8 +262,7 @@ private:
         return lost;
     }
 
-    // Newton's steps to where the rigid rows have C = 0. No further than the residuals are together: pins that no tree
-    // can join would throw its points about.
+    // Newton's steps to where the rigid rows have C = 0.
     void correct_positions()
     {
         for (int n = 0; n < most_corrections; ++n) {
@@ -279,9 +281,7 @@ private:
             }
             if (!(residuals > 0x1p-50 * longest)) return;
             const Vec3d root = solve_tree(tree_, first_, [&](std::size_t k) { return from_[k].w; });
-            double farthest = root.norm();
-            for (const Forest::Link& link : tree_) farthest = std::max(farthest, link.shift.norm());
-            double part = std::min(1.0, 2 * residuals / farthest);
+            double part = reasonable_part(residuals, root);
             if (!is_ballistic_) part = std::min(part, largest_free_part(root));
             for (std::size_t k = 0; k < to_.size(); ++k) {
                 const Vec3d correction = part * (k ? tree_[k - 1].shift : root);
@@ -289,6 +289,15 @@ private:
                 to_[k].corrected += correction;
             }
         }
+    }
+
+    // Of a step of Newton's: no point goes further than the residuals are together. Pins that no tree can join, and
+    // links that are nearly folded, would throw points about.
+    double reasonable_part(double residuals, const Vec3d& root) const
+    {
+        double farthest = root.norm();
+        for (const Forest::Link& link : tree_) farthest = std::max(farthest, link.shift.norm());
+        return farthest > 2 * residuals ? 2 * residuals / farthest : 1;
     }
 
     // As far as the springs of the points' free motion do not take energy from a correction.

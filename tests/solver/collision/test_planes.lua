@@ -1,28 +1,25 @@
 -- Points at rest on planes: what lifts them, and what they do under a force that varies from place to place.
 local scene = require "testing.scene"
+local lehmer = require "tests.lehmer"
+
+local function vector(x) return ("{%.17g, %.17g, %.17g}"):format(x.x, x.y, x.z) end
 
 -- The heights over a plane through a random place, after some frames, of points that lay on it anywhere, pulled onto it
 -- by gravity and lifted by an action of `net` m/s² more.
 local function lifted(net, substeps, frames, size, seed)
+  local random, P = lehmer.new(seed).random, {}
+  local n = vec3(random() - 0.5, random() + 0.2, random() - 0.5):normalized()
+  local at = size * vec3(random() - 0.5, random() - 0.5, random() - 0.5)
+  for k = 1, 20 do
+    local x = at + size * vec3(random() - 0.5, random() - 0.5, random() - 0.5)
+    P[k] = vector(x - n:dot(x - at) * n)
+  end
   local result = scene.run(([[
-local seed, size, net = %d, %g, %g
-local function random()
-  seed = (seed * 16807) %% 2147483647
-  return seed / 2147483647
-end
-local n = vec3(random() - 0.5, random() + 0.2, random() - 0.5):normalized()
-local at = size * vec3(random() - 0.5, random() - 0.5, random() - 0.5)
-local P = {}
-for k = 1, 20 do
-  local x = at + size * vec3(random() - 0.5, random() - 0.5, random() - 0.5)
-  x = x - n:dot(x - at) * n
-  P[k] = {x.x, x.y, x.z}
-end
-return rapid.create { fps = 24, points = rapid.points.from { P = P } } :attribute { n = {n.x, n.y, n.z} }
-  :gravity { g = {-9.81 * n.x, -9.81 * n.y, -9.81 * n.z} }
-  :action("lift", function(p) p.force = p.force + (9.81 + net) * n end)
-  :collide { shape = rapid.shape.plane { normal = {n.x, n.y, n.z}, offset = n:dot(at) }, bounce = 0.5 }
-  :solve { substeps = %d }]]):format(seed, size, net, substeps), { frames = {1, frames} })
+return rapid.create { fps = 24, points = rapid.points.from { P = {%s} } } :attribute { n = %s }
+  :gravity { g = %s } :action("lift", function(p) p.force = p.force + %.17g * p.n end)
+  :collide { shape = rapid.shape.plane { normal = %s, offset = %.17g }, bounce = 0.5 }
+  :solve { substeps = %d }]]):format(table.concat(P, ", "), vector(n), vector(-9.81 * n), 9.81 + net, vector(n),
+    n:dot(at), substeps), { frames = {1, frames} })
   local heights = {}
   for i = 1, #result[1] do heights[i] = (result[frames][i].P - result[1][i].P):dot(result[frames][i].n) end
   return heights

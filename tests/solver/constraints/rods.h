@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/solver/constraints/rows.h"
+#include "runtime/solver/constraints/twin.h"
 
 namespace rapid::test {
 
@@ -35,6 +36,10 @@ public:
     {
         rows->follow(points, group);
         return rows;
+    }
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of(*this, &RowsConstraint::rows, before);
     }
 };
 

@@ -13,7 +13,7 @@ namespace {
 // Points in free space, of random masses and velocities; links between neighbours in pairs.
 struct Pairs {
     std::vector<ProjectedPoint> points;
-    std::vector<Vec3d> v, start;
+    std::vector<Vec3d> v, start, displacement;
     std::vector<double> inverse_mass;
     Substep step;
 
@@ -25,6 +25,7 @@ struct Pairs {
             v.push_back(any());
             start.push_back(points[i].P);
             inverse_mass.push_back(w);
+            displacement.push_back(Vec3d::Zero());
         }
         step.points = points, step.v = v, step.start = start, step.inverse_mass = inverse_mass;
         step.acceleration = {0, -10, 0};
@@ -53,11 +54,12 @@ struct Pairs {
         return v[pair] / inverse_mass[pair] + v[pair + 1] / inverse_mass[pair + 1];
     }
 
-    ContactEnergy close(EnergyBound& bound)
+    ContactEnergy close(EnergyBound& bound, const RigidFallback* fallback = nullptr)
     {
-        return bound.close(step, nothing, [&](EnergyIslands& islands) {
+        const auto link = [&](EnergyIslands& islands) {
             for (std::uint32_t i = 0; i + 1 < v.size(); i += 2) islands.link(std::array{i, i + 1});
-        });
+        };
+        return bound.close(step, nothing, link, fallback);
     }
     static void nothing(double, std::span<double>) {}
 
@@ -99,6 +101,47 @@ TEST_CASE("a change that takes energy stays as it is, and is told", "[energy_bou
     CHECK(pairs.v[0] == mean);
     CHECK(told.added == 0);
     CHECK(told.lost == Approx(before - pairs.energy(0)));
+}
+
+TEST_CASE("a pair that corrections of positions lift out of all proportion moves as a rigid body", "[energy_bound]")
+{
+    Pairs pairs(1, 4);
+    pairs.step.displacement = pairs.displacement;
+    EnergyBound bound;
+    bound.begin(pairs.step, Pairs::nothing);
+    RigidFallback fallback;
+    fallback.begin(pairs.step);
+    const double before = pairs.energy(0), length = (pairs.start[0] - pairs.start[1]).norm();
+    const Vec3d momentum = pairs.momentum(0), other = pairs.points[2].P;
+    for (int i : {0, 1}) pairs.points[i].P += Vec3d(0, 1e6, 0);
+    const ContactEnergy told = pairs.close(bound, &fallback);
+    REQUIRE(bound.stalled().size() == 4);
+    CHECK((bound.stalled()[0] && bound.stalled()[1] && !bound.stalled()[2] && !bound.stalled()[3]));
+    CHECK(told.added == 0);
+    CHECK(pairs.energy(0) <= before + 1e-12 * std::abs(before));
+    CHECK((pairs.momentum(0) - momentum).norm() <= 1e-12 * momentum.norm());
+    CHECK((pairs.points[0].P - pairs.points[1].P).norm() == Approx(length));
+    CHECK(pairs.points[2].P == other);
+}
+
+TEST_CASE("a pair without a solution, one of whose points a place holds, stays where it was", "[energy_bound]")
+{
+    Pairs pairs(1, 2);
+    pairs.step.displacement = pairs.displacement;
+    EnergyBound bound;
+    bound.begin(pairs.step, Pairs::nothing);
+    RigidFallback fallback;
+    fallback.begin(pairs.step);
+    for (ProjectedPoint& point : pairs.points) point.P += Vec3d(0, 1e6, 0);
+    const auto link = [](EnergyIslands& islands) {
+        islands.link(std::array{0u, 1u});
+        islands.link(std::array{1u});
+    };
+    bound.close(pairs.step, Pairs::nothing, link, &fallback);
+    for (std::size_t i : {0, 1}) {
+        CHECK(pairs.points[i].P == pairs.start[i]);
+        CHECK(pairs.v[i].isZero(0));
+    }
 }
 
 TEST_CASE("what a moving point drives may gain", "[energy_bound]")

@@ -1,6 +1,7 @@
 -- Free rods without forces: a dumbbell that turns, two rods with a light hub, chains of masses over three decades.
 -- Energy and angular momentum are those of the start.
 local scene = require "testing.scene"
+local lehmer = require "tests.lehmer"
 
 -- Of all frames: the largest gain and loss of energy, of the first frame's, and the largest change of angular
 -- momentum, of its length.
@@ -52,11 +53,7 @@ end
 -- Twenty chains of five rods each, far apart: the worst of them by each measure. Velocities begin with what the rods
 -- allow: each chain turns as a whole, and along.
 local function chains()
-  local worst, state = { gain = 0, loss = 0, turn = 0 }, 99
-  local function random()
-    state = (state * 48271) % 2147483647
-    return state / 2147483647
-  end
+  local worst, random = { gain = 0, loss = 0, turn = 0 }, lehmer.new(99).random
   for _ = 1, 20 do
     local P, v, mass, links, at = {}, {}, {}, {}, vec3(0, 0, 0)
     local spin = vec3(random() - 0.5, random() - 0.5, random() - 0.5) * 6

@@ -1,0 +1,93 @@
+#include "runtime/solver/constraints/rigid_fallback.h"
+
+#include <algorithm>
+
+#include <Eigen/Eigenvalues>
+
+#include "runtime/parallel.h"
+#include "runtime/solver/constraints/energy_bound.h"
+
+namespace rapid {
+namespace {
+
+// ω of an angular momentum; about axes without inertia there is none.
+Vec3d angular_velocity(const Eigen::Matrix3d& inertia, const Vec3d& momentum)
+{
+    constexpr double least = 1e-12;  // of the largest
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(inertia);
+    Vec3d along = axes.eigenvectors().transpose() * momentum;
+    for (int k = 0; k < 3; ++k) {
+        const double moment = axes.eigenvalues()[k];
+        along[k] = moment > least * axes.eigenvalues()[2] ? along[k] / moment : 0;
+    }
+    return axes.eigenvectors() * along;
+}
+
+}  // namespace
+
+void RigidFallback::begin(const Substep& step)
+{
+    for (std::vector<Vec3d>* values : {&start_, &P_, &v_}) values->resize(step.size());
+    for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            start_[i] = step.start[i], P_[i] = step.points[i].P, v_[i] = step.v[i];
+    });
+}
+
+double RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, bool anchored) const
+{
+    anchored |= std::any_of(points.begin(), points.end(), [&](std::uint32_t i) {
+        return !step.mobility.empty() && (step.mobility[i].stiffness > 0 || step.surface_springs[i].w2 > 0);
+    });
+    if (anchored)
+        hold(step, points);
+    else
+        move(step, points);
+    double change = 0;
+    for (const std::uint32_t i : points)
+        change += 0.5 * (step.v[i].squaredNorm() - v_[i].squaredNorm()) / step.inverse_mass[i] +
+                  potential_energy(step, i, step.points[i].P) - potential_energy(step, i, P_[i]);
+    return change;
+}
+
+void RigidFallback::hold(Substep& step, std::span<const std::uint32_t> points) const
+{
+    for (const std::uint32_t i : points) place(step, i, start_[i], Vec3d::Zero());
+}
+
+void RigidFallback::move(Substep& step, std::span<const std::uint32_t> points) const
+{
+    double mass = 0;
+    Vec3d middle = Vec3d::Zero(), displacement = Vec3d::Zero(), velocity = Vec3d::Zero();
+    for (const std::uint32_t i : points) {
+        const double m = 1 / step.inverse_mass[i];
+        mass += m;
+        middle += m * start_[i];
+        displacement += m * (P_[i] - start_[i]);
+        velocity += m * v_[i];
+    }
+    middle /= mass, displacement /= mass, velocity /= mass;
+
+    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+    Vec3d momentum = Vec3d::Zero();
+    for (const std::uint32_t i : points) {
+        const double m = 1 / step.inverse_mass[i];
+        const Vec3d arm = start_[i] - middle;
+        inertia += m * (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
+        momentum += m * arm.cross(v_[i] - velocity);
+    }
+    const Vec3d omega = angular_velocity(inertia, momentum);
+    for (const std::uint32_t i : points)
+        place(step, i, start_[i] + displacement, velocity + omega.cross(start_[i] - middle));
+}
+
+// As the free motion leaves a point.
+void RigidFallback::place(Substep& step, std::uint32_t i, const Vec3d& P, const Vec3d& v) const
+{
+    step.displacement[i] += step.dt * (v - step.v[i]);
+    step.points[i].P = P;
+    step.start[i] = start_[i];
+    step.v[i] = v;
+}
+
+}  // namespace rapid

@@ -1,0 +1,11 @@
+// The potential energy of springs to the surfaces of shapes.
+#pragma once
+
+#include "runtime/solver/forces.h"
+
+namespace rapid {
+
+// J/kg, of a point at P: w2 φ²/2, with the distance φ of the shape as far as its gradient tells it.
+double potential_energy(const SurfaceSpring& spring, const Vec3d& P);
+
+}  // namespace rapid

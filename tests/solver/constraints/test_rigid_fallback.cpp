@@ -1,0 +1,130 @@
+// Points without a solution move as one rigid body.
+#include "runtime/solver/constraints/rigid_fallback.h"
+
+#include <rapidcheck.h>
+
+#include <numeric>
+#include <random>
+
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+struct Body {
+    std::vector<ProjectedPoint> points;
+    std::vector<Vec3d> v, start, displacement;
+    std::vector<double> inverse_mass;
+    std::vector<std::uint32_t> all;
+    Substep step;
+
+    // line: all points on one axis, about which there is no inertia.
+    Body(unsigned seed, std::size_t n, bool line) : displacement(n, Vec3d::Zero()), all(n), random_(seed)
+    {
+        const Vec3d axis = any();
+        for (std::size_t i = 0; i < n; ++i) {
+            inverse_mass.push_back(std::pow(10, 2 * number_(random_)));
+            v.push_back(any());
+            start.push_back(line ? Vec3d(any()[0] * axis) : any());
+            points.push_back({start[i] + 0.1 * any(), inverse_mass[i]});
+        }
+        std::iota(all.begin(), all.end(), 0u);
+        step.points = points, step.v = v, step.start = start, step.displacement = displacement;
+        step.inverse_mass = inverse_mass;
+        step.dt = 0.1;
+    }
+
+    Vec3d any() { return {number_(random_), number_(random_), number_(random_)}; }
+    // The velocities of a turn about the middle.
+    void turn(const Vec3d& omega)
+    {
+        for (const std::uint32_t i : all) v[i] = omega.cross(start[i] - mean(start));
+    }
+    double mass(std::size_t i) const { return 1 / inverse_mass[i]; }
+    Vec3d mean(std::span<const Vec3d> values) const
+    {
+        Vec3d sum = Vec3d::Zero();
+        double all_mass = 0;
+        for (std::size_t i = 0; i < values.size(); ++i) sum += mass(i) * values[i], all_mass += mass(i);
+        return sum / all_mass;
+    }
+    std::vector<Vec3d> places() const
+    {
+        std::vector<Vec3d> P;
+        for (const ProjectedPoint& point : points) P.push_back(point.P);
+        return P;
+    }
+    Vec3d turning(const std::vector<Vec3d>& P) const
+    {
+        Vec3d sum = Vec3d::Zero();
+        for (const std::uint32_t i : all) sum += mass(i) * (P[i] - mean(P)).cross(v[i]);
+        return sum;
+    }
+    double kinetic() const
+    {
+        double sum = 0;
+        for (const std::uint32_t i : all) sum += 0.5 * mass(i) * v[i].squaredNorm();
+        return sum;
+    }
+
+private:
+    std::mt19937 random_;
+    std::uniform_real_distribution<double> number_{-1, 1};
+};
+
+TEST_CASE("a rigid fallback keeps distances and momenta, and gives no energy", "[rigid_fallback]")
+{
+    rc::prop("", [](unsigned seed, bool line) {
+        Body body(seed, 2 + seed % 6, line);
+        RigidFallback fallback;
+        fallback.begin(body.step);
+        const std::vector<Vec3d> start = body.start, free = body.places();
+        const Vec3d velocity = body.mean(body.v), turning = body.turning(start);
+        const double before = body.kinetic();
+        for (ProjectedPoint& point : body.points) point.P += 1e3 * body.any();
+        for (Vec3d& v : body.v) v = 1e3 * body.any();
+        const double change = fallback.apply(body.step, body.all, false);
+        const std::vector<Vec3d> P = body.places();
+        for (const std::uint32_t i : body.all)
+            for (const std::uint32_t j : body.all)
+                RC_ASSERT(std::abs((P[i] - P[j]).norm() - (start[i] - start[j]).norm()) <= 1e-12);
+        RC_ASSERT((body.mean(P) - body.mean(free)).norm() <= 1e-12);
+        RC_ASSERT((body.mean(body.v) - velocity).norm() <= 1e-12);
+        RC_ASSERT((body.turning(P) - turning).norm() <= 1e-9 * (1 + turning.norm()));
+        RC_ASSERT(body.kinetic() <= before * (1 + 1e-12));
+        RC_ASSERT(std::abs(body.kinetic() - before - change) <= 1e-12 * before);
+    });
+}
+
+TEST_CASE("a rigid fallback loses nothing of a body that turns", "[rigid_fallback]")
+{
+    Body body(1, 5, false);
+    body.turn({1, -2, 3});
+    RigidFallback fallback;
+    fallback.begin(body.step);
+    const std::vector<Vec3d> v = body.v;
+    CHECK(fallback.apply(body.step, body.all, false) == Approx(0).margin(1e-12 * body.kinetic()));
+    for (const std::uint32_t i : body.all) CHECK((body.v[i] - v[i]).norm() <= 1e-12);
+}
+
+TEST_CASE("what is linked to a point at rest, or drawn to a place, stays where it was", "[rigid_fallback]")
+{
+    const bool drawn = GENERATE(false, true);
+    Body body(3, 4, false);
+    std::vector<Mobility> mobility(4, {0.1, 0.005});
+    const std::vector<SurfaceSpring> none(4);
+    if (drawn) {
+        mobility[2].stiffness = 10;
+        body.step.mobility = mobility;
+        body.step.surface_springs = none;
+    }
+    RigidFallback fallback;
+    fallback.begin(body.step);
+    const std::vector<Vec3d> start = body.start;
+    fallback.apply(body.step, body.all, !drawn);
+    CHECK(body.places() == start);
+    CHECK(body.kinetic() == 0);
+}
+
+}  // namespace
+}  // namespace rapid

@@ -9,11 +9,16 @@
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/rows.h"
+#include "runtime/solver/constraints/twin.h"
+
+#include <fmt/format.h>
 
 #include <set>
 
 namespace rapid {
 namespace {
+
+constexpr double bytes_a_bond = 320;  // of a row, its entry in the index of bonds, and of the search for it
 
 struct Bond {
     static constexpr int points = 2;
@@ -68,6 +73,10 @@ public:
         if (strength < std::exchange(bonds->strength, strength)) bonds->wake_all();
         return bonds;
     }
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of(*this, &ClumpConstraint::bonds, before);
+    }
 
 private:
     // Bonds all pairs that touch and are not bonded yet. A broken bond is forgotten once its points are apart.
@@ -90,7 +99,8 @@ private:
         }
         if (now == bonds->searched) return;
         Pairs near;
-        ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, largest / 4, 8), near);
+        ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, largest / 4, 8), near,
+                             {fmt::format("radius = {:g} m", largest / touch), "give a smaller radius", bytes_a_bond});
 
         std::set<std::array<std::int64_t, 2>> touching;
         for (std::size_t i = 0; i < n; ++i)
@@ -110,7 +120,7 @@ private:
 
 struct Clump {
     std::optional<PerPoint<float>> radius;
-    double strength = 1;
+    double strength;
     std::string group;
 
     static NodeType declare()

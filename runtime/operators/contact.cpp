@@ -3,7 +3,10 @@
 // Pairs are found in sparse grids of cells, one for each cluster of radii: `max_difference` and `max_grids` trade the
 // time of many grids for that of wide cells (Algorithm 1; solver/constraints/radius_grids.h).
 #include "runtime/graph/node.h"
+#include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contacts.h"
+#include "runtime/solver/constraints/spin.h"
+#include "runtime/solver/constraints/twin.h"
 
 namespace rapid {
 namespace {
@@ -22,14 +25,20 @@ public:
         return contacts;
     }
     std::optional<PerPoint<float>> radius() const override { return options.radius; }
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of(*this, &ContactConstraint::contacts, before);
+    }
 };
 
 struct ContactNode {
     std::optional<PerPoint<float>> radius;
     PerPoint<float> bounce, friction;
     std::optional<double> max_difference;
-    int max_grids = 8;
-    double mass_scaling = 0;
+    int max_grids;
+    double mass_scaling;
+    bool record, spin;
+    PerPoint<float> rolling;
     std::string group;
 
     static NodeType declare()
@@ -51,14 +60,44 @@ struct ContactNode {
             .param(
                 &ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, most_scaling), "",
                 "a point counts as e^mass_scaling times lighter than what it stands on, against gravity: tall stacks "
-                "hold with few sub-steps, and flow less");
+                "hold with few sub-steps, and flow less")
+            .param(&ContactNode::record, "record", false, any_number(), "",
+                   "writes the forces of contacts, with points and shapes, to the attributes normalforce and "
+                   "frictionforce (N, means over the frame) and contactnum")
+            .constant()
+            .param(&ContactNode::spin, "spin", false, any_number(), "",
+                   "friction turns points, as solid spheres, by the attributes w (rad/s) and orient")
+            .constant()
+            .param(&ContactNode::rolling, "rolling", 0.0, at_least(0), "",
+                   "with spin: coefficient of rolling friction, a torque of at most rolling times the normal force "
+                   "and the radius; of two points the geometric mean");
+    }
+
+    void check() const
+    {
+        if (!spin && (!rolling.attribute.empty() || rolling.constant > 0))
+            throw Error("rolling is the friction of points that turn; add spin = true");
+    }
+
+    void uses(Uses& uses) const
+    {
+        const auto uses_all = [&](const auto& names) {
+            uses.reads.insert(uses.reads.end(), std::begin(names), std::end(names));
+            uses.writes.insert(uses.writes.end(), std::begin(names), std::end(names));
+        };
+        if (record) uses_all(ContactForces::names);
+        if (!spin) return;
+        uses_all(SpinState::names);
+        uses.makes.push_back({"orient", Quatf(Quatf::Identity())});
+        uses.makes.push_back({"w", Vec3f(Vec3f::Zero())});
     }
 
     std::shared_ptr<const Constraint> dynamic(const Evaluation& now) const
     {
         auto constraint = dynamic_of<ContactConstraint>(now, group);
         constraint->contacts = contacts_;
-        constraint->options = {radius, bounce, friction, max_difference, max_grids, mass_scaling};
+        constraint->options = {radius,       bounce, friction, max_difference, max_grids,
+                               mass_scaling, record, spin,     rolling};
         return constraint;
     }
 

@@ -4,10 +4,10 @@
 //
 // Chains and trees of pairs are solved directly whatever their length (solver/constraints/tree_solver.h).
 #include "runtime/graph/node.h"
-#include "runtime/memory_budget.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/rows.h"
+#include "runtime/solver/constraints/twin.h"
 
 #include <fmt/format.h>
 
@@ -29,6 +29,8 @@ void read_value(const Param& param, const Value& value, PointPair& pair)
 }
 
 namespace {
+
+constexpr double bytes_a_tie = 256;  // of a row, and of the search for it
 
 struct Tie {
     static constexpr int points = 2;
@@ -68,6 +70,10 @@ public:
         rows_->follow(points, group);
         return rows_->size() > 0 || rows_->wakes() ? rows_ : nullptr;
     }
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of(*this, &TieConstraint::rows_, before);
+    }
 
 private:
     std::shared_ptr<Rows<Tie>> rows_;
@@ -76,7 +82,7 @@ private:
 struct Distance {
     std::vector<PointPair> pairs;
     std::optional<double> within, rest, strain;
-    double compliance = 0;
+    double compliance;
     std::string group;
 
     static NodeType declare()
@@ -144,34 +150,15 @@ private:
         std::vector<Vec3d> at(points.size());
         cast(std::span(P.data, P.stride ? points.size() : 0), at);
         if (P.stride == 0) std::fill(at.begin(), at.end(), P[0].cast<double>());
-        require_room(at);
         const float reach = static_cast<float>(*within / 2);
         const Strided<std::uint8_t> members = members_of(points, group);
         Pairs near;
-        ContactSearch().find(at, {&reach, 0}, RadiusGrids({&reach, 0}, at.size(), 0, 1), near);
+        ContactSearch().find(at, {&reach, 0}, RadiusGrids({&reach, 0}, at.size(), 0, 1), near,
+                             {fmt::format("within = {:g}", *within), "give a smaller within", bytes_a_tie});
         for (std::size_t i = 0; i < at.size(); ++i)
             for (const std::uint32_t j : near.of(i))
                 if (members[i] && members[j]) add(i, j);
         return rows;
-    }
-
-    // Error: more pairs than there is memory for, by the neighbours of a few points.
-    void require_room(const std::vector<Vec3d>& P) const
-    {
-        constexpr double bytes_a_pair = 256;
-        constexpr std::size_t sample = 16;
-        const std::size_t n = P.size(), asked = std::min(n, sample);
-        if (0.5 * static_cast<double>(n) * static_cast<double>(n) * bytes_a_pair < 0x1p30) return;
-        std::size_t near = 0;
-        for (std::size_t k = 0; k < asked; ++k) {
-            const Vec3d& middle = P[k * n / asked];
-            for (const Vec3d& x : P) near += (x - middle).squaredNorm() < *within * *within;
-        }
-        const double found =
-            0.5 * static_cast<double>(near - asked) / static_cast<double>(asked) * static_cast<double>(n);
-        if (!fits_in_memory(found * bytes_a_pair))
-            throw beyond_memory(fmt::format("within = {:g}: about {:.2g} pairs of {} points", *within, found, n),
-                                found * bytes_a_pair, "give a smaller within");
     }
 
     std::shared_ptr<Rows<Tie>> rows_;  // null until points have entered

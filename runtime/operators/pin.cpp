@@ -9,6 +9,7 @@
 #include "runtime/shapes/motion/motion.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
+#include "runtime/solver/constraints/twin.h"
 
 #include <map>
 
@@ -54,6 +55,14 @@ struct Along {
 };
 
 struct Pins {
+    Pins() = default;
+    // The springs of a copy draw to its own pins.
+    Pins(const Pins& other) : by_id(other.by_id), held(other.held), springs(other.springs)
+    {
+        springs.for_each([&](const auto& ids, Along& along) { along.pin = &by_id.at(ids[0]); });
+    }
+    Pins& operator=(const Pins&) = delete;
+
     std::map<std::int64_t, Pin> by_id;  // addresses of pins are stable
     std::vector<std::int64_t> held;     // in the last frame
     Rows<Along> springs;                // where pins have a compliance
@@ -78,6 +87,7 @@ public:
             if (rigid_) sleep->make_kinematic(static_cast<std::uint32_t>(i));
     }
     bool has_forces() const override { return !rigid_; }
+    bool is_driven() const override { return true; }
     void add_stored_energy(const Substep& step, std::span<const Vec3d> at, double factor,
                            std::span<double> energy) const override
     {
@@ -164,6 +174,10 @@ public:
         pins->held = std::move(held);
         return any ? coupling : nullptr;
     }
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of(*this, &PinConstraint::pins, before);
+    }
 
 private:
     // Points that are held in only one of two frames; their ids ascend.
@@ -180,7 +194,7 @@ private:
 struct PinNode {
     PinTarget target;
     MotionPtr transform;
-    double compliance = 0;
+    double compliance;
     std::string group;
 
     static NodeType declare()

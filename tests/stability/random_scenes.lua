@@ -9,22 +9,13 @@
 -- pick, magnitude and the others draw what else a scene has.
 local command = require "testing.command"
 local json = require "dkjson"
+local lehmer = require "tests.lehmer"
 
 local random_scenes = {}
 
--- Lehmer's generator: the same numbers everywhere.
-local state
-local function random()
-  state = (state * 48271) % 2147483647
-  return state / 2147483647
-end
-function random_scenes.start(seed, number)
-  state = (seed * 1000003 + number * 7919) % 2147483646 + 1
-  for _ = 1, 3 do random() end
-end
-local function pick(list) return list[math.floor(random() * #list) + 1] end
-local function chance(part) return random() < part end
-local function magnitude(low, high) return 10 ^ (low + (high - low) * random()) end
+local draw = lehmer.new()
+random_scenes.start = draw.start
+local random, pick, chance, magnitude = draw.random, draw.pick, draw.chance, draw.magnitude
 local function literal(x) return ("%.9g"):format(x) end
 local function vector(low, high)
   local size = magnitude(low, high)
@@ -67,7 +58,7 @@ values["name of a group"] = function() return '"some"' end
 values["list of vec3"] = function()
   return ("{{0, 0, 0}, %s, {1, 0, 0}, %s}"):format(vector(-3, 3), vector(-3, 3))
 end
-values["mesh, level set, shape or points"] = function()
+values["mesh, level set, shape, points or node"] = function()
   return pick { "solid", "rapid.mesh.sphere { radius = 0.5 }", "rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} }",
     ("rapid.mesh.box { size = {1, 0.1, 1} }:transform(%s)"):format(values.motion()) }
 end
@@ -75,6 +66,7 @@ values["number or {min, max}"] = function()
   local least = magnitude(-4, 1)
   return pick { "0", literal(least), ("{%s, %s}"):format(literal(least), literal(least * 3)) }
 end
+values["number or names"] = function() return literal(random()) end
 values["number, {min, max} or rapid.attr"] = values["number or {min, max}"]
 values.attributes = function() return ("{ own = %s }"):format(literal(random())) end
 values["list of frames"] = function() return pick { "{}", "{3}" } end
@@ -119,6 +111,10 @@ local rule = { -- of parameters that exclude each other
   field = function(given) if given.mode ~= '"velocity"' then given.drag = nil end end,
   attract = function(given) if given.shape then given.center = nil end end,
   emit = function(given)
+    for _, of_a_node in ipairs { "source_group", "on", "min_speed", "limit", "inherit_velocity", "split",
+      "kill_parent" } do
+      given[of_a_node] = nil
+    end
     given.impulse, given.from, given.cut = nil, nil, chance(0.1) and "{3}" or nil
     given.rate, given.count = nil, literal(math.floor(random() * 30))
     if chance(0.5) then given.rate, given.count = literal(pick { 0, magnitude(-2, 3) }), nil end

@@ -30,11 +30,15 @@
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraints/projected_point.h"
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/forces.h"
 
 namespace rapid {
 
+class ContactForces;
 class EnergyIslands;
 class Sleep;
+struct ContactMaterial;
+struct Spin;
 
 // The coupled points of a set in one sub-step; shapes [size].
 struct Substep {
@@ -46,10 +50,15 @@ struct Substep {
     std::span<const std::uint8_t> dead;    // 1: takes no part any more; empty where none can have died
     std::span<const double> inverse_mass;  // 1/kg; 0 of points that do not move by themselves
     std::span<const Mobility> mobility;    // empty where no force has a linear part
+    std::span<const SurfaceSpring> surface_springs;  // empty as mobility is; a w2 of 0 where a point has none
     // m: of each point that moves, by its acceleration up to its velocity at the end; collisions aside. Empty unless
     // some constraint has forces.
     std::span<Vec3d> displacement;
-    std::span<FreePath> paths;           // empty where nothing bounces
+    std::span<FreePath> paths;  // empty where nothing bounces
+    // m/s: what shapes have changed the velocity of each point by in its free motion. Empty where nobody asks.
+    std::span<Vec3d> reaction;
+    std::span<Spin> spins;               // empty where no point turns
+    ContactForces* forces = nullptr;     // null where they are not recorded
     bool is_shared = false;              // contacts, shapes or other constraints act, too, beside a constraint
     double dt = 0;                       // s, of a point that lives through the whole frame
     double time = 0;                     // s since the start, at its end
@@ -98,8 +107,16 @@ public:
     // Whether it has impacts to solve.
     virtual bool bounces() const { return false; }
 
+    // The radii of the points whose contact forces it records, 0 of others; empty where it records none.
+    virtual std::span<const float> recorded() const { return {}; }
+
+    // What it turns points by; null where it turns none.
+    virtual const ContactMaterial* turns() const { return nullptr; }
+
     // Whether all that it does to points takes energy from them.
     virtual bool only_dissipates() const { return false; }
+    // Whether it moves points, or the ends of springs, by itself.
+    virtual bool is_driven() const { return false; }
     // Whether what it does to points are impulses between them alone.
     virtual bool keeps_momentum() const { return false; }
     // Adds the energy that its rows have stored, J times the factor, to that of one of their points each; at the
@@ -107,6 +124,9 @@ public:
     virtual void add_stored_energy(const Substep&, std::span<const Vec3d>, double, std::span<double>) const {}
     // Links the points between which energy has gone to and fro in the sub-step.
     virtual void link(EnergyIslands&) const {}
+    // Forgets the forces of rows on these points, which have moved otherwise, and moves them towards where its rigid
+    // rows are satisfied. By point: 1, or 0.
+    virtual void yield(Substep&, std::span<const std::uint8_t>) {}
 
     // In the order of the calls; see above.
     virtual void move_kinematic(Substep&) {}
@@ -133,6 +153,11 @@ public:
     // The radius, m, that it gives its points, where it is not the attribute pscale: shapes keep them at that distance,
     // too (collision_radii.h).
     virtual std::optional<PerPoint<float>> radius() const { return std::nullopt; }
+
+    // A constraint like this one that remembers for itself, to solve the same frames a second time: what `before` does,
+    // the twin of the frame before, or where that is null a copy of what this one does. Null where there is none: then
+    // the error of its points is not estimated.
+    virtual std::shared_ptr<const Constraint> twin(const Constraint*) const { return nullptr; }
 };
 
 }  // namespace rapid

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "runtime/points/members.h"
 
@@ -22,6 +23,18 @@ ContactMaterial::ContactMaterial(const PointSet& points, const ContactOptions& o
         restitution[i] = bounce[i];
         bounces |= bounce[i] > 0;
         largest_radius = std::max(largest_radius, radius[i]);
+    }
+    if (options.spin) follow_spin(options.rolling.read(points));
+}
+
+// Impacts that turn points are solved at their times, those without restitution too: angular momentum is then kept.
+void ContactMaterial::follow_spin(Strided<float> rolling_friction)
+{
+    bounces = true;
+    rolling.resize(radius.size());
+    for (std::size_t i = 0; i < radius.size(); ++i) {
+        rolling[i] = rolling_friction[i];
+        restitution[i] = std::max(restitution[i], std::numeric_limits<float>::min());
     }
 }
 

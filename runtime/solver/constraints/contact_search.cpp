@@ -1,12 +1,18 @@
 #include "runtime/solver/constraints/contact_search.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
 
+#include "runtime/error.h"
+#include "runtime/memory_budget.h"
 #include "runtime/parallel.h"
+#include "runtime/solver/constraints/pair_estimate.h"
 
 namespace rapid {
 namespace {
@@ -17,6 +23,9 @@ constexpr float rounding = 1 + 0x1p-20f;
 // Spheres whose neighbours are looked for together: a fraction of a millisecond's work, so that a few thousand are
 // enough for several threads.
 constexpr std::size_t spheres_a_task = 2048;
+
+// Pairs are numbered by 32 bits.
+constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
 
 // Lists are short, mostly: std::sort would take longer to start.
 void sort_few(std::uint32_t* first, std::uint32_t* last)
@@ -82,18 +91,34 @@ bool touch(const SpheresView& spheres, std::uint32_t a, std::uint32_t b)
 
 }  // namespace
 
-void ContactSearch::find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs)
+void ContactSearch::find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs,
+                         const PairUse& use)
 {
     measure(P, reach);
     set_widths(grids);
-    used_ = 0;
     for (std::size_t g = 0; g < grids_.size(); ++g) {
         list_members(grids, g);
         sorter_.fill(grids_[g], spheres_, members_);
+    }
+    require_room(use);
+    used_ = 0;
+    for (std::size_t g = 0; g < grids_.size(); ++g) {
         find_within(grids_[g]);
         for (std::size_t c = 0; c < g; ++c) find_between(grids_[g], grids_[c]);
     }
     sort(pairs, P.size());
+}
+
+void ContactSearch::require_room(const PairUse& use) const
+{
+    const auto fit = [&](double pairs) { return pairs <= most_numbers && fits_in_memory(pairs * use.bytes_a_pair); };
+    const double points = static_cast<double>(spheres_.P.size());
+    if (fit(0.5 * points * points) || fit(most_pairs(grids_))) return;
+    const double found = estimate_pairs(grids_, spheres_);
+    if (fit(found)) return;
+    const std::string what = fmt::format("{}: about {:.2g} pairs of {} points", use.what, found, spheres_.P.size());
+    if (found > most_numbers) throw Error(fmt::format("{}; there can be {:.2g}; {}", what, most_numbers, use.remedy));
+    throw beyond_memory(what, found * use.bytes_a_pair, use.remedy);
 }
 
 void ContactSearch::measure(std::span<const Vec3d> P, Strided<float> reach)
@@ -208,6 +233,11 @@ void ContactSearch::sort(Pairs& pairs, std::size_t points)
     std::vector<const Found*> sources;
     for (const auto& part : std::span(found_).first(used_))
         for (const Found& found : part) sources.push_back(&found);
+    std::size_t all = 0;
+    for (const Found* found : sources) all += found->size();
+    if (static_cast<double>(all) > most_numbers)
+        throw Error(
+            fmt::format("{} pairs of points touch; there can be {:.2g}; give a smaller radius", all, most_numbers));
     const std::size_t each_size = bucket_size(points), buckets = points / each_size + 1, chunks = sources.size();
     starts_.assign(buckets * chunks + 1, 0);
     const auto each = [&](const auto& f) {

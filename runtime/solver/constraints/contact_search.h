@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -26,11 +27,20 @@ struct Pairs {
     }
 };
 
+// What becomes of the pairs, for the error where there is no memory for them.
+struct PairUse {
+    std::string what = "the search for contacts";  // "radius = 3 m"
+    std::string remedy = "give a smaller radius";
+    double bytes_a_pair = 32;  // in all; the search itself takes that
+};
+
 // Pairs with |P_i - P_j| < reach_i + reach_j.
 class ContactSearch {
 public:
-    // grids: of the radii, which the reaches may exceed; a reach is 0 for points in no grid.
-    void find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs);
+    // grids: of the radii, which the reaches may exceed; a reach is 0 for points in no grid. Error: more pairs than
+    // there is memory for, before they are looked for.
+    void find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs,
+              const PairUse& use = {});
 
 private:
     using Found = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
@@ -38,6 +48,7 @@ private:
     void measure(std::span<const Vec3d> P, Strided<float> reach);
     void set_widths(const RadiusGrids& grids);
     void list_members(const RadiusGrids& grids, std::size_t grid);
+    void require_room(const PairUse& use) const;
     std::vector<Found>& room_for(std::size_t spheres);
     void find_within(const CellGrid& grid);
     void find_between(const CellGrid& fine, const CellGrid& coarse);

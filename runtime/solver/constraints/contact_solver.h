@@ -3,10 +3,12 @@
 // weights: see MassScaling::with_weights().
 #pragma once
 
+#include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_pack.h"
 #include "runtime/solver/constraints/impact.h"
 #include "runtime/solver/constraints/point_pack.h"
 #include "runtime/solver/constraints/resting_speed.h"
+#include "runtime/solver/constraints/spin.h"
 
 namespace rapid {
 
@@ -30,14 +32,25 @@ inline bool solve_impact(const ContactPack& pack, std::uint32_t l, Substep& step
     u -= since * acceleration;
     const double distance = d.norm();
     if (!(distance > 0) || !(u.dot(d) < -at_rest * distance)) return false;
-    const Vec3d impulse = impact_impulse(d / distance, u, 1 / (wi + wj), pack.restitution[l], pack.friction[l]);
+    const Vec3d n = d / distance;
+    const Vec3d impulse =
+        step.spins.empty()
+            ? impact_impulse(n, u, 1 / (wi + wj), pack.restitution[l], pack.friction[l])
+            : spinning_impact(step, i, j, n, u, distance / pack.reach[l], pack.restitution[l], pack.friction[l]);
+    if (step.forces) {
+        const Vec3d friction = impulse - n.dot(impulse) * n;
+        const double work = friction.dot(u + 0.5 * (wi + wj) * friction);
+        for (const std::uint32_t k : {i, j}) step.forces->add(k, n, impulse), step.forces->add_work(k, 0.5 * work, 0);
+    }
     take_impulse(step, i, impulse, since, sweep);
     take_impulse(step, j, -impulse, since, sweep);
     return true;
 }
 
-// Of contacts that close faster than at rest. False where there are none, which is seen at once of most packs.
-inline bool solve_impacts(const ContactPack& pack, Substep& step, double at_rest, std::uint32_t sweep)
+// Of contacts that close faster than at rest, which are marked in `hits`, by pair. False where there are none, which is
+// seen at once of most packs.
+inline bool solve_impacts(const ContactPack& pack, Substep& step, double at_rest, std::uint32_t sweep,
+                          std::span<std::uint8_t> hits)
 {
     const PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
     const Vectors<Doubles> d = a.P - b.P, u = gather(step.v, pack.i) - gather(step.v, pack.j);
@@ -47,7 +60,9 @@ inline bool solve_impacts(const ContactPack& pack, Substep& step, double at_rest
     bool hit = false;
     for (; may_hit != 0; may_hit &= may_hit - 1) {
         const auto l = static_cast<std::uint32_t>(std::countr_zero(may_hit));
-        if (l < pack.count) hit |= solve_impact(pack, l, step, at_rest, sweep);
+        if (l >= pack.count || !solve_impact(pack, l, step, at_rest, sweep)) continue;
+        hits[pack.pair[l]] = 1;
+        hit = true;
     }
     return hit;
 }
@@ -89,8 +104,8 @@ template <class Weights>
 // throughout the sub-step, and so half of it on positions: else a point that is held would creep. recovery(pack): which
 // part of an overlap is taken away; null but in the last iteration. impact_speed: pairs that bounce, are pushed into
 // one another by recovery and close faster than this are left to the impacts of the next sub-step; infinite where none
-// bounce.
-template <class Weights, class Recovery>
+// bounce. frictional: false where points turn, and friction is solved apart (spin.h).
+template <bool frictional, class Weights, class Recovery>
 [[gnu::always_inline]] inline void solve_pack_velocities(ContactPack& pack, Substep& step, const Weights& weights,
                                                          const Recovery* recovery, double impact_speed)
 {
@@ -110,16 +125,18 @@ template <class Weights, class Recovery>
     if (std::isfinite(impact_speed))
         touches &= (before > 0) | (widen(pack.restitution) <= 0) | (normal_velocity >= -impact_speed);
     const Doubles normal = touches ? most(before - normal_velocity * mass, Doubles{}) : Doubles{};
-    const Vectors<Doubles> sticking = tangential_before - mass * (relative - normal_velocity * n);
-    const Doubles size = sqrt(dot(sticking, sticking)), bound = widen(pack.friction) * normal;
-    const Vectors<Doubles> tangential = (bound < size ? bound / size : Doubles{} + 1) * sticking;
-    const Vectors<Doubles> change = tangential - tangential_before;
+    Vectors<Doubles> impulse = (normal - before) * n, shift{};
+    if constexpr (frictional) {
+        const Vectors<Doubles> sticking = tangential_before - mass * (relative - normal_velocity * n);
+        const Doubles size = sqrt(dot(sticking, sticking)), bound = widen(pack.friction) * normal;
+        const Vectors<Doubles> tangential = (bound < size ? bound / size : Doubles{} + 1) * sticking;
+        const Vectors<Doubles> change = tangential - tangential_before;
+        pack.tangential_impulse = narrow(tangential);
+        impulse += change;
+        shift = (0.5 * step.dt) * change;
+    }
     pack.normal_impulse = narrow(normal);
-    pack.tangential_impulse = narrow(tangential);
     pack.carried_impulse = Floats{};
-
-    const Vectors<Doubles> impulse = (normal - before) * n + change;
-    Vectors<Doubles> shift = (0.5 * step.dt) * change;
     const auto [wa, wb] = weights(pack, a, b);
     va += wa * impulse;
     vb -= wb * impulse;

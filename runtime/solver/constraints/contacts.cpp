@@ -9,9 +9,11 @@
 
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
+#include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_solver.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/resting_speed.h"
+#include "runtime/solver/constraints/spin.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -49,6 +51,7 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
         grids_ = RadiusGrids({material_.radius.data(), 1}, points.size(),
                              options.max_difference.value_or(material_.largest_radius / 4), options.max_grids);
     scaling_.set(options.mass_scaling);
+    records_ = options.record;
     search_seconds_ = 0;
     begins_frame_ = true;
 
@@ -82,6 +85,8 @@ void Contacts::renumber(const Column<std::int64_t>& ids, std::span<const std::ui
 void Contacts::search(const Substep& step)
 {
     const Stopwatch stopwatch;
+    for (std::size_t k = 0; k < hit_.size(); ++k)
+        if (hit_[k]) hit_before_.push_back(impulses_.pairs[k]);
     list_.build(step, material_.radius, grids_);
     std::swap(impulses_, previous_);
     blocks_.build(list_, impulses_.pairs);
@@ -92,7 +97,9 @@ void Contacts::search(const Substep& step)
         for (std::size_t k = first; k < last; ++k)
             reach_[k] = static_cast<float>(material_.reach(pairs[k][0], pairs[k][1]));
     });
+    hit_.assign(material_.bounces ? pairs.size() : 0, 0);
     impulses_.take_over(previous_, list_.pairs(), blocks_.slots(), sleep_.sleep());
+    if (material_.turns()) impulses_.rolling.resize(pairs.size(), Vec3f::Zero());
     search_seconds_ += stopwatch.seconds();
 }
 
@@ -123,6 +130,8 @@ void Contacts::detect(Substep& step)
     if (begins_frame_) heavy_.begin(step);
     begins_frame_ = false;
     scaling_.begin(step);
+    hit_.assign(material_.bounces ? impulses_.pairs.size() : 0, 0);
+    hit_before_.clear();
     update_contacts(step);
 }
 
@@ -159,7 +168,7 @@ bool Contacts::sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t 
     std::atomic<bool> hit = false;
     backwards_ = !backwards_;
     sweep([&](const ContactPack& pack) {
-        if (changed(pack) && rapid::solve_impacts(pack, step, at_rest, number))
+        if (changed(pack) && rapid::solve_impacts(pack, step, at_rest, number, hit_))
             hit.store(true, std::memory_order_relaxed);
     });
     return hit;
@@ -262,6 +271,7 @@ void Contacts::warm_start(Substep& step)
     scaling_.with_weights(
         [&](const auto& weights) { sweep([&](const ContactPack& pack) { apply_warm_start(pack, step, weights); }); });
     each_point([&](std::size_t i) { step.v[i] += per_dt_ * (step.points[i].P - before_[i]); });
+    if (material_.turns()) sweep([&](const ContactPack& pack) { start_spins(pack, step, impulses_.rolling); });
 }
 
 void Contacts::project(Substep& step)
@@ -286,18 +296,28 @@ void Contacts::solve_velocities(Substep& step)
         const decltype(part_recovered)* none = nullptr;
         for (int k = 1; k < step.iterations; ++k) {
             backwards_ = !backwards_;
-            sweep([&](ContactPack& pack) { solve_pack_velocities(pack, step, weights, none, impact_speed); });
+            sweep([&](ContactPack& pack) { solve_pack(pack, step, weights, none, impact_speed); });
         }
         backwards_ = !backwards_;
         sweep([&](ContactPack& pack) {
-            solve_pack_velocities(pack, step, weights, &part_recovered, impact_speed);
+            solve_pack(pack, step, weights, &part_recovered, impact_speed);
             store(pack);
+            if (step.forces) add_forces(pack, step);
             if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
             if (some_asleep)
                 for_each_contact(pack,
                                  [&](const PairContact& contact) { sleep_.wake_by_load(contact, impulses_, step); });
         });
     });
+}
+
+template <class Weights, class Recovery>
+void Contacts::solve_pack(ContactPack& pack, Substep& step, const Weights& weights, const Recovery* recovery,
+                          double impact_speed)
+{
+    if (!material_.turns()) return solve_pack_velocities<true>(pack, step, weights, recovery, impact_speed);
+    solve_pack_velocities<false>(pack, step, weights, recovery, impact_speed);
+    solve_spins(pack, step, impulses_.rolling);
 }
 
 void Contacts::store(const ContactPack& pack)
@@ -308,12 +328,37 @@ void Contacts::store(const ContactPack& pack)
     }
 }
 
+std::span<const float> Contacts::recorded() const
+{
+    return records_ ? std::span<const float>(material_.radius) : std::span<const float>();
+}
+
+// Friction is the same throughout the sub-step: its work is along the way that the points slip.
+void Contacts::add_forces(const ContactPack& pack, const Substep& step)
+{
+    ContactForces& forces = *step.forces;
+    for (std::uint32_t l = 0; l < pack.count; ++l) {
+        if (!(pack.normal_impulse[l] > 0)) continue;
+        const std::uint32_t i = pack.i[l], j = pack.j[l];
+        const Vec3d slip = (step.points[i].P - step.start[i]) - (step.points[j].P - step.start[j]);
+        const double work = pack.tangential_impulse[l].dot(slip) / step.dt;
+        for (const std::uint32_t k : {i, j}) {
+            forces.add(k, pack.normal_impulse[l], pack.tangential_impulse[l].norm());
+            forces.add_work(k, 0.5 * work, 0);
+            forces.count(k);
+        }
+    }
+}
+
 void Contacts::link(EnergyIslands& islands) const
 {
     packs_.for_each([&](const PairContact& contact) {
         if (impulses_.normal[contact.pair] > 0 || contact.initial_gap < 0)
             islands.link(std::array{contact.i, contact.j});
     });
+    for (const ContactPair& pair : hit_before_) islands.link(pair);
+    for (std::size_t k = 0; k < hit_.size(); ++k)
+        if (hit_[k]) islands.link(impulses_.pairs[k]);
 }
 
 void Contacts::correct_penetration(Substep& step)

@@ -34,8 +34,10 @@ public:
 
     void join(Sleep* sleep) override;
     bool bounces() const override { return material_.bounces; }
-    bool only_dissipates() const override { return true; }  // but for mass scaling, whose gain is told
+    const ContactMaterial* turns() const override { return material_.turns() ? &material_ : nullptr; }
+    bool only_dissipates() const override { return !material_.turns(); }  // but for mass scaling, whose gain is told
     bool keeps_momentum() const override { return !scaling_.is_set(); }
+    std::span<const float> recorded() const override;
     void link(EnergyIslands& islands) const override;
     void detect(Substep& step) override;
     bool solve_impacts(Substep& step, std::uint32_t sweep) override;
@@ -55,16 +57,24 @@ private:
     bool may_touch(std::uint32_t pair, const Substep& step) const;
     void begin(ContactPack& pack, const Substep& step) const;
     void store(const ContactPack& pack);
+    static void add_forces(const ContactPack& pack, const Substep& step);
     template <class F>
     void sweep(const F& f);
+    template <class Weights, class Recovery>
+    void solve_pack(ContactPack& pack, Substep& step, const Weights& weights, const Recovery* recovery,
+                    double impact_speed);
 
     std::vector<std::int64_t> ids_;
     ContactMaterial material_;
+    bool records_ = false;
     RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};
     NeighbourList list_;
     PairBlocks blocks_;
     PairImpulses impulses_, previous_;  // in the order of the blocks; and of the list before
-    std::vector<float> reach_;          // m, of each pair; padded for whole packs
+    // Of each pair, whether an impact has hit it in this sub-step; and those of the lists before that it has hit.
+    std::vector<std::uint8_t> hit_;
+    std::vector<ContactPair> hit_before_;
+    std::vector<float> reach_;  // m, of each pair; padded for whole packs
     ContactPacks packs_;
     MassScaling scaling_;
     HeavyContacts heavy_;

@@ -67,6 +67,7 @@ inline void take_impulse(Substep& step, std::uint32_t i, const Vec3d& impulse, d
     ProjectedPoint& at = step.points[i];
     if (!(at.w > 0)) return;
     FreePath& path = step.paths[i];
+    if (!step.reaction.empty()) step.reaction[i] -= since * path.reaction;
     const Vec3d change = impact_inverse_mass(step, i) * impulse - 0.5 * since * path.reaction;
     at.P += since * change;
     step.v[i] += change - 0.5 * since * path.reaction;

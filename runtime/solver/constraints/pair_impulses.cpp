@@ -12,6 +12,7 @@ void PairImpulses::scale(float factor)
     for (float& impulse : normal) impulse *= factor;
     for (Vec3f& impulse : tangential) impulse *= factor;
     for (Vec3f& impulse : resting) impulse *= factor;
+    for (Vec3f& impulse : rolling) impulse *= factor;
 }
 
 void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& bereft)
@@ -19,7 +20,7 @@ void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<st
     struct Kept {
         ContactPair pair;
         float normal;
-        Vec3f tangential, resting;
+        Vec3f tangential, resting, rolling;
     };
     std::vector<Kept> kept;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -30,16 +31,19 @@ void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<st
         if (i == IdIndex::none || j == IdIndex::none) continue;
         const float sign = i > j ? -1.0f : 1.0f;
         const Vec3f rested = resting.empty() ? Vec3f(Vec3f::Zero()) : resting[k];
-        kept.push_back({{std::min(i, j), std::max(i, j)}, normal[k], sign * tangential[k], sign * rested});
+        const Vec3f rolled = rolling.empty() ? Vec3f(Vec3f::Zero()) : rolling[k];
+        kept.push_back(
+            {{std::min(i, j), std::max(i, j)}, normal[k], sign * tangential[k], sign * rested, sign * rolled});
     }
     std::sort(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) { return a.pair < b.pair; });
-    const bool some_resting = !resting.empty();
+    const bool some_resting = !resting.empty(), some_rolling = !rolling.empty();
     *this = {};
     for (const Kept& k : kept) {
         pairs.push_back(k.pair);
         normal.push_back(k.normal);
         tangential.push_back(k.tangential);
         if (some_resting) resting.push_back(k.resting);
+        if (some_rolling) rolling.push_back(k.rolling);
     }
 }
 
@@ -50,6 +54,7 @@ void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std:
     normal.assign(m, 0);
     tangential.assign(m, Vec3f::Zero());
     resting.assign(before.resting.empty() ? 0 : m, Vec3f::Zero());
+    rolling.assign(before.rolling.empty() ? 0 : m, Vec3f::Zero());
     for_each_chunk(before.pairs.size(), [&](std::size_t first, std::size_t last) {
         for (std::size_t k = first; k < last; ++k) {
             const bool pressed = before.normal[k] > 0;
@@ -65,6 +70,7 @@ void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std:
             normal[to] = before.normal[k];
             tangential[to] = before.tangential[k];
             if (!resting.empty()) resting[to] = before.resting[k];
+            if (!rolling.empty()) rolling[to] = before.rolling[k];
         }
     });
 }

@@ -22,6 +22,7 @@ struct PairImpulses {
     // N s, on the first point: the whole impulse at the end of the last frame in which both were awake. Empty until
     // points may sleep.
     std::vector<Vec3f> resting;
+    std::vector<Vec3f> rolling;  // N m s, by rolling friction, on the first point; empty where points do not turn
 
     // A sub-step of another length begins with the same forces.
     void scale(float factor);

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
+#include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/impact.h"
 #include "runtime/solver/constraints/resting_speed.h"
 #include "runtime/solver/constraints/sleep.h"
+#include "runtime/solver/constraints/spin.h"
 
 namespace rapid {
 namespace {
@@ -18,6 +21,13 @@ constexpr double flush = 0.01;
 
 // Points that are handled together.
 constexpr std::size_t points_a_task = 2048;
+
+bool turns(const Substep& step, std::uint32_t i) { return !step.spins.empty() && step.spins[i].k > 0; }
+
+double friction_of(const Obstacle& obstacle, std::uint32_t i)
+{
+    return obstacle.response == Response::Stick ? std::numeric_limits<double>::max() : double(obstacle.friction[i]);
+}
 
 }  // namespace
 
@@ -42,23 +52,23 @@ void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& 
         contact.obstacle = load.obstacle;
         contact.normal_impulse = contact.carried_impulse = 0.5 * dt * load.normal;
         contact.tangential_impulse = dt * load.tangent.cast<double>();
+        contact.rolling_impulse = dt * load.rolling.cast<double>();
         contacts_[i / points_a_task].push_back(contact);
     }
-    for (Batch& contacts : contacts_)
-        std::sort(contacts.begin(), contacts.end(), [](const ShapeContact& a, const ShapeContact& b) {
-            return std::pair(a.obstacle, a.i) < std::pair(b.obstacle, b.i);
-        });
+    for (Batch& contacts : contacts_) std::sort(contacts.begin(), contacts.end(), is_before);
 }
 
-void ShapeContacts::remember(ShapeLoads& loads, const Column<std::int64_t>& ids, double dt) const
+void ShapeContacts::remember(ShapeLoads& loads, const Column<std::int64_t>& ids, const Substep& step) const
 {
+    const double dt = step.dt;
     loads.loads.clear();
     for (const Batch& contacts : contacts_)
         for (const ShapeContact& contact : contacts) {
             const double normal = contact.normal_impulse + contact.carried_impulse;
-            if (normal > 0)
+            if (normal > 0 || (turns(step, contact.i) && contact.free_impulse > 0))
                 loads.loads.push_back({ids[contact.i], contact.obstacle, static_cast<float>(normal / dt),
-                                       (contact.tangential_impulse / dt).cast<float>()});
+                                       (contact.tangential_impulse / dt).cast<float>(),
+                                       (contact.rolling_impulse / dt).cast<float>()});
         }
 }
 
@@ -100,16 +110,28 @@ void ShapeContacts::solve_impact(const ShapeContact& contact, Substep& step, std
     u -= since * path.acceleration;
     if (!(u.dot(contact.n) < -resting_speed(step))) return;
     const double w = impact_inverse_mass(step, i), restitution = obstacles_[contact.obstacle].restitution(i);
-    take_impulse(step, i, impact_impulse(contact.n, u, 1 / w, restitution, contact.friction), since, sweep);
+    const Vec3d impulse = turns(step, i)
+                              ? spinning_impact(step.spins[i], w, contact.n, u, restitution, contact.friction)
+                              : impact_impulse(contact.n, u, 1 / w, restitution, contact.friction);
+    if (step.forces) {
+        const Vec3d friction = impulse - contact.n.dot(impulse) * contact.n;
+        step.forces->add(i, contact.n, impulse);
+        step.forces->add_work(i, friction.dot(u + 0.5 * w * friction), impulse.dot(contact.vc));
+    }
+    take_impulse(step, i, impulse, since, sweep);
 }
 
 void ShapeContacts::warm_start(Substep& step)
 {
+    if (!step.reaction.empty()) share_reactions(step);
     const auto start_chunk = [&](std::size_t begin, std::size_t) {
         for (ShapeContact& contact : contacts_[begin / points_a_task]) {
             if (!step.paths.empty()) leave_parting(contact, step);
             const double w = step.points[contact.i].w;
-            if (!(contact.normal_impulse > 0) || !(w > 0)) continue;
+            if (!(w > 0)) continue;
+            const bool spinning = turns(step, contact.i);
+            if (spinning) start_spinning(contact, step);
+            if (!(contact.normal_impulse > 0) && !(spinning && contact.free_impulse > 0)) continue;
             const Vec3d half =
                 0.5 * ((contact.normal_impulse + contact.carried_impulse) * contact.n + contact.tangential_impulse);
             step.points[contact.i].P += w * step.dt * half;
@@ -151,6 +173,7 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
             if (known != before.end() && known->obstacle == made.obstacle && known->i == i) {
                 made.normal_impulse = made.carried_impulse = 0.5 * (known->normal_impulse + known->carried_impulse);
                 made.tangential_impulse = known->tangential_impulse - made.n.dot(known->tangential_impulse) * made.n;
+                made.rolling_impulse = known->rolling_impulse;
             }
             contacts.push_back(made);
         }
@@ -168,8 +191,7 @@ ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std:
     contact.n = query.gradient[k] / query.gradient[k].norm();
     contact.vc = obstacle.shape->velocity_at(query.P[k], query.since);
     contact.level = contact.n.dot(query.P[k]) - std::max(0.0, query.phi[k] - obstacle.radius[contact.i]);
-    contact.friction = obstacle.response == Response::Stick ? std::numeric_limits<double>::max()
-                                                            : double(obstacle.friction[contact.i]);
+    contact.friction = friction_of(obstacle, contact.i);
     return contact;
 }
 
@@ -212,11 +234,112 @@ void ShapeContacts::solve_velocities(Substep& step)
     });
 }
 
-void ShapeContacts::drive(EnergyIslands& islands) const
+void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
 {
     for (const Batch& contacts : contacts_)
         for (const ShapeContact& contact : contacts)
-            if (contact.normal_impulse > 0 && !contact.vc.isZero(0)) islands.drive(contact.i);
+            if ((contact.normal_impulse > 0 || (turns(step, contact.i) && contact.free_impulse > 0)) &&
+                !contact.vc.isZero(0))
+                islands.drive(contact.i);
+}
+
+// What shapes did to points in their free motion, among the contacts that they are found in at its end.
+void ShapeContacts::share_reactions(const Substep& step)
+{
+    tbb::parallel_for(std::size_t{0}, contacts_.size(), [&](std::size_t c) {
+        std::vector<ShapeContact*> by_point;
+        for (ShapeContact& contact : contacts_[c]) by_point.push_back(&contact);
+        std::stable_sort(by_point.begin(), by_point.end(),
+                         [](const ShapeContact* a, const ShapeContact* b) { return a->i < b->i; });
+        Batch missed;
+        auto first = by_point.begin();
+        const std::size_t end = std::min(size_, (c + 1) * points_a_task);
+        for (std::size_t i = c * points_a_task; i < end; ++i) {
+            const auto last = std::find_if(first, by_point.end(), [&](const ShapeContact* at) { return at->i != i; });
+            if (step.points[i].w > 0 && !step.reaction[i].isZero(0))
+                share_reaction({first, last}, static_cast<std::uint32_t>(i), step, missed);
+            first = last;
+        }
+        contacts_[c].insert(contacts_[c].end(), missed.begin(), missed.end());
+        if (!missed.empty()) std::sort(contacts_[c].begin(), contacts_[c].end(), is_before);
+    });
+}
+
+void ShapeContacts::share_reaction(std::span<ShapeContact* const> contacts, std::uint32_t i, const Substep& step,
+                                   Batch& missed) const
+{
+    thread_local std::vector<Vec3d> normals;
+    thread_local std::vector<double> parts;
+    const Vec3d impulse = step.reaction[i] / step.inverse_mass[i];
+    normals.clear();
+    for (const ShapeContact* contact : contacts) normals.push_back(contact->n);
+    parts.resize(contacts.size());
+    const Vec3d tangential = split_impulse(impulse, normals, parts);
+    const double whole = std::accumulate(parts.begin(), parts.end(), 0.0);
+    for (std::size_t k = 0; k < contacts.size() && whole > 0; ++k) {
+        contacts[k]->free_impulse = parts[k];
+        contacts[k]->free_friction = parts[k] / whole * tangential;
+    }
+    if (whole > 0) return;
+    // It has bounced, and is out of reach by now.
+    if (!turns(step, i)) {
+        if (step.forces) step.forces->add(i, impulse.norm(), 0);
+        return;
+    }
+    std::optional<ShapeContact> contact = missed_contact(i, impulse, step);
+    if (!contact) return;
+    const auto same = std::find_if(contacts.begin(), contacts.end(),
+                                   [&](const ShapeContact* other) { return other->obstacle == contact->obstacle; });
+    if (same == contacts.end())
+        missed.push_back(*contact);
+    else
+        (*same)->free_impulse = impulse.norm();
+}
+
+// With the shape that is nearest.
+std::optional<ShapeContacts::ShapeContact> ShapeContacts::missed_contact(std::uint32_t i, const Vec3d& impulse,
+                                                                         const Substep& step) const
+{
+    const double since = (step.index + 1) * step.dt;
+    const Vec3d P = step.points[i].P;
+    std::optional<ShapeContact> nearest;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+        const Obstacle& obstacle = obstacles_[o];
+        if (obstacle.response == Response::Die || !obstacle.members[i]) continue;
+        double phi = 0;
+        obstacle.shape->distance_at({&P, 1}, {&since, 1}, {&phi, 1}, {});
+        const double gap = std::max(0.0, phi - obstacle.radius[i]);
+        if (!(gap < least)) continue;
+        least = gap;
+        ShapeContact& contact = nearest.emplace();
+        contact.i = i;
+        contact.obstacle = static_cast<std::uint32_t>(o);
+        contact.n = impulse.normalized();
+        contact.vc = obstacle.shape->velocity_at(P, since);
+        contact.level = contact.n.dot(P) - gap;
+        contact.friction = friction_of(obstacle, i);
+        contact.free_impulse = impulse.norm();
+    }
+    return nearest;
+}
+
+void ShapeContacts::add_forces(const Substep& step) const
+{
+    tbb::parallel_for(std::size_t{0}, contacts_.size(), [&](std::size_t c) {
+        for (const ShapeContact& contact : contacts_[c]) {
+            const std::uint32_t i = contact.i;
+            const double normal = contact.free_impulse + contact.normal_impulse;
+            if (!(step.points[i].w > 0) || !(normal > 0)) continue;
+            const Vec3d tangential = contact.free_friction + contact.tangential_impulse;
+            const Vec3d slip = (step.points[i].P - step.start[i]) / step.dt - contact.vc;
+            step.forces->add(i, normal, tangential.norm());
+            step.forces->add_work(i, contact.friction > 0 ? tangential.dot(slip) : 0,
+                                  (normal * contact.n + tangential).dot(contact.vc));
+            if (contact.n.dot(step.points[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i])
+                step.forces->count(i);
+        }
+    });
 }
 
 // The velocity that is left into the shape is taken off; then Coulomb friction acts by the whole normal impulse.
@@ -226,6 +349,7 @@ void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
     const double w = step.points[contact.i].w, before = contact.normal_impulse + contact.carried_impulse;
     contact.carried_impulse = 0;
     contact.normal_impulse = before;
+    if (turns(step, contact.i)) return solve_spinning(contact, step);
     if (!(before > 0)) return;
     Vec3d& v = step.v[contact.i];
     const double normal = std::max(0.0, before - (v - contact.vc).dot(contact.n) / w);
@@ -240,6 +364,37 @@ void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
     v += change;
     step.points[contact.i].P += 0.5 * step.dt * change;
     contact.tangential_impulse = tangential;
+}
+
+// The warm start of friction and rolling friction, as far as these turn the point. What bears nothing holds nothing.
+void ShapeContacts::start_spinning(ShapeContact& contact, Substep& step)
+{
+    if (contact.normal_impulse + contact.free_impulse > 0) {
+        const ShapeFriction friction{contact.tangential_impulse, contact.rolling_impulse};
+        friction.start(step.spins[contact.i], step.points[contact.i].w, contact.n);
+    } else {
+        contact.tangential_impulse.setZero();
+        contact.rolling_impulse.setZero();
+    }
+}
+
+// The same of a point that turns, on which free motion had no friction: the shape bears it by what it did there, too.
+void ShapeContacts::solve_spinning(ShapeContact& contact, Substep& step)
+{
+    const double w = step.points[contact.i].w;
+    Vec3d& v = step.v[contact.i];
+    if (contact.normal_impulse > 0) {
+        const double normal = std::max(0.0, contact.normal_impulse - (v - contact.vc).dot(contact.n) / w);
+        v += w * (normal - contact.normal_impulse) * contact.n;
+        contact.normal_impulse = normal;
+    }
+    ShapeFriction friction{contact.tangential_impulse, contact.rolling_impulse};
+    const Vec3d change = friction.solve(step.spins[contact.i], w, contact.n, v - contact.vc, contact.friction,
+                                        contact.normal_impulse + contact.free_impulse);
+    v += change;
+    step.points[contact.i].P += 0.5 * step.dt * change;
+    contact.tangential_impulse = friction.tangential;
+    contact.rolling_impulse = friction.rolling;
 }
 
 // Final penetration correction.

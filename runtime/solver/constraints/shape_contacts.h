@@ -10,7 +10,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "runtime/solver/collision/obstacle.h"
@@ -27,6 +29,7 @@ struct ShapeLoads {
         std::uint32_t obstacle;
         float normal;   // N
         Vec3f tangent;  // N
+        Vec3f rolling;  // N: torque / radius
     };
     std::vector<Load> loads;
 };
@@ -37,7 +40,7 @@ public:
     ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, const Sleep* sleep);
 
     void recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt);
-    void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, double dt) const;
+    void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, const Substep& step) const;
 
     // free: where the points' free motion has ended.
     void detect(const Substep& step, std::span<const Vec3d> free);
@@ -46,8 +49,10 @@ public:
     void warm_start(Substep& step);
     void project(Substep& step);
     void solve_velocities(Substep& step);
+    // To step.forces: with what shapes did to points in their free motion.
+    void add_forces(const Substep& step) const;
     // Shapes that move drive the points that they bear.
-    void drive(EnergyIslands& islands) const;
+    void drive(EnergyIslands& islands, const Substep& step) const;
 
 private:
     struct ShapeContact {
@@ -58,14 +63,28 @@ private:
         double normal_impulse;   // N s along n: at first of the projection of positions, then the whole
         double carried_impulse;  // N s along n: that the warm start gives to velocities alone
         Vec3d tangential_impulse = Vec3d::Zero();  // N s along the surface
+        Vec3d rolling_impulse = Vec3d::Zero();     // N s: torque / radius, of rolling friction
+        // N s: what the shape did in the free motion, along n and along the surface. Known where Substep::reaction is.
+        double free_impulse = 0;
+        Vec3d free_friction = Vec3d::Zero();
     };
     using Batch = std::vector<ShapeContact>;  // of a chunk of points, by obstacle and then by point
+    static bool is_before(const ShapeContact& a, const ShapeContact& b)
+    {
+        return std::pair(a.obstacle, a.i) < std::pair(b.obstacle, b.i);
+    }
 
     void find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free, std::size_t begin,
               std::size_t end);
     ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle) const;
     void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle) const;
     void solve_impact(const ShapeContact& contact, Substep& step, std::uint32_t sweep) const;
+    void share_reactions(const Substep& step);
+    void share_reaction(std::span<ShapeContact* const> contacts, std::uint32_t i, const Substep& step,
+                        Batch& missed) const;
+    std::optional<ShapeContact> missed_contact(std::uint32_t i, const Vec3d& impulse, const Substep& step) const;
+    static void start_spinning(ShapeContact& contact, Substep& step);
+    static void solve_spinning(ShapeContact& contact, Substep& step);
     static void leave_parting(ShapeContact& contact, const Substep& step);
     static void solve_velocity(ShapeContact& contact, Substep& step);
     void move_out(const Batch& contacts, Substep& step) const;

@@ -9,6 +9,7 @@
 #include "runtime/solver/collision/collisions.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/shape_grip.h"
+#include "runtime/solver/constraints/spin.h"
 #include "runtime/solver/motion/ballistic_batch.h"
 
 namespace rapid {
@@ -223,9 +224,11 @@ void Sleep::close(Substep& step, std::span<const Vec3f> P, std::span<const Vec3f
                                 : alone            ? still_alone * gained
                                                    : std::numeric_limits<double>::infinity();
             const double shift = (step.points[i].P - P[i].cast<double>()).norm();
-            const bool is_still = inverse_mass_[i] > 0 && !kept_awake_[i] && step.lives(i) && !(lived(i) < lived.h) &&
-                                  gained > 0 && shift <= std::min(still_shift * gained, most) * lived.h &&
-                                  step.v[i].norm() <= std::min(still_speed * gained, most);
+            const bool is_still =
+                inverse_mass_[i] > 0 && !kept_awake_[i] && step.lives(i) && !(lived(i) < lived.h) && gained > 0 &&
+                shift <= std::min(still_shift * gained, most) * lived.h &&
+                step.v[i].norm() <= std::min(still_speed * gained, most) &&
+                (step.spins.empty() || step.spins[i].s.norm() <= std::min(still_speed * gained, most));
             // A sleeper that has woken begins at 0.
             still[i] = is_still && (linked || still[i] < after_) ? still[i] + h : 0;
             if (linked || still[i] < after_) continue;
@@ -264,6 +267,7 @@ void Sleep::put_to_sleep(std::size_t i, Substep& step)
     asleep_[i] = 1;
     grip_[i].reset();
     step.v[i].setZero();
+    if (!step.spins.empty()) step.spins[i].s.setZero();
 }
 
 void Sleep::remember(SleepRecords& records, const Substep& step, std::span<const Obstacle> obstacles)

@@ -5,6 +5,7 @@
 
 #include "runtime/solver/constraints/contacts.h"
 #include "runtime/solver/constraints/shape_contacts.h"
+#include "runtime/solver/constraints/twin.h"
 #include "tests/solver/scene.h"
 
 namespace rapid::test {
@@ -18,6 +19,10 @@ public:
     {
         contacts->follow(set, options, group);
         return contacts;
+    }
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of(*this, &Spheres::contacts, before);
     }
 };
 

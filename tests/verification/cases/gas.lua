@@ -2,16 +2,13 @@
 -- same gas advanced event by event.
 local scene = require "testing.scene"
 local event_driven = require "tests.verification.event_driven"
+local lehmer = require "tests.lehmer"
 
 local side, r, half = 7, 0.05, 0.7 -- spheres along an edge; m
 
 -- On a lattice, with velocities of the mean speed `speed` from a fixed sequence, without momentum.
 local function start(speed)
-  local P, v, state, mean, sum = {}, {}, 12345, { 0, 0, 0 }, 0
-  local function random()
-    state = (state * 48271) % 2147483647
-    return state / 2147483647
-  end
+  local P, v, random, mean, sum = {}, {}, lehmer.new(12345).random, { 0, 0, 0 }, 0
   local n = side ^ 3
   for i = 0, n - 1 do
     local cell = { i % side, math.floor(i / side) % side, math.floor(i / side ^ 2) }

@@ -10,11 +10,11 @@
 
 namespace rapid {
 
-RunReport::RunReport(Options options, std::function<std::vector<FrameWriter::Written>()> written)
-    : options_(std::move(options)), written_(std::move(written))
+RunReport::RunReport(Options options, FrameFiles& files) : options_(std::move(options)), files_(files)
 {
     run_.graph = options_.graph;
     run_.threads = options_.threads;
+    if (!options_.stats_file.empty()) statistics_.emplace(options_.stats_file, run_);
 }
 
 double RunReport::now() const { return stopwatch_.seconds(); }
@@ -30,7 +30,8 @@ void RunReport::frame(const FrameResult& result)
     const std::lock_guard lock(mutex_);
     const FrameStatistics frame = statistics_of(result);
     totals_.add(frame);
-    if (!options_.stats_file.empty()) run_.frames.push_back(frame);
+    if (statistics_) statistics_->add(frame);
+    add_writing();
     keep_worst(run_.stiff, result.figures.stiff);
     progress_->frame(frame, now());
 }
@@ -55,7 +56,6 @@ void RunReport::finish()
     if (progress_) progress_->finish();
     write_statistics();
     if (options_.quiet) return;
-    for (const FrameWriter::Written& file : written_()) totals_.add_writing(file.seconds);
     print(summary(run_, totals_));
 }
 
@@ -88,27 +88,22 @@ void RunReport::abandon(int status, const std::string& why)
     _exit(status);
 }
 
+void RunReport::add_writing()
+{
+    const std::optional<std::int64_t> unwritten = files_.first_unwritten();  // first: files of frames before are taken
+    for (const FrameWriter::Written& file : files_.take_written()) {
+        totals_.add_writing(file.seconds);
+        if (statistics_) statistics_->add_writing(file.frame, file.seconds);
+    }
+    if (statistics_) statistics_->write_before(unwritten);
+}
+
 void RunReport::write_statistics()
 {
     run_.seconds = now();
     run_.peak_bytes = peak_memory();
-    if (options_.stats_file.empty()) return;
-    std::map<std::int64_t, FrameStatistics*> by_frame;
-    for (FrameStatistics& frame : run_.frames) {
-        frame.seconds.write = 0;
-        by_frame[frame.frame] = &frame;
-    }
-    for (const FrameWriter::Written& file : written_())
-        if (const auto found = by_frame.find(file.frame); found != by_frame.end())
-            found->second->seconds.write += file.seconds;
-    try {
-        OutputFile file(options_.stats_file);
-        const std::string text = to_json(run_);
-        file.append(text.data(), text.size());
-        file.finish();
-    } catch (Error& error) {
-        throw error.at({options_.stats_file, 0});
-    }
+    add_writing();
+    if (statistics_) statistics_->finish(run_);
 }
 
 }  // namespace rapid

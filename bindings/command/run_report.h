@@ -1,16 +1,14 @@
 // The output of `rapid run` while it runs and when it ends, however it ends.
 #pragma once
 
-#include <functional>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "bindings/command/command.h"
-#include "runtime/io/frame_writer.h"
+#include "bindings/command/frame_files.h"
+#include "bindings/command/statistics_file.h"
 #include "runtime/report/progress.h"
 #include "runtime/report/totals.h"
 #include "runtime/stopwatch.h"
@@ -26,8 +24,8 @@ public:
         std::string stats_file;  // empty: none
         bool quiet = false, verbose = false;
     };
-    // The run's time begins here. written: the files that are complete, asked from any thread.
-    RunReport(Options options, std::function<std::vector<FrameWriter::Written>()> written);
+    // The run's time begins here. files: those that the run writes.
+    RunReport(Options options, FrameFiles& files);
 
     void begin(std::int64_t first, std::int64_t last);
     void frame(const FrameResult& result);
@@ -44,16 +42,18 @@ public:
     [[noreturn]] void abandon(int status, const std::string& why);
 
 private:
+    void add_writing();
     void write_statistics();
     double now() const;
 
     const Options options_;
-    const std::function<std::vector<FrameWriter::Written>()> written_;
+    FrameFiles& files_;
     const Stopwatch stopwatch_;
 
     std::timed_mutex mutex_;
-    RunStatistics run_;  // with its frames where they are written to a file
+    RunStatistics run_;
     RunTotals totals_;
+    std::optional<StatisticsFile> statistics_;
     std::optional<Progress> progress_;
     std::set<std::string> warned_;
 };

@@ -181,6 +181,7 @@ double run_frames(const Plan& plan, const Study& study,
     const std::string output = compared_output(plan);
     const Stopwatch stopwatch;
     Evaluator evaluator(plan);
+    evaluator.leave_out_errors();
     while (evaluator.next_frame() <= study.last) {
         const FrameResult result = evaluator.advance();
         if (keep && is_compared(study, result.frame)) keep(result, result.outputs.at(output));

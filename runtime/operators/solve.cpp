@@ -4,22 +4,30 @@
 
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include "runtime/graph/node.h"
 #include "runtime/operators/solve/aging.h"
+#include "runtime/operators/solve/air_resistance.h"
 #include "runtime/operators/solve/collider_shapes.h"
+#include "runtime/operators/solve/step_recorder.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/shape_contacts.h"
+#include "runtime/solver/estimate/coupled_errors.h"
 #include "runtime/solver/estimate/energy_drift.h"
 #include "runtime/solver/estimate/error_control.h"
 #include "runtime/solver/estimate/resolution.h"
 #include "runtime/solver/estimate/shadow.h"
 #include "runtime/solver/estimate/stiffness.h"
 #include "runtime/solver/estimate/tolerance_check.h"
+#include "runtime/solver/estimate/varying_forces.h"
 #include "runtime/solver/interaction.h"
 
 namespace rapid {
 namespace {
+
+// Far above any scene's need: a run with more would not end, and gives no sign of it.
+constexpr int most_substeps = 1 << 20, most_iterations = 10000;
 
 struct Solve {
     int substeps, iterations, max_substeps;
@@ -36,13 +44,17 @@ struct Solve {
             .takes("force")
             .takes("mass")
             .takes("life")
-            .param(&Solve::substeps, "substeps", 1.0, at_least(1), "", "steps a frame")
-            .param(&Solve::iterations, "iterations", 1.0, at_least(1), "", "of the constraints, a sub-step")
+            .takes("airresist")
+            .takes("targetv")
+            .param(&Solve::substeps, "substeps", 1.0, between(1, most_substeps), "", "steps a frame")
+            .param(&Solve::iterations, "iterations", 1.0, between(1, most_iterations), "",
+                   "of the constraints, a sub-step")
             .param(&Solve::sleep, "sleep", 0.25, or_infinity(above(0)), "s",
                    "at rest, after which points with constraints sleep until something acts on them; math.huge: never")
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
                    "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")
-            .param(&Solve::max_substeps, "max_substeps", 64.0, at_least(1), "", "the most, with a tolerance")
+            .param(&Solve::max_substeps, "max_substeps", 64.0, between(1, most_substeps), "",
+                   "the most, with a tolerance")
             .writes("P")
             .writes("v");
     }
@@ -53,7 +65,10 @@ struct Solve {
         Flow flow = std::move(inputs[0]);
         flow.dynamics.clear();
         flow.simulation->state = flow.points;
+        StepRecorder(*flow.simulation).start(flow.points);
         shadows_ = Shadows();
+        coupled_errors_ = CoupledErrors();
+        varying_forces_ = VaryingForces();
         drift_ = EnergyDrift();
         tolerance_check_ = ToleranceCheck();
         return flow;
@@ -62,23 +77,32 @@ struct Solve {
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
     {
         Flow flow = std::move(inputs[0]);
+        if (auto drag = air_resistance_of(flow.points, now)) flow.dynamics.add(std::move(drag));
         require_in_range(flow, now);
         SolveOptions options = begin(flow, now);
+        StepRecorder recorder(*flow.simulation);
+        recorder.begin(flow.points, options, !tolerance);
         note_stiffness(flow, options, now);
         if (flow.simulation->trial) {
             now.figures.resolution = coarser(now.figures.resolution, resolution_of(flow.points, options.h));
             flow.simulation->state = flow.points;
             return flow;
         }
+        // With a tolerance, the points of the sample are checked in any case.
+        const bool estimates = flow.simulation->estimates_errors || tolerance;
+        const Dynamics& finer = estimates ? begin_varying(flow, options, now) : flow.dynamics;
+        if (estimates && !moves_alone(flow)) coupled_errors_.begin(flow.points, finer, options);
         if (!options.interacts) interact(flow.points, flow.dynamics, options);
-        begin_estimates(flow, options);
+        if (estimates) begin_estimates(flow, options);
         const Tolerated done = advance(flow, options);
         const std::uint64_t beyond = check_tolerance(flow, options);
         if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
-        estimate(flow, options, now);
+        if (estimates) estimate(flow, finer, options, now);
         if (!options.interacts) interact(flow.points, flow.dynamics, options);
+        if (estimates && !moves_alone(flow)) estimate_coupled(flow, now);
         report(done, beyond, now);
-        now.figures.died += age_points(flow.points, group, now.frame.dt);
+        recorder.end();
+        now.figures.died += age_points(flow.points, group, now.frame.dt, &recorder);
         feed_back(flow);
         return flow;
     }
@@ -158,16 +182,36 @@ private:
     // m, in this step.
     double allowed_error(const Flow& flow) const { return *tolerance / flow.simulation->subframes; }
 
-    // Of coupled points a sample alone tells nothing but rounding: their error is the residual of the constraints.
+    // The dynamics of the shadows. Parameters that are functions of the frame are in the errors where forces have them.
+    const Dynamics& begin_varying(const Flow& flow, const SolveOptions& options, const Evaluation& now)
+    {
+        const auto& varying = flow.simulation->varying;
+        flow.dynamics.visit_in_order([&](const auto& dynamic) {
+            using D = std::decay_t<decltype(*dynamic)>;
+            std::vector<std::string>& left_out = now.figures.left_out_of_errors;
+            if (tolerance && std::is_same_v<D, Interaction>)
+                left_out.push_back(dynamic->node + ", whose kicks with a tolerance are at the ends of frames");
+            const auto found = varying.find(dynamic->node);
+            if (found == varying.end() || std::is_same_v<D, Force>) return;
+            for (const std::string& param : found->second)
+                left_out.push_back(
+                    fmt::format("{}.{}, a function of the frame that is called once in each", dynamic->node, param));
+        });
+        const auto varies = [&](const std::string& node) { return varying.count(node) > 0; };
+        return varying_forces_.begin(flow.dynamics, varies, options.time - 0.5 * options.h);
+    }
+
+    // Of coupled points a sample alone tells nothing but rounding.
     void begin_estimates(const Flow& flow, SolveOptions& options)
     {
         const bool alone = moves_alone(flow);
-        shadows_.begin(flow.points, !alone || is_closed_form(flow.points, flow.dynamics, options), options.h);
+        const bool is_exact = !varying_forces_.any() && is_closed_form(flow.points, flow.dynamics, options);
+        shadows_.begin(flow.points, !alone || is_exact, options.h);
         if (!alone) return;
         drift_.begin(flow.points, shadows_, flow.dynamics, options);
     }
 
-    void estimate(const Flow& flow, const SolveOptions& options, const Evaluation& now)
+    void estimate(const Flow& flow, const Dynamics& finer_dynamics, const SolveOptions& options, const Evaluation& now)
     {
         std::optional<std::vector<double>> drift;
         if (!moves_alone(flow)) {
@@ -177,10 +221,11 @@ private:
                 SolveOptions finer = options;
                 finer.substeps *= 2;
                 finer.met = nullptr;
+                finer.log = nullptr;
                 if (tolerance)
-                    solve_within(shadows, flow.dynamics, finer, allowed_error(flow) / 4, 2 * max_substeps);
+                    solve_within(shadows, finer_dynamics, finer, allowed_error(flow) / 4, 2 * max_substeps);
                 else
-                    solve(shadows, flow.dynamics, finer);
+                    solve(shadows, finer_dynamics, finer);
             });
             now.figures.errors.insert(now.figures.errors.end(), errors.begin(), errors.end());
             drift = drift_.end(flow.points, shadows_, flow.dynamics);
@@ -191,6 +236,16 @@ private:
             now.figures.energy_drift.insert(now.figures.energy_drift.end(), drift->begin(), drift->end());
         else
             now.figures.has_no_energy = true;
+    }
+
+    // After interactions at the frame's end.
+    void estimate_coupled(const Flow& flow, const Evaluation& now)
+    {
+        const CoupledErrors::Errors errors = coupled_errors_.end(flow.points);
+        FrameFigures& figures = now.figures;
+        figures.errors.insert(figures.errors.end(), errors.since_birth.begin(), errors.since_birth.end());
+        figures.frame_errors.insert(figures.frame_errors.end(), errors.of_frame.begin(), errors.of_frame.end());
+        if (!errors.unknown.empty()) figures.left_out_of_errors.push_back(errors.unknown);
     }
 
     // beyond: points, by the check of the tolerance.
@@ -255,6 +310,8 @@ private:
 
     ColliderShapes shapes_;
     Shadows shadows_;
+    CoupledErrors coupled_errors_;
+    VaryingForces varying_forces_;
     EnergyDrift drift_;
     ToleranceCheck tolerance_check_;
     ShapeLoads loads_;            // of the previous frame, where points are coupled

@@ -58,6 +58,8 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.trapped = result.figures.trapped;
     frame.beyond_tolerance = result.figures.beyond_tolerance;
     frame.error = error_of(result.figures.errors);
+    frame.frame_error = error_of(result.figures.frame_errors);
+    frame.left_out_of_errors = result.figures.left_out_of_errors;
     frame.rounding = result.figures.rounding;
     frame.energy_drift = drift_of(result.figures);
     frame.substeps = result.figures.substeps;
@@ -85,17 +87,30 @@ ordered_json to_json(const Ledger& ledger)
     ordered_json json = {{"kinetic", ledger.kinetic},
                          {"potential", ledger.potential},
                          {"elastic", ledger.elastic},
-                         {"by_rods", ledger.by_rods},
-                         {"by_contacts", ledger.by_contacts},
+                         {"by_rods", ledger.by.rods},
+                         {"by_contacts", ledger.by.contacts},
+                         {"by_friction", nullptr},
+                         {"by_shapes", nullptr},
+                         {"by_pins", ledger.by.pins},
+                         {"by_drag", ledger.by.drag},
                          {"by_motion", ledger.by_motion},
                          {"momentum", list(ledger.momentum)},
                          {"angular_momentum", list(ledger.angular_momentum)},
                          {"residue", nullptr}};
+    if (ledger.by.split) {
+        json["by_friction"] = ledger.by.split->friction;
+        json["by_shapes"] = ledger.by.split->shapes;
+    }
     if (ledger.residue)
         json["residue"] = {{"energy", ledger.residue->energy},
                            {"momentum", ledger.residue->momentum},
                            {"angular_momentum", ledger.residue->angular_momentum}};
     return json;
+}
+
+ordered_json to_json(const FrameStatistics::Error& error)
+{
+    return {{"position_p50", error.p50}, {"position_p95", error.p95}, {"position_max", error.max}};
 }
 
 ordered_json to_json(const FrameStatistics& frame)
@@ -109,9 +124,9 @@ ordered_json to_json(const FrameStatistics& frame)
         {"substeps", frame.substeps},
         {"seconds",
          {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}}};
-    if (frame.error)
-        json["error"] = {
-            {"position_p50", frame.error->p50}, {"position_p95", frame.error->p95}, {"position_max", frame.error->max}};
+    if (frame.error) json["error"] = to_json(*frame.error);
+    if (frame.frame_error) json["frame_error"] = to_json(*frame.frame_error);
+    if (!frame.left_out_of_errors.empty()) json["left_out_of_errors"] = frame.left_out_of_errors;
     json["rounding"] = frame.rounding;
     json["energy_drift"] = nullptr;
     if (frame.energy_drift)
@@ -140,21 +155,28 @@ ordered_json to_json(const FrameStatistics& frame)
 
 }  // namespace
 
-std::string to_json(const RunStatistics& run)
+std::string json_head(const RunStatistics& run)
 {
     // A file name need not be UTF-8.
     const std::string graph = ordered_json(run.graph).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-    std::string text = fmt::format("{{ \"graph\": {}, \"threads\": {}, \"peak_bytes\": {}, \"seconds\": {},\n", graph,
-                                   run.threads, run.peak_bytes, ordered_json(run.seconds).dump());
+    return fmt::format("{{ \"graph\": {}, \"threads\": {},\n  \"frames\": [", graph, run.threads);
+}
+
+std::string json_line(const FrameStatistics& frame, bool first)
+{
+    return fmt::format("{}\n    {}", first ? "" : ",", to_json(frame).dump());
+}
+
+std::string json_end(const RunStatistics& run)
+{
+    std::string text = "\n  ],\n";
     if (!run.stiff.empty()) {
         ordered_json stiff = ordered_json::array();
         for (const Stiffness& stiffness : run.stiff) stiff.push_back(text_of(stiffness));
         text += fmt::format("  \"stiff\": {},\n", stiff.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
     }
-    text += "  \"frames\": [";
-    for (const FrameStatistics& frame : run.frames)
-        text += fmt::format("{}\n    {}", &frame == run.frames.data() ? "" : ",", to_json(frame).dump());
-    return text + (run.frames.empty() ? "] }\n" : "\n  ] }\n");
+    return text +
+           fmt::format("  \"peak_bytes\": {}, \"seconds\": {} }}\n", run.peak_bytes, ordered_json(run.seconds).dump());
 }
 
 }  // namespace rapid

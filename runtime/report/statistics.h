@@ -28,11 +28,13 @@ struct FrameStatistics {
     std::uint64_t born = 0, died = 0, collisions = 0;
     std::uint64_t contact_limit = 0, trapped = 0;  // points of which Solve warns (FrameFigures)
     int substeps = 0;
-    // Estimated position errors of a sample of the points, m, accumulated since birth; nothing where none was solved.
+    // Estimated position errors, m: accumulated since birth, and made in this frame alone; nothing where none were
+    // estimated. And what is in neither, as texts.
     struct Error {
         double p50, p95, max;
     };
-    std::optional<Error> error;
+    std::optional<Error> error, frame_error;
+    std::vector<std::string> left_out_of_errors;
     double rounding = 0;  // m, the most by which rounding of positions has displaced a point of the sample since birth
     // Change of the energy of motion of that sample by the integrator since birth, J/kg: the mean, and the largest
     // magnitude. Nothing where the energy is not defined (energy_drift.h).
@@ -60,19 +62,20 @@ struct RunStatistics {
     std::string graph;  // as the user named it
     int threads = 1;
     std::uint64_t peak_bytes = 0;
-    double seconds = 0;  // wall time from loading the graph to the last file
-    std::vector<FrameStatistics> frames;
+    double seconds = 0;            // wall time from loading the graph to the last file
     std::vector<Stiffness> stiff;  // the worst of each node
 };
 
-// A line for each frame. A run that ended early has the frames that it completed.
-std::string to_json(const RunStatistics& run);
+// The text of a statistics file, in the pieces in which a run knows them: its head; a line for each frame, behind the
+// one before; what the run is known by at its end. A run that ended early has the frames that it completed.
+std::string json_head(const RunStatistics& run);
+std::string json_line(const FrameStatistics& frame, bool first);
+std::string json_end(const RunStatistics& run);
 
 // A line each for points, frames, seconds by stage, memory, errors and other figures; and one for each stiff node and
-// each warning of Solve. totals: of the frames, where `run` has not kept them.
+// each warning of Solve.
 class RunTotals;
 std::string summary(const RunStatistics& run, const RunTotals& totals);
-std::string summary(const RunStatistics& run);
 
 // A line for each stiff node.
 std::string advice(const std::vector<Stiffness>& stiff);

@@ -10,15 +10,9 @@ std::string summary(const RunStatistics& run, const RunTotals& totals)
 {
     return totals.points_text() + totals.frames_text(run.seconds) +
            fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes)) + totals.error_text() +
-           totals.rounding_text() + totals.energy_text() + totals.contact_text() + totals.constraint_text() +
-           totals.sleep_text() + totals.band_text() + advice(run.stiff) + totals.warning_text();
-}
-
-std::string summary(const RunStatistics& run)
-{
-    RunTotals totals;
-    for (const FrameStatistics& frame : run.frames) totals.add(frame);
-    return summary(run, totals);
+           totals.rounding_text() + totals.energy_text() + totals.ledger_text() + totals.contact_text() +
+           totals.constraint_text() + totals.sleep_text() + totals.band_text() + advice(run.stiff) +
+           totals.warning_text();
 }
 
 std::string advice(const std::vector<Stiffness>& stiff)

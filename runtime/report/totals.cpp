@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "runtime/report/number_text.h"
@@ -34,11 +35,13 @@ void RunTotals::add(const FrameStatistics& frame)
         most_points_ = frame.points;
         most_points_frame_ = frame.frame;
     }
-    is_solved_ |= frame.points > 0 && frame.substeps > 0;
-    if (frame.error && (!worst_error_ || frame.error->max > worst_error_->max)) {
-        worst_error_ = frame.error;
-        worst_error_frame_ = frame.frame;
+    if (!is_solved_ && frame.points > 0 && frame.substeps > 0) {
+        is_solved_ = true;
+        first_solved_ = frame.frame;
     }
+    worst_error_.add(frame.error, frame.frame);
+    worst_frame_error_.add(frame.frame_error, frame.frame);
+    for (const std::string& text : frame.left_out_of_errors) left_out_of_errors_.emplace(text, frame.frame);
     if (frame.rounding > worst_rounding_) {
         worst_rounding_ = frame.rounding;
         worst_rounding_frame_ = frame.frame;
@@ -54,6 +57,10 @@ void RunTotals::add(const FrameStatistics& frame)
     contacts_ += frame.collisions;
     deepest_ = std::max(deepest_, frame.penetration_max);
     contact_energy_ += frame.contact_energy;
+    if (frame.ledger && ledger_)
+        ledger_->append(*frame.ledger);
+    else if (frame.ledger)
+        ledger_ = frame.ledger;
     search_seconds_ += frame.contact_search ? frame.contact_search->seconds : 0;
     add_bands(frame);
     contact_limit_.add(frame.frame, frame.contact_limit);
@@ -91,21 +98,40 @@ std::string RunTotals::frames_text(double run_seconds) const
                               seconds_.script, seconds_.solve, seconds_.write);
 }
 
-// The estimated errors of the frame with the largest one.
-std::string RunTotals::error_text() const
+void RunTotals::WorstError::add(const std::optional<FrameStatistics::Error>& other, std::int64_t number)
 {
-    if (!worst_error_ && !is_solved_) return "";
-    if (!worst_error_)
-        return "error    not estimated: points act on one another, and a sample of them would move differently\n";
-    const FrameStatistics::Error& error = *worst_error_;
+    if (!other) return;
+    ++frames;
+    if (error && !(other->max > error->max)) return;
+    error = other;
+    frame = number;
+}
+
+std::string RunTotals::WorstError::text(const std::string& what) const
+{
+    if (!error) return "";
     const auto within = [](double e, std::string_view unit) {
         return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : "within rounding";
     };
-    const std::string text = "error    since birth, estimated: ";
-    return text + (error.max > 0
-                       ? fmt::format("half of the points {}, 95 % {}, the worst {:.1e} (frame {})\n",
-                                     within(error.p50, " m"), within(error.p95, ""), error.max, worst_error_frame_)
-                       : std::string("none above rounding\n"));
+    if (!(error->max > 0)) return fmt::format("error    {}: none above rounding\n", what);
+    return fmt::format("error    {}: half of the points {}, 95 % {}, the worst {:.1e} (frame {})\n", what,
+                       within(error->p50, " m"), within(error->p95, ""), error->max, frame);
+}
+
+// The estimated errors of the frames with the largest ones, and what is in none of them.
+std::string RunTotals::error_text() const
+{
+    if (!is_solved_ && !worst_error_.error) return "";
+    std::string text =
+        worst_error_.text("since birth, estimated") +
+        worst_frame_error_.text(fmt::format("of one frame, estimated in {} of {}", worst_frame_error_.frames, frames_));
+    if (text.empty()) text = "error    not estimated\n";
+    for (const auto& [what, first] : left_out_of_errors_) {
+        text += "left out of the error: " + what;
+        if (first > first_solved_) text += fmt::format(" (from frame {} on)", first);
+        text += '\n';
+    }
+    return text;
 }
 
 // What rounding of positions to single precision is off by; no sub-steps change that.
@@ -122,6 +148,31 @@ std::string RunTotals::energy_text() const
     if (!last_.energy_drift || last_.energy_drift->max == 0) return "";
     return fmt::format("energy   of motion, collisions aside: {:+.1e} J/kg since birth on average, {:.1e} at most\n",
                        last_.energy_drift->mean, last_.energy_drift->max);
+}
+
+// What has changed the energy of constrained points; empty where there are none.
+std::string RunTotals::ledger_text() const
+{
+    if (!ledger_) return "";
+    std::vector<std::string> parts;
+    constexpr double rounding = 1e-6;  // of columns
+    const double size = std::abs(ledger_->kinetic) + std::abs(ledger_->by.contacts) + std::abs(ledger_->by.rods) +
+                        std::abs(ledger_->by.pins) + std::abs(ledger_->by.drag) + std::abs(ledger_->by_motion);
+    const auto add = [&](const char* by, double change) {
+        if (std::abs(change) > rounding * size) parts.push_back(fmt::format("{} {:+.3g}", by, change));
+    };
+    add("contacts", ledger_->by.contacts);
+    if (ledger_->by.split) {
+        add("friction", ledger_->by.split->friction);
+        add("moving shapes", ledger_->by.split->shapes);
+    }
+    add("rods and springs", ledger_->by.rods);
+    add("pins", ledger_->by.pins);
+    add("drag", ledger_->by.drag);
+    add("all else", ledger_->by_motion);
+    std::string text = fmt::format("energy   {:.3g} J of constrained points", ledger_->energy());
+    if (!parts.empty()) text += fmt::format("; changed by {} J", fmt::join(parts, ", "));
+    return text + '\n';
 }
 
 // The audit of all collisions; empty where there were none.

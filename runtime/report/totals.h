@@ -19,6 +19,7 @@ public:
     std::string error_text() const;
     std::string rounding_text() const;
     std::string energy_text() const;
+    std::string ledger_text() const;
     std::string contact_text() const;
     std::string constraint_text() const;
     std::string sleep_text() const;
@@ -41,14 +42,25 @@ private:
     std::uint64_t most_points_ = 0;
     std::int64_t most_points_frame_ = 0;
     bool is_solved_ = false;  // some points
-    std::optional<FrameStatistics::Error> worst_error_;
-    std::int64_t worst_error_frame_ = 0;
-    double worst_rounding_ = 0;  // m
+    // Of the frame with the largest.
+    struct WorstError {
+        std::optional<FrameStatistics::Error> error;
+        std::int64_t frame = 0;
+        std::uint64_t frames = 0;  // that have one
+
+        void add(const std::optional<FrameStatistics::Error>& other, std::int64_t number);
+        std::string text(const std::string& what) const;
+    };
+    WorstError worst_error_, worst_frame_error_;
+    std::map<std::string, std::int64_t> left_out_of_errors_;  // and the first frame of which it is
+    std::int64_t first_solved_ = 0;                           // frame
+    double worst_rounding_ = 0;                               // m
     std::int64_t worst_rounding_frame_ = 0;
     std::uint64_t contacts_ = 0;
     double deepest_ = 0;  // m
     ContactEnergy contact_energy_;
-    double worst_residual_ = 0;  // m
+    std::optional<Ledger> ledger_;  // of the frames together
+    double worst_residual_ = 0;     // m
     std::int64_t worst_residual_frame_ = 0;
     bool constrained_at_worst_ = false;
     double search_seconds_ = 0;

@@ -137,7 +137,9 @@ void BlockStep::drift_among_others(Collisions& collisions, std::span<const doubl
     if (!context_.scene.obstacles.empty()) {
         after_.resize(block.size());
         for (std::size_t i = 0; i < block.size(); ++i) after_[i] = 0.5 * halves_after * block.dt[i];
+        if (!block.reaction.empty()) find_free_velocities(dt);
         collisions.advance(block.P, block.v, {block.a, dt, after_, block.damped});
+        if (!block.reaction.empty()) add_reactions();
         if (!surface_springs_.empty()) surface_springs_.limit_energy(block, shapes_move_);
     } else if (block.linear.data) {
         for (std::size_t i = 0; i < block.size(); ++i) {
@@ -149,6 +151,23 @@ void BlockStep::drift_among_others(Collisions& collisions, std::span<const doubl
     }
 }
 
+// Of paths without shapes.
+void BlockStep::find_free_velocities(std::span<const double> dt)
+{
+    free_.resize(block.size());
+    for (std::size_t i = 0; i < block.size(); ++i)
+        free_[i] = block.linear.data ? block.damped[i].v : Vec3d(block.v[i] + dt[i] * block.a[i]);
+}
+
+void BlockStep::add_reactions()
+{
+    constexpr double rounding = 1e-12;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+        const Vec3d by = block.v[i] - free_[i];
+        if (by.norm() > rounding * free_[i].norm()) block.reaction[i] += by;
+    }
+}
+
 // All actions in the order of the chain, on the points in the middle of the sub-step. The forces that they add are
 // kicks over the whole of it. Dead points move no more.
 void BlockStep::act(int substep)
@@ -157,12 +176,15 @@ void BlockStep::act(int substep)
     set_time(substep);
     kick_.assign(size, Vec3d::Zero());
     const std::span<std::uint8_t> dead(context_.dead.data() + block.places.front(), size);
+    if (context_.options.log) dead_before_.assign(dead.begin(), dead.end());
     const Chunk chunk{context_.points, block.places.front(), block.P, block.v, block.dt, time_, substep};
     for (const StepAction& local : context_.scene.actions)
         at_node(*local.action, [&] { local.pass->act(chunk, kick_, dead); });
     for (std::size_t i = 0; i < size; ++i) {
         block.v[i] += block.dt[i] * acceleration_by(kick_[i], block.places[i]);
-        if (dead[i]) block.dt[i] = block.moved_dt[i] = half_[i] = 0;
+        if (!dead[i]) continue;
+        if (context_.options.log && !dead_before_[i]) context_.options.log->kill(block.places[i], time_[i]);
+        block.dt[i] = block.moved_dt[i] = half_[i] = 0;
     }
 }
 

@@ -32,6 +32,9 @@ public:
     // One sub-step, from 0. The collisions have begun this block.
     void advance(Collisions& collisions, int substep);
 
+    // That of point k in the sub-step; of w2 = 0 where there is none.
+    SurfaceSpring surface_spring(std::size_t k) const { return surface_springs_.of(k); }
+
     // At the end of the frame, with block.rounded. Checked before it is stored: the message tells what the point had.
     void require_finite() const;
     void store() const;
@@ -45,6 +48,8 @@ private:
     void own_linear();
     void drift(Collisions& collisions, std::span<const double> dt, double halves_after);
     void drift_among_others(Collisions& collisions, std::span<const double> dt, double halves_after);
+    void find_free_velocities(std::span<const double> dt);
+    void add_reactions();
     void act(int substep);
     void stop_dead();
     void set_time(int substep);
@@ -57,6 +62,8 @@ private:
     const bool shapes_move_;
     std::vector<double> half_, after_, time_;  // s
     std::vector<Vec3d> middle_, kick_;         // m, N
+    std::vector<Vec3d> free_;                  // m/s
+    std::vector<std::uint8_t> dead_before_;    // the actions, where deaths are logged
     Forces one_;                               // of one Force
     SurfaceSprings surface_springs_;
 };

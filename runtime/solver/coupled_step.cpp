@@ -24,6 +24,8 @@ void CoupledStep::run()
     const StepScene& scene = context_.scene;
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { read_points(begin, end); });
     begin_substeps();
+    begin_forces();
+    begin_spins();
     if (options.sleep_records && std::isfinite(options.sleep) && context_.points.has("still")) {
         sleep_.emplace(context_.points, inverse_mass_, options.sleep);
         skips_sleepers_ = scene.is_ballistic() && scene.uniform.linear.is_zero();
@@ -31,6 +33,8 @@ void CoupledStep::run()
     Projection projection(scene.constraints, scene.obstacles, now_, sleep_ ? &*sleep_ : nullptr, options.loads,
                           context_.errors);
     if (sleep_) sleep_->open(*options.sleep_records);
+    for (std::size_t i = 0; sleep_ && i < now_.spins.size(); ++i)
+        if (!now_.spins[i].s.isZero(0)) sleep_->wake(i);
     const LedgerState before = LedgerState::of(now_, projection.elastic_energy(now_));
     if (projection.bounces()) {
         paths_.resize(at_.size());
@@ -44,7 +48,9 @@ void CoupledStep::run()
         if (options.interacts) interact(substep == 0 ? 1 : 2);
         if (sleep_) sleep_->begin(now_, scene.obstacles);
         context_.for_each_chunk([&](std::size_t begin, std::size_t end) { advance_freely(begin, end); });
+        if (spin_) spin_->begin();
         projection.advance(now_);
+        if (spin_) spin_->turn(context_.time, options.substeps);
     }
     if (options.interacts) interact(1);
 
@@ -53,10 +59,12 @@ void CoupledStep::run()
     result.residual = projection.close(now_, options.loads);
     result.contact_energy += projection.energy();
     if (!scene.constraints.empty())
-        result.ledger = ledger_of(before, LedgerState::of(now_, projection.elastic_energy(now_)), projection.by_rods(),
-                                  projection.by_contacts(), is_isolated(projection), now_.acceleration, options.h);
+        result.ledger = ledger_of(before, LedgerState::of(now_, projection.elastic_energy(now_)), changes(projection),
+                                  is_isolated(projection), now_.acceleration, options.h);
     if (sleep_) sleep_->close(now_, context_.P, context_.v, context_.time);
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { store(begin, end); });
+    if (forces_) forces_->store(context_.points);
+    if (spin_) spin_->store(context_.points);
     if (!sleep_) return;
     sleep_->remember(*options.sleep_records, now_, scene.obstacles);
     result.asleep = options.sleep_records->records.size();
@@ -104,8 +112,43 @@ void CoupledStep::begin_substeps()
     if (!scene.forces.empty() || !scene.uniform.linear.is_zero()) {
         mobility_.assign(at_.size(), {now_.dt, 0.5 * now_.dt * now_.dt});
         now_.mobility = mobility_;
+        surface_springs_.resize(at_.size());
+        now_.surface_springs = surface_springs_;
         energy_.resize(at_.size());
         now_.energy = energy_;
+    }
+}
+
+void CoupledStep::begin_forces()
+{
+    for (const LocalConstraint& local : context_.scene.constraints) {
+        const std::span<const float> radii = local.coupling->recorded();
+        if (radii.empty()) continue;
+        if (!forces_) forces_.emplace(at_.size());
+        forces_->include(radii);
+    }
+    if (forces_) now_.forces = &*forces_;
+}
+
+void CoupledStep::begin_spins()
+{
+    const std::vector<Obstacle>& obstacles = context_.scene.obstacles;
+    for (const LocalConstraint& local : context_.scene.constraints) {
+        const ContactMaterial* material = local.coupling->turns();
+        if (!material) continue;
+        if (!spin_) spin_.emplace();
+        at_node(*local.constraint, [&] { spin_->include(context_.points, *material); });
+    }
+    const bool drags = !context_.scene.forces.empty() || !context_.scene.uniform.linear.is_zero();
+    if ((forces_ || spin_ || drags) && !obstacles.empty()) reaction_.resize(at_.size());
+    if (forces_ || spin_) now_.reaction = reaction_;
+    if (!spin_) return;
+    now_.spins = spin_->spins();
+    smooth_ = obstacles;
+    for (Obstacle& obstacle : smooth_) {
+        std::vector<float>& friction = smooth_friction_.emplace_back(at_.size());
+        for (std::size_t i = 0; i < friction.size(); ++i) friction[i] = now_.spins[i].k > 0 ? 0 : obstacle.friction[i];
+        obstacle.friction = {friction.data(), 1};
     }
 }
 
@@ -124,17 +167,19 @@ void CoupledStep::interact(int kicks)
 void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
 {
     const StepScene& scene = context_.scene;
-    Collisions collisions(scene.obstacles, context_.collision_context());
+    Collisions collisions(spin_ ? smooth_ : scene.obstacles, context_.collision_context());
     BlockStep step(context_);
     const PointBlock& block = step.block;
     std::vector<std::uint32_t> places;
     double max_acceleration = 0;
+    EnergyChanges changes;
     for (std::size_t first = begin; first < end; first += block_size) {
         const std::size_t last = std::min(first + block_size, end);
         places.clear();
         for (std::size_t i = first; i < last; ++i) {
             start_[i] = at_[i].P;
             if (!born_.empty()) born_[i] = at_[i].P;
+            if (!reaction_.empty()) reaction_[i].setZero();
             if (!skips_sleepers_ || !leaves_out(i)) places.push_back(static_cast<std::uint32_t>(i));
         }
         if (places.empty()) {
@@ -147,12 +192,18 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         // A point that was put out of a shape gets no velocity from that towards those that it is put into, as if it
         // had been born there.
         for (const auto& [k, by] : collisions.displacements()) start_[block.places[k]] += by;
-        for (std::size_t k = 0; k < block.size(); ++k) take_point(block, k);
+        for (std::size_t k = 0; k < block.size(); ++k) {
+            if (block.linear.data) add_drag(block, k, changes);
+            if (!surface_springs_.empty()) surface_springs_[block.places[k]] = step.surface_spring(k);
+            take_point(block, k);
+        }
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
             max_acceleration = std::max(max_acceleration, block.a[k].norm());
     }
     context_.count(collisions, 0, begin);
+    changes.contacts += collisions.counts().energy.added - collisions.counts().energy.lost;
     const std::scoped_lock lock(mutex_);
+    free_changes_.emplace_back(begin, changes);
     now_.max_acceleration = std::max(now_.max_acceleration, max_acceleration);
 }
 
@@ -160,6 +211,7 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
 {
     PointBlock& block = step.block;
     step.begin(places, context_.options.substeps);
+    if (!reaction_.empty()) block.reaction.assign(places.size(), Vec3d::Zero());
     for (std::size_t k = 0; k < block.size(); ++k) {
         const std::uint32_t i = places[k];
         block.P[k] = at_[i].P;
@@ -193,6 +245,7 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     }
     at.P = block.P[k];
     v_[i] = block.v[k];
+    if (!reaction_.empty()) reaction_[i] = block.reaction[k];
     if (!displacement_.empty())
         displacement_[i] =
             block.linear.data ? Vec3d(at.P - start_[i]) : Vec3d(block.dt[k] * (v_[i] - 0.5 * block.dt[k] * block.a[k]));
@@ -206,6 +259,34 @@ Mobility CoupledStep::mobility_of(const PointBlock& block, std::size_t k) const
     if (!block.linear.data) return {now_.dt, 0.5 * now_.dt * now_.dt, block.a[k]};
     const Propagator by = respond(block.damped[k].k, block.damped[k].w2, now_.dt);
     return {by.v_of_G, by.x_of_G, block.a[k] + block.linear[k].w2q, block.linear[k].w2};
+}
+
+// What drag takes in the free motion, and what shapes do beside it. What the acceleration of its own and springs do is
+// neither.
+void CoupledStep::add_drag(const PointBlock& block, std::size_t k, EnergyChanges& changes) const
+{
+    const std::uint32_t i = block.places[k];
+    const Linear& linear = block.linear[k];
+    if (!(inverse_mass_[i] > 0) || !(block.dt[k] > 0) || (linear.k == 0 && linear.c == 0)) return;
+    const Vec3d &from = start_[i], &to = block.P[k], way = to - from;
+    const double kinetic = 0.5 * (block.v[k] - v_[i]).dot(block.v[k] + v_[i]);
+    const double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(way);
+    const double shapes = reaction_.empty() ? 0 : block.reaction[k].dot(way) / block.dt[k];
+    changes.drag += (kinetic - block.a[k].dot(way) + springs - shapes) / inverse_mass_[i];
+    changes.contacts += shapes / inverse_mass_[i];
+}
+
+EnergyChanges CoupledStep::changes(const Projection& projection)
+{
+    // In the order of the points: a sum of doubles depends on it.
+    std::stable_sort(free_changes_.begin(), free_changes_.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    EnergyChanges all = projection.changes();
+    for (const auto& [first, changes] : free_changes_) all += changes;
+    if (!forces_ || spin_) return all;
+    all.split = {forces_->friction_work(), forces_->shape_work()};
+    all.contacts -= all.split->friction + all.split->shapes;
+    return all;
 }
 
 // Whether a sleeper under uniform forces stays asleep, and out of the blocks.
@@ -251,7 +332,9 @@ Vec3d CoupledStep::acceleration_of(const PointBlock& block, std::size_t k, bool 
 void CoupledStep::store(std::size_t begin, std::size_t end)
 {
     const bool collides = !context_.scene.obstacles.empty();
-    Collisions collisions(context_.scene.obstacles, context_.collision_context());
+    CollisionContext context = context_.collision_context();
+    context.log = nullptr;  // what is found here are no contacts of the step
+    Collisions collisions(context_.scene.obstacles, context);
     BlockStep step(context_);
     PointBlock& block = step.block;
     std::vector<std::uint32_t> places;
@@ -271,7 +354,10 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
             collisions.advance(block.P, block.v, {{&context_.scene.uniform.a, 0}, block.dt, block.dt, {}});
             deepest = std::max(deepest, collisions.round(block.P, block.rounded));
             // Contacts found here do not count: the constraints have treated them.
-            for (std::size_t i = 0; i < size; ++i) block.v[i] = v_[first + i];
+            for (std::size_t i = 0; i < size; ++i) {
+                block.v[i] = v_[first + i];
+                if (holds_still(first + i)) block.rounded[i] = at_[first + i].P.cast<float>();
+            }
         } else {
             cast(std::span<const Vec3d>(block.P), block.rounded);
         }
@@ -280,6 +366,9 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
     }
     context_.count_penetration(deepest);
 }
+
+// Whether a constraint prescribes its position, or it has slept: no shape moves it from there.
+bool CoupledStep::holds_still(std::size_t i) const { return !(at_[i].w > 0) && inverse_mass_[i] > 0; }
 
 double CoupledStep::inverse_mass(std::size_t i) const
 {

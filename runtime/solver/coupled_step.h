@@ -9,8 +9,10 @@
 
 #include "runtime/solver/block_step.h"
 #include "runtime/solver/constraints/constraint.h"
+#include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/projection.h"
 #include "runtime/solver/constraints/sleep.h"
+#include "runtime/solver/constraints/spin.h"
 #include "runtime/solver/step_context.h"
 
 namespace rapid {
@@ -24,16 +26,21 @@ public:
 private:
     void read_points(std::size_t begin, std::size_t end);
     void begin_substeps();
+    void begin_forces();
+    void begin_spins();
     bool is_isolated(const Projection& projection) const;
     void interact(int kicks);
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
     void take_point(const PointBlock& block, std::size_t k);
+    void add_drag(const PointBlock& block, std::size_t k, EnergyChanges& changes) const;
+    EnergyChanges changes(const Projection& projection);
     bool leaves_out(std::size_t i);
     void store(std::size_t begin, std::size_t end);
     Mobility mobility_of(const PointBlock& block, std::size_t k) const;
     FreePath free_path(const PointBlock& block, std::size_t k) const;
     Vec3d acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const;
+    bool holds_still(std::size_t i) const;
     double inverse_mass(std::size_t i) const;
 
     StepContext& context_;
@@ -43,15 +50,24 @@ private:
     std::vector<Vec3d> v_, start_;
     std::vector<double> inverse_mass_;  // 1/kg
     std::vector<Mobility> mobility_;    // empty where no force has a linear part
-    std::vector<Vec3d> born_;           // Substep::born
-    std::vector<double> energy_;        // Substep::energy
-    std::vector<Vec3d> displacement_;   // Substep::displacement; empty where no constraint needs it
-    std::vector<FreePath> paths_;       // empty where nothing bounces
+    std::vector<SurfaceSpring> surface_springs_;
+    std::vector<Vec3d> born_;          // Substep::born
+    std::vector<double> energy_;       // Substep::energy
+    std::vector<Vec3d> displacement_;  // Substep::displacement; empty where no constraint needs it
+    std::vector<FreePath> paths_;      // empty where nothing bounces
+
+    std::vector<Vec3d> reaction_;  // Substep::reaction
 
     Substep now_;
+    std::optional<ContactForces> forces_;  // where they are recorded
+    std::optional<SpinState> spin_;        // where points turn
+    // The obstacles as the free motion of points that turn meets them: without friction, which turns them.
+    std::vector<Obstacle> smooth_;
+    std::vector<std::vector<float>> smooth_friction_;
     std::optional<Sleep> sleep_;   // where points may sleep
     bool skips_sleepers_ = false;  // only uniform forces act: sleeping points are left out of the blocks
     std::mutex mutex_;
+    std::vector<std::pair<std::size_t, EnergyChanges>> free_changes_;  // in free motion, by a point of the chunk
 };
 
 }  // namespace rapid

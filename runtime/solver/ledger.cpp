@@ -3,14 +3,34 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/solver/constraints/spin.h"
+
 namespace rapid {
+
+double EnergyChanges::sum() const
+{
+    const double apart = split ? split->friction + split->shapes : 0;
+    return rods + contacts + pins + drag + apart;
+}
+
+EnergyChanges& EnergyChanges::operator+=(const EnergyChanges& other)
+{
+    rods += other.rods;
+    contacts += other.contacts;
+    pins += other.pins;
+    drag += other.drag;
+    if (split && other.split)
+        split->friction += other.split->friction, split->shapes += other.split->shapes;
+    else
+        split.reset();
+    return *this;
+}
 
 void Ledger::append(const Ledger& later)
 {
     const Ledger before = *this;
     *this = later;
-    by_rods += before.by_rods;
-    by_contacts += before.by_contacts;
+    by += before.by;
     by_motion += before.by_motion;
     if (!before.residue || !residue) return residue.reset();
     residue->energy = std::max(residue->energy, before.residue->energy);
@@ -35,19 +55,24 @@ LedgerState LedgerState::of(const Substep& step, double elastic)
         state.angular_momentum += mass * P.cross(v);
         state.speed += mass * v.norm();
     });
+    for (std::size_t i = 0; i < step.spins.size(); ++i)
+        if (step.inverse_mass[i] > 0 && step.lives(i)) {
+            state.kinetic += step.spins[i].kinetic_energy(1 / step.inverse_mass[i]);
+            state.angular_momentum += step.spins[i].angular_momentum(1 / step.inverse_mass[i]);
+        }
     if (!(state.mass > 0)) return state;
     const Vec3d center = state.center / state.mass;
     each([&](double mass, const Vec3d& P, const Vec3d& v) { state.turning += mass * (P - center).norm() * v.norm(); });
     return state;
 }
 
-Ledger ledger_of(const LedgerState& before, const LedgerState& after, double by_rods, double by_contacts,
-                 bool is_isolated, const Vec3d& a, double h)
+Ledger ledger_of(const LedgerState& before, const LedgerState& after, const EnergyChanges& by, bool is_isolated,
+                 const Vec3d& a, double h)
 {
     Ledger ledger;
     ledger.kinetic = after.kinetic, ledger.potential = after.potential, ledger.elastic = after.elastic;
-    ledger.by_rods = by_rods, ledger.by_contacts = by_contacts;
-    ledger.by_motion = after.energy() - before.energy() - by_rods - by_contacts;
+    ledger.by = by;
+    ledger.by_motion = after.energy() - before.energy() - by.sum();
     ledger.momentum = after.momentum, ledger.angular_momentum = after.angular_momentum;
     if (!is_isolated) return ledger;
     const auto part = [](double residue, double whole) { return whole > 0 ? residue / whole : 0; };

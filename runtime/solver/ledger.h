@@ -11,12 +11,27 @@ namespace rapid {
 // Residues beyond this part of what is in motion are no rounding.
 constexpr double largest_residue = 1e-5;
 
+// What changed the energy in a frame, J.
+struct EnergyChanges {
+    double rods = 0;      // and springs
+    double contacts = 0;  // with shapes, too, and corrections of positions
+    double pins = 0;      // what they move by themselves, and the rods and springs that they pull
+    double drag = 0;
+    // Of `contacts`, where contact forces are recorded and nothing turns: by friction; by shapes that move.
+    struct Split {
+        double friction = 0, shapes = 0;
+    };
+    std::optional<Split> split;
+
+    double sum() const;
+    EnergyChanges& operator+=(const EnergyChanges& other);
+};
+
 struct Ledger {
     // At the end of the frame, J: of motion; in the acceleration that is the same for all points; in compliant rows.
     double kinetic = 0, potential = 0, elastic = 0;
-    // In the frame, J: by rods and springs; by contacts, what they push into shapes, and corrections of positions; by
-    // all else: forces that vary, drag, shapes met in free motion, what moves by itself.
-    double by_rods = 0, by_contacts = 0, by_motion = 0;
+    EnergyChanges by;
+    double by_motion = 0;  // all else: forces that vary, actions, points that were put out of shapes
     Vec3d momentum = Vec3d::Zero(), angular_momentum = Vec3d::Zero();  // kg m/s; kg m²/s about the origin
     // Where nothing acts on the points but that acceleration and each other: the parts of the energy, the momentum and
     // the angular momentum in motion that the frame has changed them by beside it. Friction without spin turns points.
@@ -46,7 +61,7 @@ struct LedgerState {
 };
 
 // Of a frame of h seconds. is_isolated: nothing acts but `a` and the points on each other.
-Ledger ledger_of(const LedgerState& before, const LedgerState& after, double by_rods, double by_contacts,
-                 bool is_isolated, const Vec3d& a, double h);
+Ledger ledger_of(const LedgerState& before, const LedgerState& after, const EnergyChanges& by, bool is_isolated,
+                 const Vec3d& a, double h);
 
 }  // namespace rapid

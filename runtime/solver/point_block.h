@@ -45,6 +45,9 @@ public:
     std::vector<Linear> own_linear;
     std::vector<Damped> damped;
 
+    // m/s: what shapes have changed velocities by in the sub-step. Empty where nobody asks.
+    std::vector<Vec3d> reaction;
+
 private:
     void drift_dragged(std::span<const double> t);
     bool has_springs() const;

@@ -21,6 +21,7 @@
 namespace rapid {
 
 class Refinement;
+class StepLog;
 struct ShapeLoads;
 
 struct SolveOptions {
@@ -31,6 +32,7 @@ struct SolveOptions {
     std::string group;       // only these points are advanced; all when empty
     // Set to 1 for points that touch a shape, by their place before the step; null where nobody asks.
     std::uint8_t* met = nullptr;
+    StepLog* log = nullptr;    // receives contacts and deaths; null where nobody asks
     bool begins_frame = true;  // the first step of the frame: contacts are counted from 0
 
     // Neighbours act on each other at every sub-step (interaction.h); else not at all in here.

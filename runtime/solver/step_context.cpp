@@ -23,7 +23,7 @@ StepContext::StepContext(PointSet& set, const Dynamics& dynamics, const SolveOpt
 
 CollisionContext StepContext::collision_context()
 {
-    return {hits_ ? &*hits_ : nullptr, dead, options.met, scene.mass, options.time, options.h};
+    return {hits_ ? &*hits_ : nullptr, dead, options.met, scene.mass, options.time, options.h, options.log};
 }
 
 void StepContext::count(const Collisions& collisions, double deepest, std::size_t first)
@@ -46,6 +46,7 @@ void StepContext::count_penetration(double deepest)
 void StepContext::remove_dead()
 {
     if (std::find(dead.begin(), dead.end(), 1) == dead.end()) return;
+    if (options.log) options.log->take_dead(points, dead);
     for (std::uint8_t& killed : dead) killed = !killed;
     const std::size_t before = points.size();
     points.keep(dead);

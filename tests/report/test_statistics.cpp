@@ -31,9 +31,28 @@ FrameResult frame_result()
     return result;
 }
 
-RunStatistics run_of(std::initializer_list<std::uint64_t> points)
+// A run with its frames, which a run itself does not keep.
+struct Recorded : RunStatistics {
+    std::vector<FrameStatistics> frames;
+};
+
+std::string to_json(const Recorded& run)
 {
-    RunStatistics run;
+    std::string text = json_head(run);
+    for (const FrameStatistics& frame : run.frames) text += json_line(frame, &frame == run.frames.data());
+    return text + json_end(run);
+}
+
+std::string summary(const Recorded& run)
+{
+    RunTotals totals;
+    for (const FrameStatistics& frame : run.frames) totals.add(frame);
+    return summary(run, totals);
+}
+
+Recorded run_of(std::initializer_list<std::uint64_t> points)
+{
+    Recorded run;
     run.graph = "sparks.lua";
     run.threads = 2;
     run.peak_bytes = 3 << 20;
@@ -79,12 +98,12 @@ TEST_CASE("a frame's points are those of all its outputs", "[report]")
 
 TEST_CASE("the statistics file has the shape of the contract", "[report]")
 {
-    RunStatistics run = run_of({});
+    Recorded run = run_of({});
     run.frames.push_back(statistics_of(frame_result()));
     run.frames.front().seconds.write = 0.25;
     const ordered_json json = ordered_json::parse(to_json(run));
 
-    CHECK(keys_of(json) == std::vector<std::string>{"graph", "threads", "peak_bytes", "seconds", "frames"});
+    CHECK(keys_of(json) == std::vector<std::string>{"graph", "threads", "frames", "peak_bytes", "seconds"});
     CHECK(json["graph"] == "sparks.lua");
     CHECK(json["threads"] == 2);
     CHECK(json["peak_bytes"] == 3 << 20);
@@ -105,7 +124,7 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
 {
     FrameResult result = frame_result();
     for (int i = 100; i >= 0; --i) result.figures.errors.push_back(i * 1e-4);
-    RunStatistics run = run_of({});
+    Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     const ordered_json error = ordered_json::parse(to_json(run))["frames"][0]["error"];
     CHECK(error["position_p50"] == 50 * 1e-4);
@@ -115,19 +134,41 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
                Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
 }
 
-TEST_CASE("where no error is estimated, that is told; unless nothing was solved", "[report]")
+TEST_CASE("where no error is estimated, that is told, and why; unless nothing was solved", "[report]")
 {
     FrameResult result = frame_result();
     result.figures.errors.clear();
-    RunStatistics run = run_of({});
+    result.figures.left_out_of_errors = {"all points, as they are strange"};
+    Recorded run = run_of({});
     run.frames = {statistics_of(result)};
-    CHECK_THAT(summary(run), Catch::Contains("\nerror    not estimated: points act on one another"));
+    CHECK_THAT(summary(run),
+               Catch::Contains("\nerror    not estimated\nleft out of the error: all points, as they are strange\n"));
     CHECK_THAT(summary(run), !Catch::Contains("none above rounding"));
-    CHECK_FALSE(ordered_json::parse(to_json(run))["frames"][0].contains("error"));
+    const ordered_json frame = ordered_json::parse(to_json(run))["frames"][0];
+    CHECK_FALSE(frame.contains("error"));
+    CHECK(frame["left_out_of_errors"] == ordered_json{"all points, as they are strange"});
 
     result.figures.substeps = 0;
     run.frames = {statistics_of(result)};
     CHECK_THAT(summary(run), !Catch::Contains("error  "));
+}
+
+TEST_CASE("errors of single frames are told by the worst of these frames, and their number", "[report]")
+{
+    FrameResult result = frame_result();
+    Recorded run = run_of({});
+    for (int k = 0; k < 5; ++k) {
+        result.frame = 10 + k;
+        result.figures.frame_errors.clear();
+        for (int i = 0; k % 2 == 1 && i <= 100; ++i) result.figures.frame_errors.push_back(k * i * 1e-4);
+        if (k == 2) result.figures.left_out_of_errors = {"the rest"};
+        run.frames.push_back(statistics_of(result));
+    }
+    CHECK(ordered_json::parse(to_json(run))["frames"][1]["frame_error"]["position_p95"] == 95 * 1e-4);
+    CHECK_FALSE(ordered_json::parse(to_json(run))["frames"][2].contains("frame_error"));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    of one frame, estimated in 2 of 5: half of the points below "
+                                             "1.5e-02 m, 95 % below 2.9e-02, the worst 3.0e-02 (frame 13)\n"
+                                             "left out of the error: the rest (from frame 12 on)\n"));
 }
 
 TEST_CASE("what rounding is off by is told by its largest, apart from the estimated error", "[report]")
@@ -135,7 +176,7 @@ TEST_CASE("what rounding is off by is told by its largest, apart from the estima
     FrameResult result = frame_result();
     result.figures.errors = {0};
     result.figures.rounding = 0.25;
-    RunStatistics run = run_of({});
+    Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["rounding"] == 0.25);
     CHECK_THAT(summary(run), Catch::Contains("\nrounding of positions since birth: 2.5e-01 m at most (frame 7)\n"));
@@ -145,7 +186,7 @@ TEST_CASE("a drift of energy is told by its mean and its largest, whichever way,
 {
     FrameResult result = frame_result();
     result.figures.energy_drift = {0.5, -2, 0};
-    RunStatistics run = run_of({});
+    Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["energy_drift"] == ordered_json{{"mean", -0.5}, {"max", 2.0}});
     CHECK_THAT(summary(run),
@@ -166,7 +207,7 @@ TEST_CASE("a run that ended before its first frame has an empty list of frames",
 
 TEST_CASE("any name of a graph makes a file that can be parsed", "[report]")
 {
-    RunStatistics run = run_of({1, 2});
+    Recorded run = run_of({1, 2});
     run.graph = "a\"b\\c\n\xff.lua";
     CHECK_NOTHROW(ordered_json::parse(to_json(run)));
 }
@@ -174,12 +215,12 @@ TEST_CASE("any name of a graph makes a file that can be parsed", "[report]")
 TEST_CASE("a statistics file has a line for each frame", "[report]")
 {
     const std::string text = to_json(run_of({1, 2, 3}));
-    CHECK(std::count(text.begin(), text.end(), '\n') == 3 + 3);
+    CHECK(std::count(text.begin(), text.end(), '\n') == 3 + 4);
 }
 
 TEST_CASE("the summary says points, frames, seconds by stage and memory", "[report]")
 {
-    RunStatistics run = run_of({100, 2000, 1500});
+    Recorded run = run_of({100, 2000, 1500});
     run.frames[0].seconds = {0.25, 0, 0.125, 0.5};
     run.frames[2].seconds = {0.25, 0.5, 0.125, 0};
     CHECK(summary(run) ==
@@ -191,7 +232,7 @@ TEST_CASE("the summary says points, frames, seconds by stage and memory", "[repo
 
 TEST_CASE("the summary adds up what solve warned of, and in which frames", "[report]")
 {
-    RunStatistics run = run_of({1, 1, 1, 1});
+    Recorded run = run_of({1, 1, 1, 1});
     CHECK_THAT(summary(run), !Catch::Contains("warning"));
     run.frames[1].contact_limit = 1000;
     run.frames[3].contact_limit = 234;
@@ -204,7 +245,7 @@ TEST_CASE("the summary adds up what solve warned of, and in which frames", "[rep
 
 TEST_CASE("the summary says what bands took that were built in the run, and nothing of others", "[report]")
 {
-    RunStatistics run = run_of({1, 1});
+    Recorded run = run_of({1, 1});
     run.frames[0].bands = {{"collide1", 0.06, 4000, 0}, {"collide2", 0.1, 5000, 0.25}};
     run.frames[1].bands = {{"collide1", 0.06, 4000, 0}, {"collide2", 0.2, 9000, 0.5}};
     CHECK_THAT(summary(run), Catch::EndsWith("at the peak\n"
@@ -223,7 +264,7 @@ TEST_CASE("the totals of a run tell what its frames tell, and writing is added b
     for (int i = 0; i <= 100; ++i) result.figures.errors.push_back(i * 1e-4);
     result.figures.energy_drift = {0.5, -2, 0};
     result.figures.constraint_rows = 3;
-    RunStatistics run = run_of({5, 1, 9, 2});
+    Recorded run = run_of({5, 1, 9, 2});
     for (int k = 0; k < 4; ++k) {
         result.frame = 10 + k;
         result.figures.constraint_residual_max = k == 2 ? 0.5 : 0.25;

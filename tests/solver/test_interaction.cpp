@@ -185,7 +185,7 @@ TEST_CASE("coincident points separate, each in its own direction", "[interaction
         for (std::size_t j = 0; j < i; ++j) CHECK(points.v()[i] != points.v()[j]);
 }
 
-TEST_CASE("an interaction has the same bits on any number of threads", "[interaction]")
+TEST_CASE("an interaction has the same bits on any number of threads", "[interaction][threads]")
 {
     std::vector<PointSet> results;
     for (const std::size_t threads : {1, 2, 7}) {

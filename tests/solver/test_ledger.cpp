@@ -23,8 +23,8 @@ TEST_CASE("a contact without bounce takes the energy of the relative motion, and
     REQUIRE(scene.last.ledger);
     const Ledger& ledger = *scene.last.ledger;
     CHECK(ledger.kinetic == Approx(0).margin(1e-9));
-    CHECK(ledger.by_contacts == Approx(-0.5 * 0.75 * 16));
-    CHECK(ledger.by_rods == 0);
+    CHECK(ledger.by.contacts == Approx(-0.5 * 0.75 * 16));
+    CHECK(ledger.by.rods == 0);
     CHECK(ledger.by_motion == Approx(0).margin(1e-9));
     REQUIRE(ledger.residue);
     CHECK(ledger.residue->is_rounding());

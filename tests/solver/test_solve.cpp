@@ -267,7 +267,7 @@ Column<T> last_of(const Column<T>& column, std::size_t n)
     return Column<T>(std::span(column.read().data + column.size() - n, n));
 }
 
-TEST_CASE("results are the same bits on any number of threads", "[solve]")
+TEST_CASE("results are the same bits on any number of threads", "[solve][threads]")
 {
     Scene reference = crowd(20000, 0);
     {

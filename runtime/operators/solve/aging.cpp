@@ -3,6 +3,7 @@
 #include <limits>
 #include <memory>
 
+#include "runtime/operators/solve/step_recorder.h"
 #include "runtime/parallel.h"
 #include "runtime/points/members.h"
 
@@ -20,7 +21,7 @@ const T* contiguous(const Strided<T>& values, std::size_t begin, std::size_t end
 
 }  // namespace
 
-std::size_t age_points(PointSet& points, const std::string& group, double frame_length)
+std::size_t age_points(PointSet& points, const std::string& group, double frame_length, StepRecorder* recorder)
 {
     auto* ages = points.find<float>("age");
     if (!ages || points.empty()) return 0;
@@ -53,6 +54,7 @@ std::size_t age_points(PointSet& points, const std::string& group, double frame_
         }
     });
     const std::size_t before = points.size();
+    if (lives && recorder) recorder->remove_old(points, {keep.get(), before});
     if (lives) points.keep({keep.get(), points.size()});
     return before - points.size();
 }

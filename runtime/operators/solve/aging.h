@@ -17,6 +17,8 @@
 
 namespace rapid {
 
+class StepRecorder;
+
 class Aging {
 public:
     // h: frame length, s.
@@ -43,7 +45,8 @@ private:
 };
 
 // Lets the points of the group grow older by their `dt`, or by a frame, and removes those that have reached their
-// `life`. Returns how many died.
-std::size_t age_points(PointSet& points, const std::string& group, double frame_length);
+// `life`. Returns how many died; the recorder is told.
+std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
+                       StepRecorder* recorder = nullptr);
 
 }  // namespace rapid

@@ -133,19 +133,93 @@ return rapid.create { seed = 3 } :emit { source = rapid.mesh.sphere { radius = 1
   end)
 end)
 
-describe("where points act on one another, a run says that no error is estimated, by", function()
+describe("where points act on one another, the error is told, and bits are the same with or without it, by", function()
   for _, nodes in ipairs {
-    ":distance { within = 2 }", ":contact { radius = 0.1 }", ":clump { radius = 0.1 }", ":pin { compliance = 0.01 }",
-    ":interact { radius = 2, separation = 5 }",
+    ":distance { within = 2 } :vortex {}", ":contact { radius = 0.4 } :attract { center = {0.5, 0, 0} }",
+    ":clump { radius = 0.6 } :vortex {}", ":pin { compliance = 0.01 }",
+    ":interact { radius = 2, separation = 5 } :vortex {}",
   } do
     for _, substeps in ipairs { 1, 4 } do
       it(("%s at %d sub-steps"):format(nodes, substeps), function()
-        local text = "return rapid.create { points = two } :gravity {} %s :solve { substeps = %d }"
-        local run = scene.command("run", text:format(nodes, substeps), "-f 1-12 --stats stats.json")
+        local text = ("return rapid.create { points = two } :gravity {} %s :solve { substeps = %d }")
+          :format(nodes, substeps)
+        local run = scene.command("run", text, "-f 1-12 --stats stats.json -o told.##.csv")
         assert.equal(0, run.status, run.stderr)
-        assert.truthy(run.stdout:find("\nerror    not estimated: points act on one another, ", 1, true), run.stdout)
-        for _, frame in ipairs(json.decode(scene.folder:read "stats.json").frames) do assert.falsy(frame.error) end
+        assert.match("\nerror    since birth, estimated: half of the points ", run.stdout)
+        local frames = json.decode(scene.folder:read "stats.json").frames
+        assert.truthy(frames[12].error.position_max > 1e-6, frames[12].error.position_max)
+        assert.falsy(frames[12].left_out_of_errors)
+        run = scene.command("run", text, "-f 1-12 --quiet -o untold.##.csv")
+        assert.equal(0, run.status, run.stderr)
+        assert.equal(scene.folder:read "told.12.csv", scene.folder:read "untold.12.csv")
       end)
     end
   end
+end)
+
+describe("of more than 1,000 points that act on one another", function()
+  local text = [[
+local P, v = {}, {}
+for i = 1, 1100 do P[i], v[i] = {0.1 * (i %% 11), 0.1 * math.floor(i / 11), 0}, {math.sin(i), math.cos(i), 0} end
+return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {}
+  :contact { radius = 0.05, friction = 0.2 } :solve { substeps = %d, sleep = math.huge }]]
+
+  it("the error is the same on any number of threads", function()
+    local found = {}
+    for i, threads in ipairs { 1, 2, 7 } do
+      local run = scene.command("run", text:format(4), "-f 1-9 --quiet --stats stats.json --threads " .. threads)
+      assert.equal(0, run.status, run.stderr)
+      found[i] = json.decode(scene.folder:read "stats.json").frames[9].frame_error
+      assert.same(found[1], found[i])
+    end
+    assert.truthy(found[1].position_max > 0)
+  end)
+
+  it("the error of a frame is told, within a factor of four, in the 1st, 2nd, 4th, 8th, ... and each 40th", function()
+    local run = scene.command("run", text:format(4), "-f 1-42 --stats stats.json")
+    assert.equal(0, run.status, run.stderr)
+    assert.match("\nerror    of one frame, estimated in 7 of 42: half of the points below ", run.stdout)
+    assert.match("\nleft out of the error: the sum since birth, as more than 1,000 points act on", run.stdout)
+    for _, frame in ipairs(json.decode(scene.folder:read "stats.json").frames) do
+      assert.falsy(frame.error)
+      local n = frame.frame - 1 -- of those that are solved
+      local due = n == 1 or n == 2 or n == 4 or n == 8 or n == 16 or n == 32 or n == 40
+      assert.equal(due, frame.frame_error ~= nil, frame.frame)
+    end
+    local told = json.decode(scene.folder:read "stats.json").frames[2].frame_error.position_p95
+    local found, truth = scene.run(text:format(4), { frames = {2, 2} })[2],
+      scene.run(text:format(256), { frames = {2, 2} })[2]
+    local off = {}
+    for i = 1, #found do off[i] = (found[i].P - truth[i].P):length() end
+    local real = p95(off)
+    assert.truthy(told < 4 * real and told > real / 4, ("it is told as %g m, and is %g m"):format(told, real))
+  end)
+end)
+
+describe("what is left out of the error is told:", function()
+  local function told(nodes, arguments)
+    local run = scene.command("run", "return rapid.create { points = two } " .. nodes, arguments or "-f 1-4")
+    assert.equal(0, run.status, run.stderr)
+    return run.stdout
+  end
+
+  it("functions of the frame, but of forces", function()
+    local text = told ":contact { name = 'grip', radius = 0.6, friction = function(f) return f.time end } :solve {}"
+    assert.match("\nleft out of the error: grip.friction, a function of the frame that is called once in each\n", text)
+    assert.falsy(told(":wind { velocity = function(f) return {f.time, 0, 0} end } :solve {}"):find("left out", 1, true))
+  end)
+
+  it("kicks among neighbours that are at the ends of frames", function()
+    local text = told ":interact { name = 'flock', radius = 2, separation = 5 } :solve { tolerance = 1e-3 }"
+    assert.match("\nleft out of the error: flock, whose kicks with a tolerance are at the ends of frames\n", text)
+  end)
+
+  it("and nothing where there is nothing, as of motions, which are called between frames too", function()
+    local moving = "function(f) return rapid.translate(f.time, 0, 0) end"
+    for _, nodes in ipairs { ":gravity {} :solve {}",
+      ":gravity {} :collide { shape = rapid.shape.plane {}, transform = " .. moving .. " } :solve {}",
+      ":gravity {} :contact { radius = 0.1 } :solve {}" } do
+      assert.falsy(told(nodes):find("left out", 1, true), nodes)
+    end
+  end)
 end)

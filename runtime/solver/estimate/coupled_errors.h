@@ -1,0 +1,71 @@
+// Error estimate of points that act on one another, by step halving.
+//
+// A sample of them would move differently, so all have shadows (shadow.h): the whole set is advanced beside the run
+// with twice the sub-steps, from the first frame on. Constraints, sleep and the loads on shapes have memories of their
+// own for it. The estimate is twice the difference, as for points that move alone.
+//
+// That takes twice the time of Solve, and is done up to `most_points`. Of more, the frames 1, 2, 4, 8, ... and each
+// `stride`th are solved again from where the run's points begin them, and the estimate is that of the error made in
+// this frame; a sum over frames would leave out how later motion damps or spreads it.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/solver/constraints/shape_contacts.h"
+#include "runtime/solver/solve.h"
+
+namespace rapid {
+
+class CoupledErrors {
+public:
+    static constexpr std::size_t most_points = 1000;
+    static constexpr std::int64_t stride = 40;  // of frames: in long runs a twentieth of the time of Solve
+
+    // Whether the n-th frame of too many points is solved again.
+    static bool is_due(std::int64_t frame);
+
+    struct Errors {
+        std::vector<double> since_birth, of_frame;  // m, in the order of the points; empty where not estimated
+        std::string unknown;                        // why there are none since birth; else empty
+    };
+
+    // Call before Solve, and before interactions act at the frame's ends.
+    void begin(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
+    // Call after Solve: advances the shadows.
+    Errors end(const PointSet& solved);
+
+private:
+    // Of a point: what its shadow differs by.
+    struct Difference {
+        Vec3d P = Vec3d::Zero(), v = Vec3d::Zero();  // shadow minus point, after Solve
+        bool is_known = true;                        // both have lived so far
+    };
+
+    void start(const SolveOptions& options);
+    void stop();
+    void apply_differences(const PointSet& points);
+    void take_attributes(const PointSet& points);
+    bool make_twins(const Dynamics& dynamics);
+    std::vector<double> compare(const PointSet& solved);
+
+    std::string unknown_;      // why there are no shadows since birth any more; empty while there are
+    std::int64_t frames_ = 0;  // since that
+    bool runs_ = false;        // there are shadows
+
+    PointSet solved_, shadows_;            // the points and the shadows, from end() to begin()
+    Column<std::int64_t> ids_;             // of the points, from begin() to end()
+    std::vector<Difference> differences_;  // in their order
+    std::vector<std::shared_ptr<const Constraint>> twins_;
+    ShapeLoads loads_;
+    SleepRecords sleep_records_;
+
+    // The shadows, from begin() to end().
+    PointSet set_;
+    Dynamics dynamics_;
+    SolveOptions options_;
+};
+
+}  // namespace rapid

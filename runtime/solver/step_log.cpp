@@ -1,0 +1,27 @@
+#include "runtime/solver/step_log.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace rapid {
+
+void StepLog::take_dead(const PointSet& points, std::span<const std::uint8_t> dead)
+{
+    std::vector<std::uint32_t> places;
+    for (std::size_t i = 0; i < dead.size(); ++i)
+        if (dead[i]) places.push_back(static_cast<std::uint32_t>(i)), dead_times_.push_back(died_at_[i]);
+    dead_ = points.select(places);
+}
+
+std::vector<LoggedHit> StepLog::hits() const
+{
+    std::vector<LoggedHit> all;
+    for (const std::vector<LoggedHit>& part : hits_) all.insert(all.end(), part.begin(), part.end());
+    // What one thread has logged of a point is in order; which thread it was is not known.
+    std::stable_sort(all.begin(), all.end(), [](const LoggedHit& a, const LoggedHit& b) {
+        return std::tie(a.point, a.time, a.collider) < std::tie(b.point, b.time, b.collider);
+    });
+    return all;
+}
+
+}  // namespace rapid

@@ -1,0 +1,47 @@
+// What happens to points within one step: contacts and deaths, with their times.
+#pragma once
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+struct LoggedHit {
+    std::uint32_t point;    // place in the set before the step
+    std::int32_t collider;  // place among those of the chain
+    double time;            // s since the start
+    Vec3f P, n, vc;         // where, m; the surface's normal, unit, and velocity, m/s
+    Vec3f v0, v1;           // the point's velocity before and after, m/s
+    float speed;            // of approach, m/s
+    float impulse;          // kg m/s
+};
+
+class StepLog {
+public:
+    explicit StepLog(std::size_t points) : died_at_(points, std::numeric_limits<double>::quiet_NaN()) {}
+
+    // From the thread that advances the point.
+    void add(const LoggedHit& hit) { hits_.local().push_back(hit); }
+    void kill(std::size_t point, double time) { died_at_[point] = time; }
+    // The points whose mask is 1 are as they were when they died. Before they are removed.
+    void take_dead(const PointSet& points, std::span<const std::uint8_t> dead);
+
+    // By point, then by time.
+    std::vector<LoggedHit> hits() const;
+    const PointSet& dead() const { return dead_; }
+    const std::vector<double>& died_at() const { return dead_times_; }
+
+private:
+    tbb::enumerable_thread_specific<std::vector<LoggedHit>> hits_;
+    std::vector<double> died_at_;  // by point; NaN of those that live
+    PointSet dead_;
+    std::vector<double> dead_times_;
+};
+
+}  // namespace rapid

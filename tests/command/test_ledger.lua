@@ -1,0 +1,90 @@
+-- The ledger of constrained points, in --stats and in the summary, against closed forms.
+local command = require "testing.command"
+local json = require "dkjson"
+
+-- What the frames from `first` to 25 have changed the energy by, by name; and the summary.
+local function ledger(text, first)
+  local folder = command.folder()
+  folder:write("scene.lua", 'local rapid = require "rapid"\nreturn rapid.create { fps = 24, points = ' .. text)
+  local result = command.rapid("run scene.lua -f 1-25 --stats stats.json", { cwd = folder.path })
+  assert.equal(0, result.status, result.stderr)
+  local sums = {}
+  for _, frame in ipairs(json.decode(folder:read "stats.json").frames) do
+    for name, value in pairs(frame.frame >= (first or 1) and frame.ledger or {}) do
+      if name:find "^by_" then sums[name] = (sums[name] or 0) + value end
+    end
+  end
+  return sums, result.stdout
+end
+
+-- Of one second; all that is not named is 0.
+local function check(expected, sums, tolerance)
+  for name, value in pairs(sums) do assert.near(expected[name] or 0, value, tolerance, name) end
+  for name in pairs(expected) do assert.truthy(sums[name], name) end
+end
+
+local g = 9.81
+
+describe("the ledger", function()
+  it("has (1 - e²) m v²/2 of a bounce", function()
+    local sums, summary = ledger [[rapid.points.from { P = {{0, 1, 0}}, v = {{0.5, -4, 0}} } }
+  :attribute { mass = 3 } :collide { shape = rapid.shape.plane {}, bounce = 0.6 }
+  :contact { radius = 0.1 } :solve { substeps = 2 }]]
+    local lost = (1 - 0.6 ^ 2) * 3 * 4 ^ 2 / 2
+    check({ by_contacts = -lost }, sums, 1e-4)
+    assert.match("energy   9%.02 J of constrained points; changed by contacts %-15%.4 J\n", summary)
+  end)
+
+  it("has μ m g cos d of a slide, as friction where forces are recorded", function()
+    local angle, mu, mass = 0.6, 0.3, 2
+    local text = ([[rapid.points.from { P = { 0.1 * vec3(%.9g, %.9g, 0) } } }
+  :attribute { mass = %g } :gravity {} :contact { radius = 0.1, RECORD } :collide { bounce = 0, friction = %g,
+    shape = rapid.shape.plane { normal = {%.9g, %.9g, 0} } } :solve { substeps = 4 }]]):format(math.sin(angle),
+      math.cos(angle), mass, mu, math.sin(angle), math.cos(angle))
+    local way = g * (math.sin(angle) - mu * math.cos(angle)) / 2
+    local lost = mu * mass * g * math.cos(angle) * way
+    check({ by_friction = -lost, by_shapes = 0 }, (ledger(text:gsub("RECORD", "record = true"))), 1e-4 * lost)
+    check({ by_contacts = -lost }, (ledger(text:gsub("RECORD", ""))), 1e-4 * lost)
+  end)
+
+  it("has the integral of drag, while a point falls, too", function()
+    local k, mass = 2, 1.5
+    local sums = ledger [[rapid.points.from { P = {{0, 9, 0}}, v = {{3, 0, 0}} } } :attribute { mass = 1.5 }
+  :drag { linear = 2 } :contact { radius = 0.1 } :solve { substeps = 3 }]]
+    check({ by_drag = mass / 2 * 9 * (math.exp(-2 * k) - 1) }, sums, 1e-5)
+
+    sums = ledger [[rapid.points.from { P = {{0, 9, 0}} } } :attribute { mass = 1.5 }
+  :gravity {} :drag { linear = 2 } :contact { radius = 0.1 } :solve { substeps = 3 }]]
+    local fall = (1 - 2 * (1 - math.exp(-k)) / k + (1 - math.exp(-2 * k)) / (2 * k)) -- ∫ (1 - e^(-kt))²
+    check({ by_drag = -mass * k * (g / k) ^ 2 * fall }, sums, 1e-4)
+  end)
+
+  it("has what restitution and friction take of an oblique impact, apart", function()
+    -- They touch along x: p = (1 + e) 4/W, q = μ p, W = 1 + 1/3.
+    local sums = ledger [[rapid.points.from { P = {{-0.3, -0.075, 0}, {0, 0, 0}}, v = {{4, 3, 0}, {0, 0, 0}},
+    mass = {1, 3} } } :contact { radius = 0.1, bounce = 0.5, friction = 0.2, record = true } :solve { substeps = 2 }]]
+    local q = 0.2 * 1.5 * 4 * 0.75
+    local normal, friction = -0.75 / 2 * 16 * (1 - 0.5 ^ 2), -q * 3 + q ^ 2 / 2 / 0.75
+    check({ by_contacts = normal, by_friction = friction, by_shapes = 0 }, sums, 1e-5)
+  end)
+
+  it("has m g h of a floor that lifts, as the work of shapes", function()
+    local sums = ledger([[rapid.points.from { P = {{0, 0.1, 0}}, v = {{0, 0.5, 0}} } } :attribute { mass = 3 }
+  :gravity {} :contact { radius = 0.1, record = true } :collide { bounce = 0, shape = rapid.shape.plane {},
+    transform = function(frame) return rapid.translate(0, 0.5 * frame.time, 0) end } :solve { substeps = 4 }]], 4)
+    local h = 0.5 * 22 / 24
+    check({ by_shapes = 3 * g * h, by_friction = 0 }, sums, 1e-3 * 3 * g * h)
+  end)
+
+  it("has m g h of a pin that lifts, and of what hangs from it", function()
+    local text = [[rapid.points.from { P = {{0, 0, 0}, {0, -1, 0}}, v = {{0, 0.5, 0}, {0, 0.5, 0}} } }
+  :attribute { mass = 2 } :gravity {} ROD :group { name = "held", where = function(p) return HELD end }
+  :pin { group = "held", transform = function(frame) return rapid.translate(0, 0.5 * frame.time, 0) end }
+  :solve { substeps = 4 }]]
+    local h = 0.5 * 22 / 24
+    for _, case in ipairs { { ":distance { pairs = {{1, 2}} }", "p.id == 0" }, { "", "true" } } do
+      local sums = ledger(text:gsub("ROD", case[1]):gsub("HELD", case[2]), 4)
+      check({ by_pins = 4 * g * h }, sums, 1e-4 * 4 * g * h)
+    end
+  end)
+end)

@@ -101,6 +101,10 @@ function quat(x, y, z, w) end
 
 ---@class rapid.Attribute  each point's own value, from rapid.attr
 ---@class rapid.Points
+local Points = {}
+---@param motion rapid.Motion
+---@return rapid.Points
+function Points:transform(motion) end
 
 ---@class rapid.Motion  a * b moves by b, and then by a
 ---@operator mul(rapid.Motion): rapid.Motion
@@ -260,7 +264,7 @@ function Point:leave(group) end
 function Point:within(group) end
 ---Removes the point when its node ends.
 function Point:kill() end
----In [0, 1): the point's own number k, the same in every frame, or with the frame anew in each.
+---In [0, 1): the point's own number k, the same in every frame, or with the frame another in each.
 ---@param k number
 ---@param frame? rapid.Frame|number
 ---@return number

@@ -1,7 +1,8 @@
 -- The points of a :detail function: the whole set, in one state, in order.
 --
 --   #points, points[i].P, points[i].heat = 1, points[i]:join "hot", :leave, :within, :kill(), :rand(k)
---   points:add { P = vec3(0, 1, 0), heat = 3 }      appended when the function ends
+--   points:add { P = vec3(0, 1, 0), heat = 3 }      appended when the function ends; also `dt`, the time in seconds for
+--                                                   which it moves in this frame, and `group`, a name or several
 --   points:kill(i)                                  removed when the function ends
 --   points:neighbours(i, radius)                    places of the points within the radius, in order, without i, by
 --                                                   the positions at the first search with this radius
@@ -152,13 +153,13 @@ local function make(native, rand, point_names)
   function methods.kill(p)
     killed[place_in(p, "kill")] = true
   end
-  function methods.rand(p, use, anew)
+  function methods.rand(p, use, when)
     local place = place_in(p, "rand")
-    if anew == frame then anew = frame.number end
-    if type(use) ~= "number" or (anew ~= nil and type(anew) ~= "number") then
+    if when == frame then when = frame.number end
+    if type(use) ~= "number" or (when ~= nil and type(when) ~= "number") then
       error("p:rand takes a number, which of the point's random numbers, and the frame where they are to be new", 0)
     end
-    return rand(random, load("id", place), use, anew == 0 and 5e-324 or anew or 0)
+    return rand(random, load("id", place), use, when == 0 and 5e-324 or when or 0)
   end
   for _, name in ipairs(point_names.methods) do assert(methods[name], name) end
 
@@ -166,6 +167,7 @@ local function make(native, rand, point_names)
     __index = function(p, name)
       if p.rapid_serial ~= serial[0] then error(over, 0) end
       if name == "index" then return p.rapid_place + 1 end
+      if name == "nage" then return p.age / p.life end
       return methods[name] or load(name, p.rapid_place)
     end,
     __newindex = function(p, name, x)
@@ -238,6 +240,33 @@ local function make(native, rand, point_names)
     check_set(points, "kill")
     killed[place_of("points:kill", i)] = true
   end
+  -- A list of numbers stands for a vector.
+  local function vector_of(column, value)
+    if type(value) ~= "table" then return value end
+    local n = column.kind == "vec3" and 3 or column.kind == "quat" and 4
+    for k = 1, n or 0 do
+      if #value ~= n or type(value[k]) ~= "number" then return value end
+    end
+    return n == 3 and vec3(value[1], value[2], value[3]) or n == 4 and quat(value[1], value[2], value[3], value[4])
+      or value
+  end
+  local function check_time(dt)
+    if type(dt) ~= "number" or not (dt >= 0 and dt <= frame.dt) then
+      error(("points:add: dt = %s; it is the time that the point moves in this frame, from 0 to %.9g s"):format(
+        describe.value(dt), frame.dt), 0)
+    end
+    return dt
+  end
+  local function list_of_groups(names)
+    local list = type(names) == "table" and names or { names }
+    for _, name in ipairs(list) do
+      if type(name) ~= "string" or not group_of(name, false) then
+        error(("points:add: no node makes a group %s"):format(describe.value(name)), 0)
+      end
+    end
+    return list
+  end
+
   function set.add(points, values)
     check_set(points, "add")
     if type(values) ~= "table" then error("points:add takes the new point's values: { P = vec3(x, y, z) }", 0) end
@@ -250,9 +279,16 @@ local function make(native, rand, point_names)
     end
     table.sort(names) -- the first wrong one, the same each time
     for _, name in ipairs(names) do
-      if read_only[name] then error(("%s is read only"):format(name), 0) end
-      column_of(name, false).check(name, values[name])
-      copy[name] = values[name]
+      if name == "dt" then
+        copy.dt = check_time(values.dt)
+      elseif name == "group" then
+        copy.group = list_of_groups(values.group)
+      else
+        if read_only[name] then error(("%s is read only"):format(name), 0) end
+        local column = column_of(name, false)
+        copy[name] = vector_of(column, values[name])
+        column.check(name, copy[name])
+      end
     end
     added[#added + 1] = copy
   end
@@ -334,9 +370,17 @@ local function make(native, rand, point_names)
 
   local function append_added()
     if #added == 0 then return end
-    native.append(#added)
+    local timed = false
+    for _, values in ipairs(added) do timed = timed or values.dt ~= nil end
+    native.append(#added, timed and frame.dt or nil)
     columns, groups = {}, {}
+    if native.has "dt" and (timed or column_of("dt", false).stride ~= 0) then
+      local column = column_of("dt", true)
+      for k, values in ipairs(added) do column.store(column.data, size + k - 1, values.dt or frame.dt) end
+    end
     for k, values in ipairs(added) do
+      for _, name in ipairs(values.group or {}) do group_of(name, true).data[size + k - 1] = 1 end
+      values.dt, values.group = nil, nil
       for name, value in pairs(values) do
         local column = column_of(name, true)
         column.store(column.data, (size + k - 1) * column.stride, value)

@@ -198,6 +198,13 @@ local function make_runner(kernel, layout, memory, shared)
   end
   for place in ipairs(layout.groups) do fields[#fields + 1] = ("uint8_t* g%d;"):format(place) end
 
+  -- The text of a number of the point; nil where the layout lacks the column.
+  local function value_of(name)
+    for place, column in ipairs(layout.columns) do
+      if column.name == name then return ("columns.c%d[%s]"):format(place, column.uniform and "0" or "i") end
+    end
+  end
+
   add_function("within", "_, group", function()
     for place, group in ipairs(layout.groups) do
       add("if group == $S then return ($C[$I] ~= 0) end", group, "g" .. place)
@@ -220,6 +227,9 @@ local function make_runner(kernel, layout, memory, shared)
     for place, column in ipairs(layout.columns) do
       add("if name == $S then " .. getter_text[column.type] .. " end", column, "c" .. place)
     end
+    local age, life = value_of "age", value_of "life"
+    if not (age and life) then names.nage = nil end
+    if age and life then text[#text + 1] = ("if name == \"nage\" then return (%s / %s) end"):format(age, life) end
     text[#text + 1] = [[
 if name == "dt" then return (frame.dt) end
 if name == "index" then return (chunk.first + i + 1) end]]

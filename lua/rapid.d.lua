@@ -97,6 +97,10 @@ function quat(x, y, z, w) end
 
 ---@class rapid.Attribute  each point's own value, from rapid.attr
 ---@class rapid.Points
+local Points = {}
+---@param motion rapid.Motion
+---@return rapid.Points
+function Points:transform(motion) end
 
 ---@class rapid.Motion  a * b moves by b, and then by a
 ---@operator mul(rapid.Motion): rapid.Motion
@@ -458,10 +462,13 @@ function rapid.shape.sphere(options) end
 ---@field id integer  read only
 ---@field dt number  read only: seconds that this point is advanced in this frame
 ---@field index integer  read only: place in the set, from 1
+---@field nage number  read only: age as a part of life: from 0 at birth to 1 at the end
 ---@field age number
 ---@field airresist number
 ---@field birthtime number
+---@field contactnum integer
 ---@field force rapid.Vec3
+---@field frictionforce number
 ---@field hitimpulse number
 ---@field hitnml rapid.Vec3
 ---@field hitnum integer
@@ -472,6 +479,8 @@ function rapid.shape.sphere(options) end
 ---@field hitv rapid.Vec3
 ---@field life number
 ---@field mass number
+---@field normalforce number
+---@field parent integer
 ---@field pscale number
 ---@field targetv rapid.Vec3
 ---@field [string] any
@@ -485,7 +494,7 @@ function Point:leave(group) end
 function Point:within(group) end
 ---Removes the point when its node ends.
 function Point:kill() end
----In [0, 1): the point's own number k, the same in every frame, or with the frame anew in each.
+---In [0, 1): the point's own number k, the same in every frame, or with the frame another in each.
 ---@param k number
 ---@param frame? rapid.Frame|number
 ---@return number
@@ -517,6 +526,30 @@ function Node:action(params) end
 ---@param params? rapid.params.align_to_velocity
 ---@return rapid.Node
 function Node:align_to_velocity(params) end
+
+---@class rapid.params.arrive
+---@field radius? number|fun(frame: rapid.Frame): number  where they begin to slow down [number, m, at least 1e-06, default 1]
+---@field response? number|fun(frame: rapid.Frame): number  time in which other velocity falls to 1/e [number, s, at least 1e-06, default 0.2]
+---@field speed? number|fun(frame: rapid.Frame): number  beyond the radius [number, m/s, at least 1e-06, default 1]
+---@field target? rapid.Place|fun(frame: rapid.Frame): rapid.Place  where to [vec3, m, default {0, 0, 0}]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Takes points to a place, slowing down before it.
+---@param params? rapid.params.arrive
+---@return rapid.Node
+function Node:arrive(params) end
+
+---@class rapid.params.assign_goals
+---@field by? "id"|"random"|fun(frame: rapid.Frame): "id"|"random"  who gets which [string, one of id, random, default "id"]
+---@field from string|fun(frame: rapid.Frame): string  the group of the points that are places [string, required]
+---@field into? string  who has a place is put into this group [name of a group, default "assigned"]
+---@field name? string  what the node is called in messages [string]
+
+---Gives points places to go to: the points of a group, which it removes.
+---@param params rapid.params.assign_goals
+---@return rapid.Node
+function Node:assign_goals(params) end
 
 ---@class rapid.params.attract
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
@@ -603,6 +636,9 @@ function Node:color_by_speed(params) end
 ---@field max_difference? number|fun(frame: rapid.Frame): number  of the radii in one grid; where not given, a quarter of the largest [number, m, at least 0]
 ---@field max_grids? integer|fun(frame: rapid.Frame): integer  the most grids for different radii [integer, from 1 to 254, default 8]
 ---@field mass_scaling? number|fun(frame: rapid.Frame): number  a point counts as e^mass_scaling times lighter than what it stands on, against gravity: tall stacks hold with few sub-steps, and flow less [number, from 0 to 4, default 0]
+---@field record? boolean  writes the forces of contacts, with points and shapes, to the attributes normalforce and frictionforce (N, means over the frame) and contactnum [boolean, default false]
+---@field spin? boolean  friction turns points, as solid spheres, by the attributes w (rad/s) and orient [boolean, default false]
+---@field rolling? number|rapid.Attribute|fun(frame: rapid.Frame): number  with spin: coefficient of rolling friction, a torque of at most rolling times the normal force and the radius; of two points the geometric mean [number, at least 0, default 0, takes rapid.attr]
 ---@field name? string  what the node is called in messages [string]
 
 ---Points collide with each other, as spheres: sand, rubble, balls.
@@ -614,7 +650,7 @@ function Node:contact(params) end
 ---@field fps? number  frames a second [number, 1/s, above 0, default 24]
 ---@field start? integer  first frame: the initial state, at time 0 [integer, default 1]
 ---@field seed? integer  of all random numbers of this simulation [integer, at least 0, default 0]
----@field subframes? integer  times a frame that the whole graph is evaluated, scripts, emitters and colliders included; not the solver's sub-steps [integer, at least 1, default 1]
+---@field subframes? integer  times a frame that the whole graph is evaluated, scripts, emitters and colliders included; not the solver's sub-steps [integer, from 1 to 10000, default 1]
 ---@field points? rapid.Points  initial points; their ids count from 0 [points]
 ---@field name? string  what the node is called in messages [string]
 
@@ -669,26 +705,33 @@ function Node:distance(params) end
 function Node:drag(params) end
 
 ---@class rapid.params.emit
----@field source rapid.Mesh|rapid.Shape|rapid.Points|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points  what points are born from [mesh, level set, shape or points, required]
+---@field source rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, points or node, required]
 ---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  where on the source; without it "points" of points, else "surface". A mesh's points are its vertices. With count or impulse points are taken in order, so that as many births as points take each once; with rate at random [string, one of surface, volume, points]
----@field rate? number|fun(frame: rapid.Frame): number  points born a second [number, 1/s, at least 0]
----@field count? integer|fun(frame: rapid.Frame): integer  points born a frame [integer, at least 0]
+---@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second; of a node, by each of its points [number or rapid.attr, 1/s, at least 0]
+---@field count? integer|rapid.Attribute|fun(frame: rapid.Frame): integer|rapid.Attribute  points born a frame; of a node, by each of its points, a frame or an event [integer or rapid.attr, at least 0]
 ---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
 ---@field birth? "random"|"begin"|"end"|"even"|fun(frame: rapid.Frame): "random"|"begin"|"end"|"even"  when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time [string, one of random, begin, end, even, default "random"]
 ---@field age? number|number[]|rapid.Attribute|fun(frame: rapid.Frame): number|number[]|rapid.Attribute  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
 ---@field motion? "spline"|"linear"|"none"|fun(frame: rapid.Frame): "spline"|"linear"|"none"  the way of a moving source within a frame: a cubic through the frames around it, a straight line, or none, as if it were where it is at the frame's end, at rest [string, one of spline, linear, none, default "spline"]
 ---@field alpha? number|fun(frame: rapid.Frame): number  tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform [number, default 0.5]
 ---@field cut? integer[]|fun(frame: rapid.Frame): integer[]  frames to which the source jumps from the frame before: nothing is born on the way. Where it is not given, a step of 8 times those around it and half the source's size is a jump, and reported [list of frames, from -2147483647 to 2147483647]
----@field inherit? number|fun(frame: rapid.Frame): number  fraction of the source's velocity that is added [number, default 1]
+---@field inherit? number|string[]|fun(frame: rapid.Frame): number|string[]  fraction of the source's velocity that is added; of a node, also names of attributes that the newborn have of their parents [number or names, default 1]
 ---@field velocity? rapid.Place|fun(frame: rapid.Frame): rapid.Place  mean direction and size [vec3, m/s, default {0, 0, 0}]
----@field speed? number|fun(frame: rapid.Frame): number  along the source's normal N, added to velocity [number, m/s, default 0]
+---@field speed? number|number[]|fun(frame: rapid.Frame): number|number[]  along the source's normal N, added to velocity; a number or {min, max} [number or {min, max}, m/s, default 0]
 ---@field spread? number|fun(frame: rapid.Frame): number  turns velocity and speed together, uniformly in a cone of this half angle [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it they live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  the newborn join this group [string]
----@field attributes? table<string, number|number[]|rapid.Vec3>|fun(frame: rapid.Frame): table<string, number|number[]|rapid.Vec3>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; they go before the source's own [attributes]
+---@field attributes? table<string, number|rapid.Vec3|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they go before the source's own [attributes]
+---@field source_group? string  of a node: only its points in this group bear [string]
+---@field on? string|fun(p: rapid.Point, frame: rapid.Frame): any  of a node: births at an event, count of each (1), not all the time: "hit", "death", "birth", when a comparison of an attribute with a number ("age > 0.5", "P.y < 0") begins to hold, or a function of a point begins to be true [event or function of a point]
+---@field min_speed? number|fun(frame: rapid.Frame): number  with on = "hit": the least speed of approach [number, m/s, at least 0]
+---@field limit? number|fun(frame: rapid.Frame): number  of a node: the most births of one point [number, at least 0]
+---@field inherit_velocity? number|fun(frame: rapid.Frame): number  of a node: fraction of the parent's velocity at the birth that is added (1) [number]
+---@field split? boolean|fun(frame: rapid.Frame): boolean  of a node: those that are born together share the parent's mass and volume [boolean, default false]
+---@field kill_parent? boolean|fun(frame: rapid.Frame): boolean  with on: a point that has borne is removed [boolean, default false]
 ---@field name? string  what the node is called in messages [string]
 
----Bears points from a surface, in a volume or at points.
+---Bears points from a surface, in a volume, at points, or from those of a node.
 ---@param params rapid.params.emit
 ---@return rapid.Node
 function Node:emit(params) end
@@ -730,6 +773,21 @@ function Node:field(params) end
 ---@return rapid.Node
 function Node:follow_curve(params) end
 
+---@class rapid.params.goal
+---@field clock? "scene"|"age"|fun(frame: rapid.Frame): "scene"|"age"  what start is counted by [string, one of scene, age, default "scene"]
+---@field hold? boolean|fun(frame: rapid.Frame): boolean  points stay at their places afterwards [boolean, default true]
+---@field stagger? number|fun(frame: rapid.Frame): number  each begins by up to this later, at random [number, s, at least 0, default 0]
+---@field start? number|fun(frame: rapid.Frame): number  when the way begins [number, s, default 0]
+---@field time? number|fun(frame: rapid.Frame): number  that each point takes [number, s, at least 1e-06, default 1]
+---@field to? string  a vec3: each point's place; :assign_goals gives them out [name of an attribute, default "goal"]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Takes points to places of their own in a given time.
+---@param params? rapid.params.goal
+---@return rapid.Node
+function Node:goal(params) end
+
 ---@class rapid.params.gravity
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field g? rapid.Place|fun(frame: rapid.Frame): rapid.Place  acceleration [vec3, m/s², default {0, -9.81, 0}]
@@ -745,7 +803,7 @@ function Node:gravity(params) end
 ---@field name string  name of the group that is made [string, required]
 ---@field where? fun(p: rapid.Point, frame: rapid.Frame): any  says of a point whether it is in the group; without it all points are [function of a point]
 
----Puts the points for which `where` is true into a group, anew at each frame.
+---Puts the points for which `where` is true into a group, in each frame.
 ---@param params rapid.params.group
 ---@return rapid.Node
 function Node:group(params) end
@@ -831,6 +889,19 @@ function Node:lift(params) end
 ---@return rapid.Node
 function Node:limit_speed(params) end
 
+---@class rapid.params.look_ahead
+---@field clearance? number|fun(frame: rapid.Frame): number  from the surface at which they pass [number, m, at least 0, default 0.1]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape, required]
+---@field strength? number|fun(frame: rapid.Frame): number  greatest acceleration [number, m/s², at least 0, default 20]
+---@field time? number|fun(frame: rapid.Frame): number  how far ahead they see [number, s, at least 1e-06, default 1]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Turns points aside before they hit a shape.
+---@param params rapid.params.look_ahead
+---@return rapid.Node
+function Node:look_ahead(params) end
+
 ---@class rapid.params.merge
 ---@field name? string  what the node is called in messages [string]
 
@@ -891,11 +962,11 @@ function Node:randomize(params) end
 
 ---@class rapid.params.solve
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, at least 1, default 1]
----@field iterations? integer|fun(frame: rapid.Frame): integer  of the constraints, a sub-step [integer, at least 1, default 1]
+---@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, from 1 to 1048576, default 1]
+---@field iterations? integer|fun(frame: rapid.Frame): integer  of the constraints, a sub-step [integer, from 1 to 10000, default 1]
 ---@field sleep? number|fun(frame: rapid.Frame): number  at rest, after which points with constraints sleep until something acts on them; math.huge: never [number, s, above 0, default 0.25]
 ---@field tolerance? number|fun(frame: rapid.Frame): number  each point takes as many sub-steps, twice as many and so on, as its own estimated error needs [number, m a frame, above 0]
----@field max_substeps? integer|fun(frame: rapid.Frame): integer  the most, with a tolerance [integer, at least 1, default 64]
+---@field max_substeps? integer|fun(frame: rapid.Frame): integer  the most, with a tolerance [integer, from 1 to 1048576, default 64]
 ---@field name? string  what the node is called in messages [string]
 
 ---Advances the points by one frame: forces, motion, collision.

@@ -257,7 +257,7 @@ local function make(native, load_node, numeric, shapes, studies)
     for name, query in pairs(shapes.queries) do value_methods[kind][name] = query end
   end
   for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape",
-    "deforming level set" } do
+    "deforming level set", "points", "moving points" } do
     value_methods[kind] = value_methods[kind] or {}
     value_methods[kind].transform = transformed
   end
@@ -274,7 +274,7 @@ local function make(native, load_node, numeric, shapes, studies)
     end
     local known = value_methods[kind] or shapes.pointer_of(object) and shapes.queries or {}
     if known[name] then return known[name] end
-    local what = kind == "points" and "points have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
+    local what = kind:find "points$" and kind .. " have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
       or "a " .. kind .. " has"
     name = describe.name(name)
     error(("%s no %q%s"):format(what, name, native.did_you_mean(name, names_of(known))), 2)

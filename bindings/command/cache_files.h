@@ -19,7 +19,7 @@ struct CacheFiles {
 // Error: no such file, or it is a folder.
 CacheFiles find_cache(const std::string& text);
 
-// What a process behind walls reads of them: a file, or the folder of a sequence. A name that is not there is left to
+// What a sandboxed process reads of them: a file, or the folder of a sequence. A name that is not there is left to
 // find_cache().
 SandboxAccess access_to_caches(const std::vector<std::string>& texts);
 

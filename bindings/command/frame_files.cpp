@@ -241,15 +241,25 @@ void FrameFiles::finish()
     if (first) std::rethrow_exception(first);
 }
 
-std::vector<FrameWriter::Written> FrameFiles::written() const
+std::vector<FrameWriter::Written> FrameFiles::take_written()
 {
     const std::lock_guard lock(mutex_);
     std::vector<FrameWriter::Written> all;
     for (const auto& [key, writer] : writers_) {
-        const std::vector<FrameWriter::Written> files = writer->written();
+        const std::vector<FrameWriter::Written> files = writer->take_written();
         all.insert(all.end(), files.begin(), files.end());
     }
     return all;
+}
+
+std::optional<std::int64_t> FrameFiles::first_unwritten() const
+{
+    const std::lock_guard lock(mutex_);
+    std::optional<std::int64_t> first;
+    for (const auto& [key, writer] : writers_)
+        if (const std::optional<int> frame = writer->first_unwritten())
+            first = std::min(first.value_or(*frame), std::int64_t{*frame});
+    return first;
 }
 
 }  // namespace rapid

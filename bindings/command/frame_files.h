@@ -47,8 +47,10 @@ public:
     // The first name of each pattern and output, once it is known; then no more.
     std::vector<std::string> take_first_names() { return std::exchange(first_names_, {}); }
 
-    // The files that are complete. From any thread.
-    std::vector<FrameWriter::Written> written() const;
+    // The files that are complete since the last call; the first frame of which one is still to come, of those that
+    // have been queued. From any thread.
+    std::vector<FrameWriter::Written> take_written();
+    std::optional<std::int64_t> first_unwritten() const;
 
 private:
     struct Target {
@@ -69,7 +71,7 @@ private:
     std::set<std::string> named_;
     std::vector<std::string> first_names_;
 
-    mutable std::mutex mutex_;  // for written(), while a frame adds a writer
+    mutable std::mutex mutex_;  // for take_written() and first_unwritten(), while a frame adds a writer
     std::map<std::string, std::unique_ptr<FrameWriter>> writers_;
 };
 

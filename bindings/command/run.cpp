@@ -4,6 +4,7 @@
 #include <csignal>
 
 #include "bindings/command/command.h"
+#include "bindings/command/event_file.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
@@ -34,11 +35,12 @@ public:
             ->type_name("FRAMES");
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
+        events_.declare(app);
         app.add_flag("--durable", durable_, "a frame has its name when it is on the disk, and outlasts a power cut");
         app.add_flag("--keep-all", keep_all_,
                      "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
                      "the same");
-        app.add_flag("--quiet", quiet_, "no progress and no summary");
+        app.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
         untrusted_.declare(app, "graph");
         app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
         app.add_flag(Watch::tell_option, tell_)->group("");  // internal: a run of --watch
@@ -59,8 +61,7 @@ public:
         if (durable_) make_files_durable();
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
         Threads threads(common.threads);
-        RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose},
-                         [this] { return files_.written(); });
+        RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose}, files_);
         const SignalThread signals([&](int signal) { report.abandon(128 + signal, "interrupted"); });
 
         return threads.run([&] {
@@ -70,6 +71,8 @@ public:
             for (const std::string& warning : session->warnings()) report.warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = keep_all_;
+            events_.check();
+            options.keep_steps = !events_.path().empty();
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) report.warning(warning);
 
@@ -84,8 +87,9 @@ private:
     SandboxAccess access() const
     {
         SandboxAccess access{{folder_of(graph_.file())}, files_.folders()};
-        if (!stats_.empty()) {
-            access.writable.push_back(folder_of(stats_));
+        for (const std::string& file : {stats_, events_.path()}) {
+            if (file.empty()) continue;
+            access.writable.push_back(folder_of(file));
             std::filesystem::create_directories(access.writable.back());
         }
         return access;
@@ -107,14 +111,17 @@ private:
                 plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame, double fps) {
                     if (frames.contains(std::llround(frame.number))) files_.write_node(pattern, points, frame, fps);
                 });
+            if (quiet_ && stats_.empty()) evaluator.leave_out_errors();
             while (evaluator.next_frame() <= frames.last) {
                 const FrameResult result = evaluator.advance();
                 for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
                 if (frames.contains(result.frame)) files_.write(result);
                 for (const std::string& name : files_.take_first_names()) report.line("writing " + name);
                 report.frame(result);
+                events_.add(result);
             }
             files_.finish();
+            events_.finish();
             report.finish();
             return status_done;
         } catch (const Error& error) {
@@ -141,6 +148,7 @@ private:
     FrameFiles files_;
     std::optional<FrameSelection> frames_;
     std::string stats_;
+    EventFile events_;
     UntrustedOptions untrusted_;
     bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false;
 };

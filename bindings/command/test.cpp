@@ -84,7 +84,7 @@ public:
         app.add_option("--already-run", already_run_)->group("");
     }
 
-    // The processes that run the files are behind walls; this one runs no script and no plugin.
+    // The processes that run the files are sandboxed; this one runs no script and no plugin.
     void confine(const CommonOptions& common) override
     {
         if (!parent_) return;

@@ -47,15 +47,13 @@ void keep_details(PointSet& points, const Table& values)
     }
 }
 
-void number_newborn(Flow& flow, std::size_t before, double dt)
+void number_newborn(Flow& flow, std::size_t before)
 {
     const std::size_t born = flow.points.size() - before;
     if (born == 0) return;
     const std::span<std::int64_t> ids = flow.points.id().write().subspan(before);
     std::iota(ids.begin(), ids.end(), flow.simulation->next_id);
     flow.simulation->next_id += static_cast<std::int64_t>(born);
-    if (auto* own = flow.points.find<float>("dt"); own && !own->is_uniform())
-        for (float& t : own->write().subspan(before)) t = static_cast<float>(dt);
 }
 
 // Removes the points whose places, from 0, the list at `index` holds. Returns how many.
@@ -94,7 +92,7 @@ void run_detail(const Kernel& function, Flow& flow, const Evaluation& now, const
 
     const int details = lua_gettop(state.lua()), killed = details - 1;
     keep_details(flow.points, *to_value(state, details).table());
-    number_newborn(flow, before, now.frame.dt);
+    number_newborn(flow, before);
     now.figures.born += flow.points.size() - before;
     now.figures.died += remove_killed(flow.points, state.lua(), killed);
 }

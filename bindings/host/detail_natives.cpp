@@ -67,11 +67,13 @@ int group(State& state)
     return 2;
 }
 
-// native.append(n)
+// native.append(n, dt): makes the column dt, of the frame's length, where it is given.
 int append(State& state)
 {
+    lua_State* L = state.lua();
     DetailRun& detail = detail_run_of(state);
-    detail.points.append(static_cast<std::size_t>(lua_tonumber(state.lua(), 1)));
+    if (!lua_isnoneornil(L, 2)) detail.points.add({"dt", static_cast<float>(lua_tonumber(L, 2))});
+    detail.points.append(static_cast<std::size_t>(lua_tonumber(L, 1)));
     detail.changed();
     return 0;
 }

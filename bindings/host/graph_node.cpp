@@ -37,7 +37,8 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
     ScriptHost& host = state.host();
     for (const Param& param : type.params) {
         const bool of_the_set = param.type == Kernel::set_function_type;
-        if (!of_the_set && param.type != PointFunction::param_type) continue;
+        // "function of a point", or that among others.
+        if (!of_the_set && !param.type.ends_with(PointFunction::param_type)) continue;
         if (param.internal)
             push_kernel_of_type(state, type.name);
         else

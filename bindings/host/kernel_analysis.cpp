@@ -126,6 +126,8 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     found.asks = keys_of(L, "asks");
     found.asks_any = flag_of(L, "asks_any");
     found.kills = flag_of(L, "kills");
+    for (std::set<std::string>* names : {&found.reads, &found.may})
+        if (names->count("nage")) names->insert({"age", "life"});
     found.asks_places = flag_of(L, "asks_places") || flag_of(L, "computes_names");
     return found;
 }

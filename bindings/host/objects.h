@@ -1,10 +1,9 @@
-// Objects that only graph code knows: an attribute's name and a node.
+// Objects that only graph code knows: an attribute's name.
 #pragma once
 
 #include <string>
 
-#include "runtime/graph/node.h"
-#include "runtime/object.h"
+#include "runtime/graph/node_handle.h"
 
 namespace rapid {
 
@@ -15,15 +14,6 @@ public:
     std::string_view kind() const override { return "attribute"; }
 
     const std::string name;
-};
-
-// A node, as graph code holds it.
-class NodeHandle : public Object {
-public:
-    explicit NodeHandle(NodePtr held) : node(std::move(held)) {}
-    std::string_view kind() const override { return "node"; }
-
-    const NodePtr node;
 };
 
 }  // namespace rapid

@@ -87,9 +87,11 @@ public:
         std::vector<std::pair<std::size_t, Uses>> users;
         for (std::size_t i = 0; i < nodes_.size(); ++i)
             if (is_relevant(nodes_[i])) users.emplace_back(i, uses_of(nodes_[i]));
-        for (const auto& [i, uses] : users) add_maker(i, uses);
+        for (const auto& [i, uses] : users)
+            if (is_among_points(nodes_[i])) add_maker(i, uses);
         for (const auto& [i, uses] : users) {
-            add_writer(i, uses);
+            if (is_among_points(nodes_[i])) add_writer(i, uses);
+            if (reads_source_here(nodes_[i])) add_reader_of_source(i, uses);
             if (nodes_[i].carries.count(simulation_)) add_reader(i, uses);
         }
         resolve_conditional_uses();
@@ -115,9 +117,19 @@ private:
         return attribute;
     }
 
-    bool is_relevant(const PlannedNode& planned) const
+    bool reads_source_here(const PlannedNode& planned) const
+    {
+        return std::any_of(planned.sources.begin(), planned.sources.end(),
+                           [&](std::size_t source) { return nodes_[source].carries.count(simulation_) > 0; });
+    }
+
+    bool is_among_points(const PlannedNode& planned) const
     {
         return planned.carries.count(simulation_) || sources_.count(planned.simulation);
+    }
+    bool is_relevant(const PlannedNode& planned) const
+    {
+        return is_among_points(planned) || reads_source_here(planned);
     }
 
     void add_maker(std::size_t node, const Uses& uses)
@@ -143,6 +155,15 @@ private:
             for (const std::string& name : *list) add_once(takers_[group_prefix + name], node);
         for (const std::string& name : uses.takes) add_once(takers_[name], node);
         if (uses.reads_all) readers_of_all_.push_back(node);
+    }
+
+    void add_reader_of_source(std::size_t node, const Uses& uses)
+    {
+        for (const std::string& name : uses.reads_of_source)
+            if (const auto at = found_.find(name); at != found_.end()) add_once(at->second.read_by, node);
+        for (const std::string& name : uses.reads_of_source) add_once(takers_[name], node);
+        for (const std::string& name : uses.takes_of_source) add_once(takers_[name], node);
+        for (const std::string& name : uses.reads_groups_of_source) add_once(takers_[group_prefix + name], node);
     }
 
     // What is written where something reads it, and read where something else makes it.
@@ -177,12 +198,31 @@ private:
 
 }  // namespace
 
+namespace {
+
+// What nodes read of the points of this simulation as their source.
+void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t simulation, const MadeNames& made)
+{
+    for (const PlannedNode& planned : nodes)
+        for (const std::size_t source : planned.sources) {
+            if (nodes[source].simulation != simulation || nodes[source].carries.size() > 1) continue;
+            name_errors(planned.node->name, planned.node->location, [&] {
+                const Uses uses = uses_of(planned);
+                for (const std::string& name : uses.reads_of_source) made.check_attribute(name);
+                for (const std::string& name : uses.reads_groups_of_source) made.check_group(name);
+            });
+        }
+}
+
+}  // namespace
+
 void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
 {
     MadeNames made;
     for (const PlannedNode& planned : nodes)
         if (planned.simulation == simulation)
             name_errors(planned.node->name, planned.node->location, [&] { made.add(uses_of(planned), *planned.node); });
+    check_names_of_sources(nodes, simulation, made);
 
     for (const PlannedNode& planned : nodes) {
         // Points of other simulations, which come through a merge, bring names of their own.
@@ -196,6 +236,29 @@ void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
     }
 }
 
+namespace {
+
+bool gives(const PlannedNode& planned, const std::string& name)
+{
+    const Uses uses = uses_of(planned);
+    return std::find(uses.gives.begin(), uses.gives.end(), name) != uses.gives.end();
+}
+
+// Whether points of the simulation are merged with those of another that die at an age: these have ages, so that all
+// do in what comes of it.
+bool is_merged_with_mortal(const std::vector<PlannedNode>& nodes, std::size_t simulation)
+{
+    return std::any_of(nodes.begin(), nodes.end(), [&](const PlannedNode& merging) {
+        return merging.carries.size() > 1 && merging.carries.count(simulation) &&
+               std::any_of(nodes.begin(), nodes.end(), [&](const PlannedNode& other) {
+                   return other.simulation != simulation && merging.carries.count(other.simulation) &&
+                          gives(other, "life");
+               });
+    });
+}
+
+}  // namespace
+
 std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
                                               const PlanOptions& options)
 {
@@ -204,7 +267,8 @@ std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& no
     for (auto& [name, attribute] : UseCollector(nodes, simulation).collect()) {
         const std::string plain = attribute.group ? name.substr(group_prefix.size()) : name;
         attribute.asked_by_name = asked.count(plain) > 0 && name != "dt";
-        attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
+        attribute.asked_as_made = options.all_made && (!attribute.made_by.empty() ||
+                                                       (name == "age" && is_merged_with_mortal(nodes, simulation)));
         attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
                          attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
         attributes.push_back(std::move(attribute));

@@ -27,8 +27,17 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
         simulation->start = planned.start;
         simulation->subframes = planned.subframes;
         simulation->seed = planned.seed;
+        if (planned.recorded) simulation->record = std::make_shared<StepRecord>();
+        for (const PlannedNode& node : plan.nodes)
+            if (auto names = functions_of_the_frame(*node.node); !names.empty())
+                simulation->varying[node.node->name] = std::move(names);
         simulations_.push_back(std::move(simulation));
     }
+}
+
+void Evaluator::leave_out_errors()
+{
+    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->estimates_errors = false;
 }
 
 FrameResult Evaluator::advance()
@@ -66,7 +75,7 @@ FrameFigures Evaluator::examine()
 void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,
                                  FrameResult& frame)
 {
-    const auto takes_part = [&](const PlannedNode& planned) { return left == 0 || planned.in_loop; };
+    const auto takes_part = [&](const PlannedNode& planned) { return left == 0 || planned.in_steps; };
 
     // Functions of the frame are called first, on this thread; the fallbacks of columns may depend on them.
     for (const PlannedNode& planned : plan_.nodes) {
@@ -93,9 +102,33 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
         // The result hook and checked declarations take one node after the other.
         if (!result_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);
+        remove_condemned(results, frame.figures);
     }
+    for (std::size_t s = 0; plan_.keeps_steps && s < simulations_.size(); ++s)
+        if (simulations_[s]->record) frame.steps[plan_.simulations[s].create->name].push_back(*simulations_[s]->record);
     before.append(std::move(frame.figures));
     frame.figures = std::move(before);
+}
+
+// From the state, and from the results that nobody has taken yet.
+void Evaluator::remove_condemned(std::vector<Flow>& results, FrameFigures& figures)
+{
+    for (const std::shared_ptr<Simulation>& simulation : simulations_) {
+        if (simulation->condemned.empty()) continue;
+        std::vector<std::int64_t> ids = std::exchange(simulation->condemned, {});
+        std::sort(ids.begin(), ids.end());
+        const auto remove_from = [&](PointSet& points) {
+            std::vector<std::uint8_t> keep(points.size());
+            const Strided<std::int64_t> id = std::as_const(points).id().read();
+            for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = !std::binary_search(ids.begin(), ids.end(), id[i]);
+            const std::size_t before = points.size();
+            points.keep(keep);
+            return before - points.size();
+        };
+        figures.died += remove_from(simulation->state);
+        for (Flow& flow : results)
+            if (flow.simulation == simulation) remove_from(flow.points);
+    }
 }
 
 namespace {
@@ -161,6 +194,8 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
     std::vector<Flow> inputs;
     for (const std::size_t input : planned.inputs)
         inputs.push_back(--readers[input] == 0 ? std::move(results[input]) : results[input]);
+    for (const std::size_t source : planned.sources)
+        inputs.push_back(--readers[source] == 0 ? std::move(results[source]) : results[source]);
     if (node.type->kind == NodeKind::Source) inputs.push_back({PointSet(), {}, simulations_[planned.simulation]});
 
     const Context context(*this, planned, left, frame);
@@ -197,6 +232,14 @@ std::vector<Uses> Evaluator::declared_for(std::size_t node) const
     if (plan_.nodes[node].node->type->kind != NodeKind::Solve) return declared;
     // The plan lets Solve read ages where a life may end; how long a point has been still is Solve's own.
     declared.emplace_back().takes = {"age", "still"};
+    // Its record of the step holds what emitters read of its points.
+    for (const PlannedNode& planned : plan_.nodes)
+        for (const std::size_t source : planned.sources) {
+            if (plan_.nodes[source].simulation != plan_.nodes[node].simulation) continue;
+            const Uses of_source = uses_of(planned);
+            declared.emplace_back().takes = of_source.reads_of_source;
+            declared.emplace_back().takes = of_source.takes_of_source;
+        }
     for (const std::vector<std::size_t>& pass : plan_.passes()) {
         if (std::find(pass.begin(), pass.end(), node) == pass.end()) continue;
         for (const std::size_t other : pass) declared.push_back(uses_of(plan_.nodes[other]));

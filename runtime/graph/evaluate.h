@@ -20,6 +20,7 @@ struct FrameResult {
     std::map<std::string, PointSet> outputs;
     std::map<std::string, double> fps;  // of each output's simulation
     std::map<std::string, double> time;
+    std::map<std::string, std::vector<StepRecord>> steps;  // of each Create with a Solve, if the plan keeps them
     FrameFigures figures;
     double total_seconds = 0;  // wall time, without writing
     std::vector<std::string> warnings;
@@ -40,6 +41,10 @@ public:
     // From now on each node finds poison in what it has not declared, and goes over the points by itself: slower, and
     // for tests (undeclared_columns.h). Error of advance(): a node whose declaration is too short.
     void check_declarations() { checks_declarations_ = true; }
+
+    // From now on no errors are estimated, which takes up to twice the time of Solve: for runs that nobody asks for
+    // them. With a tolerance they are all the same.
+    void leave_out_errors();
 
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
@@ -62,6 +67,8 @@ private:
     // What a node may use: for a Solve, also what the dynamics upstream of it do.
     std::vector<Uses> declared_for(std::size_t node) const;
     void edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame);
+    // Takes the points away that emitters have condemned (Simulation::condemned).
+    void remove_condemned(std::vector<Flow>& results, FrameFigures& figures);
     class Context;
 
     const Plan& plan_;

@@ -40,7 +40,10 @@ struct FrameFigures {
     std::uint64_t asleep = 0;             // sleeping points at the end of the frame
     std::optional<Residual::Search> contact_search;
     std::vector<BandFigures> bands;  // of the collide nodes with a level set
-    std::vector<double> errors;      // estimated position errors of a sample of the points, m
+    // Estimated position errors, m: since birth, of a sample of the points or of all; and those made in this frame
+    // alone (coupled_errors.h). And what is in neither, as texts.
+    std::vector<double> errors, frame_errors;
+    std::vector<std::string> left_out_of_errors;
     // Change of the energy of each sample point by the integrator since its birth, J/kg; and whether that energy is not
     // defined, because of drag, scripts or couplings.
     std::vector<double> energy_drift;

@@ -29,8 +29,13 @@ struct Uses {
     std::vector<std::string> joins_groups;  // those of makes_groups that the node writes point by point
     bool reads_all = false;                 // may read every attribute that is made
 
-    // Input of Operator::uses: the parameters that are functions of the frame, whose values will change.
+    // Of the points of the nodes among its arguments (node_handle.h): what is read, and what is read if it is made.
+    std::vector<std::string> reads_of_source, takes_of_source, reads_groups_of_source;
+
+    // Input of Operator::uses: the parameters that are functions of the frame, whose values will change; and what the
+    // nodes up to those among its arguments make.
     std::set<std::string> functions;
+    std::vector<AttributeSpec> source_makes;
 };
 
 class PointEdit;

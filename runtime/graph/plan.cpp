@@ -8,6 +8,7 @@
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/attribute_uses.h"
+#include "runtime/graph/node_handle.h"
 #include "runtime/graph/point_edit.h"
 
 namespace rapid {
@@ -17,9 +18,11 @@ Uses uses_of(const PlannedNode& planned)
     Uses uses = planned.node->type->uses;
     for (const auto& [name, value] : planned.node->arguments)
         if (value.function()) uses.functions.insert(name);
+    uses.source_makes = planned.source_makes;
     planned.op->uses(uses);
+    std::vector<std::string>& references = planned.sources.empty() ? uses.reads : uses.reads_of_source;
     for (const auto& [name, value] : planned.node->arguments)
-        if (const auto* reference = value.get<AttributeRef>()) uses.reads.push_back(reference->name);
+        if (const auto* reference = value.get<AttributeRef>()) references.push_back(reference->name);
     return uses;
 }
 
@@ -36,12 +39,27 @@ const PlannedAttribute* PlannedSimulation::find(std::string_view name) const
     return found == attributes.end() ? nullptr : &*found;
 }
 
-Plan::Plan(const Graph& graph, const PlanOptions& options) : keeps_all(options.keep_all)
+namespace {
+
+// The node that is the argument `source`. As another argument a node has the wrong type.
+std::vector<NodePtr> sources_of(const Node& node)
+{
+    const auto given = node.arguments.find("source");
+    const auto handle = given == node.arguments.end() ? nullptr : given->second.object<NodeHandle>();
+    return handle ? std::vector{handle->node} : std::vector<NodePtr>();
+}
+
+}  // namespace
+
+Plan::Plan(const Graph& graph, const PlanOptions& options)
+    : keeps_all(options.keep_all), keeps_steps(options.keep_steps)
 {
     if (graph.outputs.empty())
         throw Error("the graph returns no output; end the file with `return` and a node").at({graph.file, 0});
     collect_nodes(graph);
     find_simulations();
+    find_steps();
+    for (PlannedSimulation& simulation : simulations) simulation.recorded |= keeps_steps && simulation.solve;
     if (options.seed)
         for (PlannedSimulation& simulation : simulations) simulation.seed = *options.seed;
     bind_all();
@@ -66,6 +84,8 @@ void Plan::collect_nodes(const Graph& graph)
         open.pop_back();
         if (!reached.emplace(node->serial, node).second) continue;
         open.insert(open.end(), node->inputs.begin(), node->inputs.end());
+        const std::vector<NodePtr> sources = sources_of(*node);
+        open.insert(open.end(), sources.begin(), sources.end());
     }
 
     std::map<std::uint64_t, std::size_t> index;  // by serial
@@ -83,6 +103,10 @@ void Plan::collect_nodes(const Graph& graph)
             planned.inputs.push_back(index.at(input->serial));
             ++nodes[planned.inputs.back()].consumers;
         }
+        for (const NodePtr& source : sources_of(*node)) {
+            planned.sources.push_back(index.at(source->serial));
+            ++nodes[planned.sources.back()].consumers;
+        }
         index[serial] = nodes.size();
         nodes.push_back(std::move(planned));
     }
@@ -92,8 +116,9 @@ void Plan::collect_nodes(const Graph& graph)
         nodes[index.at(node->serial)].reached_from.insert(name);
     }
     for (std::size_t i = nodes.size(); i-- > 0;)
-        for (const std::size_t input : nodes[i].inputs)
-            nodes[input].reached_from.insert(nodes[i].reached_from.begin(), nodes[i].reached_from.end());
+        for (const auto* list : {&nodes[i].inputs, &nodes[i].sources})
+            for (const std::size_t input : *list)
+                nodes[input].reached_from.insert(nodes[i].reached_from.begin(), nodes[i].reached_from.end());
 
     for (const NodePtr& node : graph.nodes) {
         if (reached.count(node->serial)) continue;
@@ -126,6 +151,43 @@ void Plan::find_simulations()
         nodes[i].in_loop = true;
         upstream.insert(nodes[i].inputs.begin(), nodes[i].inputs.end());
     }
+}
+
+// What a node in a loop reads as its source is evaluated as often as that loop.
+void Plan::find_steps()
+{
+    for (std::size_t i = nodes.size(); i-- > 0;) {
+        PlannedNode& planned = nodes[i];
+        planned.in_steps |= planned.in_loop;
+        if (!planned.in_steps) continue;
+        for (const std::size_t source : planned.sources) nodes[source].in_steps = true;
+        if (!planned.in_loop)
+            for (const std::size_t input : planned.inputs) nodes[input].in_steps = true;
+    }
+    for (PlannedNode& planned : nodes)
+        name_errors(planned.node->name, planned.node->location, [&] {
+            for (const std::size_t s : planned.sources) check_source(planned, s);
+        });
+}
+
+// Error: points that have no path through a frame.
+void Plan::check_source(const PlannedNode& planned, std::size_t s)
+{
+    const PlannedNode& source = nodes[s];
+    PlannedSimulation& from = simulations[source.simulation];
+    const std::string& name = source.node->name;
+    if (!from.solve)
+        throw Error(fmt::format(
+            "source = node \"{}\": its points are not moved by a solve; end its chain with :solve{{}}", name));
+    if (source.simulation != planned.simulation && source.in_loop && source.node->type->kind != NodeKind::Solve)
+        throw Error(fmt::format("source = node \"{}\" comes before its solve; give \"{}\", or a node after it", name,
+                                from.solve->name));
+    if (from.fps != simulations[planned.simulation].fps)
+        throw Error(
+            fmt::format("source = node \"{}\" runs at {} frames a second, and this chain at {}; give both the "
+                        "same fps",
+                        name, from.fps, simulations[planned.simulation].fps));
+    from.recorded = true;
 }
 
 void Plan::start_simulation(PlannedNode& create)
@@ -167,14 +229,26 @@ void Plan::feed_back(const PlannedNode& solve)
 // Gives every operator its arguments, as they are at the first frame, and checks them.
 void Plan::bind_all()
 {
-    for (const PlannedNode& planned : nodes)
+    for (PlannedNode& planned : nodes)
         name_errors(planned.node->name, planned.node->location, [&] {
+            find_made_by_sources(planned);
             const PlannedSimulation& simulation = simulations[planned.simulation];
             const Frame start =
                 FrameClock{simulation.fps, simulation.start, simulation.subframes}.at_step(simulation.start);
             bind_arguments(*planned.node, *planned.op, start, false);
             planned.op->check();
         });
+}
+
+// What the nodes of its sources' simulations make; they come before it.
+void Plan::find_made_by_sources(PlannedNode& planned) const
+{
+    for (const std::size_t source : planned.sources)
+        for (std::size_t i = 0; &nodes[i] != &planned; ++i) {
+            if (!nodes[source].carries.count(nodes[i].simulation)) continue;
+            const Uses uses = uses_of(nodes[i]);
+            planned.source_makes.insert(planned.source_makes.end(), uses.makes.begin(), uses.makes.end());
+        }
 }
 
 void Plan::find_changes()
@@ -190,7 +264,7 @@ void Plan::find_changes()
         else
             for (const std::size_t input : planned.inputs)
                 if (planned.changes.empty() && !nodes[input].once)
-                    planned.changes = fmt::format("\"{}\" before it is evaluated anew", nodes[input].node->name);
+                    planned.changes = fmt::format("\"{}\" before it is evaluated again", nodes[input].node->name);
         if (keeps_all && planned.changes.empty()) planned.changes = "nothing is left out";
         planned.once = planned.changes.empty();
     }

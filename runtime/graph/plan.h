@@ -29,6 +29,7 @@ struct PlanOptions {
     std::optional<std::uint64_t> seed;    // replaces each create's seed
     std::vector<std::string> attributes;  // attributes and groups that outputs ask for by name
     bool all_made = true;                 // an output asks for all that the scene makes
+    bool keep_steps = false;              // keeps what happens to the points in each step, for FrameResult::steps
     bool keep_all = false;                // leaves nothing out and evaluates nothing once, to the same bits
 };
 
@@ -54,6 +55,7 @@ struct PlannedSimulation {
     std::int64_t start = 1;
     int subframes = 1;
     std::uint64_t seed = 0;
+    bool recorded = false;                     // whether Solve keeps what happens in a step, for emitters
     std::vector<PlannedAttribute> attributes;  // all that are known or made, in order of name
     std::set<std::string> left_out;            // names of those that are not kept
 
@@ -63,14 +65,17 @@ struct PlannedSimulation {
 struct PlannedNode {
     NodePtr node;
     std::shared_ptr<Operator> op;
-    std::vector<std::size_t> inputs;     // indices into Plan::nodes
-    std::size_t consumers = 0;           // of its result, outputs included
-    std::size_t simulation = 0;          // index into Plan::simulations
-    std::set<std::size_t> carries;       // the simulations whose points pass through it
-    bool in_loop = false;                // from its Create to its Solve, both included
-    bool once = false;                   // evaluated once: its result never changes
-    std::string changes;                 // why its result changes; empty where it does not
-    std::set<std::string> reached_from;  // names of outputs
+    std::vector<std::size_t> inputs;          // indices into Plan::nodes
+    std::vector<std::size_t> sources;         // likewise, of the nodes among its arguments: their points it only reads
+    std::vector<AttributeSpec> source_makes;  // what the nodes up to these make
+    std::size_t consumers = 0;                // of its result, outputs and readers included
+    std::size_t simulation = 0;               // index into Plan::simulations
+    std::set<std::size_t> carries;            // the simulations whose points pass through it
+    bool in_loop = false;                     // from its Create to its Solve, both included
+    bool in_steps = false;                    // evaluated in each sub-frame: in_loop, or upstream of a source in a loop
+    bool once = false;                        // evaluated once: its result never changes
+    std::string changes;                      // why its result changes; empty where it does not
+    std::set<std::string> reached_from;       // names of outputs
 };
 
 class Plan {
@@ -85,6 +90,7 @@ public:
     std::map<std::string, std::size_t> outputs;  // index into `nodes` by name
     std::vector<NodePtr> left_out;               // nodes that no output depends on
     bool keeps_all = false;
+    bool keeps_steps = false;
     std::vector<std::string> warnings;  // of doubtful graphs: a write node that is not reached
 
     // The columns and groups that the points of a simulation have from its first frame on. The fallbacks follow from
@@ -111,6 +117,9 @@ private:
     void find_simulations();
     void start_simulation(PlannedNode& create);
     void feed_back(const PlannedNode& solve);
+    void find_steps();
+    void check_source(const PlannedNode& planned, std::size_t source);
+    void find_made_by_sources(PlannedNode& planned) const;
     void bind_all();
     void find_changes();
 };

@@ -3,6 +3,7 @@
 
 #include "runtime/object.h"
 #include "runtime/points/point_set.h"
+#include "runtime/shapes/motion/motion.h"
 
 namespace rapid {
 
@@ -13,5 +14,31 @@ public:
 
     PointSet points;
 };
+
+// The result of `:transform` with a motion.
+class AnimatedPoints : public Object {
+public:
+    AnimatedPoints(std::shared_ptr<const PointsObject> points, MotionPtr motion)
+        : rest_(std::move(points)), motion_(std::move(motion))
+    {
+    }
+    std::string_view kind() const override { return "moving points"; }
+    bool varies() const override { return true; }
+
+    const PointSet& rest() const { return rest_->points; }
+    const MotionPtr& motion() const { return motion_; }
+    // With another motion after its own.
+    std::shared_ptr<const AnimatedPoints> transformed(const MotionPtr& motion) const
+    {
+        return std::make_shared<AnimatedPoints>(rest_, product(motion, motion_));
+    }
+
+private:
+    std::shared_ptr<const PointsObject> rest_;
+    MotionPtr motion_;
+};
+
+// P by the map; v and N turn with it, v grows with its scale.
+std::shared_ptr<const PointsObject> transformed(const PointsObject& points, const Pose& pose);
 
 }  // namespace rapid

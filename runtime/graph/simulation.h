@@ -9,6 +9,7 @@
 
 #include "runtime/frame.h"
 #include "runtime/graph/adopted_ids.h"
+#include "runtime/graph/step_record.h"
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/dynamics.h"
@@ -26,7 +27,12 @@ struct Simulation {
     std::vector<std::string> groups;                  // likewise
     PointSet state;                                   // after the previous frame's Solve
     std::map<const Simulation*, AdoptedIds> adopted;  // ids of points of other simulations
+    std::shared_ptr<StepRecord> record;               // of the last step; null where nothing reads it
+    std::int64_t first_new = 0;                       // points with this id and above are born in the next step
+    std::vector<std::int64_t> condemned;              // ids of points that emitters of other chains take away
     bool trial = false;  // only stiffness is examined: emitters emit a sample, and Solve does not move points
+    std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
+    bool estimates_errors = true;                             // where false, Solve tells none
 
     FrameClock clock() const { return {fps, start, subframes}; }
     Frame frame(std::int64_t step) const { return clock().at_step(step); }

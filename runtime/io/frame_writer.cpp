@@ -1,6 +1,5 @@
 #include "runtime/io/frame_writer.h"
 
-#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -33,6 +32,7 @@ void FrameWriter::submit(PointSet points, FrameInfo frame, std::string output)
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return error_ || jobs_.size() < std::max<std::size_t>(1, waiting_); });
     if (error_) std::rethrow_exception(error_);
+    due_[frame.number] += targets_.size();
     jobs_.push_back({std::move(points), std::move(frame), std::move(output)});
     changed_.notify_all();
 }
@@ -51,19 +51,16 @@ void FrameWriter::finish()
         }
 }
 
-double FrameWriter::seconds(int frame) const
+std::vector<FrameWriter::Written> FrameWriter::take_written()
 {
     const std::lock_guard lock(mutex_);
-    double total = 0;
-    for (const Written& file : written_)
-        if (file.frame == frame) total += file.seconds;
-    return total;
+    return std::exchange(written_, {});
 }
 
-std::vector<FrameWriter::Written> FrameWriter::written() const
+std::optional<int> FrameWriter::first_unwritten() const
 {
     const std::lock_guard lock(mutex_);
-    return written_;
+    return due_.empty() ? std::nullopt : std::optional(due_.begin()->first);
 }
 
 void FrameWriter::run()
@@ -135,6 +132,7 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     const std::uintmax_t bytes = std::filesystem::file_size(path, ignored);
     const std::lock_guard lock(mutex_);
     written_.push_back({job.frame.number, path, spent, bytes});
+    if (--due_[job.frame.number] == 0) due_.erase(job.frame.number);
 }
 
 }  // namespace rapid

@@ -10,6 +10,7 @@
 #include <exception>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -39,10 +40,10 @@ public:
     // Waits until all frames are written. Throws the first error.
     void finish();
 
-    // Wall time spent writing the frame so far, over all its files.
-    double seconds(int frame) const;
-    // The files so far, in order.
-    std::vector<Written> written() const;
+    // The files that are complete since the last call, in order: a run of many frames keeps none of them.
+    std::vector<Written> take_written();
+    // The first of the submitted frames of which a file is still to come.
+    std::optional<int> first_unwritten() const;
 
 private:
     struct Target {
@@ -75,8 +76,9 @@ private:
     std::deque<Job> jobs_;
     bool busy_ = false, stopping_ = false;
     std::exception_ptr error_;
-    std::vector<Written> written_;
-    std::thread thread_;  // the last member: it starts when the others are initialised
+    std::vector<Written> written_;    // since they were last taken
+    std::map<int, std::size_t> due_;  // by frame: files that are still to come
+    std::thread thread_;              // the last member: it starts when the others are initialised
 };
 
 }  // namespace rapid

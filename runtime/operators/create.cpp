@@ -16,6 +16,8 @@
 namespace rapid {
 namespace {
 
+constexpr int most_subframes = 10000;
+
 struct Create {
     double fps;
     int start_frame, seed, subframes;
@@ -31,7 +33,7 @@ struct Create {
             .constant()
             .param(&Create::seed, "seed", 0.0, at_least(0), "", "of all random numbers of this simulation")
             .constant()
-            .param(&Create::subframes, "subframes", 1.0, at_least(1), "",
+            .param(&Create::subframes, "subframes", 1.0, between(1, most_subframes), "",
                    "times a frame that the whole graph is evaluated, scripts, emitters and colliders included; not the "
                    "solver's sub-steps")
             .constant()

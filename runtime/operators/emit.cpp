@@ -7,7 +7,12 @@
 // A moving source emits each point from where its birthplace is at the time of birth, t = 1 - L / h of the path from
 // the previous frame (shapes/motion/body_path.h); emit/birth_velocity.h has the equation of the velocity.
 //
-// A birth's random numbers depend on the seed, on the name of this node and on the birth's number in this emitter.
+// A source that is a node bears by its points, each along its path through the frame (emit/parent_paths.h), by rate and
+// count of each (emit/parent_clock.h). Points of another simulation, which comes before, have their path in this frame;
+// those of the same simulation move later in the frame, and bear along their path of the frame before.
+//
+// A birth's random numbers depend on the seed, on the name of this node and on the birth's number in this emitter, or
+// among the births of its parent.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,13 +23,17 @@
 
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
+#include "runtime/graph/node_handle.h"
 #include "runtime/memory_budget.h"
 #include "runtime/operators/emit/birth_age.h"
 #include "runtime/operators/emit/birth_source.h"
+#include "runtime/operators/emit/birth_values.h"
 #include "runtime/operators/emit/birth_velocity.h"
 #include "runtime/operators/emit/births.h"
 #include "runtime/operators/emit/draws.h"
+#include "runtime/operators/emit/inheritance.h"
 #include "runtime/operators/emit/interval.h"
+#include "runtime/operators/emit/parent_emitter.h"
 #include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
 
@@ -41,14 +50,16 @@ constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness i
 constexpr double bytes_a_birth = 2 * 64;
 
 struct EmitSource {
-    static constexpr std::string_view param_type = "mesh, level set, shape or points";
+    static constexpr std::string_view param_type = "mesh, level set, shape, points or node";
     ObjectPtr object;
+    bool is_node = false;
 };
 
 void read_value(const Param& param, const Value& value, EmitSource& field)
 {
     read_value(param, value, field.object);
     if (!field.object) wrong_type(param, value);
+    field.is_node = std::dynamic_pointer_cast<const NodeHandle>(field.object) != nullptr;
 }
 
 // The newborn points' part of the columns in which each has a value of its own, shape [n]; the others are empty.
@@ -58,6 +69,8 @@ struct NewbornColumns {
     std::span<float> dt, age, birthtime, life;
     // Copy inherited attributes to the newborn from number `first` on.
     std::vector<std::function<void(std::size_t first, std::span<const Birthplace> places)>> inherit;
+    // Draw those that differ from birth to birth; number: of the first, in this emitter.
+    std::vector<DrawValues> draw;
 };
 
 // The values of all points, one each; expanded in parallel, because they are many more than the newborn.
@@ -76,22 +89,37 @@ std::span<float> expanded(Column<float>& column)
 struct Emit {
     EmitSource source;
     std::string from, birth, joins;
-    std::optional<double> rate;
-    std::optional<int> count;
+    std::optional<Amount<double>> rate;
+    std::optional<Amount<int>> count;
     std::optional<std::map<std::int64_t, double>> impulse;
     std::optional<BirthAge> age;
     std::optional<Interval> life;
     std::string motion;
     double alpha;
     std::optional<FrameSet> cut;
-    double inherit, speed, spread;
+    Inheritance inherit;
+    Interval speed;
+    double spread;
     Vec3d velocity;
-    std::map<std::string, AttributeValue> attributes;
+    BirthValues attributes;
+
+    // Of a source that is a node.
+    std::string source_group;
+    std::optional<BirthEvent> on;
+    std::optional<double> min_speed, limit, inherit_velocity;
+    bool split, kill_parent;
 
     static NodeType declare()
     {
-        return node<Emit>("emit", "Bears points from a surface, in a volume or at points.")
-            .varies()
+        auto type = node<Emit>("emit", "Bears points from a surface, in a volume, at points, or from those of a node.");
+        declare_births(type);
+        declare_parents(type);
+        return type;
+    }
+
+    static void declare_births(Declaration<Emit>& type)
+    {
+        type.varies()
             .stage(Stage::Emission)
             .writes("P")
             .writes("v")
@@ -103,8 +131,10 @@ struct Emit {
                    "vertices. With count or impulse points are taken in order, so that as many births as points take "
                    "each once; with rate at random")
             .choices({"surface", "volume", "points"})
-            .param(&Emit::rate, "rate", Value(), at_least(0), "1/s", "points born a second")
-            .param(&Emit::count, "count", Value(), at_least(0), "", "points born a frame")
+            .param(&Emit::rate, "rate", Value(), at_least(0), "1/s",
+                   "points born a second; of a node, by each of its points")
+            .param(&Emit::count, "count", Value(), at_least(0), "",
+                   "points born a frame; of a node, by each of its points, a frame or an event")
             .param(&Emit::impulse, "impulse", Value(), between(0, most_births), "",
                    "points born in single frames, {[frame] = count}; at the first frame they have not moved yet")
             .param(&Emit::birth, "birth", "random", any_number(), "",
@@ -125,9 +155,13 @@ struct Emit {
                 &Emit::cut, "cut", Value(), between(-most_births, most_births), "",
                 "frames to which the source jumps from the frame before: nothing is born on the way. Where it is not "
                 "given, a step of 8 times those around it and half the source's size is a jump, and reported")
-            .param(&Emit::inherit, "inherit", 1.0, any_number(), "", "fraction of the source's velocity that is added")
+            .param(&Emit::inherit, "inherit", 1.0, any_number(), "",
+                   "fraction of the source's velocity that is added; of a node, also names of attributes that the "
+                   "newborn have "
+                   "of their parents")
             .param(&Emit::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean direction and size")
-            .param(&Emit::speed, "speed", 0.0, any_number(), "m/s", "along the source's normal N, added to velocity")
+            .param(&Emit::speed, "speed", 0.0, any_number(), "m/s",
+                   "along the source's normal N, added to velocity; a number or {min, max}")
             .param(&Emit::spread, "spread", 0.0, between(0, 180), "deg",
                    "turns velocity and speed together, uniformly in a cone of this half angle")
             .param(&Emit::life, "life", Value(), or_infinity(at_least(0)), "s",
@@ -135,16 +169,40 @@ struct Emit {
             .param(&Emit::joins, "group", Value(), any_number(), "", "the newborn join this group")
             .constant()
             .param(&Emit::attributes, "attributes", Value(), any_number(), "",
-                   "values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; they go before the source's own");
+                   "values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on "
+                   "a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they go before the source's own");
+    }
+
+    static void declare_parents(Declaration<Emit>& type)
+    {
+        type.param(&Emit::source_group, "source_group", Value(), any_number(), "",
+                   "of a node: only its points in this group bear")
+            .constant()
+            .param(&Emit::on, "on", Value(), any_number(), "",
+                   "of a node: births at an event, count of each (1), not all the time: \"hit\", \"death\", \"birth\", "
+                   "when a comparison of an attribute with a number (\"age > 0.5\", \"P.y < 0\") begins to hold, or a "
+                   "function of a point begins to be true")
+            .constant()
+            .param(&Emit::min_speed, "min_speed", Value(), at_least(0), "m/s",
+                   "with on = \"hit\": the least speed of approach")
+            .param(&Emit::limit, "limit", Value(), at_least(0), "", "of a node: the most births of one point")
+            .param(&Emit::inherit_velocity, "inherit_velocity", Value(), any_number(), "",
+                   "of a node: fraction of the parent's velocity at the birth that is added (1)")
+            .param(&Emit::split, "split", false, any_number(), "",
+                   "of a node: those that are born together share the parent's mass and volume")
+            .param(&Emit::kill_parent, "kill_parent", false, any_number(), "",
+                   "with on: a point that has borne is removed");
     }
 
     void uses(Uses& uses) const
     {
-        for (const AttributeSpec& spec : made()) uses.makes.push_back(spec);
+        for (const AttributeSpec& spec : source.is_node ? ParentEmitter::made(parent_options(), uses) : made())
+            uses.makes.push_back(spec);
+        if (source.is_node) ParentEmitter::use(parent_options(), uses);
         uses.gives.insert(uses.gives.end(), {"age", "birthtime"});
         if (life && (may_end() || uses.functions.count("life"))) uses.gives.push_back("life");
         const bool whole_frames = !age && birth == "begin" && !uses.functions.count("birth");
-        if (!whole_frames) uses.writes.push_back("dt");
+        if (source.is_node || !whole_frames) uses.writes.push_back("dt");
         if (!joins.empty()) uses.makes_groups.push_back(joins);
     }
 
@@ -152,7 +210,13 @@ struct Emit {
     {
         check_amount();
         check_attributes();
-        if (!source_.is(source.object, from)) source_ = BirthSource(source.object, from);
+        check_kind();
+        if (source.is_node) return;
+        if (!source_.is(source.object, from)) {
+            BirthSource next(source.object, from);
+            next.follow(source_);
+            source_ = std::move(next);
+        }
         check_source();
     }
 
@@ -163,6 +227,10 @@ struct Emit {
         if (impulse && !impulse->empty() && impulse->begin()->first < simulation.start)
             throw Error(fmt::format("impulse[{}] is before the first frame; frames begin at {}",
                                     impulse->begin()->first, simulation.start));
+        if (source.is_node) {
+            bear_from_parents(flow, inputs.subspan(1), now);
+            return flow;
+        }
         clock_ = BirthClock(simulation.start);
         move_source(simulation, now);
         emit(flow, clock_.at_once(impulse ? impulse_at(simulation.start) : 0, simulation.fps), now);
@@ -173,6 +241,10 @@ struct Emit {
     {
         if (now.at_start) return start(inputs, now);
         Flow flow = std::move(inputs[0]);
+        if (source.is_node) {
+            bear_from_parents(flow, inputs.subspan(1), now);
+            return flow;
+        }
         move_source(*flow.simulation, now);
         emit(flow, births(flow.simulation->clock().step_at(now.frame), flow.simulation->clock()), now);
         return flow;
@@ -182,6 +254,7 @@ private:
     void check_amount() const
     {
         const int given = rate.has_value() + count.has_value() + impulse.has_value();
+        if (given == 0 && on) return;
         if (given == 0) throw Error("nothing says how many points are born; give rate, count or impulse");
         if (given > 1)
             throw Error(fmt::format("{} are given together; keep one of them", !impulse ? "rate and count"
@@ -196,7 +269,7 @@ private:
 
     void check_attributes() const
     {
-        for (const auto& [name, value] : attributes)
+        for (const auto& [name, value] : attributes.of)
             for (const auto& [own, remedy] : {std::pair{"age", "use age"},
                                               {"life", "use life"},
                                               {"birthtime", "it is the time of birth, where something reads it"}})
@@ -205,9 +278,9 @@ private:
 
     void check_source() const
     {
-        if (speed != 0 && !source_.has_normals())
-            throw Error(fmt::format("speed = {} goes along N, which {} does not have; give velocity instead", speed,
-                                    from == "volume" ? "a volume" : "this set of points"));
+        if (!is_zero(speed) && !source_.has_normals())
+            throw Error(fmt::format("speed = {} goes along N, which {} does not have; give velocity instead",
+                                    describe(speed), from == "volume" ? "a volume" : "this set of points"));
         for (const std::string& name : inherited()) {
             const AttributeType type = type_of(*source_.values().find(name));
             if (const AttributeSpec* known = known_attribute(name); known && type_of(known->fallback) != type)
@@ -216,6 +289,10 @@ private:
         }
         if (age) age->check(source_);
     }
+
+    void check_kind() const;
+    ParentOptions parent_options(double wait = 0) const;
+    void bear_from_parents(Flow& flow, std::span<const Flow> sources, const Evaluation& now);
 
     std::size_t impulse_at(std::int64_t frame) const
     {
@@ -227,10 +304,10 @@ private:
     {
         if (!rate) return births_of_frame(step, clock);
         const double steps = clock.steps_per_second();
-        if (*rate / steps > most_births)
-            throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", *rate,
-                                    *rate / steps, most_births));
-        return clock_.at_rate(*rate, step, steps);
+        if (rate->value / steps > most_births)
+            throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", rate->value,
+                                    rate->value / steps, most_births));
+        return clock_.at_rate(rate->value, step, steps);
     }
 
     // Of `count` or `impulse`. Ages at the frame's end do not depend on sub-frames: births at one instant all belong to
@@ -238,7 +315,7 @@ private:
     Births births_of_frame(std::int64_t step, const FrameClock& clock)
     {
         const std::int64_t parts = clock.subframes, before = step - 1 - clock.start, part = before % parts;
-        const auto n = static_cast<std::size_t>(count ? *count : impulse_at(clock.start + 1 + before / parts));
+        const auto n = static_cast<std::size_t>(count ? count->value : impulse_at(clock.start + 1 + before / parts));
         if (!age && (birth == "random" || birth == "even"))
             return clock_.at_once(n, clock.fps, static_cast<int>(part), clock.subframes);
         const bool here = part == (age || birth == "end" ? parts - 1 : 0);
@@ -249,7 +326,7 @@ private:
     std::vector<std::string> inherited() const
     {
         std::vector<std::string> names = source_.inherited();
-        std::erase_if(names, [&](const std::string& name) { return attributes.count(name) > 0; });
+        std::erase_if(names, [&](const std::string& name) { return attributes.has(name); });
         return names;
     }
 
@@ -259,7 +336,7 @@ private:
     std::vector<AttributeSpec> made() const
     {
         std::vector<AttributeSpec> specs;
-        for (const auto& [name, value] : attributes) specs.push_back(attribute_like(name, value));
+        for (const auto& [name, value] : attributes.of) specs.push_back(attribute_like(name, value.first()));
         for (const std::string& name : inherited())
             std::visit([&](const auto& c) { specs.push_back(attribute_like(name, c.fallback())); },
                        *source_.values().find(name));
@@ -291,8 +368,10 @@ private:
               const BirthAges& ages, const BirthVelocity& velocity, const Evaluation& now) const;
 
     BirthClock clock_;
-    bool at_beginning_ = false;   // of an interval: see BirthSource::Move
+    bool at_beginning_ = false;  // of an interval: see BirthSource::Move
+    bool warned_unmatched_ = false;
     mutable BirthSource source_;  // made from `source` and `from` when they change
+    ParentEmitter parents_;       // where it is a node
 };
 RAPID_NODE(Emit);
 
@@ -307,6 +386,11 @@ void Emit::move_source(const Simulation& simulation, const Evaluation& now)
     const auto frame = static_cast<std::int64_t>(std::ceil(now.frame.number));
     const BirthSource::Move move = source_.move_to(simulation.clock(), simulation.clock().step_at(now.frame), options);
     at_beginning_ = move.at_beginning;
+    if (move.unmatched > 0 && !std::exchange(warned_unmatched_, true))
+        now.warnings.push_back(fmt::format(
+            "{}:{}: node \"{}\": {} of {} points of the source were not in it at the frame before {}, by "
+            "their ids; they bear along their v, or where they are",
+            now.location.file, now.location.line, now.node, move.unmatched, source_.values().size(), frame));
     if (move.jump)
         now.warnings.push_back(
             fmt::format("{}:{}: node \"{}\": the source {}; nothing is born on the way (cut = {{{}}} says so, cut = "
@@ -326,7 +410,7 @@ void Emit::emit(Flow& flow, const Births& births, const Evaluation& now)
     if (n == 0) return;
     require_room(points, n);
 
-    const BirthVelocity velocities(velocity, speed, spread, inherit, source_);
+    const BirthVelocity velocities(velocity, speed, spread, inherit.share, source_);
     append(points, n, ages, velocities, now);
     const NewbornColumns newborn = newborn_columns(points, n, ages, velocities, now);
     for_each_chunk(n, [&](std::size_t chunk_begin, std::size_t chunk_end) {
@@ -359,7 +443,7 @@ void Emit::append(PointSet& points, std::size_t n, const BirthAges& ages, const 
                   const Evaluation& now) const
 {
     std::vector<AttributeSpec> common;
-    for (const auto& [name, value] : attributes) common.push_back({name, value});
+    for (const auto& [name, value] : attributes.of) common.push_back({name, value.first()});
     for (const std::string& name : inherited())
         std::visit(
             [&](const auto& column) {
@@ -395,6 +479,9 @@ NewbornColumns Emit::newborn_columns(PointSet& points, std::size_t n, const Birt
     newborn.age = floats("age", own_age && age);
     newborn.birthtime = floats("birthtime", own_age);
     newborn.life = floats("life", life && !life->is_single());
+    for (const auto& [name, value] : attributes.of)
+        if (!value.is_common() && now.keeps(name))
+            newborn.draw.push_back(draw_values(value, *points.find(name), n, now.random, name));
     for (const std::string& name : inherited())
         std::visit(
             [&](const auto& column) {
@@ -425,6 +512,7 @@ void Emit::fill(const NewbornColumns& newborn, const Births& births, std::size_t
         uniform4(now.random, births.first + first, draw_use, draws);
     source_.place(now.random, births.first + first, /*in_order=*/!rate, places);
     for (const auto& inherit_attribute : newborn.inherit) inherit_attribute(first, places);
+    for (const auto& draw_attribute : newborn.draw) draw_attribute(first, size, births.first + first);
 
     if (own_age || source_.moves()) ages.find(births, first, places, draws, L);
     if (own_age) {
@@ -447,7 +535,62 @@ void Emit::fill(const NewbornColumns& newborn, const Births& births, std::size_t
     if (!newborn.life.empty())
         for (std::size_t i = 0; i < size; ++i)
             newborn.life[first + i] = static_cast<float>(life->at(draws[i][life_draw]));
-    if (!newborn.v.empty()) velocities.find(places, draws, source_motion, newborn.v.subspan(first, size));
+    if (newborn.v.empty()) return;
+    std::array<Draws, batch_size> speed_draws;
+    if (!speed.is_single()) uniform4(now.random, births.first + first, speed_use, std::span(speed_draws).first(size));
+    velocities.find(places, draws, speed_draws, source_motion, newborn.v.subspan(first, size));
+}
+
+// What only a node as source, or only one of another kind, has.
+void Emit::check_kind() const
+{
+    const std::pair<bool, const char*> of_node[] = {{!source_group.empty(), "source_group"},
+                                                    {on.has_value(), "on"},
+                                                    {min_speed.has_value(), "min_speed"},
+                                                    {limit.has_value(), "limit"},
+                                                    {split, "split"},
+                                                    {kill_parent, "kill_parent"},
+                                                    {!inherit.names.empty(), "inherit = {names}"},
+                                                    {inherit_velocity.has_value(), "inherit_velocity"},
+                                                    {rate && !rate->attribute.empty(), "rate = rapid.attr"},
+                                                    {count && !count->attribute.empty(), "count = rapid.attr"}};
+    const std::pair<bool, const char*> of_others[] = {{!from.empty(), "from"},  {impulse.has_value(), "impulse"},
+                                                      {age.has_value(), "age"}, {motion != "spline", "motion"},
+                                                      {alpha != 0.5, "alpha"},  {cut.has_value(), "cut"}};
+    for (const auto& [given, name] : of_node)
+        if (given && !source.is_node)
+            throw Error(fmt::format("{} is for a source that is a node; give one, or leave it out", name));
+    for (const auto& [given, name] : of_others)
+        if (given && source.is_node)
+            throw Error(fmt::format("{} is not for a source that is a node; leave it out", name));
+    if (on && rate) throw Error("rate and on are given together; with an event give count, the births of each");
+    if (on && birth != "random")
+        throw Error(fmt::format("birth = \"{}\" and on are given together; an event has its own moment", birth));
+    if (min_speed && !(on && on->kind == BirthEvent::Hit))
+        throw Error("min_speed is for on = \"hit\"; leave it out, or give on");
+    if (kill_parent && (!on || on->kind == BirthEvent::Death))
+        throw Error("kill_parent is for births at an event in a parent's life; give on, and not \"death\"");
+    if (inherit.share != 1 && inherit_velocity)
+        throw Error("inherit and inherit_velocity are given together; keep one of them");
+}
+
+ParentOptions Emit::parent_options(double wait) const
+{
+    return {{rate, count, on, min_speed.value_or(0), limit, birth},
+            {velocity, speed, spread, inherit_velocity.value_or(inherit.share), life, attributes, inherit.names, joins,
+             split, wait},
+            source_group,
+            kill_parent};
+}
+
+void Emit::bear_from_parents(Flow& flow, std::span<const Flow> sources, const Evaluation& now)
+{
+    if (sources.empty()) throw Error("source: a function of the frame can't give a node; give the node itself");
+    const Flow& parents = sources.front();
+    // Points of the same chain move after this node: their last path is that of the frame before.
+    const bool waits = parents.simulation == flow.simulation && !now.at_start;
+    parents_.bear(flow, parents, parent_options(waits ? now.frame.dt : 0),
+                  flow.simulation->trial ? trial_births : SIZE_MAX, now);
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ struct Group {
 
     static NodeType declare()
     {
-        return node<Group>("group", "Puts the points for which `where` is true into a group, anew at each frame.")
+        return node<Group>("group", "Puts the points for which `where` is true into a group, in each frame.")
             .param(&Group::name, "name", Value(), any_number(), "", "name of the group that is made")
             .required()
             .constant()

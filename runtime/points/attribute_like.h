@@ -7,8 +7,12 @@
 
 namespace rapid {
 
+// The attributes whose types Houdini and its readers fix: Cd, Alpha, N, orient, scale, instance, with the value of
+// points without one. They are made as any other is. Null for any other name.
+const AttributeSpec* conventional_attribute(std::string_view name);
+
 // An attribute that some points have, with values of the type of `like`, as the others get it: a known one with its
-// default, else zero, or white.
+// default, else that by convention, else zero.
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like);
 
 }  // namespace rapid

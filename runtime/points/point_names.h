@@ -31,6 +31,7 @@ inline constexpr PointName point_names[] = {
     {"id", PointName::OwnColumn, true, AttributeType::Int64},
     {"dt", PointName::OwnColumn, true, AttributeType::Float, "seconds that this point is advanced in this frame"},
     {"index", PointName::Field, true, AttributeType::Int64, "place in the set, from 1"},
+    {"nage", PointName::Field, true, AttributeType::Float, "age as a part of life: from 0 at birth to 1 at the end"},
     {"join", PointName::Method},
     {"leave", PointName::Method},
     {"within", PointName::Method},

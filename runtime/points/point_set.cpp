@@ -40,7 +40,9 @@ const std::vector<AttributeSpec>& known_attributes()
             {"age", 0.0f},
             {"airresist", 0.0f},
             {"birthtime", 0.0f},
+            {"contactnum", std::int32_t{0}},
             {"force", zero},
+            {"frictionforce", 0.0f},
             {"hitimpulse", 0.0f},
             {"hitnml", zero},
             {"hitnum", std::int32_t{0}},
@@ -51,6 +53,8 @@ const std::vector<AttributeSpec>& known_attributes()
             {"hitv", zero},
             {"life", std::numeric_limits<float>::infinity()},
             {"mass", 1.0f},
+            {"normalforce", 0.0f},
+            {"parent", std::int64_t{-1}},
             {"pscale", 0.0f},
             {"targetv", zero},
         };

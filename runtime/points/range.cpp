@@ -53,7 +53,7 @@ std::string Range::right() const { return bounded() ? text() : "finite"; }
 Range range_of_attribute(std::string_view name)
 {
     if (name == "mass") return or_infinity(above(0));  // infinite: nothing moves it
-    if (name == "pscale") return at_least(0);
+    if (name == "pscale" || name == "airresist") return at_least(0);
     return name == "life" ? or_infinity(any_number()) : any_number();
 }
 

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "runtime/graph/arguments.h"
+#include "runtime/graph/node_handle.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
 #include "runtime/shapes/motion/animated.h"
@@ -95,6 +96,56 @@ BENCHMARK_CAPTURE(emit, sparks, sparks())->Arg(1)->Arg(2)->UseRealTime()->Unit(b
 
 BENCHMARK_CAPTURE(emit, moving, moving(false))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(emit, deforming, moving(true))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+// 100,000 parents, each of which bears ten points in a frame along its path.
+void parents(benchmark::State& state, const char* birth, const char* event)
+{
+    constexpr std::size_t size = 100000;
+    const auto source = std::make_shared<Simulation>(), own = std::make_shared<Simulation>();
+    source->record = std::make_shared<StepRecord>();
+    PointSet before, after;
+    for (PointSet* set : {&before, &after}) {
+        set->append(size);
+        const std::span<std::int64_t> id = set->id().overwrite();
+        const std::span<Vec3f> P = set->P().overwrite(), v = set->v().overwrite();
+        for (std::size_t i = 0; i < size; ++i) {
+            id[i] = static_cast<std::int64_t>(i);
+            P[i] = {static_cast<float>(i), set == &after ? 1.0f : 0.0f, 0};
+            v[i] = {0, 24, 0};
+        }
+    }
+    *source->record = {1.0 / 24, 1.0 / 24, 0, before, {}, {}, {}, {}, {}, true};
+
+    const Registry registry;
+    const Node chain{&registry.at("create"), "create1", {}, 0, {}, {}};
+    std::map<std::string, Value> arguments{
+        {"source", ObjectPtr(std::make_shared<NodeHandle>(std::make_shared<const Node>(chain)))}, {"count", 10.0}};
+    if (*event)
+        arguments["on"] = std::string(event);
+    else
+        arguments["birth"] = std::string(birth);
+    arguments["velocity"] = Vec3d(0, 1, 0);
+    arguments["spread"] = 30.0;
+    const Node node{&registry.at("emit"), "emit1", {}, 1, {}, std::move(arguments)};
+    const auto op = node.type->make();
+    FrameFigures figures;
+    std::vector<std::string> warnings;
+    const std::function<void(const std::string&, const PointSet&)> no_write;
+    bind_arguments(node, *op, own->frame(1), false);
+    op->check();
+    tbb::task_arena arena(static_cast<int>(state.range(0)));
+    for (auto _ : state) {
+        const Evaluation now{own->frame(2),           false,   node.name, node.location,
+                             RandomKey(0, node.name), figures, warnings,  no_write};
+        Flow inputs[] = {{PointSet(), {}, own}, {after, {}, source}};
+        arena.execute([&] { benchmark::DoNotOptimize(op->evaluate(inputs, now).points.size()); });
+    }
+    state.SetItemsProcessed(static_cast<std::int64_t>(figures.born));
+}
+
+BENCHMARK_CAPTURE(parents, even, "even", "")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(parents, random, "random", "")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(parents, birth, "", "birth")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace rapid

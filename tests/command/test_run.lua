@@ -1,6 +1,7 @@
 -- rapid run: the frames that it computes, its files and its messages.
 local command = require "testing.command"
 local json = require "dkjson"
+local csv_rows = require "tests.csv_rows"
 
 -- Three points that fall from 10 m. Frame f is (f - 1) / 24 s after the start.
 local falling = [[
@@ -17,23 +18,6 @@ local function new_folder(text)
     return command.rapid("run scene.lua " .. arguments, { cwd = self.path })
   end
   return folder
-end
-
--- The rows of a CSV file as tables by column.
-local function rows_of(text)
-  local rows, header = {}, nil
-  for line in text:gmatch "[^\n]+" do
-    local cells = {}
-    for cell in line:gmatch "[^,]+" do cells[#cells + 1] = cell end
-    if not header then
-      header = cells
-    else
-      local row = {}
-      for i, name in ipairs(header) do row[name] = tonumber(cells[i]) end
-      rows[#rows + 1] = row
-    end
-  end
-  return rows, header
 end
 
 local function height_at(frame, from)
@@ -121,7 +105,7 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
       local names = {}
       for i, frame in ipairs(written) do
         names[i] = ("a.%04d.csv"):format(frame)
-        assert.near(height_at(frame), rows_of(folder:read(names[i]))[1].Py, 1e-5)
+        assert.near(height_at(frame), csv_rows(folder:read(names[i]))[1].Py, 1e-5)
       end
       table.insert(names, "scene.lua")
       assert.same(names, folder:list())
@@ -218,7 +202,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
   it("brings a known attribute into being, in that file alone", function()
     local folder = new_folder()
     assert.equal(0, folder:run("-f 25 -o a.csv:age -o b.csv").status)
-    assert.near(1, rows_of(folder:read "a.csv")[1].age, 1e-6)
+    assert.near(1, csv_rows(folder:read "a.csv")[1].age, 1e-6)
     assert.equal("id,Px,Py,Pz,vx,vy,vz", folder:read("b.csv"):match "^[^\n]+")
   end)
 
@@ -241,14 +225,14 @@ return { %s = at(1), smoke = at(2) }
     assert.equal(0, folder:run("-f 1-2 -o '{output}/a.####.csv'").status)
     assert.same({ "scene.lua", "smoke/a.0001.csv", "smoke/a.0002.csv", "sparks/a.0001.csv", "sparks/a.0002.csv" },
       folder:list())
-    assert.equal(1, rows_of(folder:read "sparks/a.0002.csv")[1].Px)
-    assert.equal(2, rows_of(folder:read "smoke/a.0002.csv")[1].Px)
+    assert.equal(1, csv_rows(folder:read "sparks/a.0002.csv")[1].Px)
+    assert.equal(2, csv_rows(folder:read "smoke/a.0002.csv")[1].Px)
   end)
 
   it("writes the output main to a pattern without", function()
     local folder = new_folder(several:format "main")
     assert.equal(0, folder:run("-f 1 -o a.csv").status)
-    assert.equal(1, rows_of(folder:read "a.csv")[1].Px)
+    assert.equal(1, csv_rows(folder:read "a.csv")[1].Px)
   end)
 
   it("needs {output} where none is called main", function()
@@ -267,7 +251,7 @@ local x, up = rapid.param("x", 1), rapid.param("up", false)
 return rapid.create { points = rapid.points.from { P = {{x, up and 1 or 0, 0}} } }
 ]]
     assert.equal(0, folder:run("-f 1 -o a.csv --set x=2.5 --set up=true").status)
-    local row = rows_of(folder:read "a.csv")[1]
+    local row = csv_rows(folder:read "a.csv")[1]
     assert.equal(2.5, row.Px)
     assert.equal(1, row.Py)
   end)
@@ -437,7 +421,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 10, 0}}, heat = {3} 
     assert.equal(0, result.status, result.stderr)
     assert.same({ "inner/a.0003.csv", "inner/a.0005.csv", "outer.0003.csv", "outer.0005.csv", "scene.lua" },
       folder:list())
-    local rows, header = rows_of(folder:read "inner/a.0005.csv")
+    local rows, header = csv_rows(folder:read "inner/a.0005.csv")
     assert.same({ "id", "Px", "Py", "Pz", "vx", "vy", "vz", "heat" }, header)
     assert.near(height_at(5), rows[1].Py, 1e-5)
     assert.truthy(folder:read("outer.0005.csv"):find "^[^\n]*,late\n")

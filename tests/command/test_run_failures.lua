@@ -209,6 +209,42 @@ wait $run
   end)
 end)
 
+describe("Ctrl-C", function()
+  -- Milliseconds from the signal to the end of a command that has just begun its endless work, and its status.
+  local function end_of(text, arguments)
+    local folder = new_folder(text)
+    local result = command.shell(([[
+env --default-signal=INT "$RAPID" %s >log 2>&1 &
+run=$!
+for i in $(seq 500); do [ -s log ] && break; sleep 0.01; done
+sleep 0.5
+begun=$(date +%%s%%N)
+kill -INT $run
+wait $run
+status=$?
+echo $status $((($(date +%%s%%N) - begun) / 1000000))
+]]):format(arguments), { cwd = folder.path })
+    local status, milliseconds = result.stdout:match "^(%d+) (%d+)\n$"
+    return tonumber(status), tonumber(milliseconds)
+  end
+
+  -- 30 ms on an idle machine; the bound is for one that is not.
+  it("ends a frame of the largest numbers of steps, and a neighbourhood of all points", function()
+    local grid = "points = rapid.points.grid { size = {%d, %d, %d}, spacing = 1 }"
+    for _, text in ipairs {
+      "rapid.create { " .. grid:format(10, 10, 10) .. ", subframes = 10000 } :contact { radius = 0.6 } :gravity {} " ..
+        ":collide { shape = rapid.shape.sphere {} } :solve { substeps = 1048576, iterations = 10000 }",
+      "rapid.create { " .. grid:format(10, 10, 10) .. " } :turbulence {} " ..
+        ":solve { tolerance = 1e-300, max_substeps = 1048576 }",
+      "rapid.create { " .. grid:format(50, 50, 50) .. " } :interact { radius = 1e9, cohesion = 1 } :solve {}",
+    } do
+      local status, milliseconds = end_of('local rapid = require "rapid" return ' .. text, "run scene.lua -f 1-3")
+      assert.equal(130, status, text)
+      assert.truthy(milliseconds < 1000, text .. ": " .. milliseconds .. " ms")
+    end
+  end)
+end)
+
 describe("a reader that goes away", function()
   it("does not end the run", function()
     local folder = new_folder(points .. "return rapid.create { points = points } :solve {}")

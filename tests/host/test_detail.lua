@@ -83,6 +83,33 @@ return rapid.create { fps = 24 }
     end
   end)
 
+  it("adds points that move for a part of the frame, from lists of numbers, into groups", function()
+    local result = scene.run([[
+return rapid.create { fps = 24, points = two } :group { name = "old", where = function(p) return p.id < 2 end }
+  :points("hot", function(p) if p.id == 99 then p:join "hot" end end)
+  :detail("d", function(points, frame)
+    if frame.number ~= 3 then return end
+    points:add { P = {7, 8, 9}, v = {0, 2, 0}, dt = 0.01, group = "hot" }
+    points:add { P = {7, 8, 9}, v = {0, 2, 0}, group = { "hot", "old" } }
+  end)
+  :points("read", function(p) local _ = p.age end) :solve {}]], { frames = {1, 4} })
+    local points = result[3]
+    assert.near({7, 8.02, 9}, points[3].P, 1e-6)
+    assert.near(0.01, points[3].age, 1e-8)
+    assert.near({7, 8 + 2 / 24, 9}, points[4].P, 1e-6)
+    assert.is_true(points[3]:within "hot" and points[4]:within "hot" and points[4]:within "old")
+    assert.is_false(points[3]:within "old")
+    assert.near({0, 1, 0}, points[1].P, 0)
+    assert.near({7, 8.02 + 2 / 24, 9}, result[4][3].P, 1e-6)
+  end)
+
+  it("keeps whole frames for added points where others are newborn", function()
+    local points = scene.run([[
+return rapid.create { fps = 24 } :emit { source = two, count = 2, velocity = {0, 1, 0} }
+  :detail("d", function(points) points:add { v = {0, 2, 0} } end) :solve {}]], { frames = {2, 2} })[2]
+    assert.near({0, 2 / 24, 0}, points[3].P, 1e-6)
+  end)
+
   it("kills points when it ends", function()
     local points = run("points:kill(2) points[4]:kill() points[1].n = #points")[2]
     assert.same({ 0, 2 }, values(points, "id"))
@@ -175,6 +202,9 @@ describe("an error in a detail function", function()
       ["points[1].P = vec3(1 / 0, 0, 0)"] = "P became vec3(inf, 0, 0); a float is finite, within 3.4e38 either way",
       ["points[1].id = 3"] = "id is read only",
       ["points:add { id = 3 }"] = "id is read only",
+      ["points:add { dt = 0.1 }"] =
+        "points:add: dt = 0.1; it is the time that the point moves in this frame, from 0 to 0.0416666667 s",
+      ["points:add { group = 'cold' }"] = "points:add: no node makes a group \"cold\"",
       ["points:add { heta = 3 }"] = 'no attribute "heta"; did you mean "heat"?',
       ["points:neighbours(1, 0)"] = "neighbours within 0 m of points up to 3 m from the origin; the radius must be " ..
         "above 0, and above 2.79397e-09 m there",

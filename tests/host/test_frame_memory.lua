@@ -1,4 +1,5 @@
 -- What a run of many frames keeps: nothing that grows with their number.
+local json = require "dkjson"
 local scene = require "testing.scene"
 
 -- The peak of a run's memory in MiB, after so many frames.
@@ -17,8 +18,11 @@ describe("the memory of a run", function()
   it("does not grow with its frames where they are small", function()
     local text = "return rapid.create { points = two } :points('k', function(p) p.v = p.v * 0.5 end) :gravity {} " ..
       ":solve {}"
-    local few, many = peak(text, 1000), peak(text, 20000)
-    assert.truthy(many - few < 1, ("%g MiB after 1,000 frames, %g after 20,000"):format(few, many))
+    for _, arguments in ipairs { "", "--stats stats.json" } do
+      local few, many = peak(text, 1000, arguments), peak(text, 20000, arguments)
+      assert.truthy(many - few < 1, ("%g MiB after 1,000 frames, %g after 20,000 %s"):format(few, many, arguments))
+    end
+    assert.equal(20000, #json.decode(scene.folder:read "stats.json").frames)
   end)
 
   it("does not grow where a function of the frame makes a level set in each", function()
@@ -26,7 +30,14 @@ describe("the memory of a run", function()
     assert.truthy(many - few < 1, ("%g MiB after 150 frames, %g after 450"):format(few, many))
   end)
 
-  -- The peak of the threads' allocators varies by a few MiB; 300 surfaces are hundreds.
+  it("does not grow with pictures and files of points", function()
+    local text = "return rapid.create { points = two } :collide { shape = rapid.shape.sphere {} } :gravity {} :solve {}"
+    local files = "--size 32x18 -o picture.####.png -o points.####.csv"
+    local few, many = peak(text, 100, files), peak(text, 1000, files)
+    assert.truthy(many - few < 1, ("%g MiB after 100 frames, %g after 1,000"):format(few, many))
+  end)
+
+  -- The peak varies by a few MiB with the moments of collections; 300 surfaces are hundreds.
   it("holds no surface of earlier frames where pictures show it", function()
     local small = "--size 32x18 -o picture.####.png"
     local few, many = peak(ball, 150, small), peak(ball, 450, small)

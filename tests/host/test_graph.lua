@@ -74,7 +74,7 @@ return { a = start, b = start:points("more", function(p) p.P = p.P + vec3(0, 10,
   end)
 
   it("names the line of the last call too, which leaves no frame behind", function()
-    assert.equal('scene.lua:3: node "solve1": substeps = 0 is out of range; it must be at least 1',
+    assert.equal('scene.lua:3: node "solve1": substeps = 0 is out of range; it must be from 1 to 1048576',
       scene.error "return rapid.create {}\n  :gravity {}\n  :solve { substeps = 0 }")
     assert.equal('scene.lua:2: unknown node "sovle"; did you mean "solve"?',
       scene.error "return rapid.create {}\n  :sovle {}")
@@ -185,8 +185,9 @@ return rapid.create {} :emit { source = two, count = function(frame) return fram
 
   it("is told from a constant by node, file, line and frame when it fails", function()
     for body, expected in pairs {
-      ["return nil"] = 'scene.lua:1: node "emit1": count is nil; it must be an integer',
-      ["return 'many'"] = 'scene.lua:1: node "emit1": count = "many" has the wrong type; it must be an integer',
+      ["return nil"] = 'scene.lua:1: node "emit1": count is nil; it must be an integer or rapid.attr',
+      ["return 'many'"] =
+        'scene.lua:1: node "emit1": count = "many" has the wrong type; it must be an integer or rapid.attr',
       ["return -1"] = 'scene.lua:1: node "emit1": count = -1 is out of range; it must be at least 0',
       ["return nil + 1"] = 'scene.lua:3: node "emit1": attempt to perform arithmetic on a nil value',
       ["error 'no more'"] = 'scene.lua:3: node "emit1": no more',

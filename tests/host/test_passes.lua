@@ -2,6 +2,7 @@
 -- them, to the bit.
 local json = require "dkjson"
 local scene = require "testing.scene"
+local lehmer = require "tests.lehmer"
 
 local head = "local ball = rapid.levelset.sphere { radius = 5, voxel = 1 } " ..
   "local function named(p, name) return p[name] end " ..
@@ -151,18 +152,14 @@ describe("neighbouring edits of points", function()
       ":points { name = 'k%d', group = '%s', kernel = function(p) if p.id %% 9 == 0 then p:kill() end end }",
       ":attribute { other%d = 1 }",
     }
-    local state = 12345
-    local function drawn(n)
-      state = (state * 1103515245 + 12345) % 2 ^ 31
-      return math.floor(state / 65536) % n + 1
-    end
+    local draw = lehmer.new(12345)
     local groups, shared = { "x", "y", "z" }, 0
     for _ = 1, 12 do
       local edits = { ":group { name = 'x' }", ":group { name = 'y', where = function(p) return p.id > 70 end }",
                       ":group { name = 'z', where = function(p) return p.id % 2 == 0 end }" }
       for k = 1, 6 do
-        edits[#edits + 1] = kinds[drawn(#kinds)]:gsub("%%%%", "\1"):gsub("%%d", k)
-          :gsub("%%s", function() return groups[drawn(3)] end):gsub("\1", "%%")
+        edits[#edits + 1] = draw.pick(kinds):gsub("%%%%", "\1"):gsub("%%d", k)
+          :gsub("%%s", function() return draw.pick(groups) end):gsub("\1", "%%")
       end
       shared = shared + #passes(together(edits))[1]
       check_same(edits)

@@ -21,7 +21,7 @@ std::string pattern(const TemporaryFolder& folder, const std::string& name) { re
 
 }  // namespace
 
-TEST_CASE("all frames are written to all patterns, with missing folders made", "[io][writer]")
+TEST_CASE("all frames are written to all patterns, with missing folders made", "[io][writer][threads]")
 {
     const TemporaryFolder folder;
     FrameWriter writer({{pattern(folder, "new/deep/a.####.ply"), {}},
@@ -38,14 +38,32 @@ TEST_CASE("all frames are written to all patterns, with missing folders made", "
         CHECK(differing_columns(expected, read_points(folder / ("new/deep/a." + number + ".ply"))) == "");
         CHECK(read_points(folder / ("new/sparks." + number + ".csv")).column_names() ==
               std::vector<std::string>{"P", "age", "id", "v"});
-        CHECK(writer.seconds(frame) > 0);
     }
-    CHECK(writer.seconds(11) == 0);
-    CHECK(writer.written().size() == 20);
-    CHECK(writer.written()[0].bytes == std::filesystem::file_size(folder / "new/deep/a.0001.ply"));
+    const std::vector<FrameWriter::Written> written = writer.take_written();
+    CHECK(written.size() == 20);
+    CHECK(written[0].bytes == std::filesystem::file_size(folder / "new/deep/a.0001.ply"));
+    for (std::size_t k = 0; k < written.size(); ++k) {
+        CHECK(written[k].frame == static_cast<int>(k / 2) + 1);
+        CHECK(written[k].seconds > 0);
+    }
+    CHECK(writer.take_written().empty());
 }
 
-TEST_CASE("what changes in a point set after it was submitted is not in the file", "[io][writer]")
+TEST_CASE("a writer knows the first frame of which a file is still to come", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    FrameWriter writer({{pattern(folder, "a.##.png"), {}}, {pattern(folder, "a.##.csv"), {}}});
+    CHECK(writer.first_unwritten() == std::nullopt);
+    // Pictures without points wait for the first that has some.
+    for (int frame = 5; frame <= 6; ++frame) writer.submit(PointSet(), {.number = frame, .picture = small_picture()});
+    CHECK(writer.first_unwritten() == 5);
+    writer.submit(random_points({.size = 50}), {.number = 7, .picture = small_picture()});
+    writer.finish();
+    CHECK(writer.first_unwritten() == std::nullopt);
+    CHECK(writer.take_written().size() == 6);
+}
+
+TEST_CASE("what changes in a point set after it was submitted is not in the file", "[io][writer][threads]")
 {
     const TemporaryFolder folder;
     PointSet points = random_points({.size = 20000, .wide = false});
@@ -150,7 +168,7 @@ TEST_CASE("an unknown extension is refused with the known ones, before anything 
           "/nowhere/a.vdb: can't be read: No such file or directory");
 }
 
-TEST_CASE("a writer that is dropped writes no half frame and leaves nothing hidden", "[io][writer]")
+TEST_CASE("a writer that is dropped writes no half frame and leaves nothing hidden", "[io][writer][threads]")
 {
     const TemporaryFolder folder;
     const PointSet points = random_points({.size = 50000});

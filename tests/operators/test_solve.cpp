@@ -134,7 +134,7 @@ TEST_CASE("substeps below 1 are refused", "[solve]")
 {
     CHECK(test::error_of([] {
               NodeTest("solve", {{"substeps", Value(0.0)}});
-          }) == "substeps = 0 is out of range; it must be at least 1");
+          }) == "substeps = 0 is out of range; it must be from 1 to 1048576");
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "runtime/graph/points_object.h"
 #include "runtime/graph/value.h"
+#include "runtime/operators/emit/point_path.h"
 #include "runtime/shapes/motion/deforming.h"
 
 namespace rapid {
@@ -52,10 +52,12 @@ Vec3f direction(const Vec3f& normal)
 
 BirthSource::BirthSource(ObjectPtr object, std::string from) : object_(std::move(object)), from_(std::move(from))
 {
-    if (const auto points = std::dynamic_pointer_cast<const PointsObject>(object_)) {
+    const auto points = std::dynamic_pointer_cast<const PointsObject>(object_);
+    moving_points_ = std::dynamic_pointer_cast<const AnimatedPoints>(object_);
+    if (points || moving_points_) {
         if (!from_.empty() && from_ != "points")
             throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of points take \"points\"", from_));
-        take_points(points->points);
+        take_points(points ? points->points : moving_points_->rest());
     } else if ((moving_mesh_ = std::dynamic_pointer_cast<const AnimatedMesh>(object_))) {
         take_mesh(moving_mesh_->rest());
     } else if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object_)) {
@@ -85,12 +87,49 @@ void BirthSource::take_shape(const ShapePtr& shape)
 
 FramePath BirthSource::path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const
 {
+    if (moving_points_) {
+        Box3d bounds;
+        for (std::size_t i = 0; i < values_.size(); ++i) bounds.extend(values_.P()[i].cast<double>());
+        return path_of(*moving_points_->motion(), bounds, clock, step, options);
+    }
     return moving_mesh_ ? path_of(*moving_mesh_, clock, step, options) : path_of(*moving_shape_, clock, step, options);
+}
+
+void BirthSource::follow(const BirthSource& last)
+{
+    if (!is_of_points_ || !last.is_of_points_ || moving_points_) return;
+    before_ = last.values_;
+    earlier_ = last.before_;
+    is_fresh_ = true;
+}
+
+// A set that stays the same is at rest, wherever it was before.
+BirthSource::Move BirthSource::move_points_to(const FrameClock& clock, std::int64_t step, const PathOptions& options)
+{
+    path_ = nullptr;
+    path_is_of_v_ = false;
+    const bool is_another = std::exchange(is_fresh_, false);
+    const std::int64_t frame = clock.start + (step - clock.start + clock.subframes - 1) / clock.subframes;
+    const bool jumps = options.cuts && options.cuts->count(frame) && clock.is_whole(step);
+    if (jumps || step <= clock.start) {
+        before_.reset();
+    } else if (!is_another) {
+        before_ = values_;
+    } else if (before_ && !values_.empty() && options.kind != PathOptions::None) {
+        const PointPath found = point_path(values_, *before_, earlier_ ? &*earlier_ : nullptr,
+                                           options.kind == PathOptions::Linear, 1 / clock.steps_per_second());
+        path_ = found.path;
+        path_is_of_v_ = found.follows_v;
+        return {std::nullopt, false, found.unmatched};
+    }
+    return {};
 }
 
 BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_t step, const PathOptions& options)
 {
-    if (!moving_mesh_ && !moving_shape_) return {std::nullopt, false};
+    if (is_of_points_ && !moving_points_) return move_points_to(simulation, step, options);
+    if (!moving_mesh_ && !moving_shape_ && !moving_points_) return {};
+    if (moving_points_ && values_.empty()) return {};
     const bool deforms = moving_mesh_ && moving_mesh_->deforms();
     FrameClock clock = simulation;
     if (deforms) clock.subframes = 1;
@@ -105,7 +144,10 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
         path = FramePath();
     }
     if (!deforms) {
-        path_ = rigid_path(moving_mesh_ ? *moving_mesh_->motion() : *moving_shape_->motion(), clock, end, path);
+        const Motion& motion = *(moving_mesh_    ? moving_mesh_->motion()
+                                 : moving_shape_ ? moving_shape_->motion()
+                                                 : moving_points_->motion());
+        path_ = rigid_path(motion, clock, end, path);
     } else {
         const PlacesOn on = from_ == "volume"   ? PlacesOn::Volume
                             : from_ == "points" ? PlacesOn::Vertices
@@ -139,6 +181,7 @@ void BirthSource::take_mesh(const MeshPtr& mesh)
 void BirthSource::take_points(PointSet points)
 {
     values_ = std::move(points);
+    is_of_points_ = true;
     if (const Column<Vec3f>* normals = std::as_const(values_).find<Vec3f>("N")) {
         normals_ = *normals;
         has_normals_ = true;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/points_object.h"
 #include "runtime/object.h"
 #include "runtime/points/point_set.h"
 #include "runtime/shapes/mesh/mesh.h"
@@ -24,13 +25,16 @@ public:
     BirthSource(ObjectPtr object, std::string from);
 
     bool is(const ObjectPtr& object, const std::string& from) const { return object_ == object && from_ == from; }
+    // Points that take the place of those of `last`, which was the source until now: they travel from there to here.
+    void follow(const BirthSource& last);
 
     // Moves it to the interval that ends with a step; at the simulation's start, to that instant. Once a step, before
     // births are placed, on one thread. A deforming source is known at whole frames, and its path within a frame does
     // not depend on the sub-frames.
     struct Move {
-        std::optional<Jump> jump;  // detected in this interval
-        bool at_beginning;         // births take place at t = 0: of the interval that begins at the start
+        std::optional<Jump> jump = {};  // detected in this interval
+        bool at_beginning = false;      // births take place at t = 0: of the interval that begins at the start
+        std::size_t unmatched = 0;      // points of a set that was another before, and did not have them
     };
     Move move_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
     // Whether birthplaces move: they are then to be carried along path().
@@ -39,6 +43,8 @@ public:
 
     bool empty() const { return !scatter_ && values_.empty(); }  // a set of no points
     bool has_normals() const { return has_normals_; }
+    // Whether its attribute v is to be added to the velocity of its path.
+    bool has_own_velocity() const { return !path_is_of_v_; }
 
     // Attributes of its points, or of a mesh's vertices, v included; read through value().
     const PointSet& values() const { return values_; }
@@ -67,6 +73,7 @@ private:
     void take_mesh(const MeshPtr& mesh);
     void take_shape(const ShapePtr& shape);
     void take_points(PointSet points);
+    Move move_points_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
     FramePath path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const;
 
     ObjectPtr object_;
@@ -79,6 +86,12 @@ private:
     PointSet values_;
     Column<Vec3f> normals_;  // of the points
     bool has_normals_ = false;
+
+    // Of points: their motion, or the sets before, where a function of the frame gives another at each step.
+    std::shared_ptr<const AnimatedPoints> moving_points_;
+    std::optional<PointSet> before_, earlier_;
+    bool is_of_points_ = false, path_is_of_v_ = false;
+    bool is_fresh_ = false;  // follows another set, and has not moved yet
 };
 
 }  // namespace rapid

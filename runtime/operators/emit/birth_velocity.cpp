@@ -2,24 +2,27 @@
 
 namespace rapid {
 
-BirthVelocity::BirthVelocity(const Vec3d& velocity, double speed, double spread, double inherit,
+BirthVelocity::BirthVelocity(const Vec3d& velocity, const Interval& speed, double spread, double inherit,
                              const BirthSource& source)
     : velocity_(velocity), speed_(speed), inherit_(inherit), source_(source), cone_(spread)
 {
-    is_random_ = spread > 0 && (speed != 0 || velocity != Vec3d::Zero());
-    source_v_differs_ = inherit != 0 && !source.values().v().is_uniform();
-    is_common_ = !is_random_ && speed == 0 && !source_v_differs_ && !(inherit != 0 && source.moves());
-    inherited_ = inherit == 0 || source_v_differs_ ? Vec3d(Vec3d::Zero())
-                                                   : Vec3d(inherit * source.values().v()[0].cast<double>());
+    is_random_ = spread > 0 && (!is_zero(speed) || velocity != Vec3d::Zero());
+    const bool has_v = inherit != 0 && source.has_own_velocity();
+    source_v_differs_ = has_v && !source.values().v().is_uniform();
+    is_common_ = !is_random_ && is_zero(speed) && !source_v_differs_ && !(inherit != 0 && source.moves());
+    inherited_ =
+        !has_v || source_v_differs_ ? Vec3d(Vec3d::Zero()) : Vec3d(inherit * source.values().v()[0].cast<double>());
 }
 
 void BirthVelocity::find(std::span<const Birthplace> places, std::span<const Draws> draws,
-                         std::span<const Vec3d> source_motion, std::span<Vec3f> v) const
+                         std::span<const Draws> speed_draws, std::span<const Vec3d> source_motion,
+                         std::span<Vec3f> v) const
 {
     const bool moves = inherit_ != 0 && source_.moves();
     const Strided<Vec3f> source_v = source_.values().v().read();
     for (std::size_t i = 0; i < places.size(); ++i) {
-        const Vec3d mean = velocity_ + speed_ * places[i].N.cast<double>();
+        const double speed = speed_.is_single() ? speed_.min : speed_.at(speed_draws[i][0]);
+        const Vec3d mean = velocity_ + speed * places[i].N.cast<double>();
         Vec3d sum = inherited_ + (is_random_ ? cone_.turn(mean, draws[i][cone_draw], draws[i][turn_draw]) : mean);
         if (source_v_differs_) sum += inherit_ * source_.value(source_v, places[i]).cast<double>();
         if (moves) sum += inherit_ * source_motion[i];

@@ -11,6 +11,7 @@
 #include "runtime/operators/emit/birth_source.h"
 #include "runtime/operators/emit/cone.h"
 #include "runtime/operators/emit/draws.h"
+#include "runtime/operators/emit/interval.h"
 
 namespace rapid {
 
@@ -18,23 +19,26 @@ namespace rapid {
 class BirthVelocity {
 public:
     // spread: rad.
-    BirthVelocity(const Vec3d& velocity, double speed, double spread, double inherit, const BirthSource& source);
+    BirthVelocity(const Vec3d& velocity, const Interval& speed, double spread, double inherit,
+                  const BirthSource& source);
 
     // Whether it needs random numbers.
     bool is_random() const { return is_random_; }
     // Whether it needs normals that follow a moving source.
-    bool needs_normals() const { return speed_ != 0; }
+    bool needs_normals() const { return !is_zero(speed_); }
     // Whether all newborn have the same.
     bool is_common() const { return is_common_; }
     Vec3f common() const { return (velocity_ + inherited_).cast<float>(); }
 
     // source_motion: the velocities of the birthplaces on a moving source, read where it moves. Spans have shape [n].
-    void find(std::span<const Birthplace> places, std::span<const Draws> draws, std::span<const Vec3d> source_motion,
-              std::span<Vec3f> v) const;
+    // speed_draws: by speed_use, read where speed is random.
+    void find(std::span<const Birthplace> places, std::span<const Draws> draws, std::span<const Draws> speed_draws,
+              std::span<const Vec3d> source_motion, std::span<Vec3f> v) const;
 
 private:
     const Vec3d velocity_;
-    const double speed_, inherit_;
+    const Interval speed_;
+    const double inherit_;
     const BirthSource& source_;
     const Cone cone_;
     bool is_random_, is_common_;

@@ -26,4 +26,10 @@ void read_value(const Param& param, const Value& value, Interval& field)
         throw Error(fmt::format("{} = {} has no mean; both must be finite", param.name, describe(value)));
 }
 
+std::string describe(const Interval& interval)
+{
+    return interval.is_single() ? fmt::format("{}", interval.min)
+                                : fmt::format("{{{}, {}}}", interval.min, interval.max);
+}
+
 }  // namespace rapid

@@ -1,6 +1,7 @@
 // A parameter that is one number for all points, or uniform between two: 2 or {1, 3}.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "runtime/graph/param.h"
@@ -17,5 +18,9 @@ struct Interval {
 };
 
 void read_value(const Param& param, const Value& value, Interval& field);
+
+inline bool is_zero(const Interval& interval) { return interval.min == 0 && interval.max == 0; }
+// 2, or {1, 3}.
+std::string describe(const Interval& interval);
 
 }  // namespace rapid

@@ -1,0 +1,106 @@
+#include "bindings/command/event_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "runtime/io/format.h"
+#include "runtime/operators/emit/parent_paths.h"
+
+namespace rapid {
+namespace {
+
+enum Kind : std::int32_t { Birth, Hit, Death };
+
+struct Event {
+    double time;  // s since the start
+    std::int32_t chain;
+    Kind kind;
+    std::int64_t id;
+    Vec3f P, v;
+    Vec3f N = Vec3f::Zero();
+    float speed = 0, impulse = 0;
+    std::int32_t collider = -1;
+};
+
+void add_events(const StepRecord& record, std::int32_t chain, std::vector<Event>& events)
+{
+    const PointSet& before = record.before;
+    const Column<float>* own = before.find<float>("dt");
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        if (before.id()[i] < record.first_new) continue;
+        const double dt = own ? std::min(record.h, double((*own)[i])) : record.h;
+        events.push_back({record.time - dt, chain, Birth, before.id()[i], before.P()[i], before.v()[i]});
+    }
+    for (const LoggedHit& hit : record.hits)
+        events.push_back(
+            {hit.time, chain, Hit, before.id()[hit.point], hit.P, hit.v1, hit.n, hit.speed, hit.impulse, hit.collider});
+    const PointSet none;
+    const ParentPaths paths(none, record, "");
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        const ParentPaths::Parent& dead = paths[i];
+        const ParentPaths::Moment last = paths.at(dead, dead.end);
+        events.push_back(
+            {record.time - record.h + dead.end, chain, Death, dead.id, last.P.cast<float>(), last.v.cast<float>()});
+    }
+}
+
+template <class T, class F>
+void append(PointSet& points, std::span<const Event> events, const char* name, const F& value)
+{
+    points.add({name, Column<T>::zero()});
+    const std::span<T> to = points.column<T>(name).write().last(events.size());
+    for (std::size_t i = 0; i < events.size(); ++i) to[i] = value(events[i]);
+}
+
+}  // namespace
+
+void EventFile::declare(CLI::App& app)
+{
+    app.add_option("--events", path_,
+                   "writes births, contacts and deaths with their places and times as points (.csv, .bgeo, .ply, .vdb)")
+        ->type_name("FILE");
+}
+
+void EventFile::check() const
+{
+    const std::string extension = std::filesystem::path(path_).extension();
+    const auto known = {".csv", ".bgeo", ".ply", ".vdb"};
+    if (!path_.empty() && std::find(known.begin(), known.end(), extension) == known.end())
+        throw Error(fmt::format("--events {}: the events are points; give a file .csv, .bgeo, .ply or .vdb", path_));
+}
+
+void EventFile::add(const FrameResult& result)
+{
+    std::vector<Event> events;
+    std::int32_t chain = 0;
+    for (const auto& [name, records] : result.steps) {
+        for (const StepRecord& record : records) add_events(record, chain, events);
+        ++chain;
+    }
+    const auto key = [](const Event& e) { return std::tuple(e.time, e.chain, e.kind, e.id, e.collider); };
+    std::sort(events.begin(), events.end(), [&](const Event& a, const Event& b) { return key(a) < key(b); });
+    if (path_.empty() || events.empty()) return;
+    events_.append(events.size());
+    append<Vec3f>(events_, events, "P", [](const Event& e) { return e.P; });
+    append<Vec3f>(events_, events, "v", [](const Event& e) { return e.v; });
+    append<Vec3f>(events_, events, "N", [](const Event& e) { return e.N; });
+    append<std::int64_t>(events_, events, "id", [](const Event& e) { return e.id; });
+    append<std::int32_t>(events_, events, "event", [](const Event& e) { return static_cast<std::int32_t>(e.kind); });
+    append<std::int32_t>(events_, events, "frame",
+                         [&](const Event&) { return static_cast<std::int32_t>(result.frame); });
+    append<std::int32_t>(events_, events, "chain", [](const Event& e) { return e.chain; });
+    append<std::int32_t>(events_, events, "hitpath", [](const Event& e) { return e.collider; });
+    append<float>(events_, events, "time", [](const Event& e) { return static_cast<float>(e.time); });
+    append<float>(events_, events, "speed", [](const Event& e) { return e.speed; });
+    append<float>(events_, events, "impulse", [](const Event& e) { return e.impulse; });
+}
+
+void EventFile::finish() const
+{
+    if (!path_.empty()) write_points(path_, events_);
+}
+
+}  // namespace rapid

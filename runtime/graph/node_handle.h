@@ -1,0 +1,17 @@
+// A node as a value: as graph code holds it, and as an argument of a node that reads its points (emit's `source`).
+#pragma once
+
+#include "runtime/graph/node_type.h"
+#include "runtime/object.h"
+
+namespace rapid {
+
+class NodeHandle : public Object {
+public:
+    explicit NodeHandle(NodePtr held) : node(std::move(held)) {}
+    std::string_view kind() const override { return "node"; }
+
+    const NodePtr node;
+};
+
+}  // namespace rapid

@@ -1,0 +1,197 @@
+#include "runtime/operators/emit/offspring.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "runtime/operators/emit/cone.h"
+#include "runtime/operators/emit/draws.h"
+#include "runtime/parallel.h"
+#include "runtime/points/attribute_like.h"
+
+namespace rapid {
+namespace {
+
+// The number of a birth among all births of all parents, for its random numbers.
+std::uint64_t number_of(std::int64_t parent, std::uint64_t number)
+{
+    return (static_cast<std::uint64_t>(parent) << 32) + number;
+}
+
+}  // namespace
+
+std::vector<std::string> Traits::of_parents() const
+{
+    std::vector<std::string> names = inherit;
+    if (splits)
+        for (const char* shared : {"mass", "pscale"})
+            if (std::find(names.begin(), names.end(), shared) == names.end()) names.emplace_back(shared);
+    std::erase_if(names, [&](const std::string& name) { return attributes.has(name); });
+    return names;
+}
+
+// The newborn points' part of the columns, shape [n]; empty where nothing reads them.
+struct Offspring::Columns {
+    std::span<Vec3f> P, v;
+    std::span<std::int64_t> id, parent;
+    std::span<float> dt, birthtime, life;
+    std::vector<DrawValues> drawn;
+    // Each copies an attribute of a parent to the births from `first` on.
+    std::vector<std::function<void(const Brood& brood, std::size_t first, std::size_t count)>> inherit;
+};
+
+Offspring::Offspring(const ParentPaths& parents, const std::vector<Brood>& broods, const Traits& traits,
+                     const Evaluation& now)
+    : parents_(parents), broods_(broods), traits_(traits), now_(now)
+{
+}
+
+void Offspring::make_columns(PointSet& points) const
+{
+    for (const auto& [name, value] : traits_.attributes.of)
+        if (now_.keeps(name)) points.add(attribute_like(name, value.first()));
+    if (!traits_.group.empty() && now_.keeps_group(traits_.group)) points.group(traits_.group);
+    if (!now_.at_start) points.add({"dt", static_cast<float>(now_.frame.dt)});
+}
+
+std::size_t Offspring::append_to(PointSet& points, std::int64_t& next_id, std::size_t most) const
+{
+    const std::size_t all = broods_.empty() ? 0 : broods_.back().first + broods_.back().count;
+    const std::size_t n = std::min(all, most);
+    if (n == 0) return 0;
+    std::vector<AttributeSpec> common = {{"age", 0.0f}};
+    for (const auto& [name, value] : traits_.attributes.of) common.push_back({name, value.first()});
+    if (traits_.life && traits_.life->is_single()) common.push_back({"life", static_cast<float>(traits_.life->min)});
+    const bool joins = !traits_.group.empty() && now_.keeps_group(traits_.group);
+    points.append(n, common, joins ? std::vector{traits_.group} : std::vector<std::string>());
+
+    const Columns columns = columns_of(points, n);
+    for_each_chunk(n, [&](std::size_t begin, std::size_t end) { fill(columns, begin, end); });
+    std::iota(columns.id.begin(), columns.id.end(), next_id);
+    next_id += static_cast<std::int64_t>(n);
+    return n;
+}
+
+Offspring::Columns Offspring::columns_of(PointSet& points, std::size_t n) const
+{
+    const auto last = [&]<class T>(const char* name, T) {
+        Column<T>* column = points.find<T>(name);
+        return column ? column->write().last(n) : std::span<T>();
+    };
+    Columns columns;
+    columns.P = points.P().write().last(n);
+    columns.v = points.v().write().last(n);
+    columns.id = points.id().write().last(n);
+    columns.parent = last("parent", std::int64_t{});
+    columns.dt = last("dt", 0.0f);
+    columns.birthtime = last("birthtime", 0.0f);
+    if (traits_.life && !traits_.life->is_single()) columns.life = last("life", 0.0f);
+    add_drawn(points, n, columns);
+    add_inherited(points, n, columns);
+    return columns;
+}
+
+void Offspring::add_drawn(PointSet& points, std::size_t n, Columns& columns) const
+{
+    for (const auto& [name, value] : traits_.attributes.of)
+        if (!value.is_common() && now_.keeps(name))
+            columns.drawn.push_back(draw_values(value, *points.find(name), n, now_.random, name));
+}
+
+// mass and pscale of a brood that shares its parent: m / n, r / n^(1/3).
+void Offspring::add_inherited(PointSet& points, std::size_t n, Columns& columns) const
+{
+    for (const std::string& name : traits_.of_parents()) {
+        if (!now_.keeps(name)) continue;
+        AnyColumn* own = points.find(name);
+        if (!own) continue;
+        std::visit(
+            [&]<class T>(Column<T>& column) {
+                const std::span<T> to = column.write().last(n);
+                const bool is_mass = traits_.splits && name == "mass", is_radius = traits_.splits && name == "pscale";
+                const T fallback = column.fallback();
+                columns.inherit.push_back([=, this](const Brood& brood, std::size_t first, std::size_t count) {
+                    const ParentPaths::Parent& parent = parents_[brood.parent];
+                    const Column<T>* from = parent.set->find<T>(name);
+                    T value = from ? (*from)[parent.place] : fallback;
+                    if constexpr (std::is_same_v<T, float>) {
+                        if (is_mass) value = value / static_cast<float>(brood.count);
+                        if (is_radius) value = value / std::cbrt(static_cast<float>(brood.count));
+                    }
+                    std::fill_n(to.begin() + static_cast<std::ptrdiff_t>(first), count, value);
+                });
+            },
+            *own);
+    }
+}
+
+// The births [begin, end) of the step, brood by brood.
+void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end) const
+{
+    const Cone cone(traits_.spread);
+    const StepRecord& record = parents_.record();
+    const bool turns = traits_.spread > 0 && (!is_zero(traits_.speed) || traits_.velocity != Vec3d::Zero());
+    auto brood = std::upper_bound(broods_.begin(), broods_.end(), begin,
+                                  [](std::size_t i, const Brood& b) { return i < b.first; }) -
+                 1;
+    std::array<Draws, 64> draws;
+    for (std::size_t i = begin; i < end;) {
+        if (i >= brood->first + brood->count) ++brood;
+        const std::size_t k = i - brood->first;
+        const std::size_t count = std::min({brood->count - k, end - i, draws.size()});
+        const std::int64_t parent = parents_.id(parents_[brood->parent]);
+        const std::uint64_t number = number_of(parent, brood->number + k);
+        uniform4(now_.random, number, draw_use, std::span(draws).first(count));
+        for (const auto& inherit : columns.inherit) inherit(*brood, i, count);
+        for (const DrawValues& draw : columns.drawn) draw(i, count, number);
+        const ParentPaths::Parent& of = parents_[brood->parent];
+        ParentPaths::Piece piece = parents_.piece(of, brood->begin);
+        for (std::size_t j = 0; j < count; ++j, ++i) {
+            double t = brood->begin;
+            if (brood->spacing > 0)
+                t += (static_cast<double>(k + j + 1) - brood->due) * brood->spacing;
+            else if (brood->end > brood->begin)
+                t += draws[j][age_draw] * (brood->end - brood->begin);
+            t = std::min(t, brood->end);
+            if (!piece.holds(t)) piece = parents_.piece(of, t);
+            const ParentPaths::Moment moment = brood->hit == Brood::no_hit ? piece.at(t) : moment_of_hit(brood->hit);
+            Vec3d v = traits_.velocity;
+            if (!is_zero(traits_.speed)) v += speed_of(number + j) * normal_of(*brood, moment.v);
+            if (turns) v = cone.turn(v, draws[j][cone_draw], draws[j][turn_draw]);
+            columns.P[i] = moment.P.cast<float>();
+            columns.v[i] = (v + traits_.share * moment.v).cast<float>();
+            const double L = record.h - t + traits_.wait;
+            if (!columns.dt.empty()) columns.dt[i] = static_cast<float>(L);
+            if (!columns.birthtime.empty()) columns.birthtime[i] = static_cast<float>(now_.frame.time - L);
+            if (!columns.life.empty()) columns.life[i] = static_cast<float>(traits_.life->at(draws[j][life_draw]));
+            if (!columns.parent.empty()) columns.parent[i] = parent;
+        }
+    }
+}
+
+double Offspring::speed_of(std::uint64_t number) const
+{
+    return traits_.speed.is_single() ? traits_.speed.min
+                                     : traits_.speed.at(uniform4(now_.random, number, speed_use)[0]);
+}
+
+ParentPaths::Moment Offspring::moment_of_hit(std::uint32_t place) const
+{
+    const LoggedHit& hit = parents_.record().hits[place];
+    return {hit.P.cast<double>(), hit.v1.cast<double>()};
+}
+
+// The direction of `speed`: off the surface at a hit, the parent's attribute N, or the way that it goes.
+Vec3d Offspring::normal_of(const Brood& brood, const Vec3d& v) const
+{
+    if (brood.hit != Brood::no_hit) return parents_.record().hits[brood.hit].n.cast<double>();
+    const ParentPaths::Parent& parent = parents_[brood.parent];
+    const Column<Vec3f>* normals = parent.set->find<Vec3f>("N");
+    const Vec3d along = normals ? Vec3d((*normals)[parent.place].cast<double>()) : v;
+    const double length = along.norm();
+    return length > 0 ? Vec3d(along / length) : Vec3d(Vec3d::UnitY());
+}
+
+}  // namespace rapid

@@ -1,0 +1,33 @@
+-- arrive: points go to a place, slower as they come near, and never beyond it.
+--
+--   d' = -speed            d: from the target, beyond the radius
+--   d' = -speed d / radius            within it
+--
+-- Solved over the frame, so that a point that heads for the target is where these say at any frame rate. Other velocity
+-- falls to 1/e in the response time; a point that is faster is slowed down where it enters the radius.
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "arrive",
+  doc  = "Takes points to a place, slowing down before it.",
+  params = {
+    target   = { "vec3", default = {0, 0, 0}, unit = "m", doc = "where to" },
+    speed    = { "float", default = 1, min = 1e-6, unit = "m/s", doc = "beyond the radius" },
+    radius   = { "float", default = 1, min = 1e-6, unit = "m", doc = "where they begin to slow down" },
+    response = { "float", default = 0.2, min = 1e-6, unit = "s", doc = "time in which other velocity falls to 1/e" },
+  },
+  points = function(p, _, params)
+    local dt = p.dt
+    local way = params.target - p.P
+    local d = way:length()
+    if dt <= 0 or d == 0 then return end
+    local n = way / d
+    local v = (n * params.speed):lerp(p.v, math.exp(-dt / params.response))
+    -- As far as it may come: at the greater of both speeds up to the radius, and slowing down in the time that is left.
+    local closing = v:dot(n)
+    local speed, free = math.max(closing, params.speed), math.max(d - params.radius, 0)
+    local inside = math.max(dt - free / speed, 0)
+    local most = math.min(speed * dt, free) + (d - free) * (1 - math.exp(-params.speed / params.radius * inside))
+    p.v = v + n * math.min(most / dt - closing, 0)
+  end,
+}

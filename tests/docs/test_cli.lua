@@ -95,8 +95,12 @@ return rapid.create { points = rapid.points.grid { size = {0.4, 0.4, 0.4}, spaci
     folder:write("free.lua", [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid {} } :attract { center = {3, 0, 0} } :solve {}]])
+    folder:write("many.lua", [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.09 } }
+  :contact { radius = 0.01 } :solve {}]])
     local keys = {}
-    for _, scene in ipairs { "all", "free" } do
+    for _, scene in ipairs { "all", "free", "many" } do
       local result = command.rapid("run " .. scene .. ".lua -f 1-3 --quiet --stats s.json", { cwd = folder.path })
       assert.equal(0, result.status, result.stderr)
       keys_of(json.decode(folder:read "s.json"), {}, keys)

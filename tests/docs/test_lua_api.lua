@@ -16,7 +16,7 @@ end
 
 describe("docs/lua-api.md", function()
   it("has a row for each native node, with its parameters, and no others", function()
-    local written_in_lua = document.code(document.section(page, "## Nodes"):match "\nSeventeen .-\n\n")
+    local written_in_lua = document.code(document.section(page, "## Nodes"):match "\nTwenty%-one .-\n\n")
     local count = 0
     for _, node in ipairs(nodes) do
       local known = documented[node.name]
@@ -39,7 +39,7 @@ describe("docs/lua-api.md", function()
   end)
 
   it("lists the nodes that are written in Lua", function()
-    local listed = document.code(document.section(page, "## Nodes"):match "\nSeventeen .-\n\n")
+    local listed = document.code(document.section(page, "## Nodes"):match "\nTwenty%-one .-\n\n")
     listed["lua/nodes"] = nil
     local there = {}
     for name in command.shell("ls lua/nodes").stdout:gmatch "([%w_]+)%.lua" do there[name] = true end
@@ -95,13 +95,14 @@ describe("docs/lua-api.md", function()
 
   it("shows scenes that run", function()
     local folder = command.folder()
-    local scene, node = document.blocks(page, "lua")[1], document.blocks(page, "lua")[2]
+    local scene, generations, node = unpack(document.blocks(page, "lua"))
     folder:write("scene.lua", scene)
+    folder:write("generations.lua", generations)
     folder:write("swirl.lua", node)
     folder:write("turned.lua", [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :solve {}]])
-    for _, name in ipairs { "scene", "turned" } do
+    for _, name in ipairs { "scene", "generations", "turned" } do
       local result = command.rapid(("run %s.lua -f 1-3 --quiet"):format(name), { cwd = folder.path })
       assert.equal(0, result.status, result.stderr)
     end
@@ -109,7 +110,7 @@ return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :s
 
   it("shows a test that passes", function()
     local folder = command.folder()
-    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[3])
+    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[4])
     assert.equal(0, command.rapid("test " .. command.quoted(file)).status)
   end)
 end)

@@ -13,10 +13,10 @@ namespace {
 
 constexpr char counts_field[] = "rapid.handle_memory";  // in the registry
 
-constexpr std::size_t least = std::size_t{16} << 20;  // bytes that are not worth a collection
+constexpr std::size_t least_held = std::size_t{16} << 20;  // bytes that are not worth a collection
 
 struct Counts {
-    std::size_t held = 0, most = least;
+    std::size_t held = 0, most = least_held;
 };
 
 Counts& counts_of(lua_State* L)
@@ -57,7 +57,7 @@ void hold(lua_State* L, const Object& object)
     counts.held += bytes;
     if (counts.held <= counts.most) return;
     lua_gc(L, LUA_GCCOLLECT, 0);
-    counts.most = std::max(least, 2 * counts.held);
+    counts.most = std::max(least_held, 2 * counts.held);
 }
 
 void release(lua_State* L, const Object& object)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/path_extent.h"
 #include "runtime/vec.h"
 
 namespace rapid {
@@ -69,18 +70,16 @@ inline double time_to_travel(double distance, double speed, double acceleration)
     return sum > 0 ? 2 * distance / sum : std::numeric_limits<double>::infinity();
 }
 
-// Whether a path from P to `end` can come near a box, by the box around the path: a parabola is off its chord by
-// a T²/8 at most.
+// Whether a path from P to `end` can come near a box.
 inline bool may_reach(const Vec3d& P, const Vec3d& end, const Vec3d& a, double duration, double radius,
                       const Box3d& bounds)
 {
     const double sagging = duration * duration / 8;
+    const Box3d box = widened(bounds, radius);
     bool may = true;
     for (int k = 0; k < 3; ++k) {
-        // The factor keeps a point that is flush with the box from being rounded away from it.
-        const double margin = sagging * std::abs(a[k]) + radius + 0x1p-21 * (std::abs(P[k]) + radius);
-        may &= std::max(P[k], end[k]) >= bounds.min()[k] - margin;
-        may &= std::min(P[k], end[k]) <= bounds.max()[k] + margin;
+        const auto extent = PathExtent<double>::of(P[k], end[k], sagging * std::abs(a[k]));
+        may &= !extent.misses(box.min()[k], box.max()[k]);
     }
     return may;
 }
@@ -88,11 +87,5 @@ inline bool may_reach(const Path& path, const Box3d& bounds)
 {
     return may_reach(path.P, path.at(path.duration), path.a, path.duration, path.radius, bounds);
 }
-
-inline Vec3d place(const Path& path, double s) { return path.at(s); }
-namespace detail {
-using rapid::time_to_travel;
-using rapid::unit_normal;
-}  // namespace detail
 
 }  // namespace rapid

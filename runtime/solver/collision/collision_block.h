@@ -58,7 +58,7 @@ struct CollisionBlock {
     {
         const Obstacle& obstacle = obstacles[o];
         if (!obstacle.is_continuous() || !has_member(obstacle, i)) return false;
-        return may_reach(path.P, place(path, path.duration), path.a, path.duration, obstacle.radius[indices[i]],
+        return may_reach(path.P, path.at(path.duration), path.a, path.duration, obstacle.radius[indices[i]],
                          obstacle.bounds);
     }
 };

@@ -43,7 +43,7 @@ void ContactResolver::resolve_on_path(CollidingPoint& point, const Contact& cont
     if (point.kind == CollidingPoint::Curved)
         resolve(point, arrival_on_chord(point, s), contact, o);
     else
-        resolve(point, {place(path, s), path.v + s * path.a, path.a}, contact, o);
+        resolve(point, {path.at(s), path.v + s * path.a, path.a}, contact, o);
 }
 
 // A contact that was found on the chord of a piece along a curved surface: the arc is off the chord by

@@ -20,7 +20,7 @@ constexpr double min_kink = 0.02;
 double shortest_piece(const Obstacle& obstacle, const Path& path, double dt)
 {
     if (!(obstacle.feature > 0)) return min_piece * dt;
-    return detail::time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm());
+    return time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm());
 }
 
 }  // namespace
@@ -53,8 +53,8 @@ void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<cons
         Path& path = point.path;
         path.v -= on.vc + on.n.dot(path.v - on.vc) * on.n;  // along the surface, in its frame
         // Beyond its smallest feature the field may have anything: a wall across, or an edge.
-        if (feature > 0) point.limit_path(detail::time_to_travel(2 * feature, path.v.norm(), path.a.norm()));
-        query_.add(slot, place(path, path.duration), block_.frame_time(point.i, point.left));  // in the surface's frame
+        if (feature > 0) point.limit_path(time_to_travel(2 * feature, path.v.norm(), path.a.norm()));
+        query_.add(slot, path.at(path.duration), block_.frame_time(point.i, point.left));  // in the surface's frame
     }
 }
 

@@ -55,7 +55,7 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
     touched_.add(i);
     Vec3d &P = block_.P[i], &v = block_.v[i];
     const Vec3d P0 = P, v0 = v, vc = obstacle.shape->velocity_at(P0, query_.time[j]);
-    const Vec3d n = detail::unit_normal(query_.gradient[j], v0 - vc);
+    const Vec3d n = unit_normal(query_.gradient[j], v0 - vc);
     const double vn = (v0 - vc).dot(n);
     const double bounce = obstacle.restitution(block_.indices[i]), friction = obstacle.friction[block_.indices[i]];
     bool backtracked = false;

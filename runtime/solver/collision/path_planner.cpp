@@ -75,7 +75,7 @@ bool PathPlanner::slide_along_surface(CollidingPoint& point, const Slide& slide)
         path.a += point.on[0].ac;
         double longest = max_edge_piece * block_.dt[point.i];
         if (const double feature = std::max(point.on[0].feature, point.on[1].feature); feature > 0)
-            longest = std::min(longest, detail::time_to_travel(feature, path.v.norm(), path.a.norm()));
+            longest = std::min(longest, time_to_travel(feature, path.v.norm(), path.a.norm()));
         point.limit_path(longest);
     }
     if (++point.events < max_contacts) return true;
@@ -114,7 +114,7 @@ void PathPlanner::finish_path(CollidingPoint& point)
         on.n = point.end.n;
         on.curvature = point.end.curvature;
     } else {
-        P = place(path, path.duration);
+        P = path.at(path.duration);
         v = path.v + path.duration * path.a;
     }
     point.left -= path.duration;

@@ -80,7 +80,7 @@ bool PlaneContacts::slide_on_plane(std::size_t i, const Support& on)
     if (left > 0 && !(slide.stops && slide_on(on, on.vc, a, left, 0).kind == Slide::Sticks)) return false;
     const Path path{P, along, slide.a, slide.duration, 0};
     if (may_meet_another(i, path, on.collider)) return false;
-    P = place(path, path.duration) + left * on.vc;
+    P = path.at(path.duration) + left * on.vc;
     v = slide.stops ? on.vc : Vec3d(path.v + path.duration * path.a);
     return true;
 }

@@ -11,7 +11,7 @@ void ContactRounds::start(std::uint32_t i)
     CollidingPoint& point = points_[slot];
     point.begin(i, block_.dt[i]);
     const double s = contacts_.contact(i).time;
-    resolver_.resolve(point, {place(motion_.path(i), s), motion_.velocity_after(i, s), motion_.acceleration(i)},
+    resolver_.resolve(point, {motion_.path(i).at(s), motion_.velocity_after(i, s), motion_.acceleration(i)},
                       contacts_.contact(i), contacts_.obstacle(i));
     if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
 }

@@ -11,8 +11,8 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t fewest = 1000, most = 1250;  // shadows, where there are as many points
-constexpr std::uint32_t gone = UINT32_MAX;         // the index of a point that has died
+constexpr std::size_t fewest_shadows = 1000, most_shadows = 1250;  // where there are as many points
+constexpr std::uint32_t gone = UINT32_MAX;                         // the index of a point that has died
 
 // The rank of an id in the random order (SplitMix64, Steele et al. 2014).
 std::uint64_t rank_of(std::int64_t id)
@@ -116,8 +116,8 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
         std::vector<std::uint64_t> order;
         for (const std::int64_t number : ids_) order.push_back(rank_of(number));
         for (const auto& [number, index] : born) order.push_back(rank_of(number));
-        std::nth_element(order.begin(), order.begin() + fewest, order.end());
-        threshold_ = order[fewest];
+        std::nth_element(order.begin(), order.begin() + fewest_shadows, order.end());
+        threshold_ = order[fewest_shadows];
         for (std::size_t k = 0; k < ids_.size(); ++k)
             if (rank_of(ids_[k]) >= threshold_) indices_[k] = gone;
         keep_found(indices_, ids_, dP_, dv_, rounding_);
@@ -129,10 +129,10 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
         next = std::max(next, id[i] + 1);
         if (rank_of(id[i]) >= threshold_) continue;
         born.emplace_back(id[i], static_cast<std::uint32_t>(i));
-        if (ids_.size() + born.size() > 4 * most) thin();
+        if (ids_.size() + born.size() > 4 * most_shadows) thin();
     }
     next_id_ = next;
-    if (ids_.size() + born.size() > most) thin();
+    if (ids_.size() + born.size() > most_shadows) thin();
     std::sort(born.begin(), born.end());
     for (const auto& [number, index] : born) {
         ids_.push_back(number);

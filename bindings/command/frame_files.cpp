@@ -203,9 +203,10 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     FrameWriter* writer = nullptr;
     {
         const std::lock_guard lock(mutex_);
-        std::unique_ptr<FrameWriter>& entry = writers_[key];
-        if (!entry) entry = std::make_unique<FrameWriter>(std::vector<OutputTarget>{to});
-        writer = entry.get();
+        auto found = writers_.find(key);
+        if (found == writers_.end())
+            found = writers_.emplace(key, std::make_unique<FrameWriter>(std::vector<OutputTarget>{to})).first;
+        writer = found->second.get();
     }
     writer->submit(std::move(points), std::move(info), output);
 }

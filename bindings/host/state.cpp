@@ -34,16 +34,38 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main)
 {
     L_ = lua_newstate(allocate, this);
     if (!L_) throw std::bad_alloc();
-    lua_pushlightuserdata(L_, this);
-    lua_setfield(L_, LUA_REGISTRYINDEX, state_field);
-    try {
-        open_libraries();
-        register_objects(L_);
-        run_host_file();
-    } catch (...) {
+    if (const std::exception_ptr error = set_up()) {
         lua_close(L_);
-        throw;
+        std::rethrow_exception(error);
     }
+}
+
+// In a protected call, since Lua's own error (out of memory) is no C++ exception: one that was caught as such could not
+// be thrown again.
+std::exception_ptr State::set_up()
+{
+    struct SetUp {
+        State& state;
+        std::exception_ptr error;
+    } now{*this, nullptr};
+    const int status = lua_cpcall(
+        L_,
+        [](lua_State* L) {
+            SetUp& here = *static_cast<SetUp*>(lua_touserdata(L, 1));
+            lua_pushlightuserdata(L, &here.state);
+            lua_setfield(L, LUA_REGISTRYINDEX, state_field);
+            try {
+                here.state.open_libraries();
+                register_objects(L);
+                here.state.run_host_file();
+            } catch (const std::exception&) {
+                here.error = std::current_exception();
+            }
+            return 0;
+        },
+        &now);
+    if (now.error || status == 0) return now.error;
+    return std::make_exception_ptr(status == LUA_ERRMEM ? Error("out of memory") : Error(lua_tostring(L_, -1)));
 }
 
 State::~State() { lua_close(L_); }

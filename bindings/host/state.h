@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <string>
 #include <vector>
@@ -97,6 +98,8 @@ public:
 
 private:
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
+    // Fills a new state; the error, where there is one.
+    std::exception_ptr set_up();
     void open_libraries();
     void run_host_file();
 

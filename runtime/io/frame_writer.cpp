@@ -6,6 +6,11 @@
 #include "runtime/stopwatch.h"
 
 namespace rapid {
+namespace {
+
+constexpr std::size_t most_waiting = 100;  // pictures; each may hold the shapes of its frame, some megabytes
+
+}  // namespace
 
 FrameWriter::FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting) : waiting_(waiting)
 {
@@ -45,10 +50,7 @@ void FrameWriter::finish()
         if (error_) std::rethrow_exception(error_);
     }
     for (auto& [output, pictures] : pictures_)
-        if (!pictures.waiting.empty()) {
-            const Job& last = pictures.waiting.back().second;
-            write_waiting(pictures, std::make_shared<PictureView>(pictures.fit.next(last.points, last.frame)));
-        }
+        if (!pictures.waiting.empty()) write_without_points(pictures);
 }
 
 std::vector<FrameWriter::Written> FrameWriter::take_written()
@@ -102,6 +104,7 @@ void FrameWriter::write(const Job& job)
             Pictures& pictures = pictures_[job.output];
             if (job.points.empty() && !pictures.fit.settled()) {
                 pictures.waiting.emplace_back(&target, job);
+                if (pictures.waiting.size() == most_waiting) write_without_points(pictures);
                 continue;
             }
             view = std::make_shared<PictureView>(pictures.fit.next(job.points, job.frame));
@@ -109,6 +112,12 @@ void FrameWriter::write(const Job& job)
         }
         write_file(target, job, view);
     }
+}
+
+void FrameWriter::write_without_points(Pictures& pictures)
+{
+    const Job& last = pictures.waiting.back().second;
+    write_waiting(pictures, std::make_shared<PictureView>(pictures.fit.next(last.points, last.frame)));
 }
 
 void FrameWriter::write_waiting(Pictures& pictures, const std::shared_ptr<const PictureView>& view)

@@ -56,8 +56,8 @@ private:
         FrameInfo frame;
         std::string output;
     };
-    // Pictures of one output. Those before the first points wait for them, because the camera is fitted to points; they
-    // hold none, and cost nothing.
+    // Pictures of one output. Those before the first points wait for them, because the camera is fitted to points. They
+    // hold none, but the shapes of their frame: a hundred wait, and where no points come they show the shapes alone.
     struct Pictures {
         PictureFit fit;
         std::vector<std::pair<const Target*, Job>> waiting;
@@ -65,6 +65,7 @@ private:
     void run();
     void write(const Job& job);
     void write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view);
+    void write_without_points(Pictures& pictures);
     void write_waiting(Pictures& pictures, const std::shared_ptr<const PictureView>& view);
 
     std::vector<Target> targets_;

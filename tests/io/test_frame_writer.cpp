@@ -63,6 +63,21 @@ TEST_CASE("a writer knows the first frame of which a file is still to come", "[i
     CHECK(writer.take_written().size() == 6);
 }
 
+TEST_CASE("pictures of an empty scene wait for points a hundred frames, and no longer", "[io][writer]")
+{
+    const TemporaryFolder folder;
+    FrameWriter writer({{pattern(folder, "a.####.png"), {}}});
+    const auto shapes = std::make_shared<const PictureScene>();
+    for (int frame = 1; frame <= 250; ++frame)
+        writer.submit(PointSet(), {.number = frame, .picture = small_picture(), .scene = shapes});
+    // At most three of those that were submitted are not yet with the writer's pictures, of which fewer than 100 wait.
+    CHECK(shapes.use_count() < 1 + 100 + 3 + 2);
+    CHECK(writer.take_written().size() >= 200 - 100);
+    writer.finish();
+    CHECK(file_names(folder.path()).size() == 250);
+    CHECK(shapes.use_count() == 1);
+}
+
 TEST_CASE("what changes in a point set after it was submitted is not in the file", "[io][writer][threads]")
 {
     const TemporaryFolder folder;

@@ -16,14 +16,18 @@ namespace {
 
 const float unit_mass = 1;
 
+// Looks of one point at another in a frame, 20 ns each: five hours of one processor.
+constexpr double most_looks = 1e12;
+
 // (1 - e^(-2 k t)) / 2: the part of the velocity difference of two points that each gets in the time t, where it decays
 // at the rate k on both sides. At most a half, which makes them equal.
 double exchanged(double k, double t) { return -0.5 * std::expm1(-2 * k * t); }
 
 class Neighbourhood {
 public:
+    // kicks: how many will be asked for.
     Neighbourhood(const Interaction& interaction, const PointSet& points, const SolveOptions& options,
-                  const InteractingPoints& at)
+                  const InteractingPoints& at, int kicks)
         : interaction_(interaction),
           h_(options.h),
           steps_(at.steps),
@@ -54,6 +58,7 @@ public:
         }
         if (members_.empty()) return;
         grid_ = index_neighbours(places, interaction.radius);
+        require_affordable(at.steps, kicks);
         weights_.assign(members_.size(), 0);
         for_all([&](std::size_t m, std::size_t other) { weights_[m] += weight_at(distance(m, other)); });
     }
@@ -69,6 +74,28 @@ public:
     std::span<const std::uint32_t> members() const { return members_; }
 
 private:
+    // What a radius that holds all points costs grows with the square of their number, and ends in no lifetime.
+    // Estimated from the neighbours of a few members, where it could be too much at all.
+    void require_affordable(double steps, int kicks) const
+    {
+        constexpr std::size_t sampled = 32;
+        const double n = static_cast<double>(members_.size());
+        const double passes = 2 * steps * (1 + kicks);  // at both ends of a step, with that over the weights
+        if (n * n * passes <= most_looks) return;
+        std::vector<std::uint32_t> near;
+        double found = 0;
+        for (std::size_t k = 0; k < sampled; ++k) {
+            grid_->find(P_[members_[k * members_.size() / sampled]], near);
+            found += static_cast<double>(near.size());
+        }
+        if (const double neighbours = found / sampled; n * neighbours * passes > most_looks)
+            throw Error(fmt::format(
+                "radius = {:g} m: about {:.2g} neighbours of each of {} points, {:.2g} looks in a frame of {:g} steps, "
+                "of "
+                "which at most {:g} are taken; give it a smaller radius",
+                interaction_.radius, neighbours, members_.size(), n * neighbours * passes, steps, most_looks));
+    }
+
     // Calls f for each member with each of its neighbours, in order of their places in the set.
     template <class F>
     void for_all(const F& f) const
@@ -149,7 +176,7 @@ void interact(const PointSet& points, const Dynamics& dynamics, const SolveOptio
     const Strided<std::uint8_t> advanced = members_of(points, options.group);
     for (const std::shared_ptr<const Interaction>& interaction : dynamics.interactions())
         at_node(*interaction, [&] {
-            const Neighbourhood neighbourhood(*interaction, points, options, at);
+            const Neighbourhood neighbourhood(*interaction, points, options, at, kicks);
             for (int kick = 0; kick < kicks; ++kick) {
                 const std::vector<Vec3d> change = neighbourhood.kicks();
                 for (std::size_t m = 0; m < change.size(); ++m) {

@@ -73,6 +73,24 @@ describe("a number of steps", function()
   end)
 end)
 
+describe("a neighbourhood of all points", function()
+  it("is refused where no run would end with it, and slow else", function()
+    local text = "return rapid.create { points = " .. grid .. " } :interact { radius = %g, cohesion = 1 } " ..
+      ":contact { radius = 0.1 } :solve { substeps = 1000 }"
+    local result = scene.command("run", text:format(1e9), "-f 1-2 --quiet")
+    assert.equal(1, result.status)
+    -- 64,000 neighbours of 64,000 points, at 1,000 steps, from 4 to 6 times.
+    assert.match('^scene%.lua:1: node "interact1": radius = 1e%+09 m: about 6%.4e%+04 neighbours of each of 64000 ' ..
+      "points, 1%.6e%+13 looks in a frame of 1000 steps, of which at most 1e%+12 are taken; give it a smaller " ..
+      "radius\n$", result.stderr)
+    -- With a few neighbours it passes, where all would be too many in these steps: pairs are counted, not points.
+    local near = text:format(1.1):gsub(":contact { radius = 0.1 }", ""):gsub("1000 }", "%%d }")
+    assert.match("looks in a frame of 62 steps", scene.command("run", text:format(1e9):gsub("1000 }", "62 }"),
+      "-f 1-2 --quiet").stderr)
+    assert.equal("", scene.command("run", near:format(62), "-f 1-2 --quiet").stderr)
+  end)
+end)
+
 describe("a graph without end", function()
   it("of a node that expands into itself is an error", function()
     scene.folder:write("selfish.lua", [[

@@ -136,7 +136,7 @@ local function make(native, run)
     if native.is_quiet then return end
     local texts = {}
     for place = 1, select("#", ...) do texts[place] = safe_tostring((select(place, ...))) end
-    print(table.concat(texts, "\t"))
+    native.print(table.concat(texts, "\t") .. "\n")
   end
 
   -- Text only: bytecode can do more than Lua.

@@ -39,7 +39,11 @@ std::vector<std::unique_ptr<Command>> make_commands()
     return commands;
 }
 
-void print(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stdout); }
+void print(std::string_view text)
+{
+    const std::string shown = printable(text);
+    std::fwrite(shown.data(), 1, shown.size(), stdout);
+}
 
 void print_error(const Error& error, bool verbose)
 {

@@ -188,7 +188,8 @@ public:
             };
             const Explanation here = explained(*graph_.load(false, on_timeout));
             if (against_.empty()) {
-                print(json_ ? json_of(here).dump(2) + '\n' : text_of(here));
+                print(json_ ? json_of(here).dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
+                            : text_of(here));
                 return status_done;
             }
             const Explanation there = explained(*graph_.load_other(against_, on_timeout));
@@ -199,7 +200,7 @@ public:
                                    {"only_graph", json_of_surplus(more)},
                                    {"only_against", json_of_surplus(less)},
                                    {"bytes_per_point", {here.bytes_per_point(), there.bytes_per_point()}}}
-                          .dump(2) +
+                          .dump(2, ' ', false, ordered_json::error_handler_t::replace) +
                       '\n');
             else
                 print(text_of_surplus(graph_.file(), against_, more) + '\n' +

@@ -114,11 +114,12 @@ public:
             print(annotations_of(registry));
         } else if (!name_.empty()) {
             const NodeType& type = registry.at(name_);
-            print(json_ ? json_of(type).dump(2) + '\n' : page_of(type));
+            print(json_ ? json_of(type).dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
+                        : page_of(type));
         } else if (json_) {
             ordered_json all = ordered_json::array();
             for (const NodeType* type : registry.types()) all.push_back(json_of(*type));
-            print(all.dump(2) + '\n');
+            print(all.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
         } else {
             print(list_of(registry.types()));
         }

@@ -21,6 +21,7 @@
 #include "bindings/command/study_run.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/files/output_file.h"
+#include "runtime/printable.h"
 #include "runtime/report/progress.h"
 
 namespace rapid {
@@ -75,13 +76,14 @@ public:
     void now(const std::string& what)
     {
         if (style_ != ProgressStyle::Bar) return;
-        put(fmt::format("\r{}/{}  {}\x1b[K", done_, rows_, what));
+        put(fmt::format("\r{}/{}  {}\x1b[K", done_, rows_, printable(what)));
         drawn_ = true;
     }
     void row(const std::string& label, const std::string& outcome)
     {
         ++done_;
-        if (style_ == ProgressStyle::Lines) put(fmt::format("{}/{}  {}: {}\n", done_, rows_, label, outcome));
+        if (style_ == ProgressStyle::Lines)
+            put(fmt::format("{}/{}  {}: {}\n", done_, rows_, printable(label), printable(outcome)));
     }
 
 private:
@@ -196,7 +198,8 @@ public:
                 result.rows.push_back(std::move(row));
             }
         }
-        const std::string text = to_json(result).dump(2) + '\n';
+        const std::string text =
+            to_json(result).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
         write_text(fs::path(folder_) / "study.json", text);
         write_text(fs::path(folder_) / "study.svg", to_svg(result));
         print(json_ ? text : to_text(result));

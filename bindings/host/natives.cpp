@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <lua.hpp>
 
 #include "bindings/host/construct.h"
@@ -15,6 +16,7 @@
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
 #include "runtime/points/point_names.h"
+#include "runtime/printable.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/shape.h"
 
@@ -25,6 +27,14 @@ namespace {
 int outside_kernels(State& state)
 {
     refuse_in_kernels(state, text_at(state.lua(), 1), text_at(state.lua(), 2));
+    return 0;
+}
+
+// native.print(text): to standard output, for a terminal.
+int print_text(State& state)
+{
+    const std::string text = printable(text_at(state.lua(), 1));
+    std::fwrite(text.data(), 1, text.size(), stdout);
     return 0;
 }
 
@@ -149,6 +159,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"unknown_type", native<unknown_type>},
                                       {"did_you_mean", native<suggest>},
                                       {"kind", native<kind_of>},
+                                      {"print", native<print_text>},
                                       {"set_index", native<set_object_methods>},
                                       {"run", run_body},
                                       {"shape", native<pointer_to<Shape>>},

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/printable.h"
 #include "runtime/report/number_text.h"
 
 namespace rapid {
@@ -60,7 +61,7 @@ void Progress::line(const std::string& text)
     if (style_ == ProgressStyle::None) return;
     const bool was_drawn = drawn_;
     erase();
-    put(out_, text + '\n');
+    put(out_, printable(text) + '\n');
     if (was_drawn) draw();
     std::fflush(out_);
 }

@@ -164,7 +164,8 @@ std::string json_head(const RunStatistics& run)
 
 std::string json_line(const FrameStatistics& frame, bool first)
 {
-    return fmt::format("{}\n    {}", first ? "" : ",", to_json(frame).dump());
+    return fmt::format("{}\n    {}", first ? "" : ",",
+                       to_json(frame).dump(-1, ' ', false, ordered_json::error_handler_t::replace));
 }
 
 std::string json_end(const RunStatistics& run)

@@ -512,6 +512,9 @@ end
 -- env: the environment in which the kernel's globals live; of_a_point: the kernel's first parameter is a point;
 -- point_names: the table of the host.
 local function analyse(kernel, env, of_a_point, point_names)
+  if not util.funcinfo(kernel).bytecodes then
+    error("the kernel is a function of Lua's own library; it must be one of the scene's, which may call it", 0)
+  end
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
     inside = {}, env = env, remedy = to_remember(of_a_point),

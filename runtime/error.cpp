@@ -44,6 +44,7 @@ std::string shortened(std::string_view text, std::size_t most)
 }
 
 constexpr std::size_t most_of_message = 4000, most_of_name = 200;  // bytes
+constexpr std::size_t most_of_path = 4096;                         // longer ones name no file
 
 }  // namespace
 
@@ -51,7 +52,7 @@ void Error::compose()
 {
     text_.clear();
     if (!location_.file.empty()) {
-        text_ += location_.file;
+        text_ += shortened(location_.file, most_of_path);
         if (location_.line > 0) text_ += fmt::format(":{}", location_.line);
         text_ += ": ";
     }

@@ -9,10 +9,11 @@ namespace rapid {
 
 CacheFiles find_cache(const std::string& text)
 {
+    std::error_code none;  // of a name that can't be one
     // A file whose name looks like a pattern takes precedence.
-    if (std::filesystem::is_directory(text))
+    if (std::filesystem::is_directory(text, none))
         throw Error("is a folder; name a file, or a sequence such as cache.####.vdb").at({text, 0});
-    if (std::filesystem::exists(text)) return {text, false, {{0, text}}};
+    if (std::filesystem::exists(text, none)) return {text, false, {{0, text}}};
     const FramePattern pattern(text);
     if (!pattern.has_frame()) throw Error("no such file").at({text, 0});
     CacheFiles found{text, true, pattern.existing()};
@@ -25,10 +26,11 @@ CacheFiles find_cache(const std::string& text)
 SandboxAccess access_to_caches(const std::vector<std::string>& texts)
 {
     SandboxAccess access;
+    std::error_code none;
     for (const std::string& text : texts) {
         const std::filesystem::path path =
-            std::filesystem::exists(text) ? std::filesystem::path(text) : folder_of(text);
-        if (std::filesystem::exists(path)) access.readable.push_back(path);
+            std::filesystem::exists(text, none) ? std::filesystem::path(text) : folder_of(text);
+        if (std::filesystem::exists(path, none)) access.readable.push_back(path);
     }
     return access;
 }

@@ -31,7 +31,8 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
 {
     std::vector<fs::path> files;
     for (const std::string& argument : arguments) {
-        if (!fs::exists(argument)) throw Error("no such file or folder").at({argument, 0});
+        std::error_code none;
+        if (!fs::exists(argument, none)) throw Error("no such file or folder").at({argument, 0});
         if (!fs::is_directory(argument)) {
             files.emplace_back(argument);
             continue;

@@ -24,9 +24,10 @@ std::vector<std::string> parts_of_path(const char* list)
 void add_own_paths(SandboxAccess& access, const CommonOptions& common)
 {
     access.readable.insert(access.readable.end(), common.plugins.begin(), common.plugins.end());
+    std::error_code none;
     for (const char* variable : {"RAPID_PLUGIN_PATH", "RAPID_PATH"})
         for (const std::string& path : parts_of_path(std::getenv(variable)))
-            if (std::filesystem::exists(path)) access.readable.emplace_back(path);
+            if (std::filesystem::exists(path, none)) access.readable.emplace_back(path);
 }
 
 }  // namespace

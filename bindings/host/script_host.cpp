@@ -72,7 +72,7 @@ void ScriptHost::analyse_kernels()
             for (const NodePtr& node : graph.nodes)
                 for (const auto& [name, argument] : node->arguments)
                     if (const auto* object = argument.get<ObjectPtr>(); object && *object == kernel)
-                        error.in_node(node->name);
+                        error.in_node(node->name).at(node->location);
             throw;
         }
     }

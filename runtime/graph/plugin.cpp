@@ -61,7 +61,7 @@ void load_plugins(const std::string& path)
         const std::string part = path.substr(begin, end - begin);
         begin = end + 1;
         if (part.empty()) continue;
-        if (!fs::is_directory(part)) {
+        if (std::error_code none; !fs::is_directory(part, none)) {
             load_plugin(part);
             continue;
         }

@@ -91,15 +91,15 @@ std::string FramePattern::expand(int frame, std::string_view output) const
 std::map<int, fs::path> FramePattern::existing(std::string_view output) const
 {
     std::map<int, fs::path> found;
+    std::error_code error;
     if (!digits_) {
         const fs::path path = with_output(text_, output);
-        if (fs::exists(path)) found.emplace(0, path);
+        if (fs::exists(path, error)) found.emplace(0, path);
         return found;
     }
     const fs::path prefix_path = with_output(before_, output);
     const fs::path folder = prefix_path.parent_path();
     const std::string prefix = prefix_path.filename().string(), suffix = with_output(after_, output);
-    std::error_code error;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
         const std::string name = entry.path().filename().string();
         if (name.size() <= prefix.size() + suffix.size() || !name.starts_with(prefix) || !name.ends_with(suffix))

@@ -247,9 +247,16 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.mesh.read 'none.obj'"] = 'rapid.mesh.read: there is no mesh file "none.obj"',
       ["rapid.mesh.read(5)"] = "path = 5 has the wrong type; it must be a string",
       ["rapid.levelset.from_mesh()"] = "the mesh is missing",
+      ["rapid.mesh.read(('x/'):rep(3000) .. 'a.obj')"] = 'rapid.mesh.read: there is no mesh file "x/x/',
+      ["rapid.levelset.read(('x/'):rep(3000) .. 'a.vdb')"] = 'there is no file "x/x/',
+      ["rapid.grid.read(('x'):rep(300) .. '.vdb')"] = 'there is no file "xxx',
       ["rapid.levelset.from_mesh(two)"] = "mesh = points has the wrong type",
       ["rapid.levelset.from_mesh(rapid.mesh.box {}, { voxel = -1 })"] = "voxel = -1 is out of range; it must be " ..
         "above 0",
+      ["rapid.levelset.from_mesh(rapid.mesh.box { center = {0, 1e15, 0} })"] = 'mesh "box" reaches 1e+15 m from the ' ..
+        "origin, more than 2^31 voxels of 0.1 m; put it nearer, and move what is made of it",
+      ["rapid.levelset.from_mesh(rapid.mesh.box { center = {0, 1e8, 0} })"] = 'mesh "box" is flat: its size is 1 x ' ..
+        "0 x 1 m; a level set needs an inside",
       ["rapid.levelset.sphere { radius = 1, voxel = 1e-9 }"] = "a voxel of at least 0.000198 m stays below that",
       ["rapid.levelset.sphere { radius = 1, voxel = 10 }"] = "use a voxel of at most 1 m",
       ["rapid.levelset.read 'none.vdb'"] = 'there is no file "none.vdb"',
@@ -265,6 +272,7 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.points.from { P = {{0, 0}} }"] = "P = {0, 0} has the wrong type; it must be a list of {x, y, z}",
       ["rapid.points.from { P = {{0, 0, 0}, {1, 1, 1}}, a = {1, {1, 2, 3}} }"] = "a[2] is {1, 2, 3}; " ..
         "it must be a float, as the first is",
+      ["rapid.points.grid { size = {2, 1, -1} }"] = "size = {2, 1, -1}: each edge must be at least 0",
       ["rapid.points.grid { spacing = 0 }"] = "spacing = 0 is out of range; it must be above 0",
       ["rapid.points.grid { spacing = 1e-6 }"] = "at most 2^31 can be",
       ["rapid.points.read 'none.vdb'"] = "rapid.points.read: none.vdb: can't be read: No such file or directory",

@@ -112,6 +112,14 @@ return rapid.create { points = rapid.points.grid { size = {30, 30, 30}, spacing 
     end
   end)
 
+  it("is refused where it is a function of Lua's own", function()
+    for _, call in ipairs { ":points('k', math.sin)", ":action('k', string.rep)", ":delete { where = math.floor }" } do
+      local message = scene.error("return rapid.create { points = two } " .. call .. " :solve {}")
+      assert.match('^scene.lua:1: node "%w+": the kernel is a function of Lua\'s own library; it must be one of the ' ..
+        "scene's, which may call it$", message)
+    end
+  end)
+
   it("leads to its own line through a helper, a module and a Lua node", function()
     scene.folder:write("air.lua", "local air = {}\nfunction air.push(p)\n  return p.v + p.heat\nend\nreturn air")
     scene.folder:write("blown.lua", [[

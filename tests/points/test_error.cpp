@@ -17,6 +17,16 @@ TEST_CASE("an error says file, line and node before the fault", "[error]")
           "graphs/sparks.lua:14: node \"collide1\": bounce = 1.4 is out of range; it must be from 0 to 1");
 }
 
+TEST_CASE("an error is not longer for names, files and messages without end", "[error]")
+{
+    const std::string endless(1'000'000, 'x');
+    const std::string text = Error(endless).in_node(endless).at({endless, 14}).what();
+    CHECK(text.size() < 9000);
+    CHECK(text.find("bytes ...] ") != std::string::npos);
+    const std::string path(4000, 'x');  // which may be one
+    CHECK(std::string(Error("it is empty").at({path}).what()) == path + ": it is empty");
+}
+
 TEST_CASE("a file without a known line is named without one", "[error]")
 {
     CHECK(std::string(Error("it is empty").at({"bunny.obj"}).what()) == "bunny.obj: it is empty");

@@ -66,8 +66,10 @@ struct GridPoints {
     {
         // An edge shorter than the spacing is one layer; a ratio just below a whole number is that number.
         const auto along = [this](int axis) { return std::max(1.0, std::floor(size[axis] / spacing * (1 + 1e-9))); };
+        if (!(size.minCoeff() >= 0))
+            throw Error(fmt::format("size = {}: each edge must be at least 0", describe(Value(size))));
         const double nx = along(0), ny = along(1), nz = along(2);
-        if (!(size.minCoeff() >= 0) || !(nx * ny * nz <= 2147483648.0))
+        if (!(nx * ny * nz <= 2147483648.0))
             throw Error(fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
                                     describe(Value(size)), spacing, nx * ny * nz));
         constexpr double bytes_a_point = 2 * (sizeof(Vec3f) + sizeof(Vec3f) + sizeof(std::int64_t));  // with the state

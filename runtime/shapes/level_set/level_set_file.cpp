@@ -66,7 +66,8 @@ const ApartReader<FloatGrid::Ptr> reader("level set", read_grid, send_grid<Float
 
 LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
 {
-    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
+    if (std::error_code none; !std::filesystem::exists(path, none))
+        throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
     const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(reader, path, name);
     if (grid->activeVoxelCount() == 0)

@@ -15,6 +15,13 @@ using openvdb::FloatGrid;
 FloatGrid::Ptr build(const Mesh& mesh, bool balanced, const LevelSetOptions& options)
 {
     const Box3d bounds = mesh.bounds().cast<double>();
+    constexpr double far = 2147483648.0;  // voxels; their whole numbers are exact, and OpenVDB's maps can be inverted
+    if (const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff();
+        !(farthest <= far * options.voxel))
+        throw Error(
+            fmt::format("mesh \"{}\" reaches {:g} m from the origin, more than 2^31 voxels of {:g} m; put it "
+                        "nearer, and move what is made of it",
+                        mesh.name, farthest, options.voxel));
     require_buildable(fmt::format("mesh \"{}\"", mesh.name), mesh.area(), bounds, options);
     const auto transform = make_transform(options.voxel, bounds);
     auto grid = signed_distance(mesh, balanced, *transform, options.half_width * options.voxel);
@@ -81,6 +88,10 @@ LevelSetPtr of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, c
                             "outside reaches its inside through them; close it",
                             mesh->name, options.voxel, open.boundary_edges));
         const Vec3f size = mesh->bounds().sizes();
+        if (size.minCoeff() == 0)
+            throw Error(
+                fmt::format("mesh \"{}\" is flat: its size is {:g} x {:g} x {:g} m; a level set needs an inside",
+                            mesh->name, size.x(), size.y(), size.z()));
         throw Error(
             fmt::format("mesh \"{}\" vanishes with voxel = {:g} m: its size is {:g} x {:g} x {:g} m; use a voxel "
                         "of at most {:.3g} m",

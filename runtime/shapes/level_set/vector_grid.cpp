@@ -83,7 +83,8 @@ const ApartReader<Vec3SGrid::Ptr> reader("vector grid", read_grid, send_grid<Vec
 
 VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
 {
-    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no file \"{}\"", path.string()));
+    if (std::error_code none; !std::filesystem::exists(path, none))
+        throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
     return std::make_shared<OpenVectorGrid>(read_grid_apart<Vec3SGrid>(reader, path, name));
 }

@@ -67,7 +67,8 @@ void check(const MeshFile& file)
 
 MeshFile read_mesh_file(const std::filesystem::path& path)
 {
-    if (!std::filesystem::exists(path)) throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
+    if (std::error_code none; !std::filesystem::exists(path, none))
+        throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
     static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
     const std::string extension = lower_case(path.extension().string());
     if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())

@@ -77,13 +77,14 @@ void allow(int ruleset, const std::filesystem::path& path, std::uint64_t rights)
 
 std::vector<std::filesystem::path> own_files()
 {
-    std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), lua_folder(),
-                                                "/proc/self"};
+    std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), lua_folder()};
     Dl_info library;
     if (dladdr(reinterpret_cast<void*>(&known_attribute), &library) != 0)
         files.push_back(std::filesystem::path(library.dli_fname).parent_path());
-    for (const char* path : {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null",
-                             "/proc/cpuinfo", "/proc/meminfo"})
+    // Of the process no more than the memory that it has: its environment and its addresses are for nobody.
+    for (const char* path :
+         {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null", "/proc/cpuinfo",
+          "/proc/meminfo", "/proc/self/statm", "/proc/self/status", "/proc/self/cgroup"})
         if (std::filesystem::exists(path)) files.push_back(path);
     for (const auto& entry : std::filesystem::directory_iterator("/usr/share"))  // LuaJIT's own modules
         if (entry.path().filename().string().starts_with("lua")) files.push_back(entry.path());

@@ -4,10 +4,31 @@
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
+
+#include "runtime/error.h"
+#include "runtime/files/input_file.h"
 
 namespace rapid {
 namespace {
+
+constexpr std::size_t most_of_text = std::size_t{64} << 20;  // bytes; no program, but what a device or a hole may give
+
+Error too_long(const std::filesystem::path& path)
+{
+    return Error("it has more than 64 MiB, which is no scene and no module").at({shown(path), 0});
+}
+
+// A module, which others may have put beside the scene: regular files alone, or a pipe there would be waited for.
+std::optional<std::string> read_module(const std::filesystem::path& path)
+{
+    try {
+        if (check_readable(path) > most_of_text) throw too_long(path);
+        return std::string(InputFile(path).text());
+    } catch (const Error& error) {
+        if (error.location().file.empty()) return std::nullopt;  // not there
+        throw;
+    }
+}
 
 std::vector<std::filesystem::path> rapid_path()
 {
@@ -38,11 +59,16 @@ std::filesystem::path lua_folder()
 
 std::optional<std::string> read_lua_file(const std::filesystem::path& path)
 {
+    std::error_code none;
     std::ifstream file(path, std::ios::binary);
-    if (!file || std::filesystem::is_directory(path)) return std::nullopt;
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
+    if (!file || std::filesystem::is_directory(path, none)) return std::nullopt;
+    std::string text;
+    for (char block[1 << 16]; file;) {
+        file.read(block, sizeof block);
+        text.append(block, static_cast<std::size_t>(file.gcount()));
+        if (text.size() > most_of_text) throw too_long(path);
+    }
+    return text;
 }
 
 std::string shown(const std::filesystem::path& path) { return path.lexically_normal().string(); }
@@ -67,7 +93,7 @@ std::optional<Modules::Source> Modules::find(std::string_view name, bool node, s
         const std::filesystem::path path = where / (relative + ".lua");
         if (std::error_code ignored; !graph_.empty() && std::filesystem::equivalent(path, graph_, ignored)) continue;
         if (on_read_) on_read_(path);
-        if (std::optional<std::string> text = read_lua_file(path)) return Source{std::move(*text), shown(path)};
+        if (std::optional<std::string> text = read_module(path)) return Source{std::move(*text), shown(path)};
         looked_in += (looked_in.empty() ? "" : ", ") + shown(path);
     }
     return std::nullopt;

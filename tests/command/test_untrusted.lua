@@ -1,5 +1,6 @@
 -- --untrusted: the sandbox of the system around a run, and around other commands.
 local command = require "testing.command"
+local json = require "dkjson"
 
 local triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -55,6 +56,27 @@ describe("rapid run --untrusted", function()
     folder:write("outside/secret.csv", "Px,Py,Pz\n1,2,3\n")
     command.shell("ln -s ../outside/secret.csv inside/link.csv", { cwd = folder.path })
     assert.equal(2, folder:run().status)
+  end)
+
+  it("reads neither the environment nor the addresses of its own process", function()
+    local folder = new_folder [[
+print(pcall(require, "link"))
+print(pcall(rapid.points.read, "link.csv"))
+return rapid.create { points = two } :solve {}]]
+    for _, file in ipairs { "environ", "maps", "cmdline", "auxv", "mem", "task/self/environ" } do
+      command.shell("ln -sfn /proc/self/" .. file .. " inside/link.lua; ln -sfn /proc/self/" .. file ..
+        " inside/link.csv", { cwd = folder.path })
+      local result = command.rapid("run inside/scene.lua -f 1 --untrusted", { cwd = folder.path })
+      assert.equal(0, result.status, result.stderr)
+      assert.match('false\tno module "link"', result.stdout)
+      assert.match("link.csv: can't be read: ", result.stdout)
+    end
+  end)
+
+  it("knows what memory it takes", function()
+    local folder = new_folder(plain)
+    assert.equal(0, folder:run("-o out/a.####.csv --stats out/stats.json").status)
+    assert.truthy(json.decode(folder:read "out/stats.json").peak_bytes > 1e6)
   end)
 
   it("writes to the outputs' folders, and nowhere else", function()

@@ -1,0 +1,62 @@
+-- What is no regular file, beside a scene or in its place: nothing is waited for, and nothing is read without end.
+local command = require "testing.command"
+
+local function folder_with(text)
+  local folder = command.folder()
+  folder:write("scene.lua", 'local rapid = require "rapid"\n' .. text)
+  command.shell([[
+mkdir out
+for name in pipe.lua pipe.csv pipe.ply pipe.bgeo pipe.vdb pipe.obj out/a.0001.csv out/.rapid-0123456789abcdef.unfinished
+do mkfifo $name; done
+for name in zero.lua zero.csv zero.vdb zero.obj; do ln -s /dev/zero $name; done
+truncate -s 100G hole.lua]], { cwd = folder.path })
+  return folder
+end
+
+local function run(text, arguments)
+  return command.shell('timeout -k 1 60 "$RAPID" run scene.lua -f 1 --quiet ' .. (arguments or ""),
+    { cwd = folder_with(text).path })
+end
+
+local nothing = "return rapid.create {} :solve {}"
+
+describe("a pipe or a device", function()
+  it("is no module and no node", function()
+    for text, message in pairs {
+      ["require 'pipe'"] = 'no module "pipe"; looked for pipe.lua', ["require 'zero'"] = 'no module "zero"',
+      ["return rapid.create {} :pipe {}"] = 'unknown node "pipe"',
+      ["require 'hole'"] = "it has more than 64 MiB, which is no scene and no module",
+    } do
+      local result = run(text)
+      assert.equal(2, result.status, text)
+      assert.truthy(result.stderr:find(message, 1, true), result.stderr)
+    end
+  end)
+
+  it("is read by no reader", function()
+    for _, call in ipairs { "points.read 'pipe.csv'", "points.read 'pipe.ply'", "points.read 'pipe.bgeo'",
+      "points.read 'pipe.vdb'", "mesh.read 'pipe.obj'", "mesh.read 'pipe.ply'", "levelset.read 'pipe.vdb'",
+      "grid.read 'pipe.vdb'", "points.read 'zero.csv'", "mesh.read 'zero.obj'", "levelset.read 'zero.vdb'" } do
+      local result = run("rapid." .. call .. " " .. nothing)
+      assert.equal(2, result.status, call)
+      assert.match("^scene.lua:2: rapid.[%w.]+: .*can't be read: it is not a regular file", result.stderr)
+    end
+  end)
+
+  it("is neither written nor waited for in the place of a frame or of an unfinished one", function()
+    local result = run(nothing, "-o out/a.####.csv")
+    assert.equal(1, result.status)
+    assert.equal("out/a.0001.csv: can't be written: it is not a regular file\n", result.stderr)
+    assert.equal(0, run(nothing, "-o out/b.####.csv").status)
+  end)
+
+  it("is a scene as far as 64 MiB", function()
+    local folder = folder_with(nothing)
+    local endless = command.shell('timeout -k 1 60 "$RAPID" run zero.lua', { cwd = folder.path })
+    assert.equal(2, endless.status)
+    assert.equal("zero.lua: it has more than 64 MiB, which is no scene and no module\n", endless.stderr)
+    local piped = command.shell('cat scene.lua | "$RAPID" run /dev/stdin -f 1 --quiet', { cwd = folder.path })
+    assert.equal("", piped.stderr)
+    assert.equal(0, piped.status)
+  end)
+end)

@@ -58,6 +58,8 @@ void Error::compose()
     }
     if (!node_.empty()) text_ += fmt::format("node \"{}\": ", shortened(node_, most_of_name));
     text_ += shortened(message_, most_of_message);
+    // what() would end there.
+    for (std::size_t zero; (zero = text_.find('\0')) != std::string::npos;) text_.replace(zero, 1, "\\x00");
 }
 
 namespace {

@@ -51,6 +51,24 @@ void ScriptHost::run_graph()
     main_->set_loaded();
 }
 
+namespace {
+
+// Error: a name that may not stand for {output} in the name of a file.
+void check_output_name(const std::string& name, const std::string& file)
+{
+    constexpr std::size_t most = 200;  // bytes; a file's name has at most 255
+    const bool plain =
+        std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f || c == '/'; });
+    if (name.empty() || name.size() > most || name.front() == '.' || !plain)
+        throw Error(
+            fmt::format("the graph returns an output \"{}\"; its name, which goes into names of files, must have "
+                        "from 1 to {} bytes, no / and no control characters, and not begin with a dot",
+                        name, most))
+            .at({file, 0});
+}
+
+}  // namespace
+
 // Error: --set names a parameter that the graph does not have.
 void ScriptHost::check_settings() const
 {
@@ -113,7 +131,9 @@ void ScriptHost::collect_outputs(State& state)
             if (lua_type(L, -2) != LUA_TSTRING || !output)
                 throw Error("the graph returns a table that holds more than nodes by name; return { main = node, ... }")
                     .at({graph.file, 0});
-            graph.outputs[lua_tostring(L, -2)] = output;
+            const std::string name = text_at(L, -2);
+            check_output_name(name, graph.file);
+            graph.outputs[name] = output;
             lua_pop(L, 1);
         }
     } else if (!lua_isnil(L, -1)) {

@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <lua.hpp>
 #include <sstream>
 #include <utility>
 
+#include "bindings/host/lua_text.h"
 #include "bindings/host/modules.h"
 #include "bindings/host/natives.h"
 #include "bindings/host/script_error.h"
@@ -26,6 +28,27 @@ std::string read_text(const std::filesystem::path& path)
     std::stringstream text;
     text << file.rdbuf();
     return text.str();
+}
+
+// Lua looks for modules in the current folder first, which may be that of a scene of others: what the host requires is
+// found below fixed folders alone.
+void leave_out_current_folder(lua_State* L)
+{
+    lua_getglobal(L, "package");
+    for (const char* field : {"path", "cpath"}) {
+        lua_getfield(L, -1, field);
+        const std::string all = text_at(L, -1);
+        lua_pop(L, 1);
+        std::string absolute;
+        for (std::size_t begin = 0; begin < all.size();) {
+            const std::size_t end = std::min(all.find(';', begin), all.size());
+            if (all[begin] == '/') absolute += all.substr(begin, end - begin) + ';';
+            begin = end + 1;
+        }
+        push_text(L, absolute);
+        lua_setfield(L, -2, field);
+    }
+    lua_pop(L, 1);
 }
 
 }  // namespace
@@ -99,6 +122,7 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
 void State::open_libraries()
 {
     luaL_openlibs(L_);
+    leave_out_current_folder(L_);
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();
     for (const char* name : {"describe", "engine_errors", "vec3", "bytecode", "kernel", "detail", "numeric", "shape",

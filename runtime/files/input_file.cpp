@@ -20,6 +20,7 @@ struct OpenFile {
 
 OpenFile open_regular(const std::filesystem::path& path)
 {
+    if (path.native().find('\0') != std::string::npos) throw Error("can't be read: its name holds a byte 0");
     // Opening a pipe would wait for its writer, were it not for O_NONBLOCK.
     Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!descriptor) throw file_error("can't be read", errno);

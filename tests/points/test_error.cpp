@@ -27,6 +27,13 @@ TEST_CASE("an error is not longer for names, files and messages without end", "[
     CHECK(std::string(Error("it is empty").at({path}).what()) == path + ": it is empty");
 }
 
+TEST_CASE("an error does not end at a byte 0 of a name", "[error]")
+{
+    const std::string name("a\0b\0", 4);
+    CHECK(std::string(Error("no " + name).in_node(name).at({name}).what()) ==
+          "a\\x00b\\x00: node \"a\\x00b\\x00\": no a\\x00b\\x00");
+}
+
 TEST_CASE("a file without a known line is named without one", "[error]")
 {
     CHECK(std::string(Error("it is empty").at({"bunny.obj"}).what()) == "bunny.obj: it is empty");

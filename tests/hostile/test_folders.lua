@@ -1,0 +1,64 @@
+-- Scenes in folders of others, and names that would lead out of them.
+local command = require "testing.command"
+
+local function run(folder, text, arguments)
+  folder:write("scene.lua", 'local rapid = require "rapid"\n' .. text)
+  return command.rapid("run scene.lua -f 1 --quiet " .. (arguments or ""), { cwd = folder.path })
+end
+
+local point = "rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } } " ..
+  ":points('k', function(p) p.v = p.v end) :solve {}"
+
+describe("a library of Lua", function()
+  it("that is beside a scene, in the current folder, is not Rapid's", function()
+    local folder = command.folder()
+    command.shell("mkdir jit table", { cwd = folder.path })
+    for _, name in ipairs { "jit/vmdef", "jit/util", "jit/bc", "vmdef", "ffi", "bit", "table/new", "table/clear",
+      "rapid", "describe", "vec3", "dkjson" } do
+      folder:write(name .. ".lua", "io.open('seen', 'w'):close() return {}")
+    end
+    for _, line in ipairs { 'run scene.lua -f 1 --quiet', "check scene.lua", "explain scene.lua", "nodes" } do
+      folder:write("scene.lua", 'local rapid = require "rapid" return ' .. point)
+      local result = command.rapid(line, { cwd = folder.path })
+      assert.equal("", result.stderr)
+      assert.equal(0, result.status)
+    end
+    -- Nor where the environment asks for it.
+    command.rapid("run scene.lua -f 1 --quiet", { cwd = folder.path,
+      environment = { LUA_PATH = "./?.lua;;", LUA_CPATH = "./?.so;;", LUA_INIT = "@rapid.lua" } })
+    assert.is_nil(folder:read "seen")
+  end)
+end)
+
+describe("the name of an output", function()
+  it("does not lead out of the folder that it is written to", function()
+    for _, name in ipairs { "../x", "/tmp/x", "a/../../x", "..", ".", ".hidden", "", "a\\0b", "a\\nb", "\\27[2J",
+      ("x"):rep(201) } do
+      local folder = command.folder()
+      local result = run(folder, ("return { ['%s'] = %s }"):format(name, point), "-o out/{output}.####.csv")
+      assert.equal(2, result.status, name)
+      assert.match("^scene.lua: the graph returns an output \".*\"; its name, which goes into names of files, must " ..
+        "have from 1 to 200 bytes, no / and no control characters, and not begin with a dot\n$", result.stderr)
+      assert.same({ "scene.lua" }, folder:list())
+    end
+    local folder = command.folder()
+    assert.equal("", run(folder, ("return { ['grains & dust.2'] = %s }"):format(point), "-o {output}.####.csv").stderr)
+    assert.truthy(folder:read "grains & dust.2.0001.csv")
+  end)
+end)
+
+describe("a name with a byte 0", function()
+  it("is not cut there: it names no file", function()
+    local folder = command.folder()
+    folder:write("points", "Px,Py,Pz\n1,2,3\n")
+    local read = run(folder, "return rapid.create { points = rapid.points.read 'points\\0.csv' } :solve {}")
+    assert.equal(2, read.status)
+    assert.match("can't be read: its name holds a byte 0", read.stderr)
+    local written = run(folder, "return " .. point .. " :write { file = 'new\\0.####.csv' }")
+    assert.equal(1, written.status)
+    assert.match("can't be written: its name holds a byte 0", written.stderr)
+    local level_set = run(folder, "rapid.levelset.sphere { voxel = 0.2 } :write 'new\\0.vdb' return " .. point)
+    assert.not_equal(0, level_set.status)
+    assert.same({ "points", "scene.lua" }, folder:list())
+  end)
+end)

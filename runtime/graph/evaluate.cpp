@@ -7,6 +7,7 @@
 
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
+#include "runtime/graph/changing_node.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/undeclared_columns.h"
 #include "runtime/stopwatch.h"
@@ -29,11 +30,20 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
         simulation->seed = planned.seed;
         if (planned.recorded) simulation->record = std::make_shared<StepRecord>();
         for (const PlannedNode& node : plan.nodes)
-            if (auto names = functions_of_the_frame(*node.node); !names.empty())
+            if (auto names = ChangingNode::not_followed(*node.node); !names.empty())
                 simulation->varying[node.node->name] = std::move(names);
         simulations_.push_back(std::move(simulation));
     }
+    changing_.resize(plan.nodes.size());
+    for (std::size_t i = 0; i < plan.nodes.size(); ++i) {
+        const PlannedNode& planned = plan.nodes[i];
+        if (planned.in_loop && planned.node->type->kind == NodeKind::Dynamic &&
+            !functions_of_the_frame(*planned.node).empty())
+            changing_[i] = std::make_unique<ChangingNode>(planned, simulations_[planned.simulation]);
+    }
 }
+
+Evaluator::~Evaluator() = default;
 
 void Evaluator::leave_out_errors()
 {
@@ -210,7 +220,9 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
         if (planned.in_loop && evaluation.at_start && node.type->kind != NodeKind::Source) {
             result = planned.op->start(inputs, evaluation);
         } else if (last == first) {
+            const std::size_t before = changing_[first] ? inputs[0].dynamics.size() : 0;
             result = planned.op->evaluate(inputs, evaluation);
+            if (changing_[first]) changing_[first]->follow(result.dynamics, before, evaluation);
         } else {
             result = std::move(inputs[0]);
             edit_together(first, last, left, result.points, frame);

@@ -15,6 +15,8 @@
 
 namespace rapid {
 
+class ChangingNode;
+
 struct FrameResult {
     std::int64_t frame = 0;
     std::map<std::string, PointSet> outputs;
@@ -37,6 +39,7 @@ public:
     using ResultHook = std::function<void(const Node& node, std::int64_t frame, const PointSet& points)>;
 
     explicit Evaluator(const Plan& plan, WriteHook write = {}, ResultHook result = {});
+    ~Evaluator();
 
     // From now on each node finds poison in what it has not declared, and goes over the points by itself: slower, and
     // for tests (undeclared_columns.h). Error of advance(): a node whose declaration is too short.
@@ -79,6 +82,8 @@ private:
     bool checks_declarations_ = false;
     std::vector<std::shared_ptr<Simulation>> simulations_;
     std::vector<std::optional<Flow>> kept_;  // results of nodes that are evaluated once, by node
+    std::vector<std::unique_ptr<ChangingNode>>
+        changing_;  // by node; null where no parameter is a function of the frame
 };
 
 }  // namespace rapid

@@ -9,6 +9,7 @@
 #include "runtime/graph/node.h"
 #include "runtime/operators/solve/aging.h"
 #include "runtime/operators/solve/air_resistance.h"
+#include "runtime/operators/solve/changing_dynamics.h"
 #include "runtime/operators/solve/collider_shapes.h"
 #include "runtime/operators/solve/step_recorder.h"
 #include "runtime/points/members.h"
@@ -20,7 +21,6 @@
 #include "runtime/solver/estimate/shadow.h"
 #include "runtime/solver/estimate/stiffness.h"
 #include "runtime/solver/estimate/tolerance_check.h"
-#include "runtime/solver/estimate/varying_forces.h"
 #include "runtime/solver/interaction.h"
 
 namespace rapid {
@@ -68,7 +68,6 @@ struct Solve {
         StepRecorder(*flow.simulation).start(flow.points);
         shadows_ = Shadows();
         coupled_errors_ = CoupledErrors();
-        varying_forces_ = VaryingForces();
         drift_ = EnergyDrift();
         tolerance_check_ = ToleranceCheck();
         return flow;
@@ -90,15 +89,17 @@ struct Solve {
         }
         // With a tolerance, the points of the sample are checked in any case.
         const bool estimates = flow.simulation->estimates_errors || tolerance;
-        const Dynamics& finer = estimates ? begin_varying(flow, options, now) : flow.dynamics;
-        if (estimates && !moves_alone(flow)) coupled_errors_.begin(flow.points, finer, options);
-        if (!options.interacts) interact(flow.points, flow.dynamics, options);
+        changing_.begin(flow.dynamics, options, tolerance ? max_substeps : 0, estimates, flow.points.has("dt"));
+        const double begin_time = options.time - options.h;
+        if (estimates) note_left_out(flow, now);
+        if (estimates && !moves_alone(flow)) coupled_errors_.begin(flow.points, changing_.finer(), options);
+        if (!options.interacts) interact(flow.points, changing_.run(), options, begin_time);
         if (estimates) begin_estimates(flow, options);
         const Tolerated done = advance(flow, options);
         const std::uint64_t beyond = check_tolerance(flow, options);
         if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
-        if (estimates) estimate(flow, finer, options, now);
-        if (!options.interacts) interact(flow.points, flow.dynamics, options);
+        if (estimates) estimate(flow, options, now);
+        if (!options.interacts) interact(flow.points, changing_.run(), options, options.time);
         if (estimates && !moves_alone(flow)) estimate_coupled(flow, now);
         report(done, beyond, now);
         recorder.end();
@@ -133,6 +134,7 @@ private:
     SolveOptions begin(Flow& flow, const Evaluation& now)
     {
         const FrameClock clock = flow.simulation->clock();
+        changing_.note_colliders(flow.dynamics);
         shapes_.prepare(flow.dynamics, flow.points, clock, tolerance ? 1 : substeps, now);
         if (is_coupled(flow) && !flow.points.has("still")) flow.points.add({"still", 0.0f});
         if (tolerance && is_coupled(flow))
@@ -167,51 +169,49 @@ private:
 
     Tolerated advance(Flow& flow, const SolveOptions& options) const
     {
-        if (!tolerance) return {solve(flow.points, flow.dynamics, options), substeps, 0};
-        return solve_within(flow.points, flow.dynamics, options, allowed_error(flow), max_substeps);
+        if (!tolerance) return {solve(flow.points, changing_.run(), options), substeps, 0};
+        return solve_within(flow.points, changing_.run(), options, allowed_error(flow), max_substeps);
     }
 
     // Points beyond the tolerance, by a sample.
     std::uint64_t check_tolerance(const Flow& flow, const SolveOptions& options)
     {
         if (!tolerance || shadows_.idle()) return 0;
-        return tolerance_check_.beyond(shadows_.before(), flow.points, flow.dynamics, options, allowed_error(flow),
+        return tolerance_check_.beyond(shadows_.before(), flow.points, changing_.finer(), options, allowed_error(flow),
                                        2 * max_substeps);
     }
 
     // m, in this step.
     double allowed_error(const Flow& flow) const { return *tolerance / flow.simulation->subframes; }
 
-    // The dynamics of the shadows. Parameters that are functions of the frame are in the errors where forces have them.
-    const Dynamics& begin_varying(const Flow& flow, const SolveOptions& options, const Evaluation& now)
+    // Parameters that are functions of the frame and in no error.
+    void note_left_out(const Flow& flow, const Evaluation& now) const
     {
         const auto& varying = flow.simulation->varying;
+        std::vector<std::string>& left_out = now.figures.left_out_of_errors;
         flow.dynamics.visit_in_order([&](const auto& dynamic) {
             using D = std::decay_t<decltype(*dynamic)>;
-            std::vector<std::string>& left_out = now.figures.left_out_of_errors;
             if (tolerance && std::is_same_v<D, Interaction>)
                 left_out.push_back(dynamic->node + ", whose kicks with a tolerance are at the ends of frames");
             const auto found = varying.find(dynamic->node);
-            if (found == varying.end() || std::is_same_v<D, Force>) return;
+            if (found == varying.end()) return;
             for (const std::string& param : found->second)
                 left_out.push_back(
                     fmt::format("{}.{}, a function of the frame that is called once in each", dynamic->node, param));
         });
-        const auto varies = [&](const std::string& node) { return varying.count(node) > 0; };
-        return varying_forces_.begin(flow.dynamics, varies, options.time - 0.5 * options.h);
     }
 
     // Of coupled points a sample alone tells nothing but rounding.
     void begin_estimates(const Flow& flow, SolveOptions& options)
     {
         const bool alone = moves_alone(flow);
-        const bool is_exact = !varying_forces_.any() && is_closed_form(flow.points, flow.dynamics, options);
+        const bool is_exact = is_closed_form(flow.points, changing_.run(), options);
         shadows_.begin(flow.points, !alone || is_exact, options.h);
         if (!alone) return;
-        drift_.begin(flow.points, shadows_, flow.dynamics, options);
+        drift_.begin(flow.points, shadows_, changing_.run(), options);
     }
 
-    void estimate(const Flow& flow, const Dynamics& finer_dynamics, const SolveOptions& options, const Evaluation& now)
+    void estimate(const Flow& flow, const SolveOptions& options, const Evaluation& now)
     {
         std::optional<std::vector<double>> drift;
         if (!moves_alone(flow)) {
@@ -223,12 +223,12 @@ private:
                 finer.met = nullptr;
                 finer.log = nullptr;
                 if (tolerance)
-                    solve_within(shadows, finer_dynamics, finer, allowed_error(flow) / 4, 2 * max_substeps);
+                    solve_within(shadows, changing_.finer(), finer, allowed_error(flow) / 4, 2 * max_substeps);
                 else
-                    solve(shadows, finer_dynamics, finer);
+                    solve(shadows, changing_.finer(), finer);
             });
             now.figures.errors.insert(now.figures.errors.end(), errors.begin(), errors.end());
-            drift = drift_.end(flow.points, shadows_, flow.dynamics);
+            drift = drift_.end(flow.points, shadows_, changing_.run());
         }
         const double rounding = shadows_.rounding(!flow.dynamics.colliders().empty());
         now.figures.rounding = std::max(now.figures.rounding, rounding);
@@ -311,7 +311,7 @@ private:
     ColliderShapes shapes_;
     Shadows shadows_;
     CoupledErrors coupled_errors_;
-    VaryingForces varying_forces_;
+    ChangingDynamics changing_;
     EnergyDrift drift_;
     ToleranceCheck tolerance_check_;
     ShapeLoads loads_;            // of the previous frame, where points are coupled

@@ -110,10 +110,12 @@ void RunTotals::WorstError::add(const std::optional<FrameStatistics::Error>& oth
 std::string RunTotals::WorstError::text(const std::string& what) const
 {
     if (!error) return "";
-    const auto within = [](double e, std::string_view unit) {
-        return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : "within rounding";
+    // What shadows do not see is not said to be nothing.
+    constexpr std::string_view same = "the same at twice the sub-steps";
+    const auto within = [&](double e, std::string_view unit) {
+        return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : std::string(same);
     };
-    if (!(error->max > 0)) return fmt::format("error    {}: none above rounding\n", what);
+    if (!(error->max > 0)) return fmt::format("error    {}: {}\n", what, same);
     return fmt::format("error    {}: half of the points {}, 95 % {}, the worst {:.1e} (frame {})\n", what,
                        within(error->p50, " m"), within(error->p95, ""), error->max, frame);
 }

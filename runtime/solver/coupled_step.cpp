@@ -45,14 +45,14 @@ void CoupledStep::run()
         now_.index = substep;
         now_.time = options.time - now_.dt * (options.substeps - substep - 1);
         now_.max_acceleration = 0;
-        if (options.interacts) interact(substep == 0 ? 1 : 2);
+        if (options.interacts) interact(substep == 0 ? 1 : 2, now_.time - now_.dt);
         if (sleep_) sleep_->begin(now_, scene.obstacles);
         context_.for_each_chunk([&](std::size_t begin, std::size_t end) { advance_freely(begin, end); });
         if (spin_) spin_->begin();
         projection.advance(now_);
         if (spin_) spin_->turn(context_.time, options.substeps);
     }
-    if (options.interacts) interact(1);
+    if (options.interacts) interact(1, options.time);
 
     SolveResult& result = context_.result();
     if (sleep_) sleep_->clear_loads();
@@ -153,12 +153,12 @@ void CoupledStep::begin_spins()
 }
 
 // Kicks of half a sub-step. They wake sleepers.
-void CoupledStep::interact(int kicks)
+void CoupledStep::interact(int kicks, double time)
 {
     std::vector<Vec3d> P(at_.size());
     for (std::size_t i = 0; i < P.size(); ++i) P[i] = at_[i].P;
-    rapid::interact(context_.points, dynamics_, context_.options, {P, v_, context_.dead, context_.options.substeps},
-                    kicks);
+    rapid::interact(context_.points, dynamics_, context_.options,
+                    {P, v_, context_.dead, time, context_.options.substeps}, kicks);
     for (std::size_t i = 0; sleep_ && i < v_.size(); ++i)
         if (sleep_->asleep(i) && !v_[i].isZero(0)) sleep_->wake(i);
 }

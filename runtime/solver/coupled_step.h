@@ -29,7 +29,7 @@ private:
     void begin_forces();
     void begin_spins();
     bool is_isolated(const Projection& projection) const;
-    void interact(int kicks);
+    void interact(int kicks, double time);
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
     void take_point(const PointBlock& block, std::size_t k);

@@ -176,7 +176,7 @@ void interact(const PointSet& points, const Dynamics& dynamics, const SolveOptio
     const Strided<std::uint8_t> advanced = members_of(points, options.group);
     for (const std::shared_ptr<const Interaction>& interaction : dynamics.interactions())
         at_node(*interaction, [&] {
-            const Neighbourhood neighbourhood(*interaction, points, options, at, kicks);
+            const Neighbourhood neighbourhood(interaction->at(at.time), points, options, at, kicks);
             for (int kick = 0; kick < kicks; ++kick) {
                 const std::vector<Vec3d> change = neighbourhood.kicks();
                 for (std::size_t m = 0; m < change.size(); ++m) {
@@ -187,7 +187,7 @@ void interact(const PointSet& points, const Dynamics& dynamics, const SolveOptio
         });
 }
 
-void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
+void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double time)
 {
     if (points.empty() || dynamics.interactions().empty()) return;
     std::vector<Vec3d> P(points.size()), v(points.size());
@@ -200,7 +200,7 @@ void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& op
         }
         Dynamics one;
         one.add(interaction);
-        interact(points, one, options, {P, v, {}, 1}, 1);
+        interact(points, one, options, {P, v, {}, time, 1}, 1);
         for (std::size_t i = 0; i < v.size(); ++i) rounded[i] = v[i].cast<float>();
     }
 }

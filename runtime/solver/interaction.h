@@ -24,6 +24,9 @@ namespace rapid {
 
 class Interaction : public Dynamic {
 public:
+    // As it is at a time, s since the start.
+    virtual const Interaction& at(double) const { return *this; }
+
     double radius = 1;                                 // m
     PerPoint<float> separation{0.0f}, cohesion{0.0f};  // m/s²
     PerPoint<float> alignment{0.0f}, drag{0.0f};       // 1/s
@@ -34,6 +37,7 @@ struct InteractingPoints {
     std::span<const Vec3d> P;            // m
     std::span<Vec3d> v;                  // m/s
     std::span<const std::uint8_t> dead;  // 1: takes no part any more; empty where none can have died
+    double time = 0;                     // s since the start
     int steps = 1;                       // of the frame
 };
 
@@ -42,7 +46,7 @@ struct InteractingPoints {
 // threads.
 void interact(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options,
               const InteractingPoints& at, int kicks);
-// The same of half the frame, for velocities in single precision.
-void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
+// The same of half the frame, for velocities in single precision. time: s since the start.
+void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double time = 0);
 
 }  // namespace rapid

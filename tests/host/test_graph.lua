@@ -166,12 +166,12 @@ return rapid.create { points = two } :collide { shape = shape, bounce = rapid.at
 end)
 
 describe("a parameter that is a function of the frame", function()
-  it("is asked at each frame, at its time", function()
+  it("is asked at each frame, at its time, and joined between them", function()
     local result = scene.run([[
 return rapid.create { points = two, fps = 10 }
   :gravity { g = function(frame) return vec3(frame.number, frame.time, frame.dt) end } :solve {}]], { frames = {1, 4} })
-    -- v = sum over the frames 2 to 4 of g dt
-    assert.near({0.1 * (2 + 3 + 4), 0.1 * (0.1 + 0.2 + 0.3), 3 * 0.01}, result[4][1].v, 1e-6)
+    -- v = sum over the frames 2 to 4 of g dt, in the middle of each
+    assert.near({0.1 * (1.5 + 2.5 + 3.5), 0.1 * (0.05 + 0.15 + 0.25), 3 * 0.01}, result[4][1].v, 1e-6)
   end)
 
   it("decides how many are born", function()

@@ -1,9 +1,9 @@
 // Energy drift: the change of the kinetic and potential energy of points by the integrator, 0 if it were exact.
 //
 // For each point that has a shadow, the change within each Solve is summed since its birth, without steps in which it
-// met a shape (those are in the audit of contacts, ContactEnergy). Changes by nodes between two Solves, and by forces
-// that vary from frame to frame, are not included. The energy is not defined with forces that are not conservative, and
-// with actions, couplings and the attribute `force`.
+// met a shape (those are in the audit of contacts, ContactEnergy). Changes by nodes between two Solves are not
+// included. The energy is not defined with forces that are not conservative, or that are functions of the frame and
+// change, and with actions, couplings and the attribute `force`.
 #pragma once
 
 #include <optional>

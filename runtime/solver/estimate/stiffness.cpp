@@ -10,6 +10,7 @@
 #include <map>
 
 #include "runtime/points/members.h"
+#include "runtime/solver/changing.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {
@@ -180,6 +181,9 @@ public:
 
     double inexact(std::size_t i) const { return inexact_[i]; }
 
+    // Whether all of it is solved exactly: linear in place and velocity, with constant coefficients.
+    bool is_linear = true;
+
 private:
     std::map<Stiffness::Kind, double> worst_;
     std::vector<double> inexact_;  // by point
@@ -210,14 +214,18 @@ StiffnessScan scan(const Force& force, const Sample& sample)
     const std::vector<Jacobians> jacobians = sample.jacobians(
         [&](std::span<Vec3d> at, std::span<Vec3d> speed) { return sample.inexact_accelerations(force, at, speed); });
     for (std::size_t i = 0; i < sample.size(); ++i) {
-        if (!sample.is_member(force, i)) continue;
         const Linear linear = forces.has_linear() ? forces.linear(i) : Linear();
+        const Jacobians& by = jacobians[i];
+        found.is_linear &= linear.c == 0 && by.by_position.isZero(0) && by.by_velocity.isZero(0);
+        if (forces.has_surface_springs() && forces.surface_spring(i).w2 > 0)
+            found.is_linear &= forces.surface_spring(i).shape->half_space().has_value();
+        if (!sample.is_member(force, i)) continue;
         const double dt = sample.dt[i];
         found.add(Stiffness::Drag, i, linear.k * dt);
         found.add(Stiffness::Spring, i, std::sqrt(linear.w2) * dt);
         found.add(Stiffness::SquaredDrag, i, linear.c * sample.v[i].norm() * dt);
         if (forces.has_surface_springs()) scan_surface(forces.surface_spring(i), sample, i, found);
-        found.add(i, jacobians[i], linear.k, dt);
+        found.add(i, by, linear.k, dt);
     }
     return found;
 }
@@ -288,6 +296,7 @@ std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynami
     std::vector<Stiffness> all;
     std::vector<double> inexact(sample.size(), 0);
     double worst = 0;
+    bool alone = pulls.size() == dynamics.size();  // no shapes, constraints and interactions
     const auto look_at = [&](const auto& pull, const std::string& name) {
         std::optional<StiffnessScan> found;
         try {
@@ -303,13 +312,18 @@ std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynami
             all.push_back(std::move(stiffness));
         }
         for (std::size_t i = 0; i < sample.size(); ++i) inexact[i] = std::max(inexact[i], found->inexact(i));
+        alone &= found->is_linear;
     };
     pulls.visit_in_order([&]<class T>(const std::shared_ptr<const T>& pull) {
-        if constexpr (std::is_same_v<T, Force>)
+        if constexpr (std::is_same_v<T, Force>) {
             look_at(*pull, pull->node);
-        else if constexpr (std::is_same_v<T, Action>)
+            alone &= dynamic_cast<const ChangingForce*>(pull.get()) == nullptr;
+        } else if constexpr (std::is_same_v<T, Action>) {
             look_at(*pull, fmt::format("action \"{}\"", pull->node));
+            alone = false;
+        }
     });
+    for (Stiffness& stiffness : all) stiffness.alone = alone;
     if (worst == 0 || !dynamics.constraints().empty()) return all;
 
     std::vector<std::uint32_t> stiffest(sample.size());
@@ -332,10 +346,13 @@ void keep_worst(std::vector<Stiffness>& worst, const std::vector<Stiffness>& fou
         const auto known = std::find_if(worst.begin(), worst.end(), [&](const Stiffness& other) {
             return other.node == stiffness.node && other.is_exact() == stiffness.is_exact();
         });
-        if (known == worst.end())
+        if (known == worst.end()) {
             worst.push_back(stiffness);
-        else if (known->step * (1 + rounding) < stiffness.step)
-            *known = stiffness;
+            continue;
+        }
+        const bool alone = known->alone && stiffness.alone;
+        if (known->step * (1 + rounding) < stiffness.step) *known = stiffness;
+        known->alone = alone;
     }
 }
 
@@ -345,7 +362,9 @@ std::string text_of(const Stiffness& stiffness)
                          : stiffness.kind == Stiffness::Drag || stiffness.kind == Stiffness::Decay ? "k dt"
                                                                                                    : "omega dt";
     const std::string what = fmt::format("{}: {} = {:.3g}", stiffness.node, number, stiffness.step);
-    if (stiffness.is_exact()) return what + "; treated exactly";
+    if (stiffness.is_exact())
+        return what + (stiffness.alone ? "; treated exactly"
+                                       : "; solved in closed form, with what else acts held through a sub-step");
     std::string text = fmt::format("{} at {} sub-step{}", what, stiffness.substeps, stiffness.substeps == 1 ? "" : "s");
     if (const auto& cure = stiffness.cure)
         text += fmt::format("; estimated error {:.1g} m; {} sub-steps would give {:.1g} m", cure->error, cure->substeps,

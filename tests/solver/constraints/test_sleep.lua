@@ -220,7 +220,7 @@ describe("what lies on a slope", function()
       GRAVITY = ("function(f) local t = late(f) and %.17g or 0 return {9.81 * math.sin(t), -9.81 * math.cos(t), 0} end")
         :format(angle) }
     local along = 9.81 * (math.sin(math.rad(20) + angle) - 1.005 * tangent * math.cos(math.rad(20) + angle))
-    local expected = 0.5 * along * (49 / 24) ^ 2
+    local expected = 0.5 * along * (48.4 / 24) ^ 2 -- gravity turns through frame 49, and is enough at a fifth of it
     assert.truthy(expected > 0.1)
     assert.near(expected, way, 0.02 * expected)
   end)

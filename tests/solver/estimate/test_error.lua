@@ -203,10 +203,15 @@ describe("what is left out of the error is told:", function()
     return run.stdout
   end
 
-  it("functions of the frame, but of forces", function()
-    local text = told ":contact { name = 'grip', radius = 0.6, friction = function(f) return f.time end } :solve {}"
-    assert.match("\nleft out of the error: grip.friction, a function of the frame that is called once in each\n", text)
-    assert.falsy(told(":wind { velocity = function(f) return {f.time, 0, 0} end } :solve {}"):find("left out", 1, true))
+  it("functions of the frame that are held through it", function()
+    local nodes = ":collide { name = 'wall', shape = rapid.shape.plane {}, response = %s } :solve {}"
+    local text = told(nodes:format "function(f) return f.time > 1 and 'slide' or 'bounce' end")
+    assert.match("\nleft out of the error: wall.response, a function of the frame that is called once in each\n", text)
+    for _, in_it in ipairs { ":wind { velocity = function(f) return {f.time, 0, 0} end }",
+      ":interact { radius = 2, separation = function(f) return f.time end }",
+      ":contact { radius = 0.6, friction = function(f) return f.time end }" } do
+      assert.falsy(told(in_it .. " :solve {}"):find("left out", 1, true), in_it)
+    end
   end)
 
   it("kicks among neighbours that are at the ends of frames", function()

@@ -193,7 +193,41 @@ for i = 0, 29 do
 end
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = P } }
   :attract { strength = 3, core = 0.5, center = function(f) return {2 * f.time, math.sin(4 * f.time), 0} end }
-  :distance { pairs = pairs } :solve { substeps = 8 }]] },
+  :distance { pairs = pairs } :solve { substeps = 2 }]] },
+  { "spring", "springs to a target on a sine of 1 Hz, 4 sub-steps", 1, 24, [[
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {0, 0, 0}) } }
+  :spring { stiffness = 60, damping = 1, target = function(f) return {2 * math.sin(2 * math.pi * f.time), 0, 0} end }
+  :solve { substeps = 4 }]] },
+  { "spring", "the same on a sine of 3 Hz, 64 sub-steps: 8 frames a period", 1, 24, [[
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {0, 0, 0}) } }
+  :spring { stiffness = 60, damping = 1, target = function(f) return {2 * math.sin(6 * math.pi * f.time), 0, 0} end }
+  :solve { substeps = 64 }]] },
+  { "vortex, drag", "a vortex that comes and goes, with drag that does", 1, 24, [[
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {1, 0, 0}) } }
+  :vortex { strength = function(f) return 6 * math.sin(5 * f.time) end }
+  :drag { linear = function(f) return 1 + math.cos(7 * f.time) end, quadratic = 0.2 } :solve { substeps = 2 }]] },
+  { "wind", "wind that rises at once after a frame, 16 sub-steps", 1, 24, [[
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {0, 0, 0}) } }
+  :wind { drag = 4, velocity = function(f) return {f.number > 10 and 5 or 0, 0, 0} end } :solve { substeps = 16 }]] },
+  { "interact", "neighbours that part by a function of the frame, 2 sub-steps", 1, 18, [[
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.3, {0, 0, 0}) } }
+  :interact { radius = 0.8, separation = function(f) return 8 * math.sin(6 * f.time) ^ 2 end }
+  :solve { substeps = 2 }]] },
+  { "collide", "friction of a floor that is a function of the frame", 1, 18, [[
+local v = {}
+for i = 1, 64 do v[i] = {4 + centred(i, 1), 0, centred(i, 2)} end
+local P = grid(8, 1, 8, 0.2, {0, 0, 0})
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = P, v = v } }
+  :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0, friction = function(f) return f.time / 2 end }
+  :solve { substeps = 4 }]] },
+  { "contact", "friction of grains that is a function of the frame", 1, 12, [[
+local P, v = {}, {}
+for i = 0, 49 do
+  P[2 * i + 1], v[2 * i + 1] = {-0.4 * u(i, 1) - 0.2, 0.17 * centred(i, 2), 3 * i}, {1 + 3 * u(i, 3), 0, 0}
+  P[2 * i + 2], v[2 * i + 2] = {0, 0, 3 * i}, {0, 0, 0}
+end
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = P, v = v } }
+  :contact { radius = 0.1, friction = function(f) return 3 * f.time end } :solve { substeps = 16 }]] },
   { "collide", "contacts found after the step", 2, 24, [[
 return from { P = grid(6, 6, 6, 0.2, {0, 0.5, 0}) } :gravity {} :turbulence { amplitude = 2, octaves = 1 }
   :collide { shape = rapid.shape.plane {}, method = "project", bounce = 0.4 } :solve { substeps = %d }]] },

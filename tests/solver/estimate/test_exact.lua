@@ -1,0 +1,188 @@
+-- What Rapid calls exact, over random scenes, against closed forms: drags and springs of which advice says that they
+-- are treated exactly, and balls that bounce on planes. EXACT_SCENES=2000 EXACT_SEED=7 rapid test tests/solver/estimate
+-- runs more, and others.
+local ffi = require "ffi"
+local scene = require "testing.scene"
+local lehmer = require "tests.lehmer"
+
+local draw = lehmer.new()
+local pick, chance, between, magnitude = draw.pick, draw.chance, draw.between, draw.magnitude
+local scenes = tonumber(os.getenv "EXACT_SCENES") or 60
+local seed = tonumber(os.getenv "EXACT_SEED") or 1
+local fps, frames = 24, 12
+
+-- As columns and parameters of points hold it.
+local function single(x) return tonumber(ffi.new("float[1]", x)[0]) end
+local function text(x) return ("%.9g"):format(x) end
+local function vector(size) return { single(between(-size, size)), single(between(-size, size)),
+  single(between(-size, size)) } end
+local function list(v) return ("{%s, %s, %s}"):format(text(v[1]), text(v[2]), text(v[3])) end
+
+-- x'' = G - k x' - w2 x, G constant, from x and v: x and v after t, along one axis. All by its two roots, or by complex
+-- ones; without a spring by that of the drag.
+local function moved(x, v, G, k, w2, t)
+  if w2 == 0 and k == 0 then return x + v * t + G * t * t / 2 end
+  if w2 == 0 then
+    local decayed = -(math.exp(-k * t) - 1) / k
+    if k * t < 1e-3 then decayed = t * (1 - k * t / 2 * (1 - k * t / 3 * (1 - k * t / 4))) end
+    local final = G / k
+    return x + final * t + (v - final) * decayed
+  end
+  local rest, D = G / w2, k * k / 4 - w2
+  local y = x - rest
+  if D < 0 then
+    local w = math.sqrt(-D)
+    return rest + math.exp(-k * t / 2) * (y * math.cos(w * t) + (v + k / 2 * y) / w * math.sin(w * t))
+  end
+  local fast = -(k / 2 + math.sqrt(D))
+  local slow = w2 / fast
+  local a = (v - fast * y) / (slow - fast)
+  return rest + a * math.exp(slow * t) + (y - a) * math.exp(fast * t)
+end
+
+-- The nodes of a scene of linear forces, and what they add up to for a point: G, k and w2, w2q within G.
+local function linear_forces(points)
+  local nodes, parts = {}, {}
+  for _ = 1, pick { 1, 2, 3, 4 } do
+    local kind = pick { "gravity", "wind", "drag", "drag", "spring", "spring" }
+    local own = chance(0.3)
+    local function rate(low, high)
+      if own then return 'rapid.attr "own"', function(p) return p.own end end
+      local k = single(magnitude(low, high))
+      return text(k), function() return k end
+    end
+    if kind == "gravity" then
+      local g = vector(10)
+      nodes[#nodes + 1] = (":gravity { g = %s }"):format(list(g))
+      parts[#parts + 1] = function() return g, 0, 0 end
+    elseif kind == "wind" then
+      local u, name, k = vector(10), rate(-2, 3)
+      nodes[#nodes + 1] = (":wind { velocity = %s, drag = %s }"):format(list(u), name)
+      parts[#parts + 1] = function(p) return { k(p) * u[1], k(p) * u[2], k(p) * u[3] }, k(p), 0 end
+    elseif kind == "drag" then
+      local name, k = rate(-2, 4)
+      nodes[#nodes + 1] = (":drag { linear = %s }"):format(name)
+      parts[#parts + 1] = function(p) return { 0, 0, 0 }, k(p), 0 end
+    else
+      local name, stiffness = rate(-2, 5)
+      local damping, at = chance(0.5) and single(magnitude(-2, 3)) or 0, vector(1)
+      local each = chance(0.3)
+      nodes[#nodes + 1] = (":spring { stiffness = %s, damping = %s, target = %s }"):format(name, text(damping),
+        each and 'rapid.attr "home"' or list(at))
+      parts[#parts + 1] = function(p)
+        local q, w2 = each and p.home or at, stiffness(p) / p.mass
+        return { w2 * q[1], w2 * q[2], w2 * q[3] }, damping / p.mass, w2
+      end
+    end
+  end
+  for _, p in ipairs(points) do
+    p.G, p.k, p.w2 = { 0, 0, 0 }, 0, 0
+    for _, part in ipairs(parts) do
+      local G, k, w2 = part(p)
+      for axis = 1, 3 do p.G[axis] = p.G[axis] + G[axis] end
+      p.k, p.w2 = p.k + k, p.w2 + w2
+    end
+  end
+  return table.concat(nodes, " ")
+end
+
+local function columns(points, names)
+  local parts = {}
+  for _, name in ipairs(names) do
+    local values = {}
+    for i, p in ipairs(points) do values[i] = type(p[name]) == "table" and list(p[name]) or text(p[name]) end
+    parts[#parts + 1] = ("%s = {%s}"):format(name, table.concat(values, ", "))
+  end
+  return "points = rapid.points.from { " .. table.concat(parts, ", ") .. " }"
+end
+
+local function some_points(speed)
+  local points = {}
+  for i = 1, 8 do
+    points[i] = { P = vector(1), v = vector(speed), mass = single(magnitude(-1, 1)), home = vector(1),
+      own = single(magnitude(-1, 3)) }
+  end
+  return points
+end
+
+describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
+  it("whose drags and springs are told to be treated exactly are where a closed form has them", function()
+    local told, faults = 0, {}
+    for number = 1, scenes do
+      draw.start(seed, number)
+      local points = some_points(magnitude(-1, 1))
+      local source = ("return rapid.create { fps = %d, %s } %s :solve { substeps = %d }"):format(fps,
+        columns(points, { "P", "v", "mass", "home", "own" }), linear_forces(points), pick { 1, 1, 2, 5 })
+      local check = scene.command("check", source)
+      assert.equal(0, check.status, check.stderr)
+      assert.falsy(check.stdout:find("solved in closed form, with", 1, true), source)
+      if check.stdout:find("treated exactly", 1, true) then told = told + 1 end
+      local set = scene.run(source, { frames = {1 + frames, 1 + frames} })[1 + frames]
+      for i, p in ipairs(points) do
+        local D = p.k * p.k / 4 - p.w2
+        -- Near critical damping the roots of this closed form cancel.
+        if p.w2 == 0 or math.abs(D) > 1e-3 * p.w2 then
+          local x, off, size = set[i].P, 0, 0
+          for axis, name in ipairs { "x", "y", "z" } do
+            local expected = moved(p.P[axis], p.v[axis], p.G[axis], p.k, p.w2, frames / fps)
+            off, size = math.max(off, math.abs(x[name] - expected)), math.max(size, math.abs(expected), 1)
+          end
+          -- The rounding of P and v in each frame, of a motion that may turn in it.
+          if off > frames * 2 ^ -22 * (size + p.v[1] ^ 2 ^ 0.5) then
+            faults[#faults + 1] = ("scene %d: point %d is off by %g m\n%s"):format(number, i - 1, off, source)
+          end
+        end
+      end
+    end
+    assert.equal("", table.concat(faults, "\n"))
+    assert.truthy(told > scenes / 3, told)
+  end)
+
+  it("of balls that bounce on a plane are where parabolas between impacts have them", function()
+    local faults, compared = {}, 0
+    for number = 1, scenes do
+      draw.start(seed, number)
+      local n, g, radius = vector(1), vector(3), chance(0.5) and single(between(0, 0.2)) or 0
+      n[2], g[2] = single(between(1, 3)), single(-between(5, 15))
+      local length = math.sqrt(n[1] ^ 2 + n[2] ^ 2 + n[3] ^ 2)
+      local function height(v) return (n[1] * v[1] + n[2] * v[2] + n[3] * v[3]) / length end
+      local bounce, offset, points = single(pick { 1, between(0.5, 1) }), single(between(-1, 1)), some_points(2)
+      for _, p in ipairs(points) do
+        local above = offset / length + radius + between(0.3, 2) - height(p.P)
+        for axis = 1, 3 do p.P[axis] = single(p.P[axis] + above * n[axis] / length) end
+      end
+      local source = ("return rapid.create { fps = %d, %s } :gravity { g = %s } :collide { radius = %s, bounce = %s, "
+        .. "shape = rapid.shape.plane { normal = %s, offset = %s } } :solve {}"):format(fps,
+        columns(points, { "P", "v" }), list(g), text(radius), text(bounce), list(n), text(offset))
+      local set = scene.run(source, { frames = {1 + frames, 1 + frames} })[1 + frames]
+      for i, p in ipairs(points) do
+        local surface = offset / length + radius
+        local along = frames / fps
+        local y, v, a, left, slowest = height(p.P) - surface, height(p.v), height(g), along, 1
+        while true do
+          local hit = (-v - math.sqrt(v * v - 2 * a * y)) / a
+          if hit >= left then break end
+          v, y, left = -bounce * (v + a * hit), 0, left - hit
+          slowest = math.min(slowest, v)
+        end
+        y = y + v * left + a * left * left / 2
+        local off = math.abs(height { set[i].P.x, set[i].P.y, set[i].P.z } - surface - y)
+        for axis, name in ipairs { "x", "y", "z" } do -- along the plane nothing acts but g
+          local free = p.P[axis] + p.v[axis] * along + g[axis] * along ^ 2 / 2
+          local slid = free - n[axis] / length * (height { p.P[1] + p.v[1] * along + g[1] * along ^ 2 / 2,
+            p.P[2] + p.v[2] * along + g[2] * along ^ 2 / 2, p.P[3] + p.v[3] * along + g[3] * along ^ 2 / 2 })
+          local P = { set[i].P.x, set[i].P.y, set[i].P.z }
+          off = math.max(off, math.abs(set[i].P[name] - n[axis] / length * height(P) - slid))
+        end
+        if slowest > 0.2 then
+          compared = compared + 1
+          if off > 3e-5 then
+            faults[#faults + 1] = ("scene %d: point %d is off by %g m\n%s"):format(number, i - 1, off, source)
+          end
+        end
+      end
+    end
+    assert.equal("", table.concat(faults, "\n"))
+    assert.truthy(compared > 4 * scenes, compared)
+  end)
+end)

@@ -21,13 +21,6 @@ bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
 
 }  // namespace
 
-BlockStep::BlockStep(StepContext& context)
-    : context_(context),
-      shapes_move_(std::any_of(context.scene.obstacles.begin(), context.scene.obstacles.end(),
-                               [](const Obstacle& obstacle) { return obstacle.moves; }))
-{
-}
-
 void BlockStep::advance(Collisions& collisions, int substep)
 {
     add_forces(substep);
@@ -140,7 +133,6 @@ void BlockStep::drift_among_others(Collisions& collisions, std::span<const doubl
         if (!block.reaction.empty()) find_free_velocities(dt);
         collisions.advance(block.P, block.v, {block.a, dt, after_, block.damped});
         if (!block.reaction.empty()) add_reactions();
-        if (!surface_springs_.empty()) surface_springs_.limit_energy(block, shapes_move_);
     } else if (block.linear.data) {
         for (std::size_t i = 0; i < block.size(); ++i) {
             block.P[i] += block.damped[i].travel;

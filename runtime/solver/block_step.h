@@ -19,7 +19,7 @@ namespace rapid {
 // One object serves many blocks, one after the other, and keeps their arrays.
 class BlockStep {
 public:
-    explicit BlockStep(StepContext& context);
+    explicit BlockStep(StepContext& context) : context_(context) {}
 
     PointBlock block;
 
@@ -59,7 +59,6 @@ private:
     }
 
     StepContext& context_;
-    const bool shapes_move_;
     std::vector<double> half_, after_, time_;  // s
     std::vector<Vec3d> middle_, kick_;         // m, N
     std::vector<Vec3d> free_;                  // m/s

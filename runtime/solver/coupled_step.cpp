@@ -63,6 +63,7 @@ void CoupledStep::run()
                                   is_isolated(projection), now_.acceleration, options.h);
     if (sleep_) sleep_->close(now_, context_.P, context_.v, context_.time);
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { store(begin, end); });
+    if (!displaced_.empty()) add_displacements(projection);
     if (forces_) forces_->store(context_.points);
     if (spin_) spin_->store(context_.points);
     if (!sleep_) return;
@@ -353,6 +354,11 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
             collisions.begin(block.places);
             collisions.advance(block.P, block.v, {{&context_.scene.uniform.a, 0}, block.dt, block.dt, {}});
             deepest = std::max(deepest, collisions.round(block.P, block.rounded));
+            for (const auto& displacements : {collisions.displacements(), collisions.corrections()})
+                for (const Ejection::Displacement& one : displacements) {
+                    const std::scoped_lock lock(mutex_);
+                    if (!holds_still(first + one.i)) displaced_[first + one.i] = block.P[one.i];
+                }
             // Contacts found here do not count: the constraints have treated them.
             for (std::size_t i = 0; i < size; ++i) {
                 block.v[i] = v_[first + i];
@@ -365,6 +371,27 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
         step.store();
     }
     context_.count_penetration(deepest);
+}
+
+// What it takes to put points out of shapes that constraints have pushed them into, against forces and rows.
+void CoupledStep::add_displacements(const Projection& projection)
+{
+    std::vector<Vec3d> P(at_.size());
+    for (std::size_t i = 0; i < P.size(); ++i) P[i] = at_[i].P;
+    double by_forces = 0, by_acceleration = 0;
+    for (const auto& [i, place] : displaced_) {
+        P[i] = place;
+        if (!(inverse_mass_[i] > 0)) continue;
+        by_forces += potential_energy(now_, i, place) - potential_energy(now_, i, at_[i].P);
+        by_acceleration -= now_.acceleration.dot(place - at_[i].P) / inverse_mass_[i];
+    }
+    const double elastic = projection.elastic_energy(now_, P) - projection.elastic_energy(now_);
+    SolveResult& result = context_.result();
+    result.contact_energy.take(by_forces + elastic);
+    if (!result.ledger) return;
+    result.ledger->potential += by_acceleration;
+    result.ledger->elastic += elastic;
+    result.ledger->by.contacts += by_acceleration + elastic;
 }
 
 // Whether a constraint prescribes its position, or it has slept: no shape moves it from there.

@@ -2,6 +2,7 @@
 // block; then the constraints are projected (constraints/constraint.h).
 #pragma once
 
+#include <map>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -37,6 +38,7 @@ private:
     EnergyChanges changes(const Projection& projection);
     bool leaves_out(std::size_t i);
     void store(std::size_t begin, std::size_t end);
+    void add_displacements(const Projection& projection);
     Mobility mobility_of(const PointBlock& block, std::size_t k) const;
     FreePath free_path(const PointBlock& block, std::size_t k) const;
     Vec3d acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const;
@@ -67,6 +69,7 @@ private:
     std::optional<Sleep> sleep_;   // where points may sleep
     bool skips_sleepers_ = false;  // only uniform forces act: sleeping points are left out of the blocks
     std::mutex mutex_;
+    std::map<std::size_t, Vec3d> displaced_;  // where store() has put points that were inside of shapes
     std::vector<std::pair<std::size_t, EnergyChanges>> free_changes_;  // in free motion, by a point of the chunk
 };
 

@@ -93,24 +93,6 @@ void SurfaceSprings::move(PointBlock& block) const
     }
 }
 
-void SurfaceSprings::limit_energy(PointBlock& block, bool shapes_move)
-{
-    for (std::size_t m = 0; m < motions_.size(); ++m) at_[m] = block.P[indices_[m]];
-    query(at_);
-    for (std::size_t m = 0; m < motions_.size(); ++m) {
-        Vec3d &P = block.P[indices_[m]], &v = block.v[indices_[m]];
-        const SurfaceMotion& motion = motions_[m];
-        const double slope = gradient_[m].norm();
-        if ((P == motion.P && v == motion.v) || !(slope > 0)) continue;
-        double left = motion.energy_left(P, phi_[m] / slope);
-        if (left < 0) {
-            P = motion.P0;
-            left = motion.v0.squaredNorm();
-        }
-        if (!shapes_move && v.squaredNorm() > left) v *= std::sqrt(left / v.squaredNorm());
-    }
-}
-
 // What follows a contact has the mean acceleration of the step.
 void SurfaceSprings::bend(std::span<Damped> paths) const
 {
@@ -127,6 +109,7 @@ void SurfaceSprings::bend(std::span<Damped> paths) const
         path.v = motion.v;
         path.path_v = motion.path_v();
         path.path_a = (path.travel - t * path.path_v) * (2 / (t * t));
+        path.pull.surface = springs_[indices_[m]];
     }
 }
 

@@ -32,10 +32,6 @@ public:
     void move(PointBlock& block) const;
     // Has the damped paths of these points end there.
     void bend(std::span<Damped> paths) const;
-    // Where contacts have kept points from there: takes the energy off that a stiff spring would give them. A place
-    // that the energy does not reach is not taken: the point waits where the step began. Shapes that move may add
-    // velocity.
-    void limit_energy(PointBlock& block, bool shapes_move);
 
 private:
     void query(std::span<const Vec3d> at);

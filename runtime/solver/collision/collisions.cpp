@@ -40,15 +40,16 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
 
 // Between contacts the mean acceleration stands for springs: where these turn a point several times in the sub-step it
 // may come out with any energy. It keeps what it had, and what displacements have given it; a place that this does not
-// reach is not taken, and the point waits where the sub-step began.
+// reach is not taken, and the point waits where the sub-step began. Shapes that move may give it velocity, and push it
+// against springs to places.
 void Collisions::limit_energy(std::size_t displaced)
 {
     constexpr double rounding = 1e-12;
-    if (std::any_of(block_.obstacles.begin(), block_.obstacles.end(), [](const Obstacle& o) { return o.moves; }))
-        return;
+    const bool any_moves =
+        std::any_of(block_.obstacles.begin(), block_.obstacles.end(), [](const Obstacle& o) { return o.moves; });
     const auto moved = ejection_.displacements().subspan(displaced);
     for (const std::uint32_t i : touched_.list()) {
-        if (stuck_.has(i) || !motion_.is_drawn(i)) continue;
+        if (stuck_.has(i) || !(any_moves ? motion_.is_drawn_to_surface(i) : motion_.is_drawn(i))) continue;
         Vec3d &P = block_.P[i], &v = block_.v[i], by = Vec3d::Zero();
         for (const Ejection::Displacement& one : moved)
             if (one.i == i) by += one.by;
@@ -56,11 +57,12 @@ void Collisions::limit_energy(std::size_t displaced)
         const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from), potential = motion_.potential(i, P);
         double kinetic = energy - potential;
         if (kinetic < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
-            P = from, v = v0;
+            P = from;
+            if (!any_moves) v = v0;
             continue;
         }
         kinetic = std::max(0.0, kinetic);
-        if (0.5 * v.squaredNorm() > kinetic) v *= std::sqrt(2 * kinetic / v.squaredNorm());
+        if (!any_moves && 0.5 * v.squaredNorm() > kinetic) v *= std::sqrt(2 * kinetic / v.squaredNorm());
     }
 }
 
@@ -112,6 +114,7 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
 {
     rounding_.snap(P, rounded);
     correction_.run(P, ejection_.lost());
+    audit_.add_final_corrections(P, correction_.displacements(), motion_);
     cast(std::span<const Vec3d>(P), rounded);
     rounding_.lift(rounded);
     return correction_.deepest(rounded);

@@ -1,6 +1,7 @@
 #include "runtime/solver/collision/contact_audit.h"
 
 #include <cmath>
+#include <map>
 
 namespace rapid {
 
@@ -37,7 +38,9 @@ void ContactAudit::add_displacements(std::span<const Ejection::Displacement> dis
 {
     for (const auto& [i, by] : displacements) {
         const double mass = block_.context.mass[block_.indices[i]];
-        if (!std::isinf(mass)) counts_.energy.take(mass * motion.potential(i, motion.initial_P(i) + by));
+        if (!std::isinf(mass))
+            counts_.energy.take(
+                mass * (motion.potential(i, motion.initial_P(i) + by) - motion.potential(i, motion.initial_P(i))));
     }
 }
 
@@ -48,6 +51,21 @@ void ContactAudit::add_corrections(std::span<const Vec3d> P, std::span<const Vec
         if (std::isinf(mass) || (P[i] == block_.P[i] && v[i] == block_.v[i])) continue;
         const double kinetic = 0.5 * (block_.v[i] - v[i]).dot(block_.v[i] + v[i]);
         counts_.energy.take(mass * (kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i])));
+    }
+}
+
+void ContactAudit::add_final_corrections(std::span<const Vec3d> P,
+                                         std::span<const Ejection::Displacement> displacements,
+                                         const FreeMotion& motion)
+{
+    std::map<std::uint32_t, Vec3d> by_point;
+    for (const auto& [i, by] : displacements) by_point.try_emplace(i, Vec3d::Zero()).first->second += by;
+    for (const auto& [i, by] : by_point) {
+        const double mass = block_.context.mass[block_.indices[i]];
+        if (std::isinf(mass)) continue;
+        const double work = motion.is_damped() ? motion.potential(i, P[i]) - motion.potential(i, P[i] - by)
+                                               : -motion.acceleration(i).dot(by);
+        counts_.energy.take(mass * work);
     }
 }
 

@@ -32,6 +32,9 @@ public:
     // Under linear forces: the work of displacements alone, and of corrections after the sub-step from P and v.
     void add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion);
     void add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion);
+    // The work of displacements that have led to P at the end of the frame.
+    void add_final_corrections(std::span<const Vec3d> P, std::span<const Ejection::Displacement> displacements,
+                               const FreeMotion& motion);
 
     const ContactCounts& counts() const { return counts_; }
 

@@ -8,6 +8,7 @@
 #include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/motion/damped_motion.h"
 #include "runtime/solver/motion/free_paths.h"
+#include "runtime/solver/surface_potential.h"
 
 namespace rapid {
 
@@ -28,13 +29,16 @@ public:
 
     // m/s², without the forces of surfaces; under damping the mean of what is left of the sub-step.
     const Vec3d& acceleration(std::size_t i) const { return a_[i]; }
-    // Whether a spring to a place draws a damped point.
-    bool is_drawn(std::size_t i) const { return damped_[i].w2 > 0; }
-    // J/kg, of a damped point: the potential energy of what draws it, at P and where its path begins.
+    // Whether a spring draws a damped point; whether it does to a surface.
+    bool is_drawn(std::size_t i) const { return damped_[i].pull.w2 > 0 || is_drawn_to_surface(i); }
+    bool is_drawn_to_surface(std::size_t i) const { return damped_[i].pull.surface.w2 > 0; }
+    // J/kg, of a damped point at P: the potential energy of what draws it, but for a constant.
     double potential(std::size_t i, const Vec3d& P) const
     {
+        const Damped::Pull& pull = damped_[i].pull;
         const Vec3d d = P - initial_P(i);
-        return 0.5 * damped_[i].w2 * d.squaredNorm() - damped_[i].G.dot(d);
+        const double surface = pull.surface.w2 > 0 ? potential_energy(pull.surface, P) : 0;
+        return 0.5 * pull.w2 * d.squaredNorm() - pull.G.dot(d) + surface;
     }
     // Sets that mean, from the velocity of the point now.
     void update_acceleration(std::size_t i, double left)

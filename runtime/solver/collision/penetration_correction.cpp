@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/solver/collision/ejection.h"
-
 namespace rapid {
 namespace {
 
@@ -42,6 +40,7 @@ void PenetrationCorrection::run(std::span<Vec3d> P, const std::vector<std::uint3
                                        [](const Obstacle& obstacle) { return obstacle.moves; });
     inside_ = any_moves ? touched_.list() : lost;
     if (!any_moves) sort_unique(inside_);
+    displacements_.clear();
     for (int tries = 0; !inside_.empty() && tries < max_ejections; ++tries) {
         still_inside_.clear();
         for (const Obstacle& obstacle : block_.obstacles)
@@ -66,10 +65,12 @@ void PenetrationCorrection::move_out(const Obstacle& obstacle, std::span<Vec3d> 
         const double radius = block_.radius(obstacle, i);
         const double f = query_.phi[j] - radius, slope2 = query_.gradient[j].squaredNorm();
         if (f >= -obstacle.contact_tolerance(P[i], radius)) continue;
+        const Vec3d before = P[i];
         if (slope2 > 0 && !to_free_place)
             P[i] -= f / slope2 * query_.gradient[j];
         else
             P[i] = free_place(obstacle, P[i], radius);
+        displacements_.push_back({i, P[i] - before});
         still_inside_.push_back(i);
     }
 }

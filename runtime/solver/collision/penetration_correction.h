@@ -12,6 +12,7 @@
 #include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/collision/contact_audit.h"
 #include "runtime/solver/collision/distance_query.h"
+#include "runtime/solver/collision/ejection.h"
 #include "runtime/solver/collision/touched_points.h"
 
 namespace rapid {
@@ -25,6 +26,8 @@ public:
 
     // P at the end of the frame. lost: points that found no way out of a shape in their sub-steps.
     void run(std::span<Vec3d> P, const std::vector<std::uint32_t>& lost);
+    // What it has done, in order.
+    std::span<const Ejection::Displacement> displacements() const { return displacements_; }
 
     // The deepest that a touched point is in an obstacle, m, given the rounded positions.
     double deepest(std::span<const Vec3f> P);
@@ -36,6 +39,7 @@ private:
     const TouchedPoints& touched_;
     ContactAudit& audit_;
     std::vector<std::uint32_t> inside_, still_inside_;
+    std::vector<Ejection::Displacement> displacements_;
     DistanceQuery query_;
 };
 

@@ -161,10 +161,10 @@ void Projection::advance_linked(Substep& step)
     changes_.rods += change.added - change.lost + credited() - driven;
 }
 
-double Projection::elastic_energy(const Substep& step) const
+double Projection::elastic_energy(const Substep& step, std::span<const Vec3d> at) const
 {
     std::vector<double> stored(step.size());
-    add_stored(step, {}, 1, stored);
+    add_stored(step, at, 1, stored);
     return std::accumulate(stored.begin(), stored.end(), 0.0);
 }
 

@@ -37,8 +37,8 @@ public:
     const ContactEnergy& energy() const { return energy_; }
     // J: by rods and springs; by all that follows them; by what pins move.
     const EnergyChanges& changes() const { return changes_; }
-    // J, in rows, where points are now.
-    double elastic_energy(const Substep& step) const;
+    // J, in rows, where points are now, or at these places.
+    double elastic_energy(const Substep& step, std::span<const Vec3d> at = {}) const;
     bool keeps_momentum() const;
 
 private:

@@ -142,6 +142,7 @@ Damped Damped::from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear
     damped.c = linear.c;
     damped.w2 = linear.w2;
     damped.G = acceleration_at_rest(P, a, linear);
+    damped.pull = {damped.G, linear.w2, {}};
     const auto [r, rate] = rapid::respond(v, damped.G, linear, t, respond);
     damped.k = rate;
     damped.linear_k = linear.k;

@@ -72,6 +72,15 @@ struct Damped {
     // The parabola that stands for the path, with the same end, and which never overshoots it.
     Vec3d path_v, path_a;
 
+    // What draws the point: G and w2, and the spring to a surface beside them (surface_springs.h), for whose bent path
+    // G is a mean and w2 is 0.
+    struct Pull {
+        Vec3d G;
+        double w2;
+        SurfaceSpring surface;
+    };
+    Pull pull;
+
     static Damped from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t,
                        Responder& respond);
 

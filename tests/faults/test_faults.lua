@@ -1,11 +1,11 @@
 -- Faults of the system in a small run: a disk that is full or breaks, short counts. Whatever fails, the run ends with a
 -- documented status and says what was wrong, and every file that is there is whole.
 --
---   RAPID_FAULTS=10000 rapid test tests/faults      as many faults (300)
+--   RAPID_FAULTS=10000 rapid test tests/faults      as many faults (1,000)
 local command = require "testing.command"
 local lehmer = require "tests.lehmer"
 
-local faults = tonumber(os.getenv "RAPID_FAULTS" or 300)
+local faults = tonumber(os.getenv "RAPID_FAULTS" or 1000)
 
 local scene = [[
 local rapid = require "rapid"

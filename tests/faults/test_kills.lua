@@ -1,9 +1,9 @@
 -- Runs that are killed at any moment, alone and beside others: whole files stay, and no others.
 --
---   RAPID_KILLS=1000 rapid test tests/faults/test_kills.lua      as many kills (40)
+--   RAPID_KILLS=1000 rapid test tests/faults/test_kills.lua      as many kills (100)
 local command = require "testing.command"
 
-local kills = tonumber(os.getenv "RAPID_KILLS" or 40)
+local kills = tonumber(os.getenv "RAPID_KILLS" or 100)
 
 local scene = [[
 local rapid = require "rapid"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "runtime/solver/timed_force.h"
+
 namespace rapid {
 namespace {
 
@@ -44,7 +46,7 @@ void BlockStep::add_forces(int substep)
     const StepScene& scene = context_.scene;
     block.a = {&scene.uniform.a, 0};
     block.linear = {scene.uniform.linear.is_zero() ? nullptr : &scene.uniform.linear, 0};
-    if (scene.is_uniform()) return;
+    if (scene.is_uniform() || add_uniform_forces(substep)) return;
     const std::size_t size = block.size();
     block.own_a.assign(size, scene.uniform.a);
     block.a = {block.own_a.data(), 1};
@@ -67,6 +69,27 @@ void BlockStep::add_forces(int substep)
         if (one_.has_linear()) add_linear(local);
         if (one_.has_surface_springs()) add_surface_springs(local);
     }
+}
+
+// Forces that change within the frame, where none of them differs from point to point: one sum for all, at half
+// the time. False where there is another force.
+bool BlockStep::add_uniform_forces(int substep)
+{
+    const StepScene& scene = context_.scene;
+    if (scene.force || context_.time.own.data) return false;
+    const double dt = context_.options.h / block.substeps;
+    const double time = context_.options.time - dt * (block.substeps - substep - 0.5);
+    uniform_ = scene.uniform;
+    for (const StepForce& local : scene.forces) {
+        std::optional<Uniform> uniform = local.uniform;
+        if (const auto* timed = dynamic_cast<const TimedForce*>(local.force)) uniform = timed->uniform_at(time);
+        if (!local.all || !uniform || !uniform->a.allFinite()) return false;
+        uniform_.a += uniform->a;
+        uniform_.linear.add(uniform->linear);
+    }
+    block.a = {&uniform_.a, 0};
+    block.linear = {uniform_.linear.is_zero() ? nullptr : &uniform_.linear, 0};
+    return true;
 }
 
 void BlockStep::add_force_attribute()

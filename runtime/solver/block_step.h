@@ -41,6 +41,7 @@ public:
 
 private:
     void add_forces(int substep);
+    bool add_uniform_forces(int substep);
     void add_force_attribute();
     void add_accelerations(const StepForce& local);
     void add_linear(const StepForce& local);
@@ -64,6 +65,7 @@ private:
     std::vector<Vec3d> free_;                  // m/s
     std::vector<std::uint8_t> dead_before_;    // the actions, where deaths are logged
     Forces one_;                               // of one Force
+    Uniform uniform_;                          // the sum of all, where they are uniform in the sub-step
     SurfaceSprings surface_springs_;
 };
 

@@ -64,6 +64,13 @@ void TimedForce::contribute(std::size_t k, const Chunk& chunk, Forces& forces) c
     if (!less_.isZero(0)) forces.add_uniform(-less_);
 }
 
+std::optional<Uniform> TimedForce::uniform_at(double time) const
+{
+    std::optional<Uniform> uniform = forces_[nearest(time)]->uniform();
+    if (uniform) uniform->a -= less_;
+    return uniform;
+}
+
 std::size_t TimedForce::nearest(double time) const
 {
     const auto last = static_cast<double>(forces_.size() - 1);

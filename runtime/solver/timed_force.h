@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,9 @@ public:
 
     void contribute(const Chunk& chunk, Forces& forces) const override;
     bool add_potential(const Chunk&, std::span<double>) const override { return false; }
+
+    // The whole of it at a time, s; nothing where it differs from point to point.
+    std::optional<Uniform> uniform_at(double time) const;
 
 private:
     std::size_t nearest(double time) const;

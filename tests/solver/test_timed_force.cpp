@@ -23,6 +23,21 @@ private:
     double x_;
 };
 
+class Wind : public Force {
+public:
+    explicit Wind(double x) : x_(x) {}
+    void contribute(const Chunk&, Forces&) const override {}
+    std::optional<Uniform> uniform() const override
+    {
+        Uniform wind{Vec3d(x_, 0, 0)};
+        wind.linear.k = x_;
+        return wind;
+    }
+
+private:
+    double x_;
+};
+
 std::vector<std::shared_ptr<const Force>> numbers(int count)
 {
     std::vector<std::shared_ptr<const Force>> list;
@@ -65,6 +80,16 @@ TEST_CASE("a force that changes in time has no potential", "[timed_force]")
     std::vector<double> energy(1, 0);
     CHECK(!force.add_potential({points, 0, P, P, one, one, 0}, energy));
     CHECK(!force.uniform());
+    CHECK(!force.uniform_at(0.5));
+}
+
+TEST_CASE("a force that is the same for all points at a time is told as such", "[timed_force]")
+{
+    std::vector<std::shared_ptr<const Force>> winds;
+    for (int k = 0; k < 3; ++k) winds.push_back(std::make_shared<Wind>(k));
+    const TimedForce force(winds, 0, 1, Vec3d(0, 5, 0));
+    CHECK(force.uniform_at(0.4)->a == Vec3d(1, -5, 0));
+    CHECK(force.uniform_at(0.9)->linear.k == 2);
 }
 
 }  // namespace rapid

@@ -607,6 +607,8 @@ function Node:clump(params) end
 ---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale, where that is 0 the radius of contact, else 0 [number, m, at least 0, takes rapid.attr]
 ---@field method? "continuous"|"backtrack"|"project"|fun(frame: rapid.Frame): "continuous"|"backtrack"|"project"  on the path, at the time of impact; or after the step, by going back or out along the gradient [string, one of continuous, backtrack, project, default "continuous"]
 ---@field response? "bounce"|"slide"|"stick"|"die"|fun(frame: rapid.Frame): "bounce"|"slide"|"stick"|"die"  slide: without bounce; stick: held by the shape; die: killed [string, one of bounce, slide, stick, die, default "bounce"]
+---@field adhesion? number|rapid.Attribute|fun(frame: rapid.Frame): number  what it takes to tear a point off that sticks or slides; where not given, no pull is enough for one that sticks, and any for one that slides [number, m/s², at least 0, takes rapid.attr]
+---@field viscosity? number|rapid.Attribute|fun(frame: rapid.Frame): number  at which the surface slows what slides on it [number, 1/s, at least 0, default 0, takes rapid.attr]
 ---@field record? number|boolean|fun(frame: rapid.Frame): number|boolean  writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, hittime, hitimpulse, hitpath [false or number, m/s, at least 0, default false]
 ---@field name? string  what the node is called in messages [string]
 

@@ -242,8 +242,9 @@ std::vector<Uses> Evaluator::declared_for(std::size_t node) const
 {
     std::vector<Uses> declared = {uses_of(plan_.nodes[node])};
     if (plan_.nodes[node].node->type->kind != NodeKind::Solve) return declared;
-    // The plan lets Solve read ages where a life may end; how long a point has been still is Solve's own.
-    declared.emplace_back().takes = {"age", "still"};
+    // The plan lets Solve read ages where a life may end; how long a point has been still, and what holds it, are
+    // Solve's own.
+    declared.emplace_back().takes = {"age", "still", "stuckP", "stuckat", "stuckface", "stuckto"};
     // Its record of the step holds what emitters read of its points.
     for (const PlannedNode& planned : plan_.nodes)
         for (const std::size_t source : planned.sources) {

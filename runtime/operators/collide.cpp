@@ -59,7 +59,8 @@ struct Collide {
     std::string method, response;
     LeastSpeed record;
     PerPoint<float> bounce, friction;
-    std::optional<PerPoint<float>> radius;
+    std::optional<PerPoint<float>> radius, adhesion;
+    PerPoint<float> viscosity;
     std::optional<FrameSet> cut;
     std::string group;
 
@@ -87,9 +88,31 @@ struct Collide {
             .param(&Collide::response, "response", "bounce", any_number(), "",
                    "slide: without bounce; stick: held by the shape; die: killed")
             .choices({"bounce", "slide", "stick", "die"})
+            .param(
+                &Collide::adhesion, "adhesion", Value(), or_infinity(at_least(0)), "m/s²",
+                "what it takes to tear a point off that sticks or slides; where not given, no pull is enough for one "
+                "that sticks, and any for one that slides")
+            .param(&Collide::viscosity, "viscosity", 0.0, at_least(0), "1/s",
+                   "at which the surface slows what slides on it")
             .param(&Collide::record, "record", false, at_least(0), "m/s",
                    "writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, "
                    "hittime, hitimpulse, hitpath");
+    }
+
+    void check() const
+    {
+        const bool holds = response == "stick" || response == "slide";
+        if (holds) return;
+        if (adhesion)
+            throw Error(
+                fmt::format("adhesion is for points that stick or slide, and response is \"{}\"; give response "
+                            "= \"stick\" or \"slide\"",
+                            response));
+        if (!viscosity.attribute.empty() || viscosity.constant > 0)
+            throw Error(
+                fmt::format("viscosity is for points that slide or stick, and response is \"{}\"; give "
+                            "response = \"slide\" or \"stick\"",
+                            response));
     }
 
     void uses(Uses& uses) const
@@ -110,6 +133,8 @@ struct Collide {
         collider->bounce = bounce;
         collider->friction = friction;
         collider->radius = radius;
+        collider->adhesion = adhesion;
+        collider->viscosity = viscosity;
         collider->method = method == "project"     ? Method::Project
                            : method == "backtrack" ? Method::Backtrack
                                                    : Method::Continuous;

@@ -13,6 +13,7 @@
 #include "runtime/operators/solve/collider_shapes.h"
 #include "runtime/operators/solve/step_recorder.h"
 #include "runtime/points/members.h"
+#include "runtime/solver/collision/stuck_columns.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/estimate/coupled_errors.h"
 #include "runtime/solver/estimate/energy_drift.h"
@@ -137,6 +138,7 @@ private:
         changing_.note_colliders(flow.dynamics);
         shapes_.prepare(flow.dynamics, flow.points, clock, tolerance ? 1 : substeps, now);
         if (is_coupled(flow) && !flow.points.has("still")) flow.points.add({"still", 0.0f});
+        if (StuckColumns::are_needed(flow.dynamics)) StuckColumns::add_to(flow.points);
         if (tolerance && is_coupled(flow))
             throw Error(
                 "a tolerance is for points that do not depend on one another, and there are constraints; give "
@@ -298,14 +300,15 @@ private:
                             beyond, *tolerance));
     }
 
-    // The state keeps how long points have been still; the output does not have that column. The copy shares the other
-    // columns, which are the state's alone as soon as the flow has been used.
+    // The state keeps how long points have been still and what holds them; the output does not have those columns. The
+    // copy shares the other columns, which are the state's alone as soon as the flow has been used.
     static void feed_back(Flow& flow)
     {
         flow.points.remove("dt");
         flow.dynamics.clear();
         flow.simulation->state = flow.points;
         flow.points.remove("still");
+        StuckColumns::remove_from(flow.points);
     }
 
     ColliderShapes shapes_;

@@ -108,6 +108,10 @@ public:
     std::optional<double> record;    // m/s: contacts at least as fast are written to the hit attributes
     PerPoint<float> bounce{0.5f};    // restitution ε in [0, 1]
     PerPoint<float> friction{0.0f};  // Coulomb μ >= 0
+    // Of what sticks or slides: m/s², what it takes to tear a point off, without end for what sticks where it is not
+    // given; 1/s, at which the surface slows what slides on it.
+    std::optional<PerPoint<float>> adhesion;
+    PerPoint<float> viscosity{0.0f};
     // Of the points; collision_radii.h where it is not given.
     std::optional<PerPoint<float>> radius;
 };

@@ -5,9 +5,18 @@
 #include "runtime/points/members.h"
 
 namespace rapid {
+namespace {
+
+PointSet& with_needed_columns(PointSet& points, const Dynamics& dynamics)
+{
+    if (StuckColumns::are_needed(dynamics)) StuckColumns::add_to(points);
+    return points;
+}
+
+}  // namespace
 
 StepContext::StepContext(PointSet& set, const Dynamics& dynamics, const SolveOptions& solve_options)
-    : points(set),
+    : points(with_needed_columns(set, dynamics)),
       options(solve_options),
       scene(set, dynamics, options.h),
       P(set.P().write()),
@@ -16,6 +25,7 @@ StepContext::StepContext(PointSet& set, const Dynamics& dynamics, const SolveOpt
       errors(set, options.frame)
 {
     if (scene.records) hits_.emplace(points, options.begins_frame);
+    if (StuckColumns::are_needed(dynamics)) stuck_.emplace(points);
     if (!options.group.empty()) members_ = members_of(points, options.group);
     time.h = options.h;
     if (points.has("dt")) time.own = points.column<float>("dt").read();
@@ -23,7 +33,15 @@ StepContext::StepContext(PointSet& set, const Dynamics& dynamics, const SolveOpt
 
 CollisionContext StepContext::collision_context()
 {
-    return {hits_ ? &*hits_ : nullptr, dead, options.met, scene.mass, options.time, options.h, options.log};
+    return {hits_ ? &*hits_ : nullptr,
+            dead,
+            options.met,
+            scene.mass,
+            options.time,
+            options.h,
+            options.log,
+            stuck_ ? &*stuck_ : nullptr,
+            scene.actions.empty() ? 1 : 2};
 }
 
 void StepContext::count(const Collisions& collisions, double deepest, std::size_t first)

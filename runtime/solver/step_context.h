@@ -53,6 +53,7 @@ public:
 private:
     Strided<std::uint8_t> members_{nullptr, 0};  // of options.group; null for all
     std::optional<Hits> hits_;
+    std::optional<StuckColumns> stuck_;
 
     std::mutex mutex_;
     SolveResult result_;

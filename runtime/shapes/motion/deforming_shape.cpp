@@ -5,6 +5,7 @@
 
 #include "runtime/shapes/contact_walk.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/motion/moving_body.h"
 #include "runtime/shapes/motion/moving_triangles.h"
 
 namespace rapid {
@@ -78,6 +79,31 @@ public:
         return faces_.velocity(faces_.nearest(P, t), t) / duration_;
     }
 
+    // Of a point that keeps to a face; and of one that slips along the nearest face at a constant rate of its edges.
+    MovingBody::State follow(const MaterialPoint& point, double time) const
+    {
+        const double t = part_of(time);
+        return {faces_.at(point.face, point.at, t), faces_.velocity(point.face, point.at, t) / duration_,
+                acceleration(point, t)};
+    }
+    Vec3d acceleration(const Vec3d& P, const Vec3d& v, double time) const
+    {
+        const double t = part_of(time);
+        const MaterialPoint point = material(P, time);
+        const Vec3d slip = v - faces_.velocity(point.face, point.at, t) / duration_;
+        return acceleration(point, t) + 2 / duration_ * faces_.turning(point.face, slip, t);
+    }
+    MaterialPoint material(const Vec3d& P, double time) const
+    {
+        const double t = part_of(time);
+        const std::int32_t face = faces_.nearest(P, t).triangle;
+        return {face, faces_.coordinates(face, P, t)};
+    }
+    bool has(const MaterialPoint& point) const
+    {
+        return point.face >= 0 && static_cast<std::size_t>(point.face) < faces_.triangles();
+    }
+
     const GridLevelSet& end() const { return *end_; }
     double band() const { return begin_ ? std::min(begin_->band(), end_->band()) : end_->band(); }
     double slope_bound() const
@@ -95,6 +121,15 @@ public:
     }
 
 private:
+    // By a difference of velocities, which are polynomials of second degree but for the turning normal.
+    Vec3d acceleration(const MaterialPoint& point, double t) const
+    {
+        constexpr double step = 0x1p-10;
+        const Vec3d change =
+            faces_.velocity(point.face, point.at, t + step) - faces_.velocity(point.face, point.at, t - step);
+        return change / (2 * step * duration_ * duration_);
+    }
+
     double part_of(double time) const { return std::clamp(time / duration_, 0.0, 1.0); }
 
     // The level set at one end of the interval, at the position that P has then in the frame of its nearest face.
@@ -210,7 +245,7 @@ struct DeformingField {
     bool open_ended() const { return false; }
 };
 
-class DeformingShape final : public Shape {
+class DeformingShape final : public MovingBody {
 public:
     explicit DeformingShape(DeformingDistance body) : body_(std::move(body)), bounds_(body_.bounds()) {}
 
@@ -238,6 +273,13 @@ public:
     }
 
     Vec3d velocity_at(const Vec3d& P, double time) const override { return body_.velocity(P, time); }
+    Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const override
+    {
+        return body_.acceleration(P, v, time);
+    }
+    MaterialPoint material_at(const Vec3d& P, double time) const override { return body_.material(P, time); }
+    bool has(const MaterialPoint& point) const override { return body_.has(point); }
+    State follow(const MaterialPoint& point, double time) const override { return body_.follow(point, time); }
 
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {

@@ -6,6 +6,7 @@
 
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/motion/moving_body.h"
 #include "runtime/shapes/motion/rigid_contacts.h"
 
 namespace rapid {
@@ -13,7 +14,7 @@ namespace {
 
 using Piece = MotionTrack::Piece;
 
-class MovingShape final : public RigidBody {
+class MovingShape final : public MovingBody {
 public:
     MovingShape(ShapePtr rest, MotionTrack track) : rest_(std::move(rest)), track_(std::move(track))
     {
@@ -61,6 +62,17 @@ public:
         return piece.a + piece.spin.cross(turned) + 2 * growth * turned + 2 * (piece.spin.cross(slip) + growth * slip);
     }
 
+    MaterialPoint material_at(const Vec3d& P, double time) const override
+    {
+        return {MaterialPoint::rigid, track_.at(time).inverse() * P};
+    }
+    bool has(const MaterialPoint& point) const override { return point.face == MaterialPoint::rigid; }
+    State follow(const MaterialPoint& point, double time) const override
+    {
+        const Vec3d P = track_.at(time) * point.at, v = velocity_at(P, time);
+        return {P, v, acceleration_at(P, v, time) + euler_acceleration(P, time)};
+    }
+
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {
         std::fill(contacts.begin(), contacts.end(), Contact());
@@ -87,6 +99,21 @@ public:
     MeshPtr surface() const override { return placed(rest_.shape, track_.at(track_.duration()))->surface(); }
 
 private:
+    // What a spin that changes adds to the acceleration of a body's point: the pieces of the track turn at a constant
+    // rate each, and the rate at a moment is interpolated between their middles.
+    Vec3d euler_acceleration(const Vec3d& P, double time) const
+    {
+        const std::span<const Piece> pieces = track_.pieces();
+        const Piece& piece = track_.piece_at(time);
+        const auto k = static_cast<std::size_t>(&piece - pieces.data());
+        const Piece &before = pieces[k > 0 ? k - 1 : k], &after = pieces[std::min(k + 1, pieces.size() - 1)];
+        const auto middle = [](const Piece& one) { return 0.5 * (one.begin + one.end); };
+        if (!(middle(after) > middle(before))) return Vec3d::Zero();
+        const Vec3d rate = (after.spin - before.spin) / (middle(after) - middle(before));
+        const Vec3d arm = P - piece.at(time).translation, spin = piece.spin + (time - middle(piece)) * rate;
+        return rate.cross(arm) + spin.cross(spin.cross(arm)) - piece.spin.cross(piece.spin.cross(arm));
+    }
+
     double least_scale() const
     {
         double least = track_.at(track_.duration()).scale;

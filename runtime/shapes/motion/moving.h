@@ -7,16 +7,9 @@
 
 namespace rapid {
 
-// A rigid body, which may also grow.
-class RigidBody : public Shape {
-public:
-    // The acceleration, m/s², of a point at P with velocity v (m/s) that moves uniformly in the frame of the body: any
-    // other acceleration presses it to the surface, or draws it off. time: s since the interval began.
-    virtual Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const = 0;
-};
-
-// Between two frames, whole or not; times (Path::begin, distance_at) are in seconds since `from`. distance() is that at
-// the end. On one thread, as the motion is evaluated here, ahead; the result may be queried from any.
+// A MovingBody, which may also grow, between two frames, whole or not; times (Path::begin, distance_at) are in seconds
+// since `from`. distance() is that at the end. On one thread, as the motion is evaluated here, ahead; the result may be
+// queried from any.
 //
 // Contacts are those of the path with the track of the motion (MotionTrack): to rounding, at any speed. Where the shape
 // only translates, the path is a parabola in its frame too, and the rest shape finds the contact; where it turns or

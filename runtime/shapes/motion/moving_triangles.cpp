@@ -163,6 +163,63 @@ Vec3d MovingTriangles::velocity(const Place& place, double t) const
     return a + place.b1 * (curves_[face[1]].derivative(t) - a) + place.b2 * (curves_[face[2]].derivative(t) - a);
 }
 
+std::array<Vec3d, 3> MovingTriangles::rates(std::int32_t triangle, double t) const
+{
+    const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(triangle)];
+    return {curves_[face[0]].derivative(t), curves_[face[1]].derivative(t), curves_[face[2]].derivative(t)};
+}
+
+namespace {
+
+// The weights x, y of x e1 + y e2, the part of d in the plane of both; zero where they span none.
+Eigen::Vector2d weights(const Vec3d& e1, const Vec3d& e2, const Vec3d& d)
+{
+    const double a = e1.squaredNorm(), b = e1.dot(e2), c = e2.squaredNorm(), area2 = a * c - b * b;
+    if (!(area2 > 0x1p-40 * a * c)) return Eigen::Vector2d::Zero();
+    const double u = d.dot(e1), w = d.dot(e2);
+    return {(c * u - b * w) / area2, (a * w - b * u) / area2};
+}
+
+}  // namespace
+
+Vec3d MovingTriangles::coordinates(std::int32_t triangle, const Vec3d& P, double t) const
+{
+    const std::array<Vec3d, 3> p = corners(triangle, t);
+    const Vec3d e1 = p[1] - p[0], e2 = p[2] - p[0], d = P - p[0], n = e1.cross(e2);
+    const Eigen::Vector2d w = weights(e1, e2, d);
+    const double size = n.norm();
+    return {w.x(), w.y(), size > 0 ? d.dot(n) / size : 0};
+}
+
+Vec3d MovingTriangles::at(std::int32_t triangle, const Vec3d& coordinates, double t) const
+{
+    const std::array<Vec3d, 3> p = corners(triangle, t);
+    const Vec3d e1 = p[1] - p[0], e2 = p[2] - p[0], n = e1.cross(e2);
+    const double size = n.norm();
+    Vec3d P = p[0] + coordinates.x() * e1 + coordinates.y() * e2;
+    if (size > 0) P += coordinates.z() / size * n;
+    return P;
+}
+
+// With m = e1 x e2 and n = m/|m|:  n' = (m' - n (n·m')) / |m|.
+Vec3d MovingTriangles::velocity(std::int32_t triangle, const Vec3d& coordinates, double t) const
+{
+    const std::array<Vec3d, 3> p = corners(triangle, t), v = rates(triangle, t);
+    const Vec3d e1 = p[1] - p[0], e2 = p[2] - p[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
+    const Vec3d m = e1.cross(e2), rate = v1.cross(e2) + e1.cross(v2);
+    const double size = m.norm();
+    Vec3d velocity = v[0] + coordinates.x() * v1 + coordinates.y() * v2;
+    if (size > 0) velocity += coordinates.z() / size * (rate - m.dot(rate) / (size * size) * m);
+    return velocity;
+}
+
+Vec3d MovingTriangles::turning(std::int32_t triangle, const Vec3d& slip, double t) const
+{
+    const std::array<Vec3d, 3> p = corners(triangle, t), v = rates(triangle, t);
+    const Eigen::Vector2d w = weights(p[1] - p[0], p[2] - p[0], slip);
+    return w.x() * (v[1] - v[0]) + w.y() * (v[2] - v[0]);
+}
+
 Eigen::Matrix3d MovingTriangles::frame(std::int32_t triangle, double t) const
 {
     const std::array<Vec3d, 3> corner = corners(triangle, t);

@@ -47,6 +47,15 @@ public:
 
     Vec3d at(const Place& place, double t) const;
     Vec3d velocity(const Place& place, double t) const;  // m an interval
+
+    // A place that keeps to a triangle: (x, y, z) is p0 + x (p1 - p0) + y (p2 - p0) + z n.
+    Vec3d coordinates(std::int32_t triangle, const Vec3d& P, double t) const;
+    Vec3d at(std::int32_t triangle, const Vec3d& coordinates, double t) const;
+    Vec3d velocity(std::int32_t triangle, const Vec3d& coordinates, double t) const;  // m an interval
+    // Of a slip along the triangle, a vector in its plane in m a unit of time, by its edges: what these turn it by.
+    Vec3d turning(std::int32_t triangle, const Vec3d& slip, double t) const;
+    std::size_t triangles() const { return tree_->triangles.size(); }
+
     // Unit tangents and the outward normal, as columns; zero where the triangle has no area.
     Eigen::Matrix3d frame(std::int32_t triangle, double t) const;
 
@@ -61,6 +70,7 @@ private:
         double squared_distance(const Vec3d& P, double t) const;
     };
     std::array<Vec3d, 3> corners(std::int32_t triangle, double t) const;
+    std::array<Vec3d, 3> rates(std::int32_t triangle, double t) const;
     void test(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const;
 
     std::shared_ptr<const TriangleTree> tree_;

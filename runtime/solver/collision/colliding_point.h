@@ -48,8 +48,9 @@ struct CollidingPoint {
     // The next path.
     Path path{Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), 0, 0};
     PathKind kind = Free;
-    bool stops = false;  // at the end of the path, on the surface
-    PieceEnd end;        // of a curved path
+    bool stops = false;                                 // at the end of the path, on the surface
+    PieceEnd end;                                       // of a curved path
+    Vec3d slip = Vec3d::Zero(), drive = Vec3d::Zero();  // of one that viscosity slows: velocity and acceleration
 
     void begin(std::uint32_t point, double dt)
     {

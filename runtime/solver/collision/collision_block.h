@@ -6,19 +6,22 @@
 
 #include "runtime/solver/collision/hits.h"
 #include "runtime/solver/collision/obstacle.h"
+#include "runtime/solver/collision/stuck_columns.h"
 #include "runtime/solver/step_log.h"
 
 namespace rapid {
 
 // What contacts read and write of the whole set, and the frame that they happen in.
 struct CollisionContext {
-    Hits* hits = nullptr;          // null where no collider records
-    std::span<std::uint8_t> dead;  // set to 1 by a collider that kills; empty where none does
-    std::uint8_t* met = nullptr;   // set to 1 by every contact; null where nobody asks
-    Strided<float> mass;           // kg
-    double time = 0;               // s since the start, at the end of the frame
-    double h = 0;                  // s, the frame's length
-    StepLog* log = nullptr;        // of all contacts and deaths; null where nobody asks
+    Hits* hits = nullptr;           // null where no collider records
+    std::span<std::uint8_t> dead;   // set to 1 by a collider that kills; empty where none does
+    std::uint8_t* met = nullptr;    // set to 1 by every contact; null where nobody asks
+    Strided<float> mass;            // kg
+    double time = 0;                // s since the start, at the end of the frame
+    double h = 0;                   // s, the frame's length
+    StepLog* log = nullptr;         // of all contacts and deaths; null where nobody asks
+    StuckColumns* stuck = nullptr;  // null where no collider holds points
+    int drifts = 1;                 // a sub-step
 
     // A collider kills a point. time: s since the start.
     void kill(std::size_t point, double at) const

@@ -30,6 +30,7 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     stuck_.advance();
     move_along_free_paths();
     rounds_.run();
+    stuck_.finish(contacts_.found());
     if (motion_.is_damped()) limit_energy(displaced);
     if (discrete_.is_used()) correct();
     if (motion_.is_damped())
@@ -86,6 +87,10 @@ void Collisions::move_along_free_paths()
     // All go to the ends of their free paths. Those that are stuck, or meet something, come back from there.
     motion_.go_to_ends();
     for (const std::uint32_t i : stuck_.list()) motion_.go_back(i);
+    for (const StuckPoints::Loose& loose : stuck_.loose()) {
+        motion_.go_back(loose.i);
+        rounds_.resume(loose.i, loose.left, loose.on);
+    }
     for (const std::uint32_t i : contacts_.found()) {
         motion_.go_back(i);
         touched_.add(i);
@@ -96,9 +101,9 @@ void Collisions::move_along_free_paths()
 void Collisions::find_first_contacts(std::size_t o)
 {
     const Obstacle& obstacle = block_.obstacles[o];
-    const bool is_plane = obstacle.plane && !motion_.is_damped();
+    const bool is_plane = obstacle.plane && !motion_.is_damped() && !obstacle.clings();
     for (const std::uint32_t i : broad_phase_.points_near(o)) {
-        if (!block_.has_member(obstacle, i) || stuck_.has(i)) continue;
+        if (!block_.has_member(obstacle, i) || stuck_.takes(i)) continue;
         if (is_plane && broad_phase_.obstacles_near(i) == 1) {
             planes_.add(i, o);
         } else {
@@ -117,6 +122,7 @@ double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)
     audit_.add_final_corrections(P, correction_.displacements(), motion_);
     cast(std::span<const Vec3d>(P), rounded);
     rounding_.lift(rounded);
+    stuck_.keep(rounded);
     return correction_.deepest(rounded);
 }
 

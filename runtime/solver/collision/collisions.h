@@ -68,10 +68,10 @@ private:
     TouchedPoints touched_{block_};
     ContactAudit audit_{block_};
     Ejection ejection_{block_};
-    StuckPoints stuck_{block_, touched_};
+    StuckPoints stuck_{block_, motion_, touched_};
     BroadPhase broad_phase_{block_};
     FirstContacts contacts_{block_};
-    ContactResolver resolver_{block_, motion_, ejection_, audit_};
+    ContactResolver resolver_{block_, motion_, ejection_, stuck_, audit_};
     PlaneContacts planes_{block_, motion_, broad_phase_, contacts_, touched_, audit_};
     ContactRounds rounds_{block_, motion_, contacts_, resolver_, touched_, audit_};
     DiscreteMethods discrete_{block_, motion_, stuck_, touched_, audit_};

@@ -28,7 +28,7 @@ void ContactResolver::resolve(CollidingPoint& point, const Arrival& arrival, con
         audit_.add_limited();
         point.left = 0;
     }
-    if (response == Response::Stick || response == Response::Die)
+    if ((response == Response::Stick && !stuck_.is_torn(point.i, o)) || response == Response::Die)
         capture(point, contact, o);
     else if (contact.depth > 0)
         ejection_.eject(point, contact, o, arrival.a);
@@ -75,7 +75,7 @@ void ContactResolver::capture(CollidingPoint& point, const Contact& contact, int
     if (obstacle.response == Response::Die)
         block_.context.kill(block_.indices[i], when);
     else
-        block_.P[i] += point.left * contact.vc;
+        stuck_.hold(i, o, point.left);
     point.left = 0;
     point.supports = 1;
     point.on[0] = {o, contact.n, contact.vc, contact.curvature, 0, contact.flat, obstacle.feature};
@@ -103,8 +103,17 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
     const bool hits = vn < 0 && vn * vn > rising2;
     const double when = block_.time(i, point.left);
 
-    const Support support{o, n, contact.vc, contact.curvature, friction, contact.flat, obstacle.feature, ac};
-    if (g < 0 && vn >= -tangential * relative.norm())
+    const Support support{o,
+                          n,
+                          contact.vc,
+                          contact.curvature,
+                          friction,
+                          contact.flat,
+                          obstacle.feature,
+                          ac,
+                          obstacle.viscosity[block_.indices[i]],
+                          obstacle.adhesion_to_sliding(block_.indices[i])};
+    if (g < -support.adhesion && vn >= -tangential * relative.norm())
         part(point, arrival, contact, vn);
     else if (vn >= 0 || u * u <= rising2 || 2 * u <= g * (1 - epsilon) * point.left)
         rest(point, support, contact_response(v, contact.vc, n, 0, friction));

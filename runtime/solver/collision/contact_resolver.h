@@ -16,8 +16,9 @@ public:
         Vec3d P, v, a;
     };
 
-    ContactResolver(const CollisionBlock& block, const FreeMotion& motion, Ejection& ejection, ContactAudit& audit)
-        : block_(block), motion_(motion), ejection_(ejection), audit_(audit)
+    ContactResolver(const CollisionBlock& block, const FreeMotion& motion, Ejection& ejection, StuckPoints& stuck,
+                    ContactAudit& audit)
+        : block_(block), motion_(motion), ejection_(ejection), stuck_(stuck), audit_(audit)
     {
     }
 
@@ -38,6 +39,7 @@ private:
     const CollisionBlock& block_;
     const FreeMotion& motion_;
     Ejection& ejection_;
+    StuckPoints& stuck_;
     ContactAudit& audit_;
 };
 

@@ -16,6 +16,17 @@ void ContactRounds::start(std::uint32_t i)
     if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
 }
 
+void ContactRounds::resume(std::uint32_t i, double left, const std::optional<Support>& on)
+{
+    const std::size_t slot = started_++;
+    if (slot == points_.size()) points_.emplace_back();
+    CollidingPoint& point = points_[slot];
+    point.begin(i, block_.dt[i]);
+    point.left = left;
+    if (on) point.on[0] = *on, point.supports = 1;
+    if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
+}
+
 void ContactRounds::run()
 {
     while (!going_.empty()) {

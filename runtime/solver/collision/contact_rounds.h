@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "runtime/solver/collision/colliding_point.h"
@@ -31,6 +32,8 @@ public:
 
     // Takes a point, which is at the beginning of its sub-step, to the first contact on its free path.
     void start(std::uint32_t i);
+    // A point goes on freely, or along what bears it, for what is `left` of its sub-step, s.
+    void resume(std::uint32_t i, double left, const std::optional<Support>& on);
     // Takes all points that were started to the end of the sub-step.
     void run();
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "runtime/shapes/first_contact.h"
+#include "runtime/solver/motion/damped_motion.h"
 
 namespace rapid {
 namespace {
@@ -54,6 +55,11 @@ void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<cons
         path.v -= on.vc + on.n.dot(path.v - on.vc) * on.n;  // along the surface, in its frame
         // Beyond its smallest feature the field may have anything: a wall across, or an edge.
         if (feature > 0) point.limit_path(time_to_travel(2 * feature, path.v.norm(), path.a.norm()));
+        point.slip = path.v, point.drive = path.a;
+        if (on.viscosity > 0) {
+            const Parabola slowed = relaxed(path.v, path.a, on.viscosity, path.duration);
+            path.v = slowed.v, path.a = slowed.a;
+        }
         query_.add(slot, path.at(path.duration), block_.frame_time(point.i, point.left));  // in the surface's frame
     }
 }
@@ -68,9 +74,12 @@ bool CurvedMotion::follow_arc(CollidingPoint& point, std::size_t j)
     const double length = d.norm(), slope = query_.gradient[j].norm();
     const Vec3d n1 = slope > 0 ? Vec3d(query_.gradient[j] / slope) : n;
     const double cosine = n.dot(n1), turn = length > 0 ? (n1 - n).dot(d) / length : 0;
-    const double curvature = length > 0 ? turn / length : 0;
+    double curvature = length > 0 ? turn / length : 0;
+    // What adheres is not flung off by creases that the field can't show.
+    if (on.adhesion > 0 && obstacle.feature > 0) curvature = std::min(curvature, 1 / obstacle.feature);
     const double shortest = shortest_piece(obstacle, path, block_.dt[point.i]);
-    const bool leaves = -(motion_.acceleration(point.i) - on.ac).dot(n) - curvature * path.v.squaredNorm() < 0;
+    const bool leaves =
+        -(motion_.acceleration(point.i) - on.ac).dot(n) - curvature * path.v.squaredNorm() < -on.adhesion;
     const bool kink = turn < -min_kink && -curvature * 2 * obstacle.feature > 1;
     if (path.duration > shortest && (cosine < min_cosine || leaves || kink || !(slope > 0)))
         return wait_for(point, shortest), false;
@@ -180,6 +189,12 @@ bool CurvedMotion::find_end_velocity(CollidingPoint& point) const
     }
     const Vec3d pull = a - on.ac;
     const Vec3d a1 = next.kind == Slide::Moves ? next.a : Vec3d(pull - pull.dot(end.n) * end.n);
+    if (on.viscosity > 0) {
+        const Propagator by = respond(on.viscosity, 0, s);
+        end.v = by.v_of_v * turned(point.slip) + 0.5 * by.v_of_G * (turned(point.drive) + a1);
+        end.v -= end.n.dot(end.v) * end.n;
+        return true;
+    }
     end.v = turned(path.v + 0.5 * s * path.a) + 0.5 * s * a1;
     end.v -= end.n.dot(end.v) * end.n;
     // The energy is known better than the velocity, whose direction that leaves: the work of the weight along the path,

@@ -59,10 +59,11 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
     const double vn = (v0 - vc).dot(n);
     const double bounce = obstacle.restitution(block_.indices[i]), friction = obstacle.friction[block_.indices[i]];
     bool backtracked = false;
-    if (obstacle.response == Response::Die || obstacle.response == Response::Stick) {
+    if (obstacle.response == Response::Die || (obstacle.sticks() && !stuck_.is_torn(i, o))) {
         v = vc;
         P = slope > 0 ? Vec3d(P0 + depth * n) : initial_P_[i];
         if (obstacle.response == Response::Die) block_.context.kill(block_.indices[i], block_.time(i, 0));
+        if (obstacle.sticks()) stuck_.hold(i, o, 0);
     } else if (!(slope > 0)) {
         P = initial_P_[i];
         v = contact_response(v0, vc, n, bounce, friction);

@@ -16,8 +16,8 @@ namespace rapid {
 
 class DiscreteMethods {
 public:
-    DiscreteMethods(const CollisionBlock& block, const FreeMotion& motion, const StuckPoints& stuck,
-                    TouchedPoints& touched, ContactAudit& audit)
+    DiscreteMethods(const CollisionBlock& block, const FreeMotion& motion, StuckPoints& stuck, TouchedPoints& touched,
+                    ContactAudit& audit)
         : block_(block), motion_(motion), stuck_(stuck), touched_(touched), audit_(audit)
     {
     }
@@ -45,7 +45,7 @@ private:
 
     const CollisionBlock& block_;
     const FreeMotion& motion_;
-    const StuckPoints& stuck_;
+    StuckPoints& stuck_;
     TouchedPoints& touched_;
     ContactAudit& audit_;
     bool is_used_ = false;

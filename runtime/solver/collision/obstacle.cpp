@@ -1,18 +1,40 @@
 #include "runtime/solver/collision/obstacle.h"
 
 #include <algorithm>
+#include <limits>
+#include <string_view>
 
 #include "runtime/points/members.h"
 #include "runtime/solver/collision/distance_query.h"
 
 namespace rapid {
+namespace {
+
+// FNV-1a, above 0.
+std::int32_t key_of(std::string_view node)
+{
+    std::uint32_t hash = 0x811c9dc5u;
+    for (const char c : node) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193u;
+    return static_cast<std::int32_t>(hash >> 1 | 1);
+}
+
+bool is_zero(const PerPoint<float>& parameter) { return parameter.attribute.empty() && parameter.constant == 0; }
+
+Strided<float> adhesion_of(const Collider& collider, const PointSet& points)
+{
+    static constexpr float none = 0, endless = std::numeric_limits<float>::infinity();
+    if (collider.adhesion) return collider.adhesion->read(points);
+    return {collider.response == Response::Stick ? &endless : &none, 0};
+}
+
+}  // namespace
 
 Obstacle::Obstacle(const Collider& collider, const PointSet& points, Strided<float> radius_of_points)
     : shape(collider.shape.get()),
       bounds(shape->bounds()),
       feature(shape->smallest_feature()),
       moves(shape->moves()),
-      body(dynamic_cast<const RigidBody*>(shape)),
+      body(dynamic_cast<const MovingBody*>(shape)),
       plane(shape->half_space()),
       method(collider.method),
       response(collider.response),
@@ -20,7 +42,12 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points, Strided<flo
       bounce(collider.bounce.read(points)),
       friction(collider.friction.read(points)),
       radius(radius_of_points),
-      members(members_of(points, collider.group))
+      adhesion(adhesion_of(collider, points)),
+      viscosity(collider.viscosity.read(points)),
+      key(key_of(collider.node)),
+      members(members_of(points, collider.group)),
+      adheres_(collider.adhesion && !is_zero(*collider.adhesion)),
+      flows_(!is_zero(collider.viscosity))
 {
 }
 

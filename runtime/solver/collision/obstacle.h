@@ -7,7 +7,7 @@
 
 #include "runtime/points/column.h"
 #include "runtime/shapes/first_contact.h"
-#include "runtime/shapes/motion/moving.h"
+#include "runtime/shapes/motion/moving_body.h"
 #include "runtime/shapes/shape.h"
 #include "runtime/solver/dynamics.h"
 
@@ -21,18 +21,25 @@ struct Obstacle {
     Box3d bounds;
     double feature;  // m, the shape's smallest
     bool moves;
-    const RigidBody* body;  // null where it does not move as one
+    const MovingBody* body;  // null where it is at rest
     std::optional<HalfSpace> plane;
     Method method;
     Response response;
     std::optional<double> record;  // m/s
-    Strided<float> bounce, friction, radius;
+    Strided<float> bounce, friction, radius, adhesion, viscosity;
+    std::int32_t key;               // of its node, above 0: points that it holds know it by this from frame to frame
     Strided<std::uint8_t> members;  // of its group; 1 for all where it has none
 
     bool is_continuous() const { return method == Method::Continuous; }
+    bool sticks() const { return response == Response::Stick; }
+    // Whether it may hold points that slide on it, or slow them.
+    bool clings() const { return response == Response::Slide && (adheres_ || flows_); }
+    // Whether it may hold points at all, against what draws them off.
+    bool holds() const { return sticks() || (response == Response::Slide && adheres_); }
 
-    // Of the point at this index of the set.
-    double restitution(std::size_t point) const { return response == Response::Slide ? 0.0 : double(bounce[point]); }
+    // Of the point at this index of the set; what adheres without end does so to what it holds, not to what slides.
+    double adhesion_to_sliding(std::size_t point) const { return sticks() ? 0.0 : double(adhesion[point]); }
+    double restitution(std::size_t point) const { return response == Response::Bounce ? double(bounce[point]) : 0.0; }
 
     // The largest radius of these points, m.
     double largest_radius(std::span<const std::uint32_t> points) const;
@@ -52,12 +59,14 @@ struct Obstacle {
     // The unit normal of the shape's field; zero where it has none. time: s since the beginning of the frame.
     Vec3d normal_at(const Vec3d& P, double time) const;
 
-    // The acceleration, m/s², of a point that moves with constant velocity in the body's frame; zero where the body's
-    // motion is not known.
+    // The acceleration, m/s², of a point that moves with constant velocity in the body's frame.
     Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const
     {
         return body ? body->acceleration_at(P, v, time) : Vec3d(Vec3d::Zero());
     }
+
+private:
+    bool adheres_, flows_;
 };
 
 // Clears the marks of points that are inside or on an obstacle at the end of the frame, with P rounded to single

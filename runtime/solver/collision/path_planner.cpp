@@ -62,6 +62,7 @@ bool PathPlanner::slide_along_surface(CollidingPoint& point, const Slide& slide)
     point.stops = slide.stops;
     if (point.is_on_flat()) {
         point.kind = CollidingPoint::Straight;
+        slow_down(point);
         path.a += point.on[0].ac;
         return true;
     }
@@ -72,15 +73,27 @@ bool PathPlanner::slide_along_surface(CollidingPoint& point, const Slide& slide)
         // Along the edge of curved surfaces in short straight pieces; each ends in the air, or within rounding of the
         // surfaces, where the next contact finds it.
         point.kind = CollidingPoint::Straight;
-        path.a += point.on[0].ac;
         double longest = max_edge_piece * block_.dt[point.i];
         if (const double feature = std::max(point.on[0].feature, point.on[1].feature); feature > 0)
             longest = std::min(longest, time_to_travel(feature, path.v.norm(), path.a.norm()));
         point.limit_path(longest);
+        slow_down(point);
+        path.a += point.on[0].ac;
     }
     if (++point.events < max_contacts) return true;
     audit_.add_limited();
     return false;
+}
+
+// By the viscosity of what it slides on.
+void PathPlanner::slow_down(CollidingPoint& point) const
+{
+    const double k = point.on[0].viscosity + (point.supports == 2 ? point.on[1].viscosity : 0);
+    if (!(k > 0)) return;
+    Path& path = point.path;
+    const Parabola slowed = relaxed(path.v - point.on[0].vc, path.a, k, path.duration);
+    path.v = point.on[0].vc + slowed.v;
+    path.a = slowed.a;
 }
 
 // Whether a point on a surface has been busy for long without getting anywhere in the surface's frame. On one that
@@ -125,7 +138,8 @@ void PathPlanner::finish_path(CollidingPoint& point)
         on.ac = obstacle.acceleration_at(P, point.stops ? on.vc : v, now);
     }
     if (point.stops) v = on.vc;
-    if (point.supports == 2 && !point.is_on_flat()) point.supports = 0;
+    // What adheres to the surfaces of an edge is still on the first.
+    if (point.supports == 2 && !point.is_on_flat()) point.supports = on.adhesion > 0 ? 1 : 0;
 }
 
 }  // namespace rapid

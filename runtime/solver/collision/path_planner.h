@@ -24,6 +24,7 @@ public:
 private:
     Slide slide(CollidingPoint& point);
     bool slide_along_surface(CollidingPoint& point, const Slide& slide);
+    void slow_down(CollidingPoint& point) const;
     bool chatters(CollidingPoint& point) const;
     void ride(CollidingPoint& point);
 

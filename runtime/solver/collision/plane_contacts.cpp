@@ -52,7 +52,7 @@ bool PlaneContacts::slides_on_plane(std::size_t i)
     const Obstacle& obstacle = block_.obstacles[o];
     const Vec3d &P = block_.P[i], &v = block_.v[i];
     if (motion_.longest_parabola(i, block_.dt[i]) < block_.dt[i]) return false;
-    if (obstacle.response == Response::Stick || obstacle.response == Response::Die) return false;
+    if (obstacle.response == Response::Stick || obstacle.response == Response::Die || obstacle.clings()) return false;
     if (!obstacle.acceleration_at(P, v, block_.frame_time(i, block_.dt[i])).isZero(0)) return false;
     const double g = -motion_.acceleration(i).dot(contact.n), vn = (v - contact.vc).dot(contact.n);
     if (!stays_on_plane(vn, g, obstacle.contact_tolerance(P, block_.radius(obstacle, i)), block_.dt[i])) return false;

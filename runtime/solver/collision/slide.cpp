@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/solver/motion/damped_motion.h"
+
 namespace rapid {
 namespace {
 
@@ -18,6 +20,12 @@ constexpr double parallel = 1e-3;  // sine of the angle between the normals
 
 // The part of an acceleration that rounding leaves along the surface where there is none.
 constexpr double rounding = 0x1p-48;
+
+// Until a speed along which `along` < 0 acts has come to 0, against viscosity, too: v' = along - k v.
+double time_to_stop(double speed, double along, double k)
+{
+    return k > 0 ? std::log1p(k * speed / -along) / k : -speed / along;
+}
 
 }  // namespace
 
@@ -39,10 +47,10 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
     const Vec3d vt = relative - relative.dot(n) * n;
     const double g = -a.dot(n), speed2 = vt.squaredNorm();
     const double N = g - support.curvature * speed2;
-    if (N < 0) return {Slide::Leaves};
+    if (N < -support.adhesion) return {Slide::Leaves};
 
     const Vec3d at = a + g * n;
-    const double holds = support.friction * N;
+    const double holds = support.friction * std::max(N, 0.0);
     if (!(speed2 > 0)) {
         const double drives = at.norm();
         if (drives <= holds + rounding * a.norm()) return {Slide::Sticks};
@@ -60,7 +68,7 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
         if (slide.duration * slide.duration * aside2 > most_turn * most_turn * speed2)
             slide.duration = std::min(left, std::max(most_turn * speed / std::sqrt(aside2), least));
     }
-    if (const double stop = along < 0 ? -speed / along : never; stop <= slide.duration) {
+    if (const double stop = along < 0 ? time_to_stop(speed, along, support.viscosity) : never; stop <= slide.duration) {
         slide.duration = stop;
         slide.stops = true;
     }
@@ -69,6 +77,15 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
         if (const double size = middle.norm(); size > 0) slide.a = at - holds / size * middle;
     }
     return slide;
+}
+
+Parabola relaxed(const Vec3d& v, const Vec3d& a, double k, double t)
+{
+    if (!(t > 0)) return {v, a};
+    const Propagator by = respond(k, 0, t);
+    const Vec3d travel = by.x_of_v * v + by.x_of_G * a, end = by.v_of_v * v + by.v_of_G * a;
+    const Vec3d begin = 2 / t * travel - end;
+    return {begin, (end - begin) / t};
 }
 
 // x - (n + n1) (n1·x) / (1 + n·n1), for n·x = 0.
@@ -98,12 +115,12 @@ Slide slide_along(const Support& A, const Support& B, const Vec3d& v, const Vec3
     const double sine2 = (1 - c) * (1 + c);
     const double NA = (gA - c * gB) / sine2, NB = (gB - c * gA) / sine2;
     lifted = -1;
-    if (NA < 0 || NB < 0) {
-        lifted = NA < NB ? 0 : 1;
+    if (NA < -A.adhesion || NB < -B.adhesion) {
+        lifted = NA + A.adhesion < NB + B.adhesion ? 0 : 1;
         return {Slide::Leaves};
     }
 
-    const double drive = a.dot(e), holds = A.friction * NA + B.friction * NB;
+    const double drive = a.dot(e), holds = A.friction * std::max(NA, 0.0) + B.friction * std::max(NB, 0.0);
     const double speed = (v - A.vc).dot(e);
     if (speed == 0) {
         if (std::abs(drive) <= holds + rounding * a.norm()) return {Slide::Sticks};
@@ -111,7 +128,9 @@ Slide slide_along(const Support& A, const Support& B, const Vec3d& v, const Vec3
     }
     const double along = drive - std::copysign(holds, speed);
     Slide slide{Slide::Moves, along * e, left};
-    if (const double stop = along * speed < 0 ? -speed / along : never; holds > 0 && stop <= left) {
+    const double stop =
+        along * speed < 0 ? time_to_stop(std::abs(speed), -std::abs(along), A.viscosity + B.viscosity) : never;
+    if (holds > 0 && stop <= left) {
         slide.duration = stop;
         slide.stops = true;
     }

@@ -15,7 +15,9 @@ struct Support {
     double friction = 0;       // μ
     bool flat = false;         // a plane
     double feature = 0;        // m, the shape's smallest
-    Vec3d ac = Vec3d::Zero();  // m/s², of uniform motion along the surface in the body's frame (RigidBody)
+    Vec3d ac = Vec3d::Zero();  // m/s², of uniform motion along the surface in the body's frame (MovingBody)
+    double viscosity = 0;      // 1/s
+    double adhesion = 0;       // m/s²: what draws the point off by less does not lift it
 };
 
 // The shortest piece of a slide whose direction of friction turns, as a part of the sub-step.
@@ -39,6 +41,12 @@ struct Slide {
 
 // `v` is tangential to the surface in its own frame; `least` (s) is the shortest piece that turning friction makes.
 Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& a, double left, double least);
+
+// The parabola that stands for the motion by v' = a - k v over the time t, s, with the same end and velocity there.
+struct Parabola {
+    Vec3d v, a;  // m/s at its beginning; m/s²
+};
+Parabola relaxed(const Vec3d& v, const Vec3d& a, double k, double t);
 
 // Parallel transport of a vector x along a surface, from where its normal is n to where it is n1: by the smallest
 // rotation that takes n to n1.

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/solver/collision/stuck_columns.h"
 #include "runtime/solver/estimate/step_doubling.h"
 
 namespace rapid {
@@ -20,6 +21,7 @@ public:
                                                                            options.met,  !writes_more(dynamics)}
     {
         done_.substeps = options.substeps;
+        if (StuckColumns::are_needed(dynamics)) StuckColumns::add_to(points);
     }
 
     Tolerated run()
@@ -42,7 +44,7 @@ private:
     // Whether a run writes more than P and v of the points.
     static bool writes_more(const Dynamics& dynamics)
     {
-        return !dynamics.actions().empty() ||
+        return !dynamics.actions().empty() || StuckColumns::are_needed(dynamics) ||
                std::any_of(dynamics.colliders().begin(), dynamics.colliders().end(),
                            [](const auto& collider) { return collider->record.has_value(); });
     }

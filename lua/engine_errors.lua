@@ -1,6 +1,13 @@
 -- What Rapid says in place of LuaJIT's own messages. Nothing but this table knows how LuaJIT words them.
 --
--- full_stack: the stack is full when the error is raised, and leaves no room for a trace.
+-- full_stack: the stack is full when the error is raised, and leaves no room for a trace. Of `endings` the text comes
+-- after LuaJIT's own, which ends so.
+
+local function added(text, remedy) return { message = ("%s; %s"):format(text, remedy) } end
+
+local no_files = "a script has no files: rapid.points.read and rapid.mesh.read read some, :write and -o write them"
+local no_clock = "a script has neither a clock nor an environment: frame.time is the time, rapid.param takes values"
+local no_chance = "math.random is not there, as each run would differ: p:rand(k) of a point is the same in every run"
 
 -- memory_limit: the text for a state that needs more memory than it may have.
 return function(memory_limit)
@@ -10,6 +17,13 @@ return function(memory_limit)
     -- `p.v.x = 1`
     ["attempt to write to constant location"] = {
       message = "neither a component nor the frame can be assigned; make a new vec3: p.v = vec3(1, p.v.y, p.v.z)",
+    },
+    ["attempt to index global 'io' (a nil value)"] = added("attempt to index global 'io' (a nil value)", no_files),
+    ["attempt to index global 'os' (a nil value)"] = added("attempt to index global 'os' (a nil value)", no_clock),
+    ["attempt to call field 'random' (a nil value)"] =
+      added("attempt to call field 'random' (a nil value)", no_chance),
+    endings = {
+      ["(number expected, got cdata)"] = "the frame, a point and a vec3 are no numbers: frame.time, p.age, v.x are",
     },
   }
 end

@@ -62,10 +62,23 @@ local operators = {
   "__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__concat", "__len", "__lt", "__le", "__call",
 }
 
+-- Of the attributes whose types Houdini fixes, as :attribute takes them.
+local conventional = {
+  Alpha = "1", Cd = "{1, 1, 1}", N = "{0, 0, 0}", instance = "0", orient = "{0, 0, 0, 1}", scale = "{1, 1, 1}",
+}
+
 local element_type = {
   vec3d = "rapid_double3", float = "float", vec3 = "rapid_float3", quat = "rapid_float4", int32 = "int32_t",
   int64 = "int64_t",
 }
+
+-- Lets every operator say what to compute with instead.
+local function refuse_operators(what, meta)
+  for _, name in ipairs(operators) do
+    meta[name] = function() error(what, 0) end
+  end
+  return meta
+end
 
 -- The host adds the place, the nearest line of graph code, and the point.
 local function wrong_type(name, wanted, value)
@@ -311,8 +324,8 @@ return run, set_params
       error(("assigns %q under a computed name; declare it: writes = { %q }"):format(name, name), 0)
     end
     name = describe.name(name)
-    error(("no attribute %q here; add :attribute{ %s = 0 } before it, or where its name is computed writes = { %q }")
-      :format(name, name, name), 0)
+    error(("no attribute %q here; add :attribute{ %s = %s } before it, or where its name is computed writes = { %q }")
+      :format(name, name, conventional[name] or "0", name), 0)
   end
   function refuse.param(name, values)
     error(("no parameter %q; the node has %s"):format(describe.name(name), table.concat(sorted_names(values), ", ")), 0)
@@ -324,12 +337,7 @@ return run, set_params
     error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
       :format(what, describe.value(name), what), 0)
   end
-  function refuse.operators(what, meta)
-    for _, name in ipairs(operators) do
-      meta[name] = function() error(what, 0) end
-    end
-    return meta
-  end
+  refuse.operators = refuse_operators
   function refuse.step(name)
     error(("the step has no %q; it has time, dt, index and detail"):format(describe.name(name)), 0)
   end
@@ -368,14 +376,14 @@ local function prepare(rand, adopt, point_names)
   end
 
   local frame_type = ffi.typeof "struct { const double number, time, dt; }"
-  ffi.metatype(frame_type, {
+  ffi.metatype(frame_type, refuse_operators("the frame is no number; compute with what it has, by name: frame.time", {
     __tostring = function(frame) return ("frame %g"):format(frame.number) end,
     __index = function(...)
       local _, name = ...
       if name == "detail" then return shown.view end
       error(("the frame has no %q; it has number, time, dt and detail"):format(describe.name(name)), 2)
     end,
-  })
+  }))
   local shared = {
     frame_type = frame_type, draw = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown,
     point_names = point_names,

@@ -66,7 +66,7 @@ local function make(native, load_node, numeric, shapes, studies)
     local known = { at = true }
     for name in pairs(defaults) do known[name] = true end
     local function fault(name, what)
-      error(("rapid.grid.from: %s = %s; it must be %s"):format(name, tostring(options[name]), what), 3)
+      error(("rapid.grid.from: %s = %s; it must be %s"):format(name, describe.value(options[name]), what), 3)
     end
     for name in pairs(options) do
       if not known[name] then
@@ -95,7 +95,9 @@ local function make(native, load_node, numeric, shapes, studies)
       for j = 0, nodes[2] - 1 do
         for k = 0, nodes[3] - 1 do
           local value = at(origin + vector.make(i, j, k) * voxel)
-          if not ffi.istype(vector.type, value) then fault("at", "a function that returns a vec3 everywhere") end
+          if not ffi.istype(vector.type, value) then
+            error(("rapid.grid.from: at returns %s; it must return a vec3 everywhere"):format(describe.value(value)), 2)
+          end
           values[n + 1], values[n + 2], values[n + 3] = value.x, value.y, value.z
           n = n + 3
         end

@@ -44,6 +44,22 @@ std::optional<EngineError> engine_error(lua_State* L, const std::string& message
     return found;
 }
 
+// What is added to one of LuaJIT's messages by how it ends; empty for others.
+std::string remedy_of(lua_State* L, const std::string& message)
+{
+    const int top = lua_gettop(L);
+    std::string remedy;
+    const std::size_t begin = message.rfind('(');
+    lua_getfield(L, LUA_REGISTRYINDEX, engine_errors);
+    if (lua_istable(L, -1) && begin != std::string::npos) {
+        lua_getfield(L, -1, "endings");
+        if (lua_istable(L, -1)) lua_getfield(L, -1, message.c_str() + begin);
+        if (lua_isstring(L, -1)) remedy = "; " + text_at(L, -1);
+    }
+    lua_settop(L, top);
+    return remedy;
+}
+
 std::string message_of(lua_State* L, int index)
 {
     if (lua_type(L, index) == LUA_TSTRING || lua_type(L, index) == LUA_TNUMBER) return text_at(L, index);
@@ -115,7 +131,7 @@ int describe_error(lua_State* L)
     std::string message = message_of(L, 1);
     const std::string place = find_place(L, message);
     const std::optional<EngineError> of_engine = engine_error(L, message);
-    if (of_engine) message = of_engine->message;
+    message = of_engine ? of_engine->message : message + remedy_of(L, message);
     std::string trace;
     if (!of_engine || !of_engine->full_stack) {
         luaL_traceback(L, L, nullptr, 1);

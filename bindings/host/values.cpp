@@ -111,6 +111,18 @@ void push_ramp(State& state, const Ramp& ramp)
     state.call(1, 1);
 }
 
+// What is wrong with something that has no value. A frame tells so by its text.
+std::string no_value(lua_State* L, int index)
+{
+    if (lua_type(L, index) == cdata_type && luaL_callmeta(L, index, "__tostring")) {
+        const std::string text = text_at(L, -1);
+        lua_pop(L, 1);
+        if (text.starts_with("frame "))
+            return "the frame can't be used as a value here; it has frame.time, frame.number and frame.dt";
+    }
+    return fmt::format("a {} can't be used as a value here", luaL_typename(L, index));
+}
+
 }  // namespace
 
 Value to_value(State& state, int index)
@@ -141,7 +153,7 @@ Value to_value(State& state, int index)
         default:
             break;
     }
-    if (value.is_nil()) throw Error(fmt::format("a {} can't be used as a value here", luaL_typename(L, index)));
+    if (value.is_nil()) throw Error(no_value(L, index));
     return value;
 }
 

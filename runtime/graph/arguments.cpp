@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "runtime/points/attribute_like.h"
+
 namespace rapid {
 namespace {
 
@@ -17,6 +19,15 @@ bool varies(const Value& value)
     return std::any_of(table->list.begin(), table->list.end(), [](const Value& entry) { return varies(entry); }) ||
            std::any_of(table->numbered.begin(), table->numbered.end(), entry_varies) ||
            std::any_of(table->named.begin(), table->named.end(), entry_varies);
+}
+
+// What a node says of a parameter that it has not; of an attribute, how its newborn points get it.
+std::string unknown(const NodeType& type, const std::string& name)
+{
+    if (type.find("attributes") && (known_attribute(name) || conventional_attribute(name)))
+        return fmt::format("unknown parameter \"{}\"; it is an attribute of points: attributes = {{ {} }}", name,
+                           text_of_making(name));
+    return fmt::format("unknown parameter \"{}\"{}", name, did_you_mean(name, type.param_names()));
 }
 
 // Calls a function of the frame; its Errors name the frame.
@@ -42,9 +53,7 @@ void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool onl
         const Param* param = node.type->find(name);
         Param any;
         if (!param) {
-            if (!node.type->rest)
-                throw Error(
-                    fmt::format("unknown parameter \"{}\"{}", name, did_you_mean(name, node.type->param_names())));
+            if (!node.type->rest) throw Error(unknown(*node.type, name));
             any = *node.type->rest;
             any.name = name;
             param = &any;

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "runtime/at_node.h"
+#include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {
@@ -40,11 +41,12 @@ struct MadeNames {
         std::vector<std::string> names = point_names_of(PointName::OwnColumn);
         for (const auto& [made, maker] : attributes) names.push_back(made);
         for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
-        const std::string near = nearest_name(name, names);
-        throw Error(near.empty() ? fmt::format("no attribute \"{0}\"; add :attribute{{ {0} = 0 }} before it", name)
-                                 : fmt::format("no attribute \"{0}\"; did you mean \"{1}\"? (or add :attribute{{ "
-                                               "{0} = 0 }} before it)",
-                                               name, near));
+        const std::string near = conventional_attribute(name) ? "" : nearest_name(name, names);
+        const std::string made = text_of_making(name);
+        throw Error(near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
+                                 : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} "
+                                               "before it)",
+                                               name, near, made));
     }
 
     void check_group(const std::string& name) const

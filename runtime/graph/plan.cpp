@@ -64,6 +64,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         for (PlannedSimulation& simulation : simulations) simulation.seed = *options.seed;
     bind_all();
     find_changes();
+    warn_of_idle_dynamics();
     for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, s);
     for (std::size_t s = 0; s < simulations.size(); ++s) {
         PlannedSimulation& simulation = simulations[s];
@@ -127,6 +128,21 @@ void Plan::collect_nodes(const Graph& graph)
             warnings.push_back(
                 fmt::format("{}:{}: node \"{}\": writes nothing: no output comes from it; return it, or go on from it",
                             node->location.file, node->location.line, node->name));
+    }
+}
+
+// Forces, colliders and constraints act in a Solve alone. One warning a simulation, of the first of them.
+void Plan::warn_of_idle_dynamics()
+{
+    std::set<std::size_t> told;
+    for (const PlannedNode& planned : nodes) {
+        const Node& node = *planned.node;
+        if (node.type->kind != NodeKind::Dynamic || simulations[planned.simulation].solve) continue;
+        if (!told.insert(planned.simulation).second) continue;
+        warnings.push_back(
+            fmt::format("{}:{}: node \"{}\": acts on nothing: no :solve comes after it; end the chain "
+                        "with :solve {{}}",
+                        node.location.file, node.location.line, node.name));
     }
 }
 

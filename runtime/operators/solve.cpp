@@ -96,13 +96,15 @@ struct Solve {
         if (estimates && !moves_alone(flow)) coupled_errors_.begin(flow.points, changing_.finer(), options);
         if (!options.interacts) interact(flow.points, changing_.run(), options, begin_time);
         if (estimates) begin_estimates(flow, options);
+        const bool newborn = are_newborn(flow.points, options.h);
         const Tolerated done = advance(flow, options);
+        if (newborn && flow.points.empty()) warn_of_deaths_at_birth(flow, now);
         const std::uint64_t beyond = check_tolerance(flow, options);
         if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
         if (estimates) estimate(flow, options, now);
         if (!options.interacts) interact(flow.points, changing_.run(), options, options.time);
         if (estimates && !moves_alone(flow)) estimate_coupled(flow, now);
-        report(done, beyond, now);
+        report(done, beyond, flow, now);
         recorder.end();
         now.figures.died += age_points(flow.points, group, now.frame.dt, &recorder);
         feed_back(flow);
@@ -250,8 +252,40 @@ private:
         if (!errors.unknown.empty()) figures.left_out_of_errors.push_back(errors.unknown);
     }
 
+    // Whether a shape that points meet knows its distance in a band only.
+    static bool has_band(const Flow& flow)
+    {
+        const auto& colliders = flow.dynamics.colliders();
+        return std::any_of(colliders.begin(), colliders.end(),
+                           [](const auto& collider) { return std::isfinite(collider->shape->band()); });
+    }
+
+    // Whether there are points, all of which were born in this step.
+    static bool are_newborn(const PointSet& points, double h)
+    {
+        const auto* own = points.find<float>("dt");
+        if (points.empty() || !own) return false;
+        const Strided<float> dt = own->read();
+        for (std::size_t i = 0; i < points.size(); ++i)
+            if (!(dt[i] < static_cast<float>(h))) return false;
+        return true;
+    }
+
+    static void warn_of_deaths_at_birth(const Flow& flow, const Evaluation& now)
+    {
+        for (const auto& collider : flow.dynamics.colliders())
+            if (collider->response == Response::Die) {
+                now.warnings.push_back(
+                    fmt::format("{}:{}: node \"{}\": kills all points where they are born: with response = \"die\" a "
+                                "point dies within its radius (pscale) of the shape; give radius = 0, or let points be "
+                                "born farther away",
+                                collider->location.file, collider->location.line, collider->node));
+                return;
+            }
+    }
+
     // beyond: points, by the check of the tolerance.
-    void report(const Tolerated& done, std::uint64_t beyond, const Evaluation& now) const
+    void report(const Tolerated& done, std::uint64_t beyond, const Flow& flow, const Evaluation& now) const
     {
         const SolveResult& result = done.result;
         FrameFigures& figures = now.figures;
@@ -285,9 +319,11 @@ private:
                 "constraints gave energy or momentum that nothing accounts for; take more substeps, or more "
                 "iterations");
         if (result.trapped > 0)
-            warn(
-                "points are deep in a shape, where its field shows no way out; a level set of a larger half_width "
-                "shows it farther");
+            warn(has_band(flow)
+                     ? "points are deep in a shape, where its field shows no way out; a level set of a larger "
+                       "half_width shows it farther"
+                     : "points are in a shape, with no way out: between shapes that leave no room, or in its middle; "
+                       "let them be born outside, or move the shapes apart");
         if (done.beyond > 0)
             warn(
                 fmt::format("points need more than {} sub-steps for an error of {:g} m a frame; raise max_substeps "

@@ -1,5 +1,7 @@
 #include "runtime/points/attribute_like.h"
 
+#include <fmt/format.h>
+
 namespace rapid {
 
 const AttributeSpec* conventional_attribute(std::string_view name)
@@ -15,6 +17,20 @@ const AttributeSpec* conventional_attribute(std::string_view name)
     for (const AttributeSpec& spec : usual)
         if (spec.name == name) return &spec;
     return nullptr;
+}
+
+std::string text_of_making(const std::string& name)
+{
+    const AttributeSpec* usual = conventional_attribute(name);
+    if (!usual) return name + " = 0";
+    const auto list = [&](const auto& value, auto... k) {
+        std::string text;
+        ((text += fmt::format("{}{:g}", text.empty() ? "" : ", ", value[k])), ...);
+        return fmt::format("{} = {{{}}}", name, text);
+    };
+    if (const auto* vector = std::get_if<Vec3f>(&usual->fallback)) return list(*vector, 0, 1, 2);
+    if (const auto* turn = std::get_if<Quatf>(&usual->fallback)) return list(turn->coeffs(), 0, 1, 2, 3);
+    return std::holds_alternative<float>(usual->fallback) ? name + " = 1" : name + " = 0";
 }
 
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like)

@@ -11,6 +11,9 @@ namespace rapid {
 // points without one. They are made as any other is. Null for any other name.
 const AttributeSpec* conventional_attribute(std::string_view name);
 
+// How an attribute of this name is made by a node `attribute`: "Cd = {1, 1, 1}", "heat = 0".
+std::string text_of_making(const std::string& name);
+
 // An attribute that some points have, with values of the type of `like`, as the others get it: a known one with its
 // default, else that by convention, else zero.
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like);

@@ -134,7 +134,8 @@ describe("a way out", function()
       count = count + 1
       for where, text in pairs(places) do
         local message, place = refused(text:format(code))
-        assert.equal(expected, message, where .. ": " .. name)
+        -- What there is instead comes after.
+        assert.equal(expected, message:sub(1, #expected), where .. ": " .. name)
         assert.equal("scene.lua:2", place, where .. ": " .. name)
       end
     end)

@@ -77,7 +77,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
       :find("rapid.grid.from: voxel = -1; it must be above 0 m", 1, true))
     assert.truthy(fault("rapid.grid.from { vocel = 1 }"):find('did you mean "voxel"?', 1, true))
     assert.truthy(fault("rapid.grid.from { at = function() end }")
-      :find("it must be a function that returns a vec3 everywhere", 1, true))
+      :find("at returns nil; it must return a vec3 everywhere", 1, true))
     assert.truthy(fault("rapid.grid.read 'none.vdb'"):find("there is no file", 1, true))
   end)
 end)

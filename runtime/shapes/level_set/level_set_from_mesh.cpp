@@ -72,6 +72,13 @@ void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& o
             fmt::format("{} of the {} pieces of mesh \"{}\" are thinner than a voxel ({:g} m) and may be "
                         "missing; a smaller voxel keeps them",
                         thin, pieces.size(), mesh.name, options.voxel));
+    Box3f bounds;
+    for (const Box3f& piece : pieces) bounds.extend(piece);
+    if (const double size = bounds.isEmpty() ? 0 : bounds.sizes().maxCoeff(); 2 * options.voxel >= size && size > 0)
+        warnings.push_back(
+            fmt::format("a voxel of {:g} m is half as large as mesh \"{}\" or larger: it is {:g} m long; a voxel of "
+                        "{:.1g} m shows its form",
+                        options.voxel, mesh.name, size, size / 30));
 }
 
 LevelSetPtr of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)

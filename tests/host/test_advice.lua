@@ -1,0 +1,89 @@
+-- Messages and warnings that say what would be right.
+local scene = require "testing.scene"
+
+local points = "rapid.points.from { P = {{0, 1, 0}} }"
+
+local function fault(text)
+  return scene.error((text:gsub("POINTS", points)))
+end
+
+local function kernel_fault(body)
+  return fault(('return rapid.create { points = POINTS } :points("k", function(p, frame) %s end) :solve {}')
+    :format(body))
+end
+
+local function expect(part, message)
+  assert.truthy(message:find(part, 1, true), message)
+end
+
+local function warnings(text)
+  return table.concat(scene.run((text:gsub("POINTS", points)), { frames = {1, 3} }).warnings, "\n")
+end
+
+describe("a message", function()
+  it("makes an attribute with the type by which others know it", function()
+    expect('no attribute "Cd"; add :attribute{ Cd = {1, 1, 1} } before it', kernel_fault "p.Cd = vec3(1, 0, 0)")
+    expect("add :attribute{ orient = {0, 0, 0, 1} } before it", kernel_fault "p.orient = quat(0, 0, 0, 1)")
+    expect("add :attribute{ Alpha = 1 } before it", kernel_fault "p.Alpha = 1")
+    expect("add :attribute{ heat = 0 } before it", kernel_fault "p.heat = 1")
+    expect("add :attribute{ Cd = {1, 1, 1} } before it", kernel_fault 'local name = "C" .. "d" p[name] = vec3(1, 0, 0)')
+  end)
+
+  it("names frame.time where the frame stands for a number", function()
+    local number = "the frame is no number; compute with what it has, by name: frame.time"
+    local emit = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function(frame) %s end } "
+      .. ":solve {}"
+    expect(number, fault(emit:format "return 5 * frame"))
+    expect(number, fault(emit:format "if frame > 5 then return 1 end return 2"))
+    expect(number, kernel_fault "p.v = vec3(0, frame * 2, 0)")
+    expect("the frame can't be used as a value here; it has frame.time", fault(emit:format "return frame"))
+    expect("number expected, got cdata); the frame, a point and a vec3 are no numbers: frame.time, p.age",
+      fault(emit:format "return math.sin(frame)"))
+    expect("the frame, a point and a vec3 are no numbers", kernel_fault "p.v = vec3(math.sin(p.P), 0, 0)")
+  end)
+
+  it("says what there is in place of chance, files and clocks", function()
+    expect("p:rand(k) of a point is the same in every run", fault "math.random() return rapid.create {} :solve {}")
+    expect("p:rand(k)", kernel_fault "p.v = vec3(math.random(), 0, 0)")
+    expect("a script has no files: rapid.points.read", fault "io.open 'a' return rapid.create {} :solve {}")
+    expect("frame.time is the time", fault "os.time() return rapid.create {} :solve {}")
+  end)
+
+  it("shows no address, and names where attributes of the newborn go", function()
+    expect("rapid.grid.from: at returns 3; it must return a vec3 everywhere",
+      fault "rapid.grid.from { at = function() return 3 end } return rapid.create {} :solve {}")
+    local emit = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 5, %s } :solve {}"
+    expect('unknown parameter "pscale"; it is an attribute of points: attributes = { pscale = 0 }',
+      fault(emit:format "pscale = 0.1"))
+    expect("attributes = { Cd = {1, 1, 1} }", fault(emit:format "Cd = {1, 0, 0}"))
+    expect('did you mean "rate"?', fault(emit:format "rat = 1"))
+  end)
+end)
+
+describe("a warning", function()
+  it("names the first node that acts on nothing, as no :solve comes after it", function()
+    local text = warnings "return rapid.create { points = POINTS } :gravity {} :wind {}"
+    expect('node "gravity1": acts on nothing: no :solve comes after it', text)
+    assert.falsy(text:find("wind1", 1, true))
+    assert.equal("", warnings "return rapid.create { points = POINTS } :gravity {} :solve {}")
+    assert.equal("", warnings "return rapid.create { points = POINTS } :attribute { heat = 1 }")
+  end)
+
+  it("tells where all points die as they are born", function()
+    local scene_text = [[return rapid.create {}
+  :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 2000, attributes = { pscale = 0.1 } }
+  :collide { shape = rapid.shape.sphere { radius = %s }, response = "die" } :solve {}]]
+    expect('node "collide1": kills all points where they are born', warnings(scene_text:format "1"))
+    assert.equal("", warnings(scene_text:format "0.5"))
+  end)
+
+  it("tells of a voxel that is as large as half of the mesh", function()
+    local text = "rapid.levelset.from_mesh(rapid.mesh.box { size = {0.2, 0.2, 0.2} }, { voxel = %g }) "
+      .. "return rapid.create { points = POINTS } :solve {}"
+    local function told(voxel)
+      return scene.command("check", (text:format(voxel):gsub("POINTS", points))).stderr
+    end
+    expect("a voxel of 0.11 m is half as large as mesh", told(0.11))
+    assert.falsy(told(0.05):find("voxel", 1, true))
+  end)
+end)

@@ -35,6 +35,13 @@ public:
     // Along the shortest way out that is known. a: the acceleration on the point.
     void eject(CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& a);
 
+    // Of a point that stays where it is put.
+    void displace(std::uint32_t i, const Vec3d& by)
+    {
+        block_.P[i] += by;
+        displacements_.push_back({i, by});
+    }
+
     std::span<const Displacement> displacements() const { return displacements_; }
     // The points that found no way out; some more than once.
     const std::vector<std::uint32_t>& lost() const { return lost_; }

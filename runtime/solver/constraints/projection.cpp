@@ -80,8 +80,9 @@ void Projection::advance(Substep& step)
     if (shapes_) shapes_->detect(step, free_);
     bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); });
     if (has_forces_ && !step.energy.empty()) {
-        add_stored(step, step.start, 1, bound_.credit());
-        add_stored(step, {}, -1, bound_.credit());
+        const std::span<double> credit = bound_.credit();
+        for (std::size_t i = 0; i < credit.size(); ++i) credit[i] += stored_[i];
+        add_stored(step, {}, -1, credit);
     }
     if (!step.paths.empty()) solve_impacts(step);
     const bool moved = has_forces_ || !step.paths.empty();  // since the free motion
@@ -148,7 +149,11 @@ void Projection::advance_linked(Substep& step)
         energy_.added += std::max(0.0, work);
         changes_.contacts += work;
     }
-    bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, step.start, factor, energy); });
+    stored_.assign(step.size(), 0.0);
+    add_stored(step, step.start, 1, stored_);
+    bound_.begin(step, [&](double factor, std::span<double> energy) {
+        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
+    });
     fallback_.begin(step);
     each([&](Coupling& coupling) {
         coupling.advance(step);

@@ -68,6 +68,7 @@ private:
     std::optional<ShapeContacts> shapes_;
     std::vector<Vec3d> free_;                           // where the points' free motion has ended
     std::vector<Vec3d> linked_;                         // where the projection begins, if elsewhere
+    std::vector<double> stored_;                        // J, in rows, where the sub-step begins
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
 };
 

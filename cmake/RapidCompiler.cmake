@@ -47,6 +47,10 @@ if(RAPID_SANITIZE)
   target_compile_options(rapid_private INTERFACE
     -fsanitize=${RAPID_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(rapid_private INTERFACE -fsanitize=${RAPID_SANITIZE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    target_compile_options(rapid_private INTERFACE
+      -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/sanitizer_ignore.txt)
+  endif()
 endif()
 
 # ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so. Two

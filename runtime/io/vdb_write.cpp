@@ -90,9 +90,9 @@ PointDataGrid::Ptr make_point_grid(const PointSet& points)
     for (const auto& [name, column] : points.columns()) {
         if (name == "P") continue;
         std::visit(
-            [&](const auto& c) {
+            [&, &attribute = name](const auto& c) {
                 using Value = typename VdbValue<std::decay_t<decltype(c[0])>>::Type;
-                vdb::points::appendAttribute(tree, name, vdb::points::TypedAttributeArray<Value>::attributeType());
+                vdb::points::appendAttribute(tree, attribute, vdb::points::TypedAttributeArray<Value>::attributeType());
             },
             column);
     }
@@ -105,8 +105,11 @@ PointDataGrid::Ptr make_point_grid(const PointSet& points)
         const auto& order = indices->tree().probeConstLeaf(leaf.origin())->indices();
         for (const auto& [name, column] : points.columns())
             if (name != "P")
-                std::visit([&](const auto& c) { fill_array(leaf.attributeArray(descriptor.find(name)), c, order); },
-                           column);
+                std::visit(
+                    [&, &attribute = name](const auto& c) {
+                        fill_array(leaf.attributeArray(descriptor.find(attribute)), c, order);
+                    },
+                    column);
         for (const auto& [name, members] : points.groups()) {
             auto handle = leaf.groupWriteHandle(name);
             if (members.is_uniform())

@@ -46,14 +46,14 @@ LedgerState LedgerState::of(const Substep& step, double elastic)
         for (std::size_t i = 0; i < step.size(); ++i)
             if (step.inverse_mass[i] > 0 && step.lives(i)) f(1 / step.inverse_mass[i], step.points[i].P, step.v[i]);
     };
-    each([&](double mass, const Vec3d& P, const Vec3d& v) {
-        state.mass += mass;
-        state.kinetic += 0.5 * mass * v.squaredNorm();
-        state.potential -= mass * step.acceleration.dot(P);
-        state.center += mass * P;
-        state.momentum += mass * v;
-        state.angular_momentum += mass * P.cross(v);
-        state.speed += mass * v.norm();
+    each([&](double m, const Vec3d& P, const Vec3d& v) {
+        state.mass += m;
+        state.kinetic += 0.5 * m * v.squaredNorm();
+        state.potential -= m * step.acceleration.dot(P);
+        state.center += m * P;
+        state.momentum += m * v;
+        state.angular_momentum += m * P.cross(v);
+        state.speed += m * v.norm();
     });
     for (std::size_t i = 0; i < step.spins.size(); ++i)
         if (step.inverse_mass[i] > 0 && step.lives(i)) {
@@ -62,7 +62,7 @@ LedgerState LedgerState::of(const Substep& step, double elastic)
         }
     if (!(state.mass > 0)) return state;
     const Vec3d center = state.center / state.mass;
-    each([&](double mass, const Vec3d& P, const Vec3d& v) { state.turning += mass * (P - center).norm() * v.norm(); });
+    each([&](double m, const Vec3d& P, const Vec3d& v) { state.turning += m * (P - center).norm() * v.norm(); });
     return state;
 }
 

@@ -23,6 +23,17 @@ struct InMesh {
     }
 };
 
+// The nearest cell; along an axis in which the mesh is flat there is one.
+Eigen::Vector3i cell_at(const ScatterCells& cells, const Vec3d& P)
+{
+    Eigen::Vector3i cell = Eigen::Vector3i::Zero();
+    for (int k = 0; k < 3; ++k)
+        if (cells.edge[k] > 0)
+            cell[k] = std::clamp(static_cast<int>(std::floor((P[k] - cells.origin[k]) / cells.edge[k])), 0,
+                                 cells.counts[k] - 1);
+    return cell;
+}
+
 // The cells that a face touches are partly inside; each of the others is wholly inside or outside, as its centre is.
 ScatterCells cells_of(const Mesh& mesh, const InMesh& inside)
 {
@@ -40,10 +51,8 @@ ScatterCells cells_of(const Mesh& mesh, const InMesh& inside)
     for (const Mesh::Triangle& t : mesh.triangles) {
         const Vec3d a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>();
         const Vec3d c = mesh.positions[t[2]].cast<double>();
-        const Vec3d low = (a.cwiseMin(b).cwiseMin(c) - slack - cells.origin).cwiseQuotient(cells.edge);
-        const Vec3d high = (a.cwiseMax(b).cwiseMax(c) + slack - cells.origin).cwiseQuotient(cells.edge);
-        const Eigen::Vector3i from = low.array().floor().cast<int>().max(0);
-        const Eigen::Vector3i to = high.array().floor().cast<int>().min(cells.counts.array() - 1);
+        const Eigen::Vector3i from = cell_at(cells, a.cwiseMin(b).cwiseMin(c) - slack);
+        const Eigen::Vector3i to = cell_at(cells, a.cwiseMax(b).cwiseMax(c) + slack);
         const Vec3d normal = (b - a).cross(c - a);
         const double reach = normal.cwiseAbs().dot(cells.edge / 2 + slack);  // of a cell along the normal
         for (int x = from.x(); x <= to.x(); ++x)

@@ -117,7 +117,7 @@ void PlaneBatch::leave_out_near(const Box3d& box, double radius)
             far[j] |= PathExtent<double>::of(from[j], end[j], sagging[j]).misses(lowest, highest);
     }
     for (std::size_t j = 0; j < size_; ++j)
-        outcome_[j] = (outcome_[j] == Misses) | (far[j] != 0) ? outcome_[j] : Undecided;
+        outcome_[j] = ((outcome_[j] == Misses) | (far[j] != 0)) ? outcome_[j] : Undecided;
 }
 
 }  // namespace rapid

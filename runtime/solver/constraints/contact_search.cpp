@@ -30,6 +30,7 @@ constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
 // Lists are short, mostly: std::sort would take longer to start.
 void sort_few(std::uint32_t* first, std::uint32_t* last)
 {
+    if (last - first < 2) return;
     if (last - first > 32) return std::sort(first, last);
     for (std::uint32_t* next = first + 1; next < last; ++next) {
         const std::uint32_t value = *next;

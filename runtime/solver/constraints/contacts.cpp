@@ -21,7 +21,7 @@ namespace {
 
 // The part of an overlap that is taken away in a sub-step; less of one with a sleeper: of two sleepers that hold a
 // point between them neither gives way, and it would be pushed to and fro.
-constexpr double recovery = 0.8, recovery_asleep = 0.1;
+constexpr double overlap_recovery = 0.8, overlap_recovery_asleep = 0.1;
 
 // Points in one place are parted in some direction, each pair in another.
 Vec3d arbitrary_direction(std::uint32_t i, std::uint32_t j)
@@ -180,7 +180,8 @@ void Contacts::find_contacts(const Substep& step)
     packs_.begin(step.size());
     blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
         thread_local std::vector<std::uint32_t> near;
-        const auto last = near.begin() + static_cast<std::ptrdiff_t>(find_near(b, step, near));
+        const auto found = static_cast<std::ptrdiff_t>(find_near(b, step, near));  // first: it makes room
+        const auto last = near.begin() + found;
         const auto end = std::remove_if(near.begin(), last, [&](std::uint32_t k) { return !may_touch(k, step); });
         packs_.pack(b, {near.begin(), end}, impulses_.pairs);
         for (ContactPack& pack : packs_[b]) begin(pack, step);
@@ -285,10 +286,10 @@ void Contacts::solve_velocities(Substep& step)
 {
     const bool some_asleep = sleep_.any();
     const auto part_recovered = [&](const ContactPack& pack) {
-        Doubles part = Doubles{} + recovery;
+        Doubles part = Doubles{} + overlap_recovery;
         if (some_asleep)
             for (std::uint32_t l = 0; l < lanes; ++l)
-                if (sleep_.asleep(pack.i[l]) || sleep_.asleep(pack.j[l])) part[l] = recovery_asleep;
+                if (sleep_.asleep(pack.i[l]) || sleep_.asleep(pack.j[l])) part[l] = overlap_recovery_asleep;
         return part;
     };
     const double impact_speed = material_.bounces ? resting_speed(step) : std::numeric_limits<double>::infinity();

@@ -176,8 +176,8 @@ void Shadows::add_rounding(const PointSet& solved)
         const Vec3f &P1 = P[indices_[k]], &v1 = v[indices_[k]];
         for (int axis = 0; axis < 3; ++axis) {
             const double way = 0.5 * point.dt * (double(point.v[axis]) + double(v1[axis]));
-            const double gone = double(P1[axis]) - double(point.P[axis]);
-            const double lost = std::remainder(way - gone, spacing_at(P1[axis]));
+            const double moved = double(P1[axis]) - double(point.P[axis]);
+            const double lost = std::remainder(way - moved, spacing_at(P1[axis]));
             if (std::isfinite(lost)) point.displacement[axis] += lost;
         }
         point.P = P1;

@@ -1,7 +1,6 @@
 #include "runtime/shapes/motion/body_path.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "runtime/shapes/analytic/analytic.h"
 #include "tests/test.h"
@@ -11,7 +10,6 @@ using rapid::test::close_to;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double everywhere = std::numeric_limits<double>::infinity();
 const FrameClock clock_24{24, 1};
 

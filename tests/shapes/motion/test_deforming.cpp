@@ -17,7 +17,6 @@ using rapid::test::close_to;
 
 namespace {
 
-constexpr double everywhere = std::numeric_limits<double>::infinity();
 const FrameClock clock_24{24, 1};
 constexpr double h = 1.0 / 24;
 

@@ -4,6 +4,7 @@
 --
 --   local text, mistakes = require "tests.hostile.wrong_scenes".make(seed)      mistakes: their kinds, as a text
 local command = require "testing.command"
+local document = require "testing.document"
 local json = require "dkjson"
 local lehmer = require "tests.lehmer"
 local random_scenes = require "tests.stability.random_scenes"
@@ -13,16 +14,9 @@ local pick = draw.pick
 
 local nodes = json.decode(command.rapid("nodes --json").stdout)
 
-local function text_of(path)
-  local file = assert(io.open(path))
-  local text = file:read "*a"
-  file:close()
-  return text
-end
-
 local scenes = {}
 for path in command.shell("ls graphs/*.lua graphs/nodes/*.lua").stdout:gmatch "[^\n]+" do
-  scenes[#scenes + 1] = text_of(path)
+  scenes[#scenes + 1] = document.read(path)
 end
 
 -- The pieces of a program, { kind, text }, without its comments.

@@ -1,6 +1,7 @@
 -- Every node in lua/nodes, by its scene in graphs/nodes: compiled without a failed trace, finite, and the same bits on
 -- any number of threads.
 local command = require "testing.command"
+local document = require "testing.document"
 
 local function exists(path)
   local file = io.open(path)
@@ -8,17 +9,10 @@ local function exists(path)
   return file ~= nil
 end
 
-local function read(path)
-  local file = assert(io.open(path))
-  local text = file:read "*a"
-  file:close()
-  return text
-end
-
 -- What LuaJIT did not compile of the node. A loop within a kernel becomes a trace of its own, into which that of the
 -- points leads; before that LuaJIT gives up attempts to have both in one. Functions of the whole set run once a frame.
 local function failed_traces(name, aborts)
-  local text, failed = read("lua/nodes/" .. name .. ".lua"), {}
+  local text, failed = document.read("lua/nodes/" .. name .. ".lua"), {}
   if text:find "\n  detail = " then return failed end
   local has_loop = text:find "\n    while "
   for _, abort in ipairs(aborts) do
@@ -34,10 +28,10 @@ describe("every node in lua/nodes", function()
 
     it(name .. " has a test, a scene that uses it, and a picture", function()
       assert.is_true(exists("tests/lua/nodes/test_" .. name .. ".lua"))
-      assert.truthy(read(scene):find(":" .. name .. "%s*{"), scene)
+      assert.truthy(document.read(scene):find(":" .. name .. "%s*{"), scene)
       local picture = "graphs/nodes/pictures/" .. name .. ".png"
       assert.is_true(exists(picture))
-      assert.is_true(#read(picture) < 75000, picture)
+      assert.is_true(#document.read(picture) < 75000, picture)
     end)
 
     it(name .. " declares the attributes that it uses", function()

@@ -18,6 +18,14 @@ local function grid(nx, ny, nz, d, at)
   end end end
   return P
 end
+local function shots(n)  -- pairs of grains, one of which hits the other obliquely
+  local P, v = {}, {}
+  for i = 0, n - 1 do
+    P[2 * i + 1], v[2 * i + 1] = {-0.4 * u(i, 1) - 0.2, 0.17 * centred(i, 2), 3 * i}, {1 + 3 * u(i, 3), 0, 0}
+    P[2 * i + 2], v[2 * i + 2] = {0, 0, 3 * i}, {0, 0, 0}
+  end
+  return { P = P, v = v }
+end
 local function chain(n) local list = {} for i = 1, n do list[i] = {i, i + 1} end return list end
 local function from(set) return rapid.create { fps = 24, points = rapid.points.from(set) } end
 local function hooked(set, ...)
@@ -98,12 +106,7 @@ return from { P = P } :gravity {} :distance { pairs = chain(40) }
 return from { P = {{-0.5, 0.05, 0}, {0.3, 0, 0.02}}, v = {{2, 0, 0}, {0, 0.1, 0}}, mass = {1, 2} } :gravity {}
   :contact { radius = 0.1, friction = 0.3 } :solve { substeps = %d }]] },
   { "contact", "200 pairs of grains, oblique, with friction", 4, 12, [[
-local P, v = {}, {}
-for i = 0, 199 do
-  P[2 * i + 1], v[2 * i + 1] = {-0.4 * u(i, 1) - 0.2, 0.17 * centred(i, 2), 3 * i}, {1 + 3 * u(i, 3), 0, 0}
-  P[2 * i + 2], v[2 * i + 2] = {0, 0, 3 * i}, {0, 0, 0}
-end
-return from { P = P, v = v } :gravity {} :contact { radius = 0.1, friction = 0.4 }
+return from(shots(200)) :gravity {} :contact { radius = 0.1, friction = 0.4 }
   :solve { substeps = %d }]] },
   { "contact, collide", "heap of 64 grains", 8, 10, [[
 return from { P = grid(4, 4, 4, 0.12, {0, 0.2, 0}) } :gravity {}
@@ -221,12 +224,7 @@ return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P =
   :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0, friction = function(f) return f.time / 2 end }
   :solve { substeps = 4 }]] },
   { "contact", "friction of grains that is a function of the frame", 1, 12, [[
-local P, v = {}, {}
-for i = 0, 49 do
-  P[2 * i + 1], v[2 * i + 1] = {-0.4 * u(i, 1) - 0.2, 0.17 * centred(i, 2), 3 * i}, {1 + 3 * u(i, 3), 0, 0}
-  P[2 * i + 2], v[2 * i + 2] = {0, 0, 3 * i}, {0, 0, 0}
-end
-return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = P, v = v } }
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from(shots(50)) }
   :contact { radius = 0.1, friction = function(f) return 3 * f.time end } :solve { substeps = 16 }]] },
   { "collide", "contacts found after the step", 2, 24, [[
 return from { P = grid(6, 6, 6, 0.2, {0, 0.5, 0}) } :gravity {} :turbulence { amplitude = 2, octaves = 1 }

@@ -213,6 +213,29 @@ describe("what slides with viscosity", function()
     assert.truthy(drop(0.95 * g * math.cos(math.rad(30))).P:dot(normal) > 1)
   end)
 
+  it("is kicked off by more than the adhesion, as an acceleration over the frame", function()
+    local function height(kick)
+      return run([[shape = rapid.shape.plane {}, response = "slide", adhesion = 100]], "P = {{0, 0.1, 0}}", 40, 2,
+        ([[:gravity {} :points("kick", function(p, frame)
+          if frame.number == 20 then p.v = p.v + vec3(0, %g, 0) end
+        end)]]):format(kick))[22][1].P.y
+    end
+    assert.equal(0, height(99 / 24))
+    assert.truthy(height((101 + g) / 24) > 0.1)
+  end)
+
+  -- It leaves where v²/R - g cos θ exceeds the adhesion, with v² = v0² + 2 g R (1 - cos θ), and keeps v cos θ.
+  it("leaves a ball where adhesion and weight no longer turn it", function()
+    for _, adhesion in ipairs { 0, 5, 12 } do
+      local cosine = (2 * g + 0.5 ^ 2 - adhesion) / (3 * g)
+      local speed = math.sqrt(0.5 ^ 2 + 2 * g * (1 - cosine))
+      local p = run(([[shape = rapid.shape.sphere { radius = 1 }, response = "slide", adhesion = %g]]):format(adhesion),
+        "P = {{0, 1, 0}}, v = {{0.5, 0, 0}}", 37, 16)[37][1]
+      assert.truthy(p.P:length() > 1.5)
+      assert.near(speed * cosine, p.v.x, 0.01 * speed)
+    end
+  end)
+
   -- Where viscosity is strong the angle from the top follows R k θ' = g sin θ: tan(θ/2) grows as exp(g t/(R k)).
   it("runs down a ball, round it and to its lowest point", function()
     local level_set = "rapid.levelset.sphere { radius = 1, voxel = 0.03 }"

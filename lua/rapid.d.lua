@@ -516,6 +516,18 @@ local Node = {}
 ---@return rapid.Node
 function Node:action(params) end
 
+---@class rapid.params.align
+---@field axis? rapid.Place|fun(frame: rapid.Frame): rapid.Place  of the point, any length but zero [vec3, default {0, 1, 0}]
+---@field response? number|fun(frame: rapid.Frame): number  time in which the angle falls to 1/e [number, s, at least 0, default 0]
+---@field to? string  a vec3: where the axis is to point [name of an attribute, default "N"]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Turns orient so that an axis points along an attribute.
+---@param params? rapid.params.align
+---@return rapid.Node
+function Node:align(params) end
+
 ---@class rapid.params.align_to_velocity
 ---@field least? number|fun(frame: rapid.Frame): number  slower points keep their orientation [number, m/s, at least 0, default 1e-06]
 ---@field up? rapid.Place|fun(frame: rapid.Frame): rapid.Place  where the y axis points as far as it can [vec3, default {0, 1, 0}]
@@ -541,7 +553,7 @@ function Node:align_to_velocity(params) end
 function Node:arrive(params) end
 
 ---@class rapid.params.assign_goals
----@field by? "id"|"random"|fun(frame: rapid.Frame): "id"|"random"  who gets which [string, one of id, random, default "id"]
+---@field by? "id"|"nearest"|"random"|fun(frame: rapid.Frame): "id"|"nearest"|"random"  who gets which [string, one of id, nearest, random, default "id"]
 ---@field from string|fun(frame: rapid.Frame): string  the group of the points that are places [string, required]
 ---@field into? string  who has a place is put into this group [name of a group, default "assigned"]
 ---@field name? string  what the node is called in messages [string]
@@ -775,6 +787,21 @@ function Node:field(params) end
 ---@return rapid.Node
 function Node:follow_curve(params) end
 
+---@class rapid.params.follow_leader
+---@field distance? number|fun(frame: rapid.Frame): number  behind the leader at which the train begins [number, m, at least 0, default 0.5]
+---@field leader string|fun(frame: rapid.Frame): string  the group of the leader [string, required]
+---@field length? number|fun(frame: rapid.Frame): number  of the train [number, m, at least 0, default 2]
+---@field response? number|fun(frame: rapid.Frame): number  time in which the difference falls to 1/e [number, s, at least 1e-06, default 0.2]
+---@field speed? number|fun(frame: rapid.Frame): number  greatest [number, m/s, at least 1e-06, default 5]
+---@field time? number|fun(frame: rapid.Frame): number  in which they close up [number, s, at least 1e-06, default 0.5]
+---@field width? number|fun(frame: rapid.Frame): number  of the train, to each side [number, m, at least 0, default 0.5]
+---@field name? string  what the node is called in messages [string]
+
+---Has points follow one that leads them.
+---@param params rapid.params.follow_leader
+---@return rapid.Node
+function Node:follow_leader(params) end
+
 ---@class rapid.params.goal
 ---@field clock? "scene"|"age"|fun(frame: rapid.Frame): "scene"|"age"  what start is counted by [string, one of scene, age, default "scene"]
 ---@field hold? boolean|fun(frame: rapid.Frame): boolean  points stay at their places afterwards [boolean, default true]
@@ -833,6 +860,16 @@ function Node:group_by_bounds(params) end
 ---@param params rapid.params.group_by_shape
 ---@return rapid.Node
 function Node:group_by_shape(params) end
+
+---@class rapid.params.impact_spin
+---@field grip? number|fun(frame: rapid.Frame): number  part of the way to rolling at each contact [number, from 0 to 1, default 1]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Sets points turning that have hit a shape.
+---@param params? rapid.params.impact_spin
+---@return rapid.Node
+function Node:impact_spin(params) end
 
 ---@class rapid.params.interact
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
@@ -1011,6 +1048,27 @@ function Node:spring(params) end
 ---@param params? rapid.params.swirl
 ---@return rapid.Node
 function Node:swirl(params) end
+
+---@class rapid.params.torque
+---@field inertia? number|fun(frame: rapid.Frame): number  moment of inertia; 0: of a solid sphere [number, kg m², at least 0, default 0]
+---@field torque? rapid.Place|fun(frame: rapid.Frame): rapid.Place  about its own direction [vec3, N m, default {0, 0, 0}]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Speeds up the turning of points.
+---@param params? rapid.params.torque
+---@return rapid.Node
+function Node:torque(params) end
+
+---@class rapid.params.tumble
+---@field drag? number|fun(frame: rapid.Frame): number  rate at which w falls [number, 1/s, at least 0, default 0]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Turns orient by each point's own angular velocity w.
+---@param params? rapid.params.tumble
+---@return rapid.Node
+function Node:tumble(params) end
 
 ---@class rapid.params.turbulence
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]

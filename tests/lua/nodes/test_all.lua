@@ -13,7 +13,7 @@ end
 -- points leads; before that LuaJIT gives up attempts to have both in one. Functions of the whole set run once a frame.
 local function failed_traces(name, aborts)
   local text, failed = document.read("lua/nodes/" .. name .. ".lua"), {}
-  if text:find "\n  detail = " then return failed end
+  if text:find "\n  detail = " or text:find ":detail {" then return failed end
   local has_loop = text:find "\n    while "
   for _, abort in ipairs(aborts) do
     local nested = abort:find ": leaving loop in root trace$" or abort:find ": inner loop in root trace$"

@@ -58,4 +58,32 @@ describe("assign_goals", function()
     assert.is_true(result[6][10]:within "assigned" and result[6][11]:within "assigned")
     assert.is_true(result[6][10].goal.y ~= result[6][11].goal.y)
   end)
+
+  it("by nearest gives each by id the nearest place that is free, and all again when all are taken", function()
+    local text = [[
+return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = %s } } :attribute { place = 0 }
+  :points("spread", function(p, frame)
+    if frame.number == 2 then p.P = vec3(p:rand(1), p:rand(2), p:rand(3)) p.place = p.id %% 3 == 0 and 1 or 0 end
+  end) %s :solve {}]]
+    local before = scene.run(text:format("0.14", ""), { frames = {2, 2} })[2]
+    local after = scene.run(text:format("0.14", [[
+      :group { name = "places", where = function(p) return p.place == 1 end }
+      :assign_goals { from = "places", by = "nearest" }]]), { frames = {2, 2} })[2]
+    local places, free = {}, {}
+    for i = 1, #before do
+      if before[i].place == 1 then places[#places + 1] = before[i] end
+    end
+    assert.truthy(#places > 50)
+    assert.equal(#before - #places, #after)
+    for i = 1, #after do
+      if #free == 0 then free = { unpack(places) } end
+      local best, least = 1, math.huge
+      for k, place in ipairs(free) do
+        local d = (place.P - after[i].P):length()
+        if d < least then best, least = k, d end
+      end
+      assert.near(free[best].P, after[i].goal, 0)
+      table.remove(free, best)
+    end
+  end)
 end)

@@ -1,0 +1,55 @@
+-- follow_leader: points of a group go behind one of them, each at a place of its own in the train.
+--
+--   v' = (w - v) / response            w = u + (place - P) / time, at most speed
+--   place = L - (distance + r1 length) û + r2 width            L, u: place and velocity of the leader
+--
+-- solved over the frame with w held; r1, r2 are the point's own, and its place is across û by up to width. The leader
+-- is the member of `leader` with the least id, and does as other nodes tell it; where there is none, nothing happens.
+local rapid = require "rapid"
+
+local function across(along, p)
+  local axis = math.abs(along.y) < 0.9 and vec3(0, 1, 0) or vec3(1, 0, 0)
+  local side = along:cross(axis):normalized()
+  local angle, r = 2 * math.pi * p:rand(2), math.sqrt(p:rand(3))
+  return (side * math.cos(angle) + along:cross(side) * math.sin(angle)) * r
+end
+
+return rapid.node {
+  name = "follow_leader",
+  doc  = "Has points follow one that leads them.",
+  params = {
+    leader   = { "string", required = true, doc = "the group of the leader" },
+    distance = { "float", default = 0.5, min = 0, unit = "m", doc = "behind the leader at which the train begins" },
+    length   = { "float", default = 2, min = 0, unit = "m", doc = "of the train" },
+    width    = { "float", default = 0.5, min = 0, unit = "m", doc = "of the train, to each side" },
+    speed    = { "float", default = 5, min = 1e-6, unit = "m/s", doc = "greatest" },
+    time     = { "float", default = 0.5, min = 1e-6, unit = "s", doc = "in which they close up" },
+    response = { "float", default = 0.2, min = 1e-6, unit = "s", doc = "time in which the difference falls to 1/e" },
+  },
+  expand = function(input, params)
+    return input
+      :detail { kernel = function(points)
+        local first
+        for i = 1, #points do
+          local p = points[i]
+          if p:within(params.leader) and (not first or p.id < first.id) then first = p end
+        end
+        points.detail.leads = first and 1 or 0
+        points.detail.leader_P = first and first.P or vec3(0, 0, 0)
+        points.detail.leader_v = first and first.v or vec3(0, 0, 0)
+      end }
+      :points { kernel = function(p, frame)
+        local detail = frame.detail
+        if detail.leads == 0 or p:within(params.leader) then return end
+        local u = detail.leader_v
+        local speed = u:length()
+        local along = speed > 1e-9 and u / speed or vec3(0, 0, 1)
+        local place = detail.leader_P - along * (params.distance + params.length * p:rand(1))
+          + across(along, p) * params.width
+        local wanted = u + (place - p.P) / params.time
+        local most = wanted:length()
+        if most > params.speed then wanted = wanted * (params.speed / most) end
+        p.v = wanted:lerp(p.v, math.exp(-p.dt / params.response))
+      end }
+  end,
+}

@@ -1,0 +1,21 @@
+-- impact_spin: what hits a surface is set turning, up to the rate at which it would roll.
+--
+--   w' = w + grip (n × u / r - w)            u: velocity relative to the surface;  r: pscale
+--
+-- in the frame after a contact that :collide{ record = true } has written to the hit attributes.
+local rapid = require "rapid"
+
+return rapid.node {
+  name = "impact_spin",
+  doc  = "Sets points turning that have hit a shape.",
+  params = {
+    grip = { "float", default = 1, min = 0, max = 1, doc = "part of the way to rolling at each contact" },
+  },
+  makes = { w = {0, 0, 0} },
+  points = function(p, _, params)
+    if p.hitnum == 0 then return end
+    if p.pscale == 0 then error("a point of pscale 0 does not roll; give it a pscale") end
+    local roll = p.hitnml:cross(p.v - p.hitv) / p.pscale
+    p.w = p.w + (roll - p.w) * params.grip
+  end,
+}

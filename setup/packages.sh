@@ -4,12 +4,13 @@
 # Boost's, though it does not depend on them.
 build_packages=(
     ccache cmake g++ ninja-build
-    libassimp-dev libboost-dev libcli11-dev libeigen3-dev libfmt-dev libluajit-5.1-dev libopenvdb-dev libpng-dev
-    librandom123-dev libseccomp-dev libtbb-dev nlohmann-json3-dev
+    libassimp-dev libboost-dev libcli11-dev libeigen3-dev libfmt-dev libluajit-5.1-dev libminizip-dev libopenvdb-dev
+    libpng-dev libpugixml-dev librandom123-dev libseccomp-dev libtbb-dev nlohmann-json3-dev zlib1g-dev
     lua-busted
 )
 
 # What its tests need besides.
 test_packages=(
-    catch2 clang-14 clang-format-14 libbenchmark-dev libclang-rt-14-dev librapidcheck-dev lua-check python3 universal-ctags
+    catch2 clang-14 clang-format-14 libbenchmark-dev libclang-rt-14-dev librapidcheck-dev lua-check python3 python3-numpy
+    universal-ctags
 )

@@ -60,16 +60,21 @@ void append(PointSet& points, std::span<const Event> events, const char* name, c
 void EventFile::declare(CLI::App& app)
 {
     app.add_option("--events", path_,
-                   "writes births, contacts and deaths with their places and times as points (.csv, .bgeo, .ply, .vdb)")
+                   "writes births, contacts and deaths with their places and times as points (any format that can be "
+                   "read: .csv, .bgeo, .npz, ...)")
         ->type_name("FILE");
 }
 
 void EventFile::check() const
 {
+    if (path_.empty()) return;
+    std::string known;
+    for (const Format& format : formats())
+        if (format.read) known += (known.empty() ? "" : ", ") + format.extension;
     const std::string extension = std::filesystem::path(path_).extension();
-    const auto known = {".csv", ".bgeo", ".ply", ".vdb"};
-    if (!path_.empty() && std::find(known.begin(), known.end(), extension) == known.end())
-        throw Error(fmt::format("--events {}: the events are points; give a file .csv, .bgeo, .ply or .vdb", path_));
+    const auto is_points = [&](const Format& format) { return format.read && format.extension == extension; };
+    if (std::none_of(formats().begin(), formats().end(), is_points))
+        throw Error(fmt::format("--events {}: the events are points; give a file of {}", path_, known));
 }
 
 void EventFile::add(const FrameResult& result)

@@ -1,6 +1,7 @@
 // Numbers in binary files.
 #pragma once
 
+#include <Eigen/Core>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -8,15 +9,24 @@
 namespace rapid {
 
 enum class ByteOrder { Little, Big };
-enum class ScalarType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
+enum class ScalarType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Half, Float, Double };
+
+// IEEE 754's binary16.
+struct Half {
+    std::uint16_t bits = 0;
+
+    Half() = default;
+    explicit Half(double value) : bits(Eigen::half(static_cast<float>(value)).x) {}
+    operator float() const { return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits)); }
+};
 
 constexpr std::size_t scalar_bytes(ScalarType type)
 {
-    constexpr std::size_t bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+    constexpr std::size_t bytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 2, 4, 8};
     return bytes[static_cast<std::size_t>(type)];
 }
 
-constexpr bool is_floating(ScalarType type) { return type == ScalarType::Float || type == ScalarType::Double; }
+constexpr bool is_floating(ScalarType type) { return type >= ScalarType::Half; }
 
 template <class Scalar>
 Scalar load_scalar(const unsigned char* from, ByteOrder order)
@@ -44,6 +54,12 @@ auto with_scalar(ScalarType type, const F& f)
             return f(std::int32_t{});
         case ScalarType::UInt32:
             return f(std::uint32_t{});
+        case ScalarType::Int64:
+            return f(std::int64_t{});
+        case ScalarType::UInt64:
+            return f(std::uint64_t{});
+        case ScalarType::Half:
+            return f(Half{});
         case ScalarType::Float:
             return f(float{});
         case ScalarType::Double:

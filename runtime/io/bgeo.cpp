@@ -251,7 +251,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
         throw Error(fmt::format("the file ends early: its header promises {} points, it holds {}", n,
                                 reader.rest().size() / dictionary.stride));
     PointSet points =
-        read_records(reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big, dictionary.attributes);
+        read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
     if (primitives > 0) return points;
     reader.enter("attributes of the whole");
     if (of_the_whole > 0) reader.take(read_dictionary(reader, of_the_whole, 0).stride);

@@ -6,17 +6,16 @@
 // except id is float, unless it holds only integers and float would round one of them; then it is int32, or int64 where
 // that is too small.
 #include <fmt/format.h>
-#include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
 #include <atomic>
 #include <charconv>
-#include <utility>
 
 #include "runtime/files/input_file.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/id_order.h"
+#include "runtime/io/ordered_chunks.h"
 #include "runtime/parallel.h"
 
 namespace rapid {
@@ -109,19 +108,8 @@ void write_csv(OutputFile& file, const PointSet& points, const FrameInfo&)
     const std::vector<std::size_t> order = id_order(points.id());
     file.append(table.header.data(), table.header.size());
 
-    // Lines are formatted in parallel and written in order; the number of tokens bounds the memory.
-    constexpr std::size_t tokens = 16;
-    std::size_t next = 0;
-    tbb::parallel_pipeline(
-        tokens,
-        tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& control) {
-            if (next >= points.size()) control.stop();
-            return std::exchange(next, next + chunk_size);
-        }) & tbb::make_filter<std::size_t, std::string>(tbb::filter_mode::parallel, [&](std::size_t begin) {
-            return csv_lines(table, order, begin, std::min(begin + chunk_size, points.size()));
-        }) & tbb::make_filter<std::string, void>(tbb::filter_mode::serial_in_order, [&](const std::string& text) {
-            file.append(text.data(), text.size());
-        }));
+    append_chunks(file, points.size(),
+                  [&](std::size_t begin, std::size_t end) { return csv_lines(table, order, begin, end); });
 }
 
 // The start of each line, without the header and trailing empty lines.

@@ -120,7 +120,7 @@ PointSet read_vertices(PlyFile& file, const PlyElement& vertex)
                                     [](const RecordAttribute& a) { return a.name == "P" && a.offsets.size() == 3; });
     if (!placed) throw Error("the vertices have no x y z");
     const PlyRecords records = file.read_records(vertex);
-    return read_records(records.bytes, vertex.count, records.stride, records.order, attributes);
+    return read_records({records.bytes, vertex.count, records.stride, records.order}, attributes);
 }
 
 PointSet read_ply(const std::filesystem::path& path)

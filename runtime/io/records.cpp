@@ -70,52 +70,76 @@ auto with_loader(ScalarType type, ByteOrder order, const F& f)
     });
 }
 
-struct Records {
-    std::span<const unsigned char> bytes;
-    std::size_t points, stride;
-    ByteOrder order;
+// The numbers of an attribute.
+struct Numbers {
+    const Records& records;
+    const RecordAttribute& attribute;
 
     // out[i * step] = the number at `offset` of record i.
     template <class Number>
-    void read(ScalarType type, std::size_t offset, double scale, Number* out, std::size_t step) const
+    void read(std::size_t offset, Number* out, std::size_t step) const
     {
-        with_loader(type, order, [&](const auto& loader) {
-            for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
-                const unsigned char* from = bytes.data() + begin * stride + offset;
+        const double scale = attribute.scale;
+        with_loader(attribute.type, records.order, [&](const auto& loader) {
+            for_each_chunk(records.points, [&](std::size_t begin, std::size_t end) {
+                const unsigned char* from = records.bytes.data() + begin * records.stride + offset;
                 if (scale == 1)
-                    for (std::size_t i = begin; i < end; ++i, from += stride)
+                    for (std::size_t i = begin; i < end; ++i, from += records.stride)
                         out[i * step] = static_cast<Number>(loader(from));
                 else
-                    for (std::size_t i = begin; i < end; ++i, from += stride)
+                    for (std::size_t i = begin; i < end; ++i, from += records.stride)
                         out[i * step] = static_cast<Number>(scale * static_cast<double>(loader(from)));
             });
         });
     }
 
-    // Of floating numbers, which must be whole ones.
-    void check_ids(ScalarType type, std::size_t offset) const
+    // Calls f(i, number) for each.
+    template <class F>
+    void check(std::size_t offset, const F& f) const
     {
-        with_loader(type, order, [&](const auto& loader) {
-            for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) {
-                    const auto id = static_cast<double>(loader(bytes.data() + i * stride + offset));
-                    if (!(std::abs(id) <= 0x1p53 && id == std::floor(id)))
-                        throw Error(fmt::format("point {} has the id {}; ids are whole numbers", i, id));
-                }
+        with_loader(attribute.type, records.order, [&](const auto& loader) {
+            for_each_chunk(records.points, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i)
+                    f(i, loader(records.bytes.data() + i * records.stride + offset));
             });
         });
     }
 
+    // Of floating numbers, which must be whole ones.
+    void check_ids(std::size_t offset) const
+    {
+        check(offset, [](std::size_t i, auto number) {
+            const auto id = static_cast<double>(number);
+            if (!(std::abs(id) <= 0x1p53 && id == std::floor(id)))
+                throw Error(fmt::format("point {} has the id {}; ids are whole numbers", i, id));
+        });
+    }
+
+    // Of unsigned integers of 64 bits.
+    void check_fits_int64(std::size_t offset) const
+    {
+        check(offset, [this](std::size_t i, auto number) {
+            if (static_cast<std::uint64_t>(number) > std::numeric_limits<std::int64_t>::max())
+                throw Error(fmt::format("point {} has {} = {}; it must be at most 2^63 - 1", i, attribute.name,
+                                        static_cast<std::uint64_t>(number)));
+        });
+    }
+
     template <class T, class Number>
-    Column<T> column(const RecordAttribute& attribute, std::span<const std::size_t> offsets) const
+    Column<T> column(std::span<const std::size_t> offsets) const
     {
         Column<T> column;
-        if (points == 0) return column;
-        std::span<T> values = column.append_for_writing(points);
+        if (records.points == 0) return column;
+        std::span<T> values = column.append_for_writing(records.points);
         Number* numbers = reinterpret_cast<Number*>(values.data());
-        for (std::size_t c = 0; c < offsets.size(); ++c)
-            read(attribute.type, offsets[c], attribute.scale, numbers + c, offsets.size());
+        for (std::size_t c = 0; c < offsets.size(); ++c) read(offsets[c], numbers + c, offsets.size());
         return column;
+    }
+
+    bool is_wide() const
+    {
+        return attribute.type == ScalarType::UInt32 || attribute.type == ScalarType::Int64 ||
+               attribute.type == ScalarType::UInt64;
     }
 };
 
@@ -134,8 +158,8 @@ void RecordWriter::add(const std::string& name, const AnyColumn& column)
         [&](const auto& c) {
             using T = std::decay_t<decltype(c[0])>;
             const Strided<T> values = c.read();
-            if constexpr (std::is_same_v<T, std::int64_t>) {
-                check_fits_int32(name, c);
+            if (std::is_same_v<T, std::int64_t> && integers_ == Narrow) {
+                if constexpr (std::is_same_v<T, std::int64_t>) check_fits_int32(name, c);
                 push(Part::Narrowed, values.data, values.stride * sizeof(T), 1, 4);
             } else {
                 push(Part::Words, values.data, values.stride * sizeof(T), sizeof(T) / 4, sizeof(T));
@@ -165,6 +189,7 @@ void RecordWriter::interleave(const Part& part, std::size_t begin, std::size_t e
         switch (part.encoding) {
             case Part::Words:
                 if (part.words == 1) return interleave_words<swapped, 1>(from, part.stride, to, record_bytes_, n);
+                if (part.words == 2) return interleave_words<swapped, 2>(from, part.stride, to, record_bytes_, n);
                 if (part.words == 3) return interleave_words<swapped, 3>(from, part.stride, to, record_bytes_, n);
                 return interleave_words<swapped, 4>(from, part.stride, to, record_bytes_, n);
             case Part::Narrowed:
@@ -180,6 +205,11 @@ void RecordWriter::interleave(const Part& part, std::size_t begin, std::size_t e
         interleaved.template operator()<false>();
 }
 
+void RecordWriter::interleave(std::size_t begin, std::size_t end, unsigned char* records) const
+{
+    for (const Part& part : parts_) interleave(part, begin, end, records);
+}
+
 void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t points) const
 {
     // The records of a chunk, 32 to 128 bytes each, and their columns stay in the second-level cache.
@@ -187,55 +217,62 @@ void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t poi
         // A buffer per thread that is kept, so that its pages are touched once.
         thread_local std::vector<unsigned char> records;
         records.resize((end - begin) * record_bytes_);
-        for (const Part& part : parts_) interleave(part, begin, end, records.data());
+        interleave(begin, end, records.data());
         file.write_at(offset + begin * record_bytes_, records.data(), records.size());
     });
 }
 
-PointSet read_records(std::span<const unsigned char> bytes, std::size_t n, std::size_t stride, ByteOrder order,
-                      const std::vector<RecordAttribute>& attributes)
+void read_attribute(PointSet& points, const Records& records, const RecordAttribute& attribute)
 {
-    RAPID_ASSERT(bytes.size() >= n * stride);
-    const Records records{bytes, n, stride, order};
-    PointSet points;
-    points.append(n);
-
-    for (const RecordAttribute& attribute : attributes) {
-        const std::span<const std::size_t> offsets = attribute.offsets;
-        if (attribute.group) {
-            std::span<std::uint8_t> members = points.group(attribute.name).overwrite();
-            records.read(attribute.type, offsets[0], 1, members.data(), 1);
-            for (std::uint8_t& member : members) member = member != 0;
-            continue;
-        }
-        const bool floating = is_floating(attribute.type) || attribute.scale != 1;
-        if (attribute.name == "id" && offsets.size() == 1) {
-            if (is_floating(attribute.type)) records.check_ids(attribute.type, offsets[0]);
-            points.set("id", records.column<std::int64_t, std::int64_t>(attribute, offsets));
-        } else if (floating && offsets.size() == 3) {
-            points.set(attribute.name, records.column<Vec3f, float>(attribute, offsets));
-        } else if (floating && offsets.size() == 4) {
-            points.set(attribute.name, records.column<Quatf, float>(attribute, offsets));
-        } else {
-            for (std::size_t c = 0; c < offsets.size(); ++c) {
-                const std::string name = offsets.size() == 1 ? attribute.name : fmt::format("{}{}", attribute.name, c);
-                const std::span<const std::size_t> one = offsets.subspan(c, 1);
-                if (floating)
-                    points.set(name, records.column<float, float>(attribute, one));
-                else if (attribute.type == ScalarType::UInt32)
-                    points.set(name, records.column<std::int64_t, std::int64_t>(attribute, one));
-                else
-                    points.set(name, records.column<std::int32_t, std::int32_t>(attribute, one));
-            }
+    const Numbers numbers{records, attribute};
+    const std::span<const std::size_t> offsets = attribute.offsets;
+    if (attribute.group) {
+        std::span<std::uint8_t> members = points.group(attribute.name).overwrite();
+        numbers.read(offsets[0], members.data(), 1);
+        for (std::uint8_t& member : members) member = member != 0;
+        return;
+    }
+    if (attribute.type == ScalarType::UInt64)
+        for (const std::size_t offset : offsets) numbers.check_fits_int64(offset);
+    const bool floating = is_floating(attribute.type) || attribute.scale != 1;
+    if (attribute.name == "id" && offsets.size() == 1) {
+        if (is_floating(attribute.type)) numbers.check_ids(offsets[0]);
+        points.set("id", numbers.column<std::int64_t, std::int64_t>(offsets));
+    } else if (floating && offsets.size() == 3) {
+        points.set(attribute.name, numbers.column<Vec3f, float>(offsets));
+    } else if (floating && offsets.size() == 4) {
+        points.set(attribute.name, numbers.column<Quatf, float>(offsets));
+    } else {
+        for (std::size_t c = 0; c < offsets.size(); ++c) {
+            const std::string name = offsets.size() == 1 ? attribute.name : fmt::format("{}{}", attribute.name, c);
+            const std::span<const std::size_t> one = offsets.subspan(c, 1);
+            if (floating)
+                points.set(name, numbers.column<float, float>(one));
+            else if (numbers.is_wide())
+                points.set(name, numbers.column<std::int64_t, std::int64_t>(one));
+            else
+                points.set(name, numbers.column<std::int32_t, std::int32_t>(one));
         }
     }
+}
+
+void number_points(PointSet& points)
+{
+    if (points.empty()) return;
+    std::span<std::int64_t> ids = points.id().overwrite();
+    std::iota(ids.begin(), ids.end(), std::int64_t{0});
+}
+
+PointSet read_records(const Records& records, const std::vector<RecordAttribute>& attributes)
+{
+    RAPID_ASSERT(records.bytes.size() >= records.points * records.stride);
+    PointSet points;
+    points.append(records.points);
+    for (const RecordAttribute& attribute : attributes) read_attribute(points, records, attribute);
     const bool has_id = std::any_of(attributes.begin(), attributes.end(), [](const RecordAttribute& a) {
         return a.name == "id" && !a.group && a.offsets.size() == 1;
     });
-    if (!has_id && n > 0) {
-        std::span<std::int64_t> ids = points.id().overwrite();
-        std::iota(ids.begin(), ids.end(), std::int64_t{0});
-    }
+    if (!has_id) number_points(points);
     return points;
 }
 

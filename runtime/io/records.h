@@ -1,4 +1,5 @@
-// Records of fixed size, one for each point, as in .bgeo and .ply.
+// Records of fixed size, one for each point, as in .bgeo, .ply and .prt; or a record of one attribute, which is an
+// array, as in .npz and .vtp.
 //
 // Columns are interleaved into records, and separated again, chunk by chunk in parallel. The records of a chunk stay in
 // cache until they are written, so that writing costs little more than writing the same bytes from an array.
@@ -18,9 +19,11 @@ namespace rapid {
 // Interleaves columns, in the order of the calls. The columns must outlive it.
 class RecordWriter {
 public:
-    explicit RecordWriter(ByteOrder order) : order_(order) {}
+    // int64 is written as int32, or as it is.
+    enum Integers { Narrow, Wide };
+    explicit RecordWriter(ByteOrder order, Integers integers = Narrow) : order_(order), integers_(integers) {}
 
-    // Floats and int32 unchanged; int64 as int32. Error: a value that does not fit, naming .vdb and .csv.
+    // Floats and int32 unchanged. Error: an int64 that has to be narrowed and does not fit, naming .vdb and .csv.
     void add(const std::string& name, const AnyColumn& column);
     // Membership as a UInt8.
     void add_group(const Column<std::uint8_t>& members);
@@ -29,6 +32,8 @@ public:
 
     std::size_t record_bytes() const { return record_bytes_; }
     void write(OutputFile& file, std::uint64_t offset, std::size_t points) const;
+    // The records of the points [begin, end), shape [(end - begin) * record_bytes()].
+    void interleave(std::size_t begin, std::size_t end, unsigned char* records) const;
 
 private:
     // A column in the record.
@@ -43,6 +48,7 @@ private:
     void push(Part::Encoding encoding, const void* from, std::size_t stride, std::size_t words, std::size_t bytes);
 
     ByteOrder order_;
+    Integers integers_;
     std::vector<Part> parts_;
     std::size_t record_bytes_ = 0;
     std::vector<std::unique_ptr<std::uint32_t>> constants_;
@@ -57,10 +63,20 @@ struct RecordAttribute {
     double scale = 1;  // factor, which makes integers floats (colours stored as bytes)
 };
 
-// Reads points from records of `stride` bytes. Three floats become a vec3, four a quaternion; integers become int32;
-// unsigned 32-bit integers and id become int64. Without an id, points are numbered from 0. Error: an id that is not
-// whole.
-PointSet read_records(std::span<const unsigned char> records, std::size_t points, std::size_t stride, ByteOrder order,
-                      const std::vector<RecordAttribute>& attributes);
+// Records in memory, which must outlive it.
+struct Records {
+    std::span<const unsigned char> bytes;
+    std::size_t points, stride;
+    ByteOrder order;
+};
+
+// Sets an attribute of the points. Three floats become a vec3, four a quaternion; integers become int32; integers
+// beyond 32 bits, unsigned 32-bit ones and id become int64. Error: an id that is not whole; an integer beyond int64.
+void read_attribute(PointSet& points, const Records& records, const RecordAttribute& attribute);
+// Ids from 0, in order.
+void number_points(PointSet& points);
+
+// Reads points from records. Without an id, points are numbered from 0.
+PointSet read_records(const Records& records, const std::vector<RecordAttribute>& attributes);
 
 }  // namespace rapid

@@ -69,6 +69,7 @@ return rapid.create { fps = 24 }
   it("refuses a file that holds no points", function()
     local result = scene.command("run", "return rapid.create {} :solve {}", "-f 1-2 --events events.json")
     assert.equal(2, result.status)
-    assert.truthy(result.stderr:find("give a file .csv, .bgeo, .ply or .vdb", 1, true), result.stderr)
+    assert.truthy(result.stderr:find("give a file of .bgeo, .csv, .npz, .ply, .prt, .usda, .vdb, .vtp", 1, true),
+      result.stderr)
   end)
 end)

@@ -153,8 +153,9 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
 
   it("writes every format that it knows, and the same points to each", function()
     local folder = new_folder()
-    assert.equal(0, folder:run("-f 9 -o a.csv -o a.vdb -o a.bgeo -o a.ply -o a.png").status)
-    for _, other in ipairs { "a.vdb", "a.bgeo", "a.ply" } do
+    local others = { "a.vdb", "a.bgeo", "a.ply", "a.npz", "a.prt", "a.usda", "a.vtp" }
+    assert.equal(0, folder:run("-f 9 -o a.csv -o a.png -o " .. table.concat(others, " -o ")).status)
+    for _, other in ipairs(others) do
       local result = command.rapid("diff a.csv " .. other, { cwd = folder.path })
       assert.equal(0, result.status, result.stdout .. result.stderr)
     end
@@ -165,8 +166,8 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
     local folder = new_folder()
     local result = folder:run "-f 1-4 -o a.####.xyz"
     assert.equal(2, result.status)
-    assert.equal('-o a.####.xyz: unknown extension ".xyz"; it must be one of .bgeo, .csv, .ply, .png, .vdb\n',
-      result.stderr)
+    assert.equal('-o a.####.xyz: unknown extension ".xyz"; it must be one of .bgeo, .csv, .npz, .ply, .png, .prt, ' ..
+      '.usda, .vdb, .vtp\n', result.stderr)
     assert.equal("", result.stdout)
   end)
 

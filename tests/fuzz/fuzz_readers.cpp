@@ -20,9 +20,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (::ftruncate(file, 0) != 0 || ::pwrite(file, data + 1, size - 1, 0) != static_cast<ssize_t>(size - 1))
         std::abort();
     try {
-        const char* formats[] = {"a.csv", "a.bgeo", "a.ply"};
-        if (data[0] % 4 < 3)
-            rapid::format_of(formats[data[0] % 4]).read(path);
+        const char* formats[] = {"a.csv", "a.bgeo", "a.ply", "", "a.npz", "a.prt", "a.usda", "a.vtp"};
+        if (const char* format = formats[data[0] % 8]; *format)
+            rapid::format_of(format).read(path);
         else
             rapid::read_ply_mesh(path);
     } catch (const rapid::Error&) {

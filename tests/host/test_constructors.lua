@@ -209,7 +209,7 @@ return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, vec3(4, 5, 6)
   it(".read reads what a run has written", function()
     local text = [[
 return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, {4, 5, 6}}, heat = {0.5, 7} } } :solve {}]]
-    for _, format in ipairs { "vdb", "bgeo", "ply", "csv" } do
+    for _, format in ipairs { "vdb", "bgeo", "ply", "csv", "npz", "prt", "usda", "vtp" } do
       local result = scene.command("run", text, ("-f 1 -o made.####.%s --quiet"):format(format))
       assert.equal("", result.stderr)
       local points = scene.run(("return rapid.create { points = rapid.points.read 'made.0001.%s' }"):format(format),

@@ -94,7 +94,7 @@ TEST_CASE("what changes in a point set after it was submitted is not in the file
 
 TEST_CASE("a full disk is an error that names the file, earlier frames stay, nothing unfinished does", "[io][writer]")
 {
-    const std::string extension = GENERATE(".ply", ".bgeo", ".vdb", ".csv", ".png");
+    const std::string extension = GENERATE(".ply", ".bgeo", ".vdb", ".csv", ".npz", ".prt", ".usda", ".vtp", ".png");
     CAPTURE(extension);
     const SmallDisk disk;
     if (!disk.mounted()) return;  // not allowed to mount: nothing to fill
@@ -174,9 +174,11 @@ TEST_CASE("an unknown extension is refused with the known ones, before anything 
 {
     CHECK(error_of([] {
               FrameWriter(std::vector<OutputTarget>{{"a.####.abc", {}}});
-          }) == "a.####.abc: unknown extension \".abc\"; it must be one of .bgeo, .csv, .ply, .png, .vdb");
+          }) ==
+          "a.####.abc: unknown extension \".abc\"; it must be one of .bgeo, .csv, .npz, .ply, .png, .prt, .usda, .vdb, "
+          ".vtp");
     CHECK(error_of([] { format_of("a"); }) ==
-          "a: it has no extension; it must be one of .bgeo, .csv, .ply, .png, .vdb");
+          "a: it has no extension; it must be one of .bgeo, .csv, .npz, .ply, .png, .prt, .usda, .vdb, .vtp");
     CHECK(format_of("A.VDB").extension == ".vdb");
     CHECK(error_of([] { read_points("a.png"); }) == "a.png: a .png file holds no points that could be read");
     CHECK(error_of([] { read_points("/nowhere/a.vdb"); }) ==

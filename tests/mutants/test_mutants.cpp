@@ -70,6 +70,13 @@ constexpr const char* ply =
     "red\n"
     "property uchar green\nproperty uchar blue\nelement face 3\nproperty list uchar int vertex_indices\nend_header\n"
     "0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n0 0 1 1 1 1\n3 0 2 1\n4 0 1 2 3\n3 1 2 3\n";
+constexpr const char* vtp =
+    "<VTKFile type=\"PolyData\" compressor=\"vtkZLibDataCompressor\"><PolyData><Piece NumberOfPoints=\"3\"><Point"
+    "s><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">AQAAACQAAAAAAAAAHwAAAA==eJxjYACBBns"
+    "g4QBEQNwAxAuA+AAQPwBiBkcAUQgFgQ==</DataArray></Points><PointData><DataArray type=\"Int16\" Name=\"kind\" for"
+    "mat=\"ascii\">1 2 3</DataArray><DataArray type=\"Float32\" Name=\"v\" NumberOfComponents=\"3\" format=\"appe"
+    "nded\" offset=\"0\"/></PointData></Piece></PolyData><AppendedData encoding=\"base64\">_AQAAACQAAAAAAAAAHwAAA"
+    "A==eJxjYACBBnsg4QBEQNwAxAuA+AAQPwBiBkcAUQgFgQ==</AppendedData></VTKFile>";
 constexpr const char* stl =
     "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nfacet "
     "normal 0 1 "
@@ -125,6 +132,11 @@ const std::vector<Reader>& readers()
         {"points .ply, binary", "a.ply", "", write_points_of, use_points},
         {"points .ply, ascii", "a.ply", ply, nullptr, use_points},
         {"points .vdb", "a.vdb", "", write_points_of, use_points},
+        {"points .npz", "a.npz", "", write_points_of, use_points},
+        {"points .prt", "a.prt", "", write_points_of, use_points},
+        {"points .usda", "a.usda", "", write_points_of, use_points},
+        {"points .vtp, raw", "a.vtp", "", write_points_of, use_points},
+        {"points .vtp, text and base64", "a.vtp", vtp, nullptr, use_points},
         {"mesh .ply", "a.ply", ply, nullptr, use_mesh},
         {"mesh .obj", "a.obj", obj, nullptr, use_mesh},
         {"mesh .stl", "a.stl", stl, nullptr, use_mesh},

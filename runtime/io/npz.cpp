@@ -1,0 +1,268 @@
+// .npz: NumPy's archive (numpy.lib.format): a zip file of arrays, a member NAME.npy for each attribute.
+//
+//   0x93 "NUMPY" 1 0 | uint16: bytes of the header | {'descr': '<f4', 'fortran_order': False, 'shape': (n, 3), }
+//
+// padded by spaces to 64 bytes, then the numbers. P and every vec3 are <f4 (n, 3), a quaternion <f4 (n, 4) x y z w, a
+// float <f4 (n,), integers <i4 and <i8; a group is |b1 group_NAME. Members are stored, as by numpy.savez.
+//
+// Reads archives of numpy.savez and numpy.savez_compressed, of any order of bytes and of dimensions. Arrays of text and
+// objects (which are Python programs), of more than two dimensions, of more than 16 numbers a point, and of other than
+// n rows are left out; a |b1 (n,) is a group.
+#include <fmt/format.h>
+
+#include <charconv>
+#include <optional>
+
+#include "runtime/files/input_file.h"
+#include "runtime/io/attribute_names.h"
+#include "runtime/io/format.h"
+#include "runtime/io/records.h"
+#include "runtime/io/zip_file.h"
+#include "runtime/parallel.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::string_view magic = "\x93NUMPY", suffix = ".npy", group_prefix = "group_";
+constexpr std::size_t most_numbers = 16;  // of a point in an array
+
+std::string_view numpy_type(AttributeType type)
+{
+    if (type == AttributeType::Int32) return "<i4";
+    return type == AttributeType::Int64 ? "<i8" : "<f4";
+}
+
+std::string npy_header(std::string_view type, std::size_t n, std::size_t count)
+{
+    std::string dictionary = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({},{}), }}", type, n,
+                                         count > 1 ? fmt::format(" {}", count) : "");
+    const std::size_t before = magic.size() + 2 + 2;
+    dictionary.resize((before + dictionary.size() + 1 + 63) / 64 * 64 - before - 1, ' ');
+    dictionary += '\n';
+    std::string header = std::string(magic) + '\1' + '\0';
+    header += static_cast<char>(dictionary.size() & 0xff);
+    header += static_cast<char>(dictionary.size() >> 8);
+    return header + dictionary;
+}
+
+void write_array(ZipWriter& zip, const std::string& name, const std::string& header, const RecordWriter& array,
+                 std::size_t n)
+{
+    zip.begin(name + std::string(suffix), header.size() + n * array.record_bytes());
+    zip.write(header.data(), header.size());
+    std::vector<unsigned char> numbers(std::min(n, chunk_size) * array.record_bytes());
+    for (std::size_t begin = 0; begin < n; begin += chunk_size) {
+        const std::size_t end = std::min(n, begin + chunk_size);
+        array.interleave(begin, end, numbers.data());
+        zip.write(numbers.data(), (end - begin) * array.record_bytes());
+    }
+    zip.end();
+}
+
+void write_npz(OutputFile& file, const PointSet& points, const FrameInfo&)
+{
+    std::vector<std::string> attributes = further_attributes(points), names;
+    attributes.insert(attributes.begin(), {"P", "v", "id"});
+    names = attributes;
+    for (const std::string& group : points.group_names()) names.push_back(std::string(group_prefix) + group);
+    check_column_names(names, std::string_view("/\\\0", 3));
+
+    ZipWriter zip(file);
+    for (const std::string& name : attributes) {
+        const AnyColumn& column = *points.find(name);
+        RecordWriter array(ByteOrder::Little, RecordWriter::Wide);
+        array.add(name, column);
+        const AttributeType type = type_of(column);
+        write_array(zip, name, npy_header(numpy_type(type), points.size(), component_count(type)), array,
+                    points.size());
+    }
+    for (const auto& [name, members] : points.groups()) {
+        RecordWriter array(ByteOrder::Little);
+        array.add_group(members);
+        write_array(zip, std::string(group_prefix) + name, npy_header("|b1", points.size(), 1), array, points.size());
+    }
+    zip.finish();
+}
+
+// The header of an array: Python's dictionary of a text, a truth value and a tuple of whole numbers.
+class NpyHeader {
+public:
+    explicit NpyHeader(std::string_view text) : text_(text)
+    {
+        expect('{');
+        while (!accept('}')) {
+            const std::string_view key = quoted();
+            expect(':');
+            if (key == "descr" && (peek() == '\'' || peek() == '"'))
+                descr = quoted();
+            else if (key == "fortran_order")
+                fortran = word() == "True";
+            else if (key == "shape")
+                read_shape();
+            else
+                return;  // a list: a structure of several types
+            accept(',');
+        }
+        complete = true;
+    }
+
+    std::string_view descr;
+    bool fortran = false, complete = false;
+    std::vector<std::uint64_t> shape;
+
+private:
+    char peek()
+    {
+        const std::size_t at = text_.find_first_not_of(" \t\r\n");
+        if (at == std::string_view::npos) throw Error("the header of the array is cut off");
+        text_.remove_prefix(at);
+        return text_.front();
+    }
+    bool accept(char c)
+    {
+        if (peek() != c) return false;
+        text_.remove_prefix(1);
+        return true;
+    }
+    void expect(char c)
+    {
+        if (!accept(c)) throw Error(fmt::format("the header of the array has no '{}' where there must be one", c));
+    }
+    std::string_view quoted()
+    {
+        const char quote = peek();
+        const std::size_t end = text_.find(quote, 1);
+        if ((quote != '\'' && quote != '"') || end == std::string_view::npos)
+            throw Error("the header of the array has no text where there must be one");
+        const std::string_view result = text_.substr(1, end - 1);
+        text_.remove_prefix(end + 1);
+        return result;
+    }
+    std::string_view word()
+    {
+        peek();
+        const std::string_view result = text_.substr(0, text_.find_first_of(" ,}"));
+        text_.remove_prefix(result.size());
+        return result;
+    }
+    void read_shape()
+    {
+        expect('(');
+        while (!accept(')')) {
+            peek();
+            const auto parsed = std::from_chars(text_.data(), text_.data() + text_.size(), shape.emplace_back());
+            if (parsed.ec != std::errc()) throw Error("the shape of the array is no tuple of whole numbers");
+            text_.remove_prefix(static_cast<std::size_t>(parsed.ptr - text_.data()));
+            accept(',');
+        }
+    }
+
+    std::string_view text_;
+};
+
+struct NumberType {
+    ScalarType scalar;
+    ByteOrder order;
+    bool truth;
+};
+
+// Nothing for types that are no numbers.
+std::optional<NumberType> number_type(std::string_view descr)
+{
+    static const std::map<std::string_view, ScalarType> types = {
+        {"f2", ScalarType::Half},   {"f4", ScalarType::Float},  {"f8", ScalarType::Double}, {"i1", ScalarType::Int8},
+        {"i2", ScalarType::Int16},  {"i4", ScalarType::Int32},  {"i8", ScalarType::Int64},  {"u1", ScalarType::UInt8},
+        {"u2", ScalarType::UInt16}, {"u4", ScalarType::UInt32}, {"u8", ScalarType::UInt64}, {"b1", ScalarType::UInt8}};
+    if (descr.empty() || std::string_view("<>|=").find(descr[0]) == std::string_view::npos) return {};
+    const auto found = types.find(descr.substr(1));
+    if (found == types.end()) return {};
+    return NumberType{found->second, descr[0] == '>' ? ByteOrder::Big : ByteOrder::Little, descr.substr(1) == "b1"};
+}
+
+struct Array {
+    NumberType type;
+    std::size_t rows, numbers;  // of each row
+    bool fortran;
+    std::span<const unsigned char> bytes;
+};
+
+// Nothing for arrays that are no attribute.
+std::optional<Array> array_in(std::span<const unsigned char> bytes)
+{
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (!text.starts_with(magic) || bytes.size() < 12) throw Error("not an array of NumPy");
+    const std::size_t length_bytes = bytes[6] == 1 ? 2 : 4, begin = 8 + length_bytes;
+    std::size_t length = 0;
+    for (std::size_t b = length_bytes; b-- > 0;) length = length << 8 | bytes[8 + b];
+    if (length > bytes.size() - begin) throw Error("the header of the array is cut off");
+    const NpyHeader header(text.substr(begin, length));
+    const std::optional<NumberType> type = number_type(header.descr);
+    if (!header.complete || !type || header.shape.empty() || header.shape.size() > 2) return {};
+    const std::uint64_t rows = header.shape[0], numbers = header.shape.size() == 2 ? header.shape[1] : 1;
+    if (numbers < 1 || numbers > most_numbers) return {};
+    const std::span<const unsigned char> data = bytes.subspan(begin + length);
+    const std::size_t row = numbers * scalar_bytes(type->scalar);
+    if (rows > data.size() / row)
+        throw Error(
+            fmt::format("the array ends early: its header promises {} rows, it holds {}", rows, data.size() / row));
+    return Array{*type, rows, numbers, header.fortran, data};
+}
+
+void read_array(PointSet& points, const std::string& name, const Array& array)
+{
+    RecordAttribute attribute;
+    attribute.type = array.type.scalar;
+    attribute.group = array.type.truth && array.numbers == 1;
+    attribute.name = attribute.group && name.starts_with(group_prefix) ? name.substr(group_prefix.size()) : name;
+    const std::size_t number = scalar_bytes(array.type.scalar);
+    // In Fortran's order all first numbers come first.
+    for (std::size_t c = 0; c < array.numbers; ++c)
+        attribute.offsets.push_back(array.fortran ? c * array.rows * number : c * number);
+    const std::size_t stride = array.fortran ? number : array.numbers * number;
+    read_attribute(points, {array.bytes, array.rows, stride, array.type.order}, attribute);
+}
+
+PointSet read_npz(const std::filesystem::path& path)
+{
+    const InputFile file(path);
+    ZipReader zip(file.bytes());
+    const auto with_array = [&](const ZipReader::Member& member, const auto& use) {
+        const std::vector<unsigned char> bytes = zip.read(member);
+        try {
+            if (const std::optional<Array> array = array_in(bytes)) use(*array);
+        } catch (const Error& error) {
+            throw Error(fmt::format("\"{}\": {}", member.name, error.what()));
+        }
+    };
+
+    PointSet points;
+    std::vector<std::string> names;
+    bool placed = false;
+    for (const ZipReader::Member& member : zip.members()) {
+        if (member.name.ends_with(suffix)) names.push_back(member.name.substr(0, member.name.size() - suffix.size()));
+        if (member.name != "P.npy") continue;
+        with_array(member, [&](const Array& array) {
+            placed = array.numbers == 3 && is_floating(array.type.scalar);
+            if (placed && points.empty()) points.append(array.rows);
+        });
+    }
+    check_column_names(names, "");
+    if (!placed) throw Error("there is no array P of floats and of shape (n, 3)");
+    bool has_id = false;
+    for (const ZipReader::Member& member : zip.members()) {
+        if (!member.name.ends_with(suffix)) continue;
+        const std::string name = member.name.substr(0, member.name.size() - suffix.size());
+        with_array(member, [&](const Array& array) {
+            if (array.rows != points.size()) return;
+            read_array(points, name, array);
+            has_id |= name == "id" && array.numbers == 1 && !array.type.truth;
+        });
+    }
+    if (!has_id) number_points(points);
+    return points;
+}
+
+RAPID_FORMAT(Format{".npz", "NumPy's arrays, one for each attribute; all types", write_npz, read_npz});
+
+}  // namespace
+}  // namespace rapid

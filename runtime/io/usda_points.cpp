@@ -1,0 +1,285 @@
+#include "runtime/io/usda_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+bool is_word(char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view("_:.+-").find(c) != std::string_view::npos;
+}
+
+// An array of numbers by the name of its type ("point3f[]"); nothing for other types.
+std::optional<UsdArray> array_of(std::string_view type)
+{
+    if (!type.ends_with("[]")) return {};
+    type.remove_suffix(2);
+    UsdArray array{"", ScalarType::Double, 1, type.starts_with("quat"), {}};
+    if (type == "bool") return UsdArray{"", ScalarType::UInt8, 1, false, {}};
+    if (type == "uint" || type == "int64" || type == "uint64") return UsdArray{"", ScalarType::Int64, 1, false, {}};
+    static constexpr std::string_view integers[] = {"uchar", "int", "int2", "int3", "int4"};
+    static constexpr std::string_view floats[] = {
+        "half", "float", "double", "point3", "vector3", "normal3", "color3", "color4",  "texCoord2", "texCoord3",
+        "quat", "half2", "half3",  "half4",  "float2",  "float3",  "float4", "double2", "double3",   "double4"};
+    const auto is_in = [](const auto& names, std::string_view name) {
+        return std::find(std::begin(names), std::end(names), name) != std::end(names);
+    };
+    if (is_in(integers, type))
+        array.type = ScalarType::Int32;
+    else if (!is_in(floats, type) && !is_in(floats, type.substr(0, type.size() - !type.empty())))
+        return {};
+    const std::size_t digit = type.find_first_of("234");
+    array.tuple = array.quaternion                  ? 4
+                  : digit == std::string_view::npos ? 1
+                                                    : static_cast<std::size_t>(type[digit] - '0');
+    return array;
+}
+
+class UsdaReader {
+public:
+    explicit UsdaReader(std::string_view text) : text_(text) {}
+
+    std::vector<UsdArray> read()
+    {
+        if (!text_.starts_with("#usda")) throw Error("not USD's text: it does not begin with \"#usda\"");
+        bool found = false;
+        while (skip_space(), at_ < text_.size()) {
+            if (!is_word(text_[at_])) {
+                skip_mark();
+                continue;
+            }
+            if (word() != "def" || (skip_space(), !at_word()) || word() != "Points") continue;
+            if (std::exchange(found, true))
+                throw wrong("there are several prims of the type Points; there must be one");
+            skip_space();
+            skip_value();  // its name
+            if (skip_space(), is_at('(')) skip_value();
+            if (skip_space(), !is_at('{')) throw wrong("the prim of points has no { }");
+            ++at_;
+            read_properties();
+        }
+        if (!found) throw Error("there is no prim of the type Points");
+        return std::move(arrays_);
+    }
+
+private:
+    Error wrong(const std::string& what) const
+    {
+        const auto end = text_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, text_.size()));
+        return Error(fmt::format("line {}: {}", 1 + std::count(text_.begin(), end, '\n'), what));
+    }
+    bool is_at(char c) const { return at_ < text_.size() && text_[at_] == c; }
+    bool at_word() const { return at_ < text_.size() && is_word(text_[at_]); }
+
+    // Passes over white space and comments; whether there was an end of a line.
+    bool skip_space()
+    {
+        bool line = false;
+        for (; at_ < text_.size(); ++at_) {
+            if (text_[at_] == '#') at_ = std::min(text_.find('\n', at_), text_.size());
+            if (at_ == text_.size() || !is_space(text_[at_])) break;
+            line |= text_[at_] == '\n';
+        }
+        return line;
+    }
+    std::string_view word()
+    {
+        const std::size_t begin = at_;
+        while (at_word()) ++at_;
+        if (text_.substr(at_, 2) == "[]") at_ += 2;
+        return text_.substr(begin, at_ - begin);
+    }
+    void skip_to(std::string_view end, std::size_t from)
+    {
+        const std::size_t found = text_.find(end, from);
+        if (found == std::string_view::npos) throw wrong(fmt::format("no {} follows", end));
+        at_ = found + end.size();
+    }
+    // A text, a path of a file or of a prim, or one other character.
+    void skip_mark()
+    {
+        const char c = text_[at_];
+        if (c == '"' || c == '\'') {
+            const std::string three(3, c);
+            if (text_.substr(at_, 3) == three) return skip_to(three, at_ + 3);
+            for (++at_; at_ < text_.size() && text_[at_] != c; ++at_)
+                if (text_[at_] == '\\') ++at_;
+            if (at_ >= text_.size()) throw wrong("a text has no end");
+            ++at_;
+        } else if (c == '@') {
+            text_.substr(at_, 3) == "@@@" ? skip_to("@@@", at_ + 3) : skip_to("@", at_ + 1);
+        } else if (c == '<') {
+            skip_to(">", at_);
+        } else {
+            ++at_;
+        }
+    }
+    // A word, a text, a path, or all between brackets.
+    void skip_value()
+    {
+        if (at_word()) {
+            word();
+            return;
+        }
+        std::size_t depth = 0;
+        do {
+            skip_space();
+            if (at_ >= text_.size()) throw wrong("the file ends within a value");
+            if (std::string_view("([{").find(text_[at_]) != std::string_view::npos) ++depth;
+            if (std::string_view(")]}").find(text_[at_]) != std::string_view::npos && depth-- == 0)
+                throw wrong("a bracket closes that was not opened");
+            skip_mark();
+        } while (depth > 0);
+    }
+
+    void read_properties()
+    {
+        while (true) {
+            skip_space();
+            if (at_ >= text_.size()) throw wrong("the file ends within the prim of points");
+            if (is_at('}')) {
+                ++at_;
+                return;
+            }
+            read_statement();
+        }
+    }
+
+    // [custom] TYPE NAME [= VALUE] [(METADATA)], or a prim within this one, which is passed over.
+    void read_statement()
+    {
+        std::string_view type, name;
+        bool line = false;
+        while (!line && at_word()) {
+            type = name;
+            name = word();
+            line = skip_space();
+        }
+        if (!line && is_at('=')) {
+            ++at_;
+            skip_space();
+            read_value(type, name);
+            line = skip_space();
+        } else if (name.empty() && !is_at('"') && !is_at('(') && !is_at('{') && !is_at(';')) {
+            throw wrong("there is no property of a prim where there should be one");
+        } else if (!line && at_ < text_.size() && !is_at('}')) {
+            skip_mark_or_brackets();
+            line = false;
+        }
+        if (!line && (is_at('(') || is_at('{'))) skip_value();
+    }
+    void skip_mark_or_brackets() { is_at('(') || is_at('{') || is_at('[') ? skip_value() : skip_mark(); }
+
+    void read_value(std::string_view type, std::string_view name)
+    {
+        constexpr std::string_view samples = ".timeSamples";
+        std::optional<UsdArray> array = array_of(type);
+        if (!array) return skip_value();
+        if (!name.ends_with(samples)) {
+            if (!is_at('[')) return skip_value();  // None
+            array->name = std::string(name);
+            read_numbers(*array);
+            if (find(name) == arrays_.end()) arrays_.push_back(std::move(*array));
+            return;
+        }
+        name.remove_suffix(samples.size());
+        if (!is_at('{')) throw wrong("time samples have no { }");
+        ++at_;
+        bool found = false;
+        while (skip_space(), !is_at('}')) {
+            if (!at_word()) throw wrong("a time sample has no time");
+            word();  // the time, with its colon
+            if (skip_space(), is_at(':')) ++at_;
+            skip_space();
+            if (std::exchange(found, true))
+                throw wrong(
+                    fmt::format("{} has several time samples; give a file of one frame (usdcat can take one)", name));
+            if (is_at('['))
+                read_numbers(*array);
+            else
+                skip_value();
+            if (skip_space(), is_at(',')) ++at_;
+        }
+        ++at_;
+        array->name = std::string(name);
+        if (const auto before = find(name); before != arrays_.end()) arrays_.erase(before);
+        if (found) arrays_.push_back(std::move(*array));
+    }
+    std::vector<UsdArray>::iterator find(std::string_view name)
+    {
+        return std::find_if(arrays_.begin(), arrays_.end(), [&](const UsdArray& a) { return a.name == name; });
+    }
+
+    // [1, 2], [(1, 2, 3), (4, 5, 6)]
+    void read_numbers(UsdArray& array)
+    {
+        ++at_;
+        while (skip_space(), !is_at(']')) {
+            const bool tuple = array.tuple > 1;
+            if (tuple) expect('(');
+            for (std::size_t c = 0; c < array.tuple; ++c) {
+                if (c > 0) expect(',');
+                skip_space();
+                read_number(array);
+            }
+            if (tuple) expect(')');
+            if (skip_space(), is_at(',')) ++at_;
+        }
+        ++at_;
+    }
+    void expect(char c)
+    {
+        skip_space();
+        if (!is_at(c)) throw wrong(fmt::format("there is no '{}' where there should be one", c));
+        ++at_;
+    }
+
+    void read_number(UsdArray& array)
+    {
+        const char *from = text_.data() + at_, *end = text_.data() + text_.size();
+        const auto put = [&](auto number) {
+            const auto* bytes = reinterpret_cast<const unsigned char*>(&number);
+            array.bytes.insert(array.bytes.end(), bytes, bytes + sizeof number);
+        };
+        const auto parse = [&](auto number) {
+            const auto parsed = std::from_chars(from, end, number);
+            if (parsed.ec != std::errc()) throw wrong("there is no number of its type where there should be one");
+            at_ = static_cast<std::size_t>(parsed.ptr - text_.data());
+            return number;
+        };
+        switch (array.type) {
+            case ScalarType::Int32:
+                return put(parse(std::int32_t{}));
+            case ScalarType::Int64:
+                return put(parse(std::int64_t{}));
+            case ScalarType::UInt8:
+                if (text_.substr(at_, 4) == "true" || text_.substr(at_, 5) == "false")
+                    return put(std::uint8_t(word() == "true"));
+                return put(std::uint8_t(parse(std::int32_t{}) != 0));
+            default:
+                return put(parse(double{}));
+        }
+    }
+
+    std::string_view text_;
+    std::size_t at_ = 0;
+    std::vector<UsdArray> arrays_;
+};
+
+}  // namespace
+
+std::vector<UsdArray> usda_points(std::string_view text) { return UsdaReader(text).read(); }
+
+}  // namespace rapid

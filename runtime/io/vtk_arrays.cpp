@@ -1,0 +1,232 @@
+#include "runtime/io/vtk_arrays.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <map>
+#include <new>
+#include <string>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::size_t most_numbers = 16;      // of a row of an attribute
+constexpr std::size_t most_expansion = 1032;  // bytes that deflate makes of one, at most
+constexpr std::string_view white_space = " \t\r\n";
+
+std::optional<ScalarType> scalar_type(std::string_view name)
+{
+    static const std::map<std::string_view, ScalarType> types = {
+        {"Int8", ScalarType::Int8},     {"UInt8", ScalarType::UInt8},   {"Int16", ScalarType::Int16},
+        {"UInt16", ScalarType::UInt16}, {"Int32", ScalarType::Int32},   {"UInt32", ScalarType::UInt32},
+        {"Int64", ScalarType::Int64},   {"UInt64", ScalarType::UInt64}, {"Float32", ScalarType::Float},
+        {"Float64", ScalarType::Double}};
+    const auto found = types.find(name);
+    return found == types.end() ? std::nullopt : std::optional(found->second);
+}
+
+Error ends_early() { return Error("the array ends early"); }
+
+// Base64 (RFC 4648) of `bytes` bytes at the beginning of the text, whose length in characters is put into `length`.
+std::vector<unsigned char> from_base64(std::string_view text, std::size_t bytes, std::size_t& length)
+{
+    static const std::array<std::int8_t, 256> values = [] {
+        std::array<std::int8_t, 256> table;
+        table.fill(-1);
+        const std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+        for (std::size_t i = 0; i < digits.size(); ++i)
+            table[static_cast<unsigned char>(digits[i])] = static_cast<std::int8_t>(i);
+        return table;
+    }();
+    if (bytes > text.size() / 4 * 3) throw ends_early();
+    length = (bytes + 2) / 3 * 4;
+    std::vector<unsigned char> result;
+    result.reserve(length / 4 * 3);
+    for (std::size_t at = 0; at < length; at += 4) {
+        std::uint32_t word = 0;
+        for (std::size_t c = 0; c < 4; ++c) {
+            const std::int8_t value = values[static_cast<unsigned char>(text[at + c])];
+            const bool padding = text[at + c] == '=' && at + 4 == length && c >= 2;
+            if (value < 0 && !padding) throw Error("the array is no base64");
+            word = word << 6 | static_cast<std::uint32_t>(padding ? 0 : value);
+        }
+        for (int shift = 16; shift >= 0; shift -= 8) result.push_back(static_cast<unsigned char>(word >> shift));
+    }
+    result.resize(bytes);
+    return result;
+}
+
+// Numbers as text, in memory as the machine has them.
+std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type, std::size_t count)
+{
+    if (count > (text.size() + 1) / 2) throw ends_early();  // a digit each, and a space between them
+    std::vector<unsigned char> bytes(count * scalar_bytes(type));
+    with_scalar(type, [&](auto like) {
+        using Number = std::conditional_t<std::is_same_v<decltype(like), Half>, float, decltype(like)>;
+        for (std::size_t i = 0; i < count; ++i) {
+            text.remove_prefix(std::min(text.find_first_not_of(white_space), text.size()));
+            Number number = 0;
+            const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
+            if (parsed.ec != std::errc())
+                throw Error(fmt::format("the array has no number where it should have its {}", i));
+            text.remove_prefix(static_cast<std::size_t>(parsed.ptr - text.data()));
+            std::memcpy(bytes.data() + i * sizeof number, &number, sizeof number);
+        }
+    });
+    return bytes;
+}
+
+std::string_view without_space(std::string_view text)
+{
+    text.remove_prefix(std::min(text.find_first_not_of(white_space), text.size()));
+    return text;
+}
+
+}  // namespace
+
+std::optional<std::size_t> whole_number(std::string_view text)
+{
+    std::size_t number = 0;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (parsed.ec != std::errc() || parsed.ptr != text.data() + text.size()) return {};
+    return number;
+}
+
+VtkFile::VtkFile(std::string_view text, std::string_view type)
+{
+    // What is appended is no XML where it is raw.
+    const std::size_t appended = text.find("<AppendedData");
+    std::string xml(text.substr(0, appended));
+    if (appended != std::string_view::npos) {
+        const std::size_t tag_end = text.find('>', appended);
+        const std::size_t begin = tag_end == std::string_view::npos ? tag_end : text.find('_', tag_end);
+        if (begin == std::string_view::npos) throw Error("the file ends within its AppendedData");
+        appended_base64_ = text.substr(appended, tag_end - appended).find("base64") != std::string_view::npos;
+        appended_ = text.substr(begin + 1);
+        xml += "</VTKFile>";
+    }
+    const pugi::xml_parse_result parsed = document_.load_buffer(xml.data(), xml.size());
+    const pugi::xml_node root = document_.child("VTKFile");
+    if (!root) throw Error("not a file of VTK: it has no element VTKFile");
+    if (!parsed) throw Error(fmt::format("its XML is damaged: {}", parsed.description()));
+    if (root.attribute("type").value() != type)
+        throw Error(
+            fmt::format("it holds {}; it must hold {}", root.attribute("type").as_string("no type of data"), type));
+    if (root.attribute("byte_order").value() == std::string_view("BigEndian")) order_ = ByteOrder::Big;
+    wide_header_ = root.attribute("header_type").value() == std::string_view("UInt64");
+    const std::string_view compressor = root.attribute("compressor").value();
+    compressed_ = !compressor.empty();
+    if (compressed_ && compressor != "vtkZLibDataCompressor")
+        throw Error(
+            fmt::format("it is compressed by {}; it must be by vtkZLibDataCompressor, or not at all", compressor));
+}
+
+std::size_t VtkFile::header_number(std::span<const unsigned char> bytes, std::size_t index) const
+{
+    if (wide_header_) return load_scalar<std::uint64_t>(bytes.data() + 8 * index, order_);
+    return load_scalar<std::uint32_t>(bytes.data() + 4 * index, order_);
+}
+
+std::span<const unsigned char> VtkFile::raw(std::string_view text, std::size_t wanted) const
+{
+    const std::size_t header = wide_header_ ? 8 : 4;
+    const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());
+    if (text.size() < header || header_number({bytes, header}, 0) < wanted || wanted > text.size() - header)
+        throw ends_early();
+    return {bytes + header, wanted};
+}
+
+std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, std::size_t wanted) const
+{
+    const std::size_t number = wide_header_ ? 8 : 4;
+    // The next bytes; in base64 the header and the data are encoded apart, the header as one.
+    const auto bytes_at = [&](std::size_t count, std::size_t& length) {
+        if (base64) return from_base64(text, count, length);
+        if (count > text.size()) throw ends_early();
+        length = count;
+        const auto* begin = reinterpret_cast<const unsigned char*>(text.data());
+        return std::vector<unsigned char>(begin, begin + count);
+    };
+    std::size_t length = 0;
+    if (!compressed_) {
+        // A count of bytes, then these; encoded as one.
+        if (header_number(bytes_at(number, length), 0) < wanted || wanted > text.size()) throw ends_early();
+        std::vector<unsigned char> bytes = bytes_at(number + wanted, length);
+        bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(number));
+        return bytes;
+    }
+    // The number of blocks, bytes of each and of the last one (0: as the others), then the compressed bytes of each.
+    const std::size_t blocks = header_number(bytes_at(3 * number, length), 0);
+    if (blocks > text.size() / number) throw ends_early();
+    const std::vector<unsigned char> header = bytes_at((3 + blocks) * number, length);
+    text.remove_prefix(length);
+    const std::size_t block = header_number(header, 1), last = header_number(header, 2);
+    std::size_t packed = 0;
+    for (std::size_t b = 0; b < blocks; ++b) {
+        const std::size_t bytes = header_number(header, 3 + b);
+        if (bytes > text.size()) throw ends_early();
+        packed += bytes;
+        if (packed > text.size()) throw ends_early();
+    }
+    if (wanted / most_expansion > packed) throw ends_early();
+    const std::vector<unsigned char> data = bytes_at(packed, length);
+    std::vector<unsigned char> result(wanted);
+    std::size_t from = 0, to = 0;
+    for (std::size_t b = 0; b < blocks; ++b) {
+        const std::size_t size = b + 1 == blocks && last > 0 ? last : block;
+        const std::size_t packed_size = header_number(header, 3 + b);
+        if (size > result.size() - to) throw Error("the blocks of the array hold more than its numbers");
+        uLongf found = size;
+        const int status = ::uncompress(result.data() + to, &found, data.data() + from, packed_size);
+        if (status == Z_MEM_ERROR) throw std::bad_alloc();
+        if (status != Z_OK || found != size) throw Error("a compressed block of the array is damaged");
+        from += packed_size;
+        to += size;
+    }
+    if (to < wanted) throw ends_early();
+    return result;
+}
+
+std::optional<VtkArray> VtkFile::array(pugi::xml_node node, std::size_t rows) const
+{
+    if (!node) throw Error("an array is missing");
+    const std::string_view name = node.attribute("Name").value(), format = node.attribute("format").value();
+    const std::optional<ScalarType> type = scalar_type(node.attribute("type").value());
+    const pugi::xml_attribute components = node.attribute("NumberOfComponents");
+    const std::size_t numbers = components ? whole_number(components.value()).value_or(0) : 1;
+    if (!type || numbers < 1 || numbers > most_numbers) return {};
+    VtkArray array{*type, numbers, order_, {}, {}};
+    const std::size_t row = numbers * scalar_bytes(*type);
+    try {
+        if (rows > (std::size_t{1} << 48)) throw ends_early();
+        const std::string_view text = without_space(node.text().get());
+        if (format == "ascii") {
+            array.decoded = parsed_numbers(text, *type, rows * numbers);
+            array.order = ByteOrder::Little;
+        } else if (format == "appended") {
+            const std::optional<std::size_t> offset = whole_number(node.attribute("offset").value());
+            if (!offset || *offset > appended_.size()) throw Error("its offset leads out of the file");
+            const std::string_view data = appended_.substr(*offset);
+            if (!appended_base64_ && !compressed_) {
+                array.bytes = raw(data, rows * row);
+                return array;
+            }
+            array.decoded = decode(data, appended_base64_, rows * row);
+        } else if (format == "binary") {
+            array.decoded = decode(text, true, rows * row);
+        } else {
+            throw Error(fmt::format("its format is \"{}\"; it must be ascii, binary or appended", format));
+        }
+    } catch (const Error& error) {
+        throw Error(fmt::format("the array \"{}\" of {} rows: {}", name, rows, error.what()));
+    }
+    array.bytes = array.decoded;
+    return array;
+}
+
+}  // namespace rapid

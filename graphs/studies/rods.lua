@@ -1,8 +1,8 @@
 -- rods: free rods that turn and drift, of points whose masses differ by up to ten thousand, against the circles that
 -- their ends should follow.
 --
--- Shows:  what a row costs: :distance is projected at each sub-step, along the direction that the rod had at its
---         beginning (as SHAKE), so that the places are of second order, whatever the masses.
+-- Shows:  the force of a rod is the same throughout a sub-step, along the discrete gradient between its places at both
+--         ends (Gonzalez 1996), so that the places are of second order, whatever the masses.
 -- Proves: order 2 for each ratio of masses (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/rods.lua -o /tmp/rods
 local rapid = require "rapid"

@@ -110,6 +110,14 @@ describe("the study", function()
     assert.near(1, lines["of v"].order, 0.1)
   end)
 
+  it("impacts is of second order under forces of the place, of first under forces of the velocity", function()
+    local lines = lines_of "impacts"
+    assert.near(2, lines.turbulence.order, 0.1)
+    assert.near(1, lines.drag.order, 0.1)
+    falls(lines.turbulence.errors)
+    falls(lines.drag.errors)
+  end)
+
   it("rods is of second order, whatever the masses", function()
     for ratio, line in pairs(lines_of "rods") do assert.near(2, line.order, 0.05, ratio) end
   end)
@@ -122,7 +130,7 @@ describe("the study", function()
 
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
-    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua interact.lua " ..
+    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua impacts.lua interact.lua " ..
       "kepler.lua net.lua orbit.lua rods.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
   end)
 end)

@@ -130,7 +130,7 @@ describe("the study", function()
 
   it("is here for every file there is", function()
     local names = command.shell("cd graphs/studies && ls *.lua | tr '\\n' ' '").stdout
-    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua impacts.lua interact.lua " ..
-      "kepler.lua net.lua orbit.lua rods.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
+    assert.equal("action.lua ball.lua collapse.lua drag.lua emitter.lua floor.lua grids.lua impacts.lua " ..
+      "interact.lua kepler.lua net.lua orbit.lua rods.lua spring.lua stiff.lua subframes.lua turbulence.lua ", names)
   end)
 end)

@@ -5,7 +5,8 @@
 build_packages=(
     ccache cmake g++ ninja-build
     libassimp-dev libboost-dev libcli11-dev libeigen3-dev libfmt-dev libluajit-5.1-dev libminizip-dev libopenvdb-dev
-    libpng-dev libpugixml-dev librandom123-dev libseccomp-dev libtbb-dev nlohmann-json3-dev zlib1g-dev
+    libpng-dev libpugixml-dev librandom123-dev libseccomp-dev libstb-dev libtbb-dev nlohmann-json3-dev
+    zlib1g-dev
     lua-busted
 )
 

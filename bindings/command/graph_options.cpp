@@ -19,7 +19,7 @@ void GraphOptions::declare(CLI::App& app)
                    session_.set[text.substr(0, equals)] = text.substr(equals + 1);
                }
            },
-           "gives a rapid.param of the graph a value")
+           "gives a rapid.param of the graph a value, or a node's parameter: solve.substeps=4")
         ->type_name("NAME=VALUE")
         ->allow_extra_args(false);
     app.add_option_function<std::string>(

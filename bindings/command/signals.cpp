@@ -1,6 +1,5 @@
 #include "bindings/command/signals.h"
 
-#include <csignal>
 #include <utility>
 
 namespace rapid {
@@ -15,12 +14,18 @@ bool is_ignored(int signal)
 
 }  // namespace
 
+sigset_t ending_signals()
+{
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT})
+        if (!is_ignored(signal)) sigaddset(&set, signal);
+    return set;
+}
+
 SignalThread::SignalThread(std::function<void(int signal)> end)
 {
-    sigset_t ours;
-    sigemptyset(&ours);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT})
-        if (!is_ignored(signal)) sigaddset(&ours, signal);
+    sigset_t ours = ending_signals();
     sigaddset(&ours, SIGUSR1);  // the destructor's
     pthread_sigmask(SIG_BLOCK, &ours, nullptr);
     thread_ = std::thread([this, ours, end = std::move(end)] {

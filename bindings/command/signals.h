@@ -3,15 +3,19 @@
 #pragma once
 
 #include <atomic>
+#include <csignal>
 #include <functional>
 #include <thread>
 
 namespace rapid {
 
+// SIGINT, SIGTERM, SIGHUP and SIGQUIT, without those that were ignored when the program started (nohup).
+sigset_t ending_signals();
+
 class SignalThread {
 public:
     // `end` gets the signal and must not return. Make it before any other thread, as threads inherit the mask that
-    // blocks these signals. A signal that was ignored when the program started (nohup) stays ignored.
+    // blocks these signals. What was ignored stays ignored.
     explicit SignalThread(std::function<void(int signal)> end);
     ~SignalThread();
     SignalThread(const SignalThread&) = delete;

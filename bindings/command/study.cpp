@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -19,7 +18,9 @@
 #include "bindings/command/graph_options.h"
 #include "bindings/command/machine.h"
 #include "bindings/command/study_run.h"
+#include "bindings/command/swept_setting.h"
 #include "bindings/command/untrusted.h"
+#include "bindings/host/graph_parameter.h"
 #include "runtime/files/output_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"
@@ -29,32 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-Value read_value_of(const std::string& option, const std::string& text)
-{
-    if (text.empty()) throw Error(fmt::format("{}: a value is missing", option));
-    if (text == "true" || text == "false") return Value(text == "true");
-    double number = 0;
-    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (parsed.ec == std::errc() && parsed.ptr == text.data() + text.size() && std::isfinite(number))
-        return Value(number);
-    return Value(text);
-}
-
-// "solve.substeps=1,2,4" -> the name and the values.
-std::pair<std::string, std::vector<std::string>> split_setting(const std::string& option, const std::string& text)
-{
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos || equals == 0)
-        throw Error(fmt::format("{} \"{}\"; it must be NODE.PARAM=VALUE,VALUE,...", option, text));
-    std::vector<std::string> values;
-    for (std::size_t at = equals + 1; at <= text.size();) {
-        const std::size_t end = std::min(text.find(',', at), text.size());
-        values.push_back(text.substr(at, end - at));
-        at = end + 1;
-    }
-    return {text.substr(0, equals), values};
-}
 
 void write_text(const fs::path& path, const std::string& text)
 {
@@ -214,10 +189,9 @@ private:
         study.file = graph_.file();
         study.name = fs::path(graph_.file()).filename().string();
         for (const std::string& text : sweep_) {
-            const auto [knob, values] = split_setting("--sweep", text);
+            const auto [knob, values] = read_swept_setting("--sweep", text, "NODE.PARAM");
             if (study.sweep.count(knob)) throw Error(fmt::format("--sweep: {} is swept twice", knob));
-            for (const std::string& value : values)
-                study.sweep[knob].push_back(read_value_of("--sweep " + knob, value));
+            for (const std::string& value : values) study.sweep[knob].push_back(read_argument(value));
         }
         if (error_) study.error = *error_;
         if (!study.compares() && !reference_.empty())
@@ -227,12 +201,12 @@ private:
         if (study.compares()) study.reference.emplace();
         for (const std::string& text : reference_) {
             if (study.sweep.size() == 1 && text.find('=') == std::string::npos) {
-                (*study.reference)[study.sweep.begin()->first] = read_value_of("--reference", text);
+                (*study.reference)[study.sweep.begin()->first] = read_argument(text);
                 continue;
             }
-            const auto [knob, values] = split_setting("--reference", text);
+            const auto [knob, values] = read_swept_setting("--reference", text, "NODE.PARAM");
             if (values.size() != 1) throw Error(fmt::format("--reference \"{}\"; it must be one value", text));
-            (*study.reference)[knob] = read_value_of("--reference " + knob, values.front());
+            (*study.reference)[knob] = read_argument(values.front());
         }
         study.lines = lines_;
         study.last_frame_only = error_frames_ == "last";

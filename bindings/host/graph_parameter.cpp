@@ -13,6 +13,22 @@
 namespace rapid {
 namespace {
 
+// "1,2,3", "{1, 2, 3}" or "5": its numbers. Nothing: a word of it is no number.
+std::vector<double> numbers_in(std::string text)
+{
+    std::vector<double> numbers;
+    std::erase_if(text, [](char c) { return c == '{' || c == '}' || c == ' '; });
+    for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find(',', begin), text.size());
+        const std::string word = text.substr(begin, end - begin);
+        char* stop = nullptr;
+        numbers.push_back(std::strtod(word.c_str(), &stop));
+        if (word.empty() || *stop != '\0' || std::isnan(numbers.back())) return {};
+        begin = end + 1;
+    }
+    return numbers;
+}
+
 // "5000" as a value of the type of the default. Error: the text is no such value.
 Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
 {
@@ -26,23 +42,21 @@ Value parse_setting(const std::string& name, const std::string& text, const Valu
         if (text == "false" || text == "0") return Value(false);
         return refuse("true or false");
     }
-    std::vector<double> numbers;
-    std::string rest = text;
-    std::erase_if(rest, [](char c) { return c == '{' || c == '}' || c == ' '; });
-    for (std::size_t begin = 0; begin <= rest.size();) {
-        const std::size_t end = std::min(rest.find(',', begin), rest.size());
-        const std::string word = rest.substr(begin, end - begin);
-        char* stop = nullptr;
-        numbers.push_back(std::strtod(word.c_str(), &stop));
-        if (word.empty() || *stop != '\0' || std::isnan(numbers.back()))
-            return refuse(fallback.get<double>() ? "a number" : "a vec3 x,y,z");
-        begin = end + 1;
-    }
+    const std::vector<double> numbers = numbers_in(text);
     if (fallback.get<double>()) return numbers.size() == 1 ? Value(numbers[0]) : refuse("a number");
     return numbers.size() == 3 ? Value(Vec3d(numbers[0], numbers[1], numbers[2])) : refuse("a vec3 x,y,z");
 }
 
 }  // namespace
+
+Value read_argument(const std::string& text)
+{
+    if (text == "true" || text == "false") return Value(text == "true");
+    const std::vector<double> numbers = numbers_in(text);
+    if (numbers.size() == 1) return Value(numbers[0]);
+    if (numbers.size() == 3) return Value(Vec3d(numbers[0], numbers[1], numbers[2]));
+    return Value(text);
+}
 
 int declare_parameter(State& state)
 {

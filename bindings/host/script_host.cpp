@@ -7,10 +7,12 @@
 #include <cstring>
 #include <lua.hpp>
 
+#include "bindings/host/graph_parameter.h"
 #include "bindings/host/kernel_analysis.h"
 #include "bindings/host/lua_text.h"
 #include "bindings/host/objects.h"
 #include "bindings/host/values.h"
+#include "runtime/graph/override.h"
 
 namespace rapid {
 
@@ -44,7 +46,7 @@ void ScriptHost::run_graph()
         lua_pop(main_->lua(), 1);  // a study of which only the description is wanted: it made no scene
     else
         collect_outputs(*main_);
-    check_settings();
+    apply_arguments();
 
     const Watchdog::Section section(watchdog, fmt::format("{}: reading the kernels' bytecode", graph.file));
     analyse_kernels();
@@ -69,16 +71,27 @@ void check_output_name(const std::string& name, const std::string& file)
 
 }  // namespace
 
-// Error: --set names a parameter that the graph does not have.
-void ScriptHost::check_settings() const
+// Gives nodes what --set NODE.PARAM=VALUE says; a rapid.param has its value already. Error: the graph has no such
+// parameter or node.
+void ScriptHost::apply_arguments()
 {
     std::vector<std::string> names;
     for (const Session::Parameter& parameter : parameters) names.push_back(parameter.name);
-    for (const auto& [name, value] : options_.set)
-        if (std::find(names.begin(), names.end(), name) == names.end())
+    std::map<std::string, Value> arguments;
+    for (const auto& [name, value] : options_.set) {
+        if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+        if (name.find('.') == std::string::npos)
             throw Error(fmt::format("--set {}={}: the graph has no parameter \"{}\"{}", name, value, name,
                                     did_you_mean(name, names)))
                 .at({graph.file, 0});
+        arguments.emplace(name, read_argument(value));
+    }
+    if (arguments.empty()) return;
+    try {
+        graph = with_arguments(graph, arguments);
+    } catch (Error& error) {
+        throw Error(fmt::format("--set {}", error.what())).at({graph.file, 0});
+    }
 }
 
 void ScriptHost::analyse_kernels()

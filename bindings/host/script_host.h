@@ -56,7 +56,7 @@ public:
 
 private:
     void run_graph();
-    void check_settings() const;
+    void apply_arguments();
     void analyse_kernels();
     std::unique_ptr<State> make_worker();
     void check_kernels(State& worker) const;

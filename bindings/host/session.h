@@ -31,7 +31,7 @@ struct KernelOrder {
 };
 
 struct SessionOptions {
-    std::map<std::string, std::string> set;            // --set NAME=VALUE
+    std::map<std::string, std::string> set;            // --set NAME=VALUE and NODE.PARAM=VALUE
     double script_timeout = 600;                       // s in scripts, for each frame and for loading
     std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory for each state
     bool may_write = false;                            // whether levelset:write acts; in a run only

@@ -1,0 +1,163 @@
+// rapid wedge: one scene at many settings, each run in a process of its own.
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+
+#include "bindings/command/command.h"
+#include "bindings/command/frame_files.h"
+#include "bindings/command/frame_selection.h"
+#include "bindings/command/graph_options.h"
+#include "bindings/command/process_pool.h"
+#include "bindings/command/untrusted.h"
+#include "bindings/command/wedge_report.h"
+#include "bindings/command/wedge_rows.h"
+#include "runtime/files/file_error.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A folder for the statistics of rows; removed in the end.
+class TemporaryFolder {
+public:
+    TemporaryFolder() : path_((fs::temp_directory_path() / "rapid-wedge-XXXXXX").string())
+    {
+        if (!mkdtemp(path_.data())) throw file_error("no folder for the statistics of rows", errno);
+    }
+    ~TemporaryFolder()
+    {
+        std::error_code ignored;
+        fs::remove_all(path_, ignored);
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+    fs::path file(std::size_t row) const { return fs::path(path_) / fmt::format("{}.json", row); }
+
+private:
+    std::string path_;
+};
+
+class WedgeCommand : public Command, public Confined {
+public:
+    std::string name() const override { return "wedge"; }
+    std::string doc() const override { return "runs a graph at many settings"; }
+
+    void declare(CLI::App& app) override
+    {
+        app_ = &app;
+        graph_.declare(app);
+        app.add_option_function<std::vector<std::string>>(
+               "--vary",
+               [this](const std::vector<std::string>& texts) {
+                   for (const std::string& text : texts)
+                       settings_.push_back(read_swept_setting("--vary", text, "NAME"));
+               },
+               "the values of a rapid.param, or of a node's parameter: solve.substeps=1,4")
+            ->type_name("NAME=A,B,...")
+            ->allow_extra_args(false)
+            ->required();
+        app.add_flag("--zip", zip_, "the n-th values of all that is varied go together, in place of all combinations");
+        app.add_option_function<std::string>(
+               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+               fmt::format("the frames to write, as of run [default: {} from the first]", default_frames))
+            ->type_name("FRAMES");
+        files_.declare(app);
+        app.add_option_function<std::string>(
+               "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
+               "rows that run at a time, which share the threads [default 1]")
+            ->type_name("N");
+        app.add_flag("--quiet", quiet_, "no progress and no table");
+        untrusted_.declare(app, "graph");
+    }
+
+    // The processes of the rows confine themselves; this one runs no script but in a copy of itself.
+    void confine(const CommonOptions&) override {}
+    bool takes_plugins() const override { return false; }
+
+    int run(const CommonOptions& common) override
+    {
+        const std::vector<WedgeRow> rows = wedge_rows(settings_, zip_, files_.names());
+        const std::vector<fs::path> folders = files_.folders();
+        check(rows.front(), common);
+
+        WedgeReport report(graph_.file(), settings_, rows, folders.empty() ? fs::path(".") : folders.front(), quiet_);
+        const TemporaryFolder statistics;
+        const int signal = run_processes(
+            rows.size(), static_cast<int>(jobs_),
+            [&](std::size_t row) { return words_of(rows[row], statistics.file(row), common); },
+            [&](std::size_t row, const EndedProcess& ended) { report.ended(row, ended, statistics.file(row)); });
+        if (signal != 0) return signal;
+        return report.finish() ? status_done : status_failed;
+    }
+
+private:
+    // What a misspelt setting is wrong with is found before any row runs. Error: that of `rapid check`.
+    void check(const WedgeRow& row, const CommonOptions& common) const
+    {
+        std::string failure;
+        const int signal = run_processes(
+            1, 1,
+            [&](std::size_t) {
+                std::vector<std::string> words = {"rapid", "check", graph_.file()};
+                add_shared(words, row, common);
+                // check takes it that there are several frames.
+                if (!frames_ || !frames_->single()) add_outputs(words, row);
+                return words;
+            },
+            [&](std::size_t, const EndedProcess& ended) { failure = ended.failure; });
+        if (signal != 0) std::exit(signal);
+        if (!failure.empty()) throw Error(failure);
+    }
+
+    // `rapid run` of the row.
+    std::vector<std::string> words_of(const WedgeRow& row, const fs::path& statistics,
+                                      const CommonOptions& common) const
+    {
+        const int threads = common.threads > 0 ? common.threads : tbb::info::default_concurrency();
+        std::vector<std::string> words = {"rapid",
+                                          "run",
+                                          graph_.file(),
+                                          "--quiet",
+                                          "--stats=" + statistics.string(),
+                                          fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
+        for (const std::string& frames : app_->get_option("--frames")->results()) words.push_back("--frames=" + frames);
+        add_shared(words, row, common);
+        add_outputs(words, row);
+        return words;
+    }
+
+    static void add_outputs(std::vector<std::string>& words, const WedgeRow& row)
+    {
+        for (const std::string& output : row.outputs) words.push_back("--output=" + output);
+    }
+
+    // The options that check and run take alike.
+    void add_shared(std::vector<std::string>& words, const WedgeRow& row, const CommonOptions& common) const
+    {
+        for (const std::string& plugin : common.plugins) words.push_back("--plugin=" + plugin);
+        for (const char* option :
+             {"--set", "--seed", "--script-timeout", "--script-memory", "--memory", "--camera", "--size"})
+            for (const std::string& value : app_->get_option(option)->results())
+                words.push_back(fmt::format("{}={}", option, value));
+        for (const auto& [name, value] : row.settings) words.push_back(fmt::format("--set={}={}", name, value));
+        for (const std::string& word : untrusted_.words()) words.push_back(word);
+    }
+
+    CLI::App* app_ = nullptr;
+    GraphOptions graph_;
+    FrameFiles files_;
+    UntrustedOptions untrusted_;
+    std::vector<SweptSetting> settings_;
+    std::optional<FrameSelection> frames_;
+    std::int64_t jobs_ = 1;
+    bool zip_ = false, quiet_ = false;
+};
+RAPID_COMMAND(WedgeCommand);
+
+}  // namespace
+}  // namespace rapid

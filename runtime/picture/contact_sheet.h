@@ -1,0 +1,20 @@
+// A contact sheet: small pictures in rows, with a label below each.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "runtime/picture/picture.h"
+
+namespace rapid {
+
+struct SheetTile {
+    Picture picture;                 // of width 0: none
+    std::vector<std::string> label;  // lines of ASCII; what does not fit is cut
+};
+
+// Tiles from left to right and from the top, in about as many rows as columns; at most 8,192 pixels wide. All have the
+// shape of the first picture; others are fitted into it.
+Picture contact_sheet(const std::vector<SheetTile>& tiles);
+
+}  // namespace rapid

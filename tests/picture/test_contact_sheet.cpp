@@ -1,0 +1,95 @@
+#include "runtime/picture/contact_sheet.h"
+
+#include <array>
+
+#include "runtime/picture/png_file.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Colour = std::array<int, 3>;
+
+Picture plain(int width, int height, Colour colour)
+{
+    Picture picture{width, height, {}};
+    for (int k = 0; k < width * height; ++k)
+        for (const int channel : colour) picture.rgb.push_back(static_cast<std::uint8_t>(channel));
+    return picture;
+}
+
+Colour at(const Picture& picture, int x, int y)
+{
+    const std::uint8_t* pixel = picture.pixel(x, y);
+    return {pixel[0], pixel[1], pixel[2]};
+}
+
+// Pixels of the rectangle that differ from its left upper one.
+int marks(const Picture& picture, int left, int top, int width, int height)
+{
+    int count = 0;
+    for (int y = top; y < top + height; ++y)
+        for (int x = left; x < left + width; ++x) count += at(picture, x, y) != at(picture, left, top);
+    return count;
+}
+
+constexpr Colour red = {200, 10, 10}, blue = {10, 10, 200};
+
+TEST_CASE("a contact sheet has tiles in order, each in its place")
+{
+    const Picture sheet = contact_sheet({{plain(800, 400, red), {"a"}},
+                                         {plain(80, 40, blue), {"b"}},
+                                         {{}, {"failed"}},
+                                         {plain(800, 400, blue), {"d"}}});
+    REQUIRE(sheet.width == 2 * 400 + 3 * 12);
+    const int pitch = 200 + 22 + 2 * 12;
+    REQUIRE(sheet.height == 2 * pitch + 12);
+    CHECK(at(sheet, 12 + 200, 12 + 100) == red);
+    CHECK(at(sheet, 12, 12) == red);
+    CHECK(at(sheet, 12 + 399, 12 + 199) == red);
+    CHECK(at(sheet, 12 + 412 + 200, 12 + 100) == blue);
+    CHECK(at(sheet, 12 + 412 + 200, 12 + pitch + 100) == blue);
+    CHECK(at(sheet, 12 + 200, 12 + pitch + 100) != red);
+    CHECK(marks(sheet, 12, 12 + pitch, 400, 200) == 0);  // there is no picture
+}
+
+TEST_CASE("a picture of another shape is fitted into its tile")
+{
+    const Picture sheet = contact_sheet({{plain(200, 100, red), {}}, {plain(100, 200, blue), {}}});
+    const int left = 12 + 412, top = 12;
+    CHECK(at(sheet, left + 200, top + 1) == blue);
+    CHECK(at(sheet, left + 200, top + 198) == blue);
+    CHECK(at(sheet, left + 200 - 60, top + 100) != blue);  // 50 pixels to each side of the middle
+    CHECK(at(sheet, left + 200 - 40, top + 100) == blue);
+}
+
+TEST_CASE("labels stay below their own tile, however long, and in ASCII")
+{
+    const Picture sheet = contact_sheet({{plain(200, 100, red), {std::string(5000, 'W'), "\xff\n"}}, {{}, {}}});
+    CHECK(marks(sheet, 12, 12 + 200 + 2, 400, 2 * 22) > 100);
+    CHECK(marks(sheet, 12 + 400 + 1, 12 + 200 + 2, 400, 2 * 22) == 0);
+}
+
+TEST_CASE("a contact sheet of many tiles stays within 8,192 pixels")
+{
+    const Picture sheet = contact_sheet(std::vector<SheetTile>(900, {{}, {"x"}}));
+    CHECK(sheet.width <= 8192);
+    CHECK(sheet.rgb.size() == 3 * static_cast<std::size_t>(sheet.width) * sheet.height);
+}
+
+TEST_CASE("a picture is read from a .png as it was written")
+{
+    const test::TemporaryFolder folder;
+    Picture picture{7, 5, {}};
+    for (int k = 0; k < 3 * 7 * 5; ++k) picture.rgb.push_back(static_cast<std::uint8_t>(37 * k));
+    const Picture again = read_png(folder.write("p.png", encode_png(picture)));
+    CHECK(again.width == 7);
+    CHECK(again.height == 5);
+    CHECK(again.rgb == picture.rgb);
+
+    CHECK_THROWS_WITH(read_png(folder.write("q.png", "no picture")), Catch::Matchers::Contains("can't be read"));
+}
+
+}  // namespace
+}  // namespace rapid

@@ -162,13 +162,16 @@ void StuckPoints::advance_sliding(std::uint32_t i, int o, const Gap& gap)
     if (std::abs(gap.f) > reach || !(slope > 0)) return let_go(i);
     const Vec3d n = gap.gradient / slope, P = block_.P[i] - gap.f / slope * n;
     const Vec3d vc = obstacle.shape->velocity_at(P, now);
-    if (kick_on(i, vc).dot(n) > adhesion) return let_go(i);
     Support on{o, n, vc, 0, obstacle.friction[index], obstacle.plane.has_value(), obstacle.feature};
     on.viscosity = obstacle.viscosity[index];
     on.adhesion = adhesion;
+    const Vec3d given = block_.v[i], v = tangential_to(on, given);
+    on.ac = obstacle.acceleration_at(P, v, now);
+    // What is not kicked the slide takes off the surface, as it knows how that turns.
+    const bool is_kicked = (given - vc).dot(n) > velocity_tolerance * (1 + given.norm());
+    if (is_kicked && (kick_on(i, vc) + motion_.acceleration(i) - on.ac).dot(n) > adhesion) return let_go(i);
     block_.P[i] = P;
-    block_.v[i] = tangential_to(on, block_.v[i]);
-    on.ac = obstacle.acceleration_at(P, block_.v[i], now);
+    block_.v[i] = v;
     touched_.set_only_plane(i, -1);
     touched_.add(i);
     taken_[i] = Released;

@@ -213,15 +213,20 @@ describe("what slides with viscosity", function()
     assert.truthy(drop(0.95 * g * math.cos(math.rad(30))).P:dot(normal) > 1)
   end)
 
-  it("is kicked off by more than the adhesion, as an acceleration over the frame", function()
-    local function height(kick)
-      return run([[shape = rapid.shape.plane {}, response = "slide", adhesion = 100]], "P = {{0, 0.1, 0}}", 40, 2,
+  -- As what sticks is: by the kick over the frame, with the weight.
+  it("is kicked off a floor by more than the adhesion and its weight, a ceiling by more than the rest", function()
+    local function height(up, kick)
+      local normal = vec3(0, up, 0)
+      return run(([[shape = rapid.shape.plane { normal = {0, %g, 0} }, response = "slide", adhesion = 100]]):format(up),
+        ("P = {{0, %g, 0}}, v = {{0, %g, 0}}"):format(0.02 * up, -up), 40, 2,
         ([[:gravity {} :points("kick", function(p, frame)
           if frame.number == 20 then p.v = p.v + vec3(0, %g, 0) end
-        end)]]):format(kick))[22][1].P.y
+        end)]]):format(kick * up))[22][1].P:dot(normal)
     end
-    assert.equal(0, height(99 / 24))
-    assert.truthy(height((101 + g) / 24) > 0.1)
+    for _, up in ipairs { 1, -1 } do
+      assert.equal(0, height(up, (100 + up * g - 1) / 24))
+      assert.truthy(height(up, (100 + up * g + 1) / 24) > 0.1)
+    end
   end)
 
   -- It leaves where v²/R - g cos θ exceeds the adhesion, with v² = v0² + 2 g R (1 - cos θ), and keeps v cos θ.

@@ -24,6 +24,17 @@ constexpr std::size_t points_a_task = 2048;
 
 bool turns(const Substep& step, std::uint32_t i) { return !step.spins.empty() && step.spins[i].k > 0; }
 
+// rad/s: of the body at a place, half of the curl of its velocity, which is linear over a length of the point's size.
+Vec3d turning_of(const Obstacle& obstacle, const Vec3d& P, double length, double time)
+{
+    Vec3d along[3];
+    for (int k = 0; k < 3; ++k) {
+        const Vec3d d = 0.5 * length * Vec3d::Unit(k);
+        along[k] = (obstacle.shape->velocity_at(P + d, time) - obstacle.shape->velocity_at(P - d, time)) / length;
+    }
+    return 0.5 * Vec3d(along[1].z() - along[2].y(), along[2].x() - along[0].z(), along[0].y() - along[1].x());
+}
+
 double friction_of(const Obstacle& obstacle, std::uint32_t i)
 {
     return obstacle.response == Response::Stick ? std::numeric_limits<double>::max() : double(obstacle.friction[i]);
@@ -168,7 +179,7 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
             const std::uint32_t i = query.asked[k];
             if (query.phi[k] - obstacle.radius[i] > query.reach(obstacle, i) || !(query.gradient[k].norm() > 0))
                 continue;
-            ShapeContact made = contact(query, k, o);
+            ShapeContact made = contact(query, k, o, step);
             while (known != before.end() && std::pair(known->obstacle, known->i) < std::pair(made.obstacle, i)) ++known;
             if (known != before.end() && known->obstacle == made.obstacle && known->i == i) {
                 made.normal_impulse = made.carried_impulse = 0.5 * (known->normal_impulse + known->carried_impulse);
@@ -182,7 +193,8 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
     }
 }
 
-ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std::size_t k, std::size_t o) const
+ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std::size_t k, std::size_t o,
+                                                   const Substep& step) const
 {
     const Obstacle& obstacle = obstacles_[o];
     ShapeContact contact{};
@@ -192,7 +204,18 @@ ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std:
     contact.vc = obstacle.shape->velocity_at(query.P[k], query.since);
     contact.level = contact.n.dot(query.P[k]) - std::max(0.0, query.phi[k] - obstacle.radius[contact.i]);
     contact.friction = friction_of(obstacle, contact.i);
+    if (turns(step, contact.i)) follow_turning(contact, query.P[k], query.since);
     return contact;
+}
+
+// A point that turns feels the surface where it touches, and how the body turns.
+void ShapeContacts::follow_turning(ShapeContact& contact, const Vec3d& P, double time) const
+{
+    const Obstacle& obstacle = obstacles_[contact.obstacle];
+    const double radius = obstacle.radius[contact.i];
+    if (!obstacle.moves || !(radius > 0)) return;
+    contact.turning = turning_of(obstacle, P, radius, time);
+    contact.vc = obstacle.shape->velocity_at(P - radius * contact.n, time);
 }
 
 // The contacts of sleepers with a shape: as they were, and out of use.
@@ -239,7 +262,7 @@ void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
     for (const Batch& contacts : contacts_)
         for (const ShapeContact& contact : contacts)
             if ((contact.normal_impulse > 0 || (turns(step, contact.i) && contact.free_impulse > 0)) &&
-                !contact.vc.isZero(0))
+                !(contact.vc.isZero(0) && contact.turning.isZero(0)))
                 islands.drive(contact.i);
 }
 
@@ -320,6 +343,7 @@ std::optional<ShapeContacts::ShapeContact> ShapeContacts::missed_contact(std::ui
         contact.level = contact.n.dot(P) - gap;
         contact.friction = friction_of(obstacle, i);
         contact.free_impulse = impulse.norm();
+        if (turns(step, i)) follow_turning(contact, P, since);
     }
     return nearest;
 }
@@ -389,8 +413,8 @@ void ShapeContacts::solve_spinning(ShapeContact& contact, Substep& step)
         contact.normal_impulse = normal;
     }
     ShapeFriction friction{contact.tangential_impulse, contact.rolling_impulse};
-    const Vec3d change = friction.solve(step.spins[contact.i], w, contact.n, v - contact.vc, contact.friction,
-                                        contact.normal_impulse + contact.free_impulse);
+    const Vec3d change = friction.solve(step.spins[contact.i], w, contact.n, v - contact.vc, contact.turning,
+                                        contact.friction, contact.normal_impulse + contact.free_impulse);
     v += change;
     step.points[contact.i].P += 0.5 * step.dt * change;
     contact.tangential_impulse = friction.tangential;

@@ -57,11 +57,12 @@ public:
 private:
     struct ShapeContact {
         std::uint32_t i, obstacle;
-        Vec3d n, vc;             // unit normal out of the shape; its velocity, m/s
-        double level;            // m: on the shape's outer side n·x is more
-        double friction;         // μ
-        double normal_impulse;   // N s along n: at first of the projection of positions, then the whole
-        double carried_impulse;  // N s along n: that the warm start gives to velocities alone
+        Vec3d n, vc;                    // unit normal out of the shape; its velocity, m/s
+        double level;                   // m: on the shape's outer side n·x is more
+        double friction;                // μ
+        double normal_impulse;          // N s along n: at first of the projection of positions, then the whole
+        double carried_impulse;         // N s along n: that the warm start gives to velocities alone
+        Vec3d turning = Vec3d::Zero();  // rad/s, of the shape; 0 for points that do not turn
         Vec3d tangential_impulse = Vec3d::Zero();  // N s along the surface
         Vec3d rolling_impulse = Vec3d::Zero();     // N s: torque / radius, of rolling friction
         // N s: what the shape did in the free motion, along n and along the surface. Known where Substep::reaction is.
@@ -76,7 +77,8 @@ private:
 
     void find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free, std::size_t begin,
               std::size_t end);
-    ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle) const;
+    ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle, const Substep& step) const;
+    void follow_turning(ShapeContact& contact, const Vec3d& P, double time) const;
     void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle) const;
     void solve_impact(const ShapeContact& contact, Substep& step, std::uint32_t sweep) const;
     void share_reactions(const Substep& step);

@@ -169,10 +169,11 @@ void ShapeFriction::start(Spin& spin, double w, const Vec3d& n) const
     spin.s += spin.k * w * rolling;
 }
 
-Vec3d ShapeFriction::solve(Spin& spin, double w, const Vec3d& n, const Vec3d& velocity, double friction, double normal)
+Vec3d ShapeFriction::solve(Spin& spin, double w, const Vec3d& n, const Vec3d& velocity, const Vec3d& turning,
+                           double friction, double normal)
 {
     const Vec3d rolling_before = rolling, before = tangential;
-    if (spin.k > 0) rolling = limited(rolling - spin.s / (spin.k * w), spin.rolling * normal);
+    if (spin.k > 0) rolling = limited(rolling - (spin.s - spin.radius * turning) / (spin.k * w), spin.rolling * normal);
     spin.s += spin.k * w * (rolling - rolling_before);
     const Vec3d sliding = across(velocity, n) + n.cross(spin.s);
     tangential = limited(tangential - sliding / (w * (1 + spin.k)), friction * normal);

@@ -74,8 +74,9 @@ struct ShapeFriction {
     Vec3d rolling = Vec3d::Zero();     // N s: torque / r
 
     void start(Spin& spin, double w, const Vec3d& n) const;
-    // Returns the change of the velocity.
-    Vec3d solve(Spin& spin, double w, const Vec3d& n, const Vec3d& velocity, double friction, double normal);
+    // turning: of the shape, rad/s. Returns the change of the velocity.
+    Vec3d solve(Spin& spin, double w, const Vec3d& n, const Vec3d& velocity, const Vec3d& turning, double friction,
+                double normal);
 };
 
 }  // namespace rapid

@@ -140,9 +140,8 @@ void CoupledStep::begin_spins()
         if (!spin_) spin_.emplace();
         at_node(*local.constraint, [&] { spin_->include(context_.points, *material); });
     }
-    const bool drags = !context_.scene.forces.empty() || !context_.scene.uniform.linear.is_zero();
-    if ((forces_ || spin_ || drags) && !obstacles.empty()) reaction_.resize(at_.size());
-    if (forces_ || spin_) now_.reaction = reaction_;
+    if ((forces_ || spin_) && !obstacles.empty()) reaction_.resize(at_.size());
+    now_.reaction = reaction_;
     if (!spin_) return;
     now_.spins = spin_->spins();
     smooth_ = obstacles;
@@ -194,7 +193,7 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         // had been born there.
         for (const auto& [k, by] : collisions.displacements()) start_[block.places[k]] += by;
         for (std::size_t k = 0; k < block.size(); ++k) {
-            if (block.linear.data) add_drag(block, k, changes);
+            if (block.linear.data) add_drag(block, k, collisions.contact_work(k), changes);
             if (!surface_springs_.empty()) surface_springs_[block.places[k]] = step.surface_spring(k);
             take_point(block, k);
         }
@@ -262,9 +261,8 @@ Mobility CoupledStep::mobility_of(const PointBlock& block, std::size_t k) const
     return {by.v_of_G, by.x_of_G, block.a[k] + block.linear[k].w2q, block.linear[k].w2};
 }
 
-// What drag takes in the free motion, and what shapes do beside it. What the acceleration of its own and springs do is
-// neither.
-void CoupledStep::add_drag(const PointBlock& block, std::size_t k, EnergyChanges& changes) const
+// What drag takes in the free motion, beside what the acceleration of its own, springs and contacts do (J/kg).
+void CoupledStep::add_drag(const PointBlock& block, std::size_t k, double contacts, EnergyChanges& changes) const
 {
     const std::uint32_t i = block.places[k];
     const Linear& linear = block.linear[k];
@@ -272,9 +270,7 @@ void CoupledStep::add_drag(const PointBlock& block, std::size_t k, EnergyChanges
     const Vec3d &from = start_[i], &to = block.P[k], way = to - from;
     const double kinetic = 0.5 * (block.v[k] - v_[i]).dot(block.v[k] + v_[i]);
     const double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(way);
-    const double shapes = reaction_.empty() ? 0 : block.reaction[k].dot(way) / block.dt[k];
-    changes.drag += (kinetic - block.a[k].dot(way) + springs - shapes) / inverse_mass_[i];
-    changes.contacts += shapes / inverse_mass_[i];
+    changes.drag += (kinetic - block.a[k].dot(way) + springs - contacts) / inverse_mass_[i];
 }
 
 EnergyChanges CoupledStep::changes(const Projection& projection)

@@ -34,7 +34,7 @@ private:
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
     void take_point(const PointBlock& block, std::size_t k);
-    void add_drag(const PointBlock& block, std::size_t k, EnergyChanges& changes) const;
+    void add_drag(const PointBlock& block, std::size_t k, double contacts, EnergyChanges& changes) const;
     EnergyChanges changes(const Projection& projection);
     bool leaves_out(std::size_t i);
     void store(std::size_t begin, std::size_t end);

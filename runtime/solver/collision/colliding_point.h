@@ -2,6 +2,7 @@
 // path.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -9,6 +10,23 @@
 #include "runtime/solver/collision/slide.h"
 
 namespace rapid {
+
+// What forces have done to a point, J/kg, by the accelerations that stand for them: the rest of what its energy of
+// motion has changed by is the work of contacts.
+struct ForceWork {
+    double kinetic = 0;  // J/kg, that it had at first
+    double work = 0;     // J/kg, up to the place `from`
+    Vec3d from = Vec3d::Zero();
+
+    void begin(const Vec3d& P, const Vec3d& v) { *this = {0.5 * v.squaredNorm(), 0, P}; }
+    void advance(const Vec3d& P, const Vec3d& a) { work += a.dot(P - from), from = P; }
+    double of_contacts(const Vec3d& v) const
+    {
+        constexpr double rounding = 1e-12;
+        const double now = 0.5 * v.squaredNorm(), by_contacts = now - kinetic - work;
+        return std::abs(by_contacts) > rounding * (now + kinetic + std::abs(work)) ? by_contacts : 0;
+    }
+};
 
 // What a point may meet in one sub-step before the rest of it is dropped, counted in contacts and in pieces of a path
 // along a curved surface.
@@ -37,6 +55,7 @@ struct CollidingPoint {
     double piece = 0;     // s: the length of the next piece along a curved surface
     int events = 0;       // towards max_contacts
     int ejections = 0;    // times that it was taken out of a shape
+    ForceWork by_forces;  // since it met a shape; under linear forces alone
 
     // Where it was, after how many events, when chatter was last looked for.
     int checked_events = 0;

@@ -9,6 +9,7 @@ void Collisions::begin(std::span<const std::uint32_t> indices)
 {
     block_.indices = indices;
     touched_.begin();
+    audit_.begin();
     ejection_.begin();
     stuck_.begin();
     broad_phase_.begin();
@@ -25,13 +26,15 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     block_.dt = drift.dt;
     block_.after = drift.after;
     motion_.begin(drift);
+    if (motion_.is_damped()) audit_.begin_work();
     const std::size_t displaced = ejection_.displacements().size();
     if (discrete_.is_used()) discrete_.begin_substep();
     stuck_.advance();
+    audit_.add_carried(stuck_, motion_);
     move_along_free_paths();
     rounds_.run();
     stuck_.finish(contacts_.found());
-    if (motion_.is_damped()) limit_energy(displaced);
+    if (motion_.is_damped()) limit_energy(displaced), audit_.count_work(touched_);
     if (discrete_.is_used()) correct();
     if (motion_.is_damped())
         audit_.add_displacements(ejection_.displacements().subspan(displaced), motion_);
@@ -60,10 +63,14 @@ void Collisions::limit_energy(std::size_t displaced)
         if (kinetic < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
             P = from;
             if (!any_moves) v = v0;
+            audit_.set_work(i, 0.5 * (v - v0).dot(v + v0));
             continue;
         }
         kinetic = std::max(0.0, kinetic);
-        if (!any_moves && 0.5 * v.squaredNorm() > kinetic) v *= std::sqrt(2 * kinetic / v.squaredNorm());
+        const double excess = 0.5 * v.squaredNorm() - kinetic;
+        if (any_moves || !(excess > 0)) continue;
+        v *= std::sqrt(2 * kinetic / v.squaredNorm());
+        audit_.add_work(i, -excess);
     }
 }
 

@@ -54,6 +54,9 @@ public:
     std::span<const Ejection::Displacement> displacements() const { return ejection_.displacements(); }
     std::span<const Ejection::Displacement> corrections() const { return correction_.displacements(); }
 
+    // J/kg, by contacts in the motion of a point of the block under linear forces, since begin().
+    double contact_work(std::size_t i) const { return audit_.work().empty() ? 0 : audit_.work()[i]; }
+
     // Of all blocks.
     const ContactCounts& counts() const { return audit_.counts(); }
 

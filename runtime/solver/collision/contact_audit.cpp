@@ -34,6 +34,34 @@ void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& s
     }
 }
 
+// What carries a point gives it what its motion gains, and bears it against the acceleration of its forces.
+void ContactAudit::add_carried(const StuckPoints& stuck, const FreeMotion& motion)
+{
+    for (const StuckPoints::Carried& at : stuck.carried()) {
+        const double mass = block_.context.mass[block_.indices[at.i]];
+        if (std::isinf(mass)) continue;
+        const double work = 0.5 * (at.to_v - at.v).dot(at.to_v + at.v) - motion.acceleration(at.i).dot(at.to_P - at.P);
+        counts_.energy.take(mass * work);
+        if (motion.is_damped()) all_work_[at.i] += work;
+    }
+}
+
+void ContactAudit::begin_work()
+{
+    work_.assign(block_.size(), 0.0);
+    if (all_work_.empty()) all_work_ = work_;
+}
+
+void ContactAudit::count_work(const TouchedPoints& touched)
+{
+    for (const std::uint32_t i : touched.list()) {
+        const double mass = block_.context.mass[block_.indices[i]];
+        if (work_[i] == 0 || std::isinf(mass)) continue;
+        counts_.energy.take(mass * work_[i]);
+        all_work_[i] += work_[i];
+    }
+}
+
 void ContactAudit::add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion)
 {
     for (const auto& [i, by] : displacements) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/collision/contact_energy.h"
@@ -16,7 +18,7 @@ struct ContactCounts {
     std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
     std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
     std::uint64_t trapped = 0;   // points that are in a shape at the end of the frame, with no way out
-    ContactEnergy energy;        // of points under linear forces, which take energy all the time, by displacements only
+    ContactEnergy energy;
 };
 
 class ContactAudit {
@@ -27,11 +29,23 @@ public:
     void add(std::size_t i, int obstacle, const Impact& impact);
     void add_limited() { ++counts_.limited; }
     void add_trapped(std::size_t points) { counts_.trapped += points; }
-    // At the end of a sub-step.
+    // At the end of a sub-step: of the points that have moved freely at first; of those that shapes carry.
     void add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion);
-    // Under linear forces: the work of displacements alone, and of corrections after the sub-step from P and v.
+    void add_carried(const StuckPoints& stuck, const FreeMotion& motion);
+
+    // Under linear forces: the work of contacts in the motion of a point, J/kg, which is known once its sub-step is
+    // over; the work of displacements, and of corrections after the sub-step from P and v.
+    void begin_work();
+    void add_work(std::size_t i, double by) { work_[i] += by; }
+    void set_work(std::size_t i, double work) { work_[i] = work; }
+    void count_work(const TouchedPoints& touched);
     void add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion);
     void add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion);
+    // J/kg, by contacts in the motion of a point since the block began; empty without linear forces.
+    std::span<const double> work() const { return all_work_; }
+
+    // A new block.
+    void begin() { all_work_.clear(); }
     // The work of displacements that have led to P at the end of the frame.
     void add_final_corrections(std::span<const Vec3d> P, std::span<const Ejection::Displacement> displacements,
                                const FreeMotion& motion);
@@ -41,6 +55,7 @@ public:
 private:
     const CollisionBlock& block_;
     ContactCounts counts_;
+    std::vector<double> work_, all_work_;  // J/kg, by point of the block: in this sub-step or half of it, and so far
 };
 
 }  // namespace rapid

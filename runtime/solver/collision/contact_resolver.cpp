@@ -69,7 +69,10 @@ void ContactResolver::capture(CollidingPoint& point, const Contact& contact, int
     const std::size_t i = point.i;
     const Vec3d P = block_.P[i], v = block_.v[i];
     const double when = block_.time(i, point.left);
-    if (contact.depth > 0) ejection_.displace(point.i, contact.depth * contact.n);
+    if (contact.depth > 0) {
+        ejection_.displace(point.i, contact.depth * contact.n);
+        point.by_forces.from += contact.depth * contact.n;
+    }
     block_.v[i] = contact.vc;
     audit_.add(i, o, {P, contact.n, contact.vc, -(v - contact.vc).dot(contact.n), v, contact.vc - v, when});
     if (obstacle.response == Response::Die)

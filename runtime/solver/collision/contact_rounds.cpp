@@ -11,8 +11,10 @@ void ContactRounds::start(std::uint32_t i)
     CollidingPoint& point = points_[slot];
     point.begin(i, block_.dt[i]);
     const double s = contacts_.contact(i).time;
-    resolver_.resolve(point, {motion_.path(i).at(s), motion_.velocity_after(i, s), motion_.acceleration(i)},
-                      contacts_.contact(i), contacts_.obstacle(i));
+    const ContactResolver::Arrival arrival{motion_.path(i).at(s), motion_.velocity_after(i, s),
+                                           motion_.acceleration(i)};
+    point.by_forces.begin(arrival.P, arrival.v);
+    resolver_.resolve(point, arrival, contacts_.contact(i), contacts_.obstacle(i));
     if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
 }
 
@@ -24,6 +26,7 @@ void ContactRounds::resume(std::uint32_t i, double left, const std::optional<Sup
     point.begin(i, block_.dt[i]);
     point.left = left;
     if (on) point.on[0] = *on, point.supports = 1;
+    point.by_forces.begin(block_.P[i], block_.v[i]);
     if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
 }
 
@@ -61,6 +64,10 @@ bool ContactRounds::goes_on(CollidingPoint& point)
                                   : TouchedPoints::Surface{};
     };
     touched_.set_surfaces(point.i, {surface(0), surface(1)});
+    if (motion_.is_damped()) {
+        point.by_forces.advance(block_.P[point.i], motion_.acceleration(point.i));
+        audit_.add_work(point.i, point.by_forces.of_contacts(block_.v[point.i]));
+    }
     return false;
 }
 

@@ -25,6 +25,7 @@ public:
           contacts_(contacts),
           resolver_(resolver),
           touched_(touched),
+          audit_(audit),
           planner_(block, motion, audit),
           curved_(block, motion, resolver)
     {
@@ -48,6 +49,7 @@ private:
     FirstContacts& contacts_;
     ContactResolver& resolver_;
     TouchedPoints& touched_;
+    ContactAudit& audit_;
     PathPlanner planner_;
     CurvedMotion curved_;
 

@@ -11,6 +11,7 @@ void Ejection::eject(CollidingPoint& point, const Contact& contact, int obstacle
         point.left = 0;
     }
     displacements_.push_back({point.i, block_.P[point.i] - before});
+    point.by_forces.from += displacements_.back().by;
 }
 
 // False where there is no way out.

@@ -22,6 +22,7 @@ bool PathPlanner::plan(CollidingPoint& point)
     const std::size_t i = point.i;
     while (point.left > 0) {
         const double duration = motion_.longest_parabola(i, point.left);
+        if (motion_.is_damped()) point.by_forces.advance(block_.P[i], motion_.acceleration(i));
         motion_.update_acceleration(i, duration);
         point.path = {block_.P[i], block_.v[i], motion_.acceleration(i), duration, 0};
         point.kind = CollidingPoint::Free;

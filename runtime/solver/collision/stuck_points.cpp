@@ -22,6 +22,7 @@ void StuckPoints::begin()
     given_.assign(block_.size(), std::nullopt);
     list_.clear();
     loose_.clear();
+    carried_.clear();
     torn_.clear();
     held_.resize(block_.obstacles.size());
 }
@@ -33,6 +34,7 @@ void StuckPoints::advance()
     for (const Loose& loose : loose_) taken_[loose.i] = Free;
     list_.clear();
     loose_.clear();
+    carried_.clear();
     find_held();
     for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
         ask(o, held_[o]);
@@ -134,13 +136,15 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
     const MovingBody::State here = state(i, o, now);
     const Vec3d kick = kick_on(i, given_[i].value_or(here.v));
     const double torn = time_of_tearing(i, o, kick, now);
+    const Vec3d P = block_.P[i], v = block_.v[i];
     touched_.set_only_plane(i, -1);
     touched_.add(i);
     if (!(torn < block_.dt[i])) {
         taken_[i] = Glued;
         list_.push_back(i);
         block_.P[i] = here.P, block_.v[i] = here.v;
-        return go(i, o, now, block_.dt[i]);
+        go(i, o, now, block_.dt[i]);
+        return carried_.push_back({i, P, v, block_.P[i], block_.v[i]});
     }
     columns_->to[index] = -obstacle.key;
     torn_.push_back(i);
@@ -149,6 +153,7 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
     const MovingBody::State there = state(i, o, now + torn);
     block_.P[i] = there.P;
     if (torn > 0) block_.v[i] = there.v;
+    carried_.push_back({i, P, v, block_.P[i], block_.v[i]});
     loose_.push_back({i, block_.dt[i] - torn, std::nullopt});
 }
 

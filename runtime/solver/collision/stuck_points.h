@@ -42,6 +42,14 @@ public:
         std::optional<Support> on;
     };
 
+    // A glued point that its shape has taken along, up to the moment at which it was torn off, if it was.
+    struct Carried {
+        std::uint32_t i;
+        Vec3d P, v;  // before
+        Vec3d to_P, to_v;
+    };
+    const std::vector<Carried>& carried() const { return carried_; }  // in this sub-step
+
     // Whether a point is glued; and whether it is that, or released to go on.
     bool has(std::size_t i) const { return taken_[i] == Glued; }
     bool takes(std::size_t i) const { return taken_[i] != Free; }
@@ -89,6 +97,7 @@ private:
     std::vector<std::optional<Vec3d>> given_;  // the velocity that a glued point had at the end of the last sub-step
     std::vector<std::uint32_t> list_, torn_;
     std::vector<Loose> loose_;
+    std::vector<Carried> carried_;
     std::vector<std::vector<std::uint32_t>> held_;  // by obstacle
     std::vector<std::uint8_t> met_;
     DistanceQuery query_;

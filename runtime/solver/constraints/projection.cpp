@@ -103,8 +103,10 @@ void Projection::advance(Substep& step)
     if (shapes_ && step.forces) shapes_->add_forces(step);
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
     const ContactEnergy change = close_bound(step, false);
-    energy_ += change;
-    changes_.contacts += change.added - change.lost + credited();
+    const double credit = credited();
+    energy_.added += change.added;
+    energy_.lost += std::max(0.0, change.lost - credit);
+    changes_.contacts += change.added - change.lost + credit;
     require_finite(step);
 }
 

@@ -1,0 +1,100 @@
+-- What a run tells of the energy that contacts add and take, against the energy that points have: in random scenes of
+-- shapes at rest and in motion, of all responses, with and without drag and springs, of single and of coupled points.
+local scene = require "testing.scene"
+local json = require "dkjson"
+local draw = require("tests.lehmer").new(1)
+
+local g, frames = 9.81, 25
+local rounding = 2e-3 -- of single precision, of 20 points in 24 frames, and of what stands for drag and springs
+
+local shapes = {
+  "rapid.shape.plane { normal = {0.3, 1, 0} }",
+  "rapid.shape.sphere { radius = 0.8 }",
+  "rapid.shape.box { size = {3, 0.5, 3} }",
+  "rapid.levelset.box { size = {3, 0.5, 3}, voxel = 0.06 }",
+  "rapid.levelset.torus { radius = 0.8, tube = 0.3, voxel = 0.06 }",
+}
+local motions = {
+  "rapid.translate(0, 0.4 * math.sin(5 * frame.time), 0)",
+  "rapid.translate(0.3 * frame.time, 0, 0) * rapid.rotate({0, 1, 0}, 90 * frame.time)",
+  "rapid.rotate({1, 0.2, 0}, 40 * frame.time)",
+  "rapid.translate(0, 0.5 * frame.time ^ 2, 0)",
+}
+
+-- moves: shapes move. forces: the text of those beside gravity. couples: points touch each other, too.
+local function random_scene(moves, forces, couples)
+  local P, v, mass = {}, {}, {}
+  for i = 1, 20 do
+    P[i] = ("{%.6g, %.6g, %.6g}"):format(draw.between(-1, 1), draw.between(1.2, 2), draw.between(-1, 1))
+    v[i] = ("{%.6g, %.6g, %.6g}"):format(draw.between(-2, 2), draw.between(-3, 1), draw.between(-2, 2))
+    mass[i] = ("%.6g"):format(draw.magnitude(-1, 1))
+  end
+  local text = ([[
+return rapid.create { fps = 24, points = rapid.points.from {
+  P = {%s},
+  v = {%s},
+  mass = {%s} } }
+]]):format(table.concat(P, ", "), table.concat(v, ", "), table.concat(mass, ", "))
+  text = text .. "  :gravity {} " .. forces .. "\n"
+  for _ = 1, draw.pick { 1, 1, 2 } do
+    local response = draw.pick { "bounce", "bounce", "slide", "stick" }
+    local more = response ~= "bounce" and (", adhesion = %.3g"):format(draw.pick { 0, 5, 50 }) or ""
+    text = text .. ("  :collide { shape = %s, bounce = %g, friction = %g, response = %q%s%s }\n"):format(
+      draw.pick(shapes), draw.pick { 0, 0.5, 1 }, draw.pick { 0, 0.3, 1 }, response, more,
+      moves and (", transform = function(frame) return %s end"):format(draw.pick(motions)) or "")
+  end
+  if couples then text = text .. "  :contact { radius = 0.08, friction = 0.3 }\n" end
+  return text .. ("  :solve { substeps = %d }"):format(draw.pick { 4, 8 })
+end
+
+-- Of points that springs of so many N/m draw to the origin: how much more energy they have in the last frame than in
+-- the first, what contacts have added and taken between, and the most that was in motion, and in springs, at once; J.
+local function energies(text, stiffness)
+  local ran = scene.command("run", text, ("-f 1-%d --stats stats.json --quiet"):format(frames))
+  assert.equal(0, ran.status, ran.stderr .. text)
+  local added, taken, size = 0, 0, 0
+  for _, frame in ipairs(json.decode(scene.folder:read "stats.json").frames) do
+    added, taken = added + frame.contact_energy.added, taken + frame.contact_energy.lost
+  end
+  local first, last
+  for _, points in scene.run(text, { frames = {1, frames} }):frames() do
+    local inner, potential = 0, 0
+    for i = 1, #points do
+      local p = points[i]
+      inner = inner + 0.5 * (p.mass * p.v:dot(p.v) + stiffness * p.P:dot(p.P))
+      potential = potential + p.mass * g * p.P.y
+    end
+    last, size = inner + potential, math.max(size, inner)
+    first = first or last
+  end
+  return last - first, added, taken, size
+end
+
+-- takes: the largest part of `size` that drag can take in a second, 2 k or 2 c v.
+local kinds = {
+  { name = "gravity", forces = "", takes = 0 },
+  { name = "drag", forces = ":drag { linear = 0.05 }", takes = 0.1 },
+  { name = "quadratic drag", forces = ":drag { quadratic = 0.01 }", takes = 0.2 },
+  { name = "springs", forces = ":spring { stiffness = 5, target = {0, 0, 0} }", stiffness = 5, takes = 0 },
+}
+
+describe("the energy that contacts add and take", function()
+  for _, couples in ipairs { false, true } do
+    for _, kind in ipairs(kinds) do
+      it(("is what points gain under %s%s"):format(kind.name, couples and ", and from each other" or ""), function()
+        for number = 1, 8 do
+          draw.start(1, number)
+          local moves = number % 2 == 0
+          local text = random_scene(moves, kind.forces, couples)
+          local gained, added, taken, size = energies(text, kind.stiffness or 0)
+          local off = (gained - (added - taken)) / size
+          local told = ("gained %g J, told %g - %g J, at most %g J in motion:\n%s"):format(gained, added, taken, size,
+            text)
+          assert.truthy(off < rounding and off > -rounding - kind.takes, told)
+          -- Shapes at rest add nothing to single points.
+          if not moves and not couples then assert.truthy(added < 1e-6 * size, told) end
+        end
+      end)
+    end
+  end
+end)

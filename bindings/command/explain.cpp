@@ -38,6 +38,11 @@ ordered_json json_of(const Explanation::ExplainedAttribute& attribute)
     return json;
 }
 
+ordered_json json_of(const Explanation::ExplainedFunction& function)
+{
+    return {{"name", function.name}, {"called", function.called}, {"between", function.between}};
+}
+
 ordered_json json_of(const Explanation::ExplainedStage& stage)
 {
     return {{"name", stage.name}, {"kept", stage.kept}, {"why", stage.why}};
@@ -55,6 +60,7 @@ ordered_json json_of(const Explanation& plan)
 {
     return {{"nodes", json_of(plan.nodes)},
             {"attributes", json_of(plan.attributes)},
+            {"functions", json_of(plan.functions)},
             {"stages", json_of(plan.stages)},
             {"passes", plan.passes},
             {"bytes_per_point", plan.bytes_per_point()}};
@@ -123,6 +129,9 @@ std::string text_of(const Explanation& plan, bool kept)
 std::string text_of(const Explanation& plan)
 {
     std::string text = text_of(plan, true);
+    Rows functions;
+    for (const auto& function : plan.functions) functions.add(function.name, function.called, function.between);
+    text += functions.text(" functions of the frame");
     text += " passes over the points\n";
     for (const std::vector<std::string>& pass : plan.passes) text += fmt::format("  {}\n", fmt::join(pass, ", "));
     return text + text_of(plan, false);

@@ -26,18 +26,25 @@ const Dynamics::List<D>& list_of(const Dynamics& dynamics)
         return dynamics.actions();
 }
 
+bool is_followed(const Node& node, const Param& param)
+{
+    return ChangingNode::between_calls(node, param) != ChangingNode::Between::Unfollowed;
+}
+
+}  // namespace
+
 // Of forces all parameters are followed. Others place things, as the targets of pins, and are Solve's to interpolate:
 // of these nodes numbers alone. Actions are the script's.
-bool is_followed(const Node& node, const Param& param)
+ChangingNode::Between ChangingNode::between_calls(const Node& node, const Param& param)
 {
     const auto has = [&](Stage stage) {
         return std::count(node.type->stages.begin(), node.type->stages.end(), stage) > 0;
     };
-    if (node.type->kind != NodeKind::Dynamic || param.type == "integer") return false;
-    return has(Stage::Forces) || (param.type == "number" && (has(Stage::Collision) || has(Stage::Constraints)));
+    if (node.type->kind != NodeKind::Dynamic || param.type == "integer") return Between::Unfollowed;
+    if (has(Stage::Forces)) return Between::Interpolated;
+    const bool is_number = param.type == "number" && (has(Stage::Collision) || has(Stage::Constraints));
+    return is_number ? Between::Held : Between::Unfollowed;
 }
-
-}  // namespace
 
 ChangingNode::ChangingNode(const PlannedNode& planned, std::shared_ptr<Simulation> simulation)
     : planned_(planned), simulation_(std::move(simulation))

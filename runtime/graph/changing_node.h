@@ -14,6 +14,14 @@ namespace rapid {
 
 class ChangingNode {
 public:
+    // What becomes of the numbers of a parameter between the calls of its function.
+    enum class Between {
+        Interpolated,  // functions of time
+        Held,          // as at the end of the step; what that is off by is in the error
+        Unfollowed,    // as at the end of the step, or the node's own affair; in no error
+    };
+    static Between between_calls(const Node& node, const Param& param);
+
     // Both outlive this.
     ChangingNode(const PlannedNode& planned, std::shared_ptr<Simulation> simulation);
 

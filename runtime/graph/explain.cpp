@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "runtime/graph/changing_node.h"
 #include "runtime/graph/point_function.h"
 
 namespace rapid {
@@ -76,6 +77,47 @@ std::string what_brings_in(const PlannedAttribute& attribute)
     return usual_way_in(attribute.name);
 }
 
+// Whether functions are called for each step: those of Solves and of what is before them.
+int calls_a_frame(const Plan& plan, const PlannedNode& planned)
+{
+    return planned.in_loop ? plan.simulations[planned.simulation].subframes : 1;
+}
+
+std::string times_a_frame(int times) { return times > 1 ? fmt::format("{} times a frame", times) : "once a frame"; }
+
+// What holds between the calls of a function of the frame.
+std::string between_calls(const PlannedNode& planned, const Param& param)
+{
+    if (planned.node->type->kind != NodeKind::Dynamic || !planned.in_loop) return "its value holds for the frame";
+    switch (ChangingNode::between_calls(*planned.node, param)) {
+        case ChangingNode::Between::Interpolated:
+            return "numbers are interpolated to the time of each sub-step; the estimated error has what that is off by";
+        case ChangingNode::Between::Held:
+            return "its value at the end holds throughout; the estimated error has what that is off by";
+        case ChangingNode::Between::Unfollowed:
+            break;
+    }
+    return param.type.find("vec3") == 0 ? "straight from value to value; not in the estimated error"
+                                        : "its value at the end holds throughout; not in the estimated error";
+}
+
+void explain_functions(const Plan& plan, const PlannedNode& planned, Explanation& result)
+{
+    for (const auto& [name, value] : planned.node->arguments) {
+        const NodeType& type = *planned.node->type;
+        const Param* param = type.find(name) ? type.find(name) : type.rest ? &*type.rest : nullptr;
+        if (!param || !value.function()) continue;
+        const std::string full = fmt::format("{}.{}", planned.node->name, name);
+        if (param->keeps_function)
+            result.functions.push_back(
+                {full, "as its path needs",
+                 "called between frames, until pieces of the path are within 1e-5 of its length"});
+        else
+            result.functions.push_back(
+                {full, times_a_frame(calls_a_frame(plan, planned)), between_calls(planned, *param)});
+    }
+}
+
 template <class T>
 void put_kept_first(std::vector<T>& all)
 {
@@ -100,7 +142,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
 {
     Explanation result;
     for (const PlannedNode& planned : plan.nodes) {
-        const int times = planned.in_loop ? plan.simulations[planned.simulation].subframes : 1;
+        const int times = calls_a_frame(plan, planned);
         const std::string why = plan.outputs.size() == 1 ? "reached from the output"
                                                          : fmt::format("reached from the output{} {}",
                                                                        planned.reached_from.size() == 1 ? "" : "s",
@@ -110,6 +152,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
                                 : times > 1  ? fmt::format("{} times a frame", times)
                                              : "every frame",
                                 why, planned.changes});
+        explain_functions(plan, planned, result);
     }
     for (const NodePtr& node : plan.left_out)
         result.nodes.push_back({node->name, node->type->name, false, "never", "no output comes from it", ""});

@@ -26,6 +26,11 @@ struct Explanation {
         std::string why;
         std::string brought_in_by;  // what would keep it; empty where it is kept
     };
+    struct ExplainedFunction {
+        std::string name;     // of the node and the parameter: "pin1.target"
+        std::string called;   // how often: "once a frame", "4 times a frame", "as its path needs"
+        std::string between;  // what holds between the calls, and whether the estimated error has it
+    };
     struct ExplainedStage {
         std::string name;
         bool kept;
@@ -36,6 +41,7 @@ struct Explanation {
     std::vector<ExplainedNode> nodes;
     // Kept ones first, by simulation and in order of name.
     std::vector<ExplainedAttribute> attributes;
+    std::vector<ExplainedFunction> functions;  // parameters of kept nodes, in the order of these
     std::vector<ExplainedStage> stages;
     std::vector<std::vector<std::string>> passes;  // names of nodes
 

@@ -115,6 +115,32 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
     assert.equal("write1, -o b.####.csv", bounces.stages.writing.why)
   end)
 
+  it("tells how often functions of the frame are called, and what holds between", function()
+    write("changes.lua", [[
+return rapid.create { subframes = 2, points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.5 } }
+  :gravity { g = function(frame) return {0, -frame.time, 0} end }
+  :contact { radius = 0.1, friction = function(frame) return 0.1 * frame.time end }
+  :collide { shape = rapid.shape.plane {}, transform = function(frame) return rapid.translate(0, frame.time, 0) end }
+  :pin { group = "held", target = function(frame) return {0, frame.time, 0} end }
+  :group { name = "held", where = function(p) return p.id == 0 end } :solve {}
+  :attribute { heat = function(frame) return frame.time end }
+]])
+    local error_has = "the estimated error has what that is off by"
+    assert.same({
+      { name = "gravity1.g", called = "2 times a frame",
+        between = "numbers are interpolated to the time of each sub-step; " .. error_has },
+      { name = "contact1.friction", called = "2 times a frame",
+        between = "its value at the end holds throughout; " .. error_has },
+      { name = "collide1.transform", called = "as its path needs",
+        between = "called between frames, until pieces of the path are within 1e-5 of its length" },
+      { name = "pin1.target", called = "2 times a frame",
+        between = "straight from value to value; not in the estimated error" },
+      { name = "attribute1.heat", called = "once a frame", between = "its value holds for the frame" },
+    }, plan_of("changes.lua").raw.functions)
+    assert.truthy(explain("changes.lua").stdout:find("functions of the frame\n  gravity1.g ", 1, true))
+    assert.same({}, plan_of("falls.lua").raw.functions)
+  end)
+
   it("groups the nodes that go over the points together", function()
     assert.same({ { "emit1" }, { "swirl" }, { "gravity1", "collide1", "solve1" }, { "write1" } },
                 plan_of("bounces.lua").passes)

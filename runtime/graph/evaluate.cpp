@@ -88,19 +88,8 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     const auto takes_part = [&](const PlannedNode& planned) { return left == 0 || planned.in_steps; };
 
     // Functions of the frame are called first, on this thread; the fallbacks of columns may depend on them.
-    for (const PlannedNode& planned : plan_.nodes) {
-        if (!takes_part(planned) || (planned.once && next_ > plan_.first_frame())) continue;
-        const Simulation& simulation = *simulations_[planned.simulation];
-        const Frame now = simulation.frame(simulation.clock().step_of(next_) - left);
-        name_errors(planned.node->name, planned.node->location, [&] {
-            bind_arguments(*planned.node, *planned.op, now, true);
-            planned.op->check();
-        });
-    }
-    for (std::size_t s = 0; s < simulations_.size(); ++s) {
-        simulations_[s]->columns = plan_.columns_of(s);
-        simulations_[s]->groups = plan_.groups_of(s);
-    }
+    call_functions(next_, left);
+    take_columns();
 
     FrameFigures before = std::exchange(frame.figures, {});
     results.assign(plan_.nodes.size(), {});
@@ -118,6 +107,27 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
         if (simulations_[s]->record) frame.steps[plan_.simulations[s].create->name].push_back(*simulations_[s]->record);
     before.append(std::move(frame.figures));
     frame.figures = std::move(before);
+}
+
+void Evaluator::call_functions(std::int64_t frame, int left)
+{
+    for (const PlannedNode& planned : plan_.nodes) {
+        if ((left > 0 && !planned.in_steps) || (planned.once && frame > plan_.first_frame())) continue;
+        const Simulation& simulation = *simulations_[planned.simulation];
+        const Frame now = simulation.frame(simulation.clock().step_of(frame) - left);
+        name_errors(planned.node->name, planned.node->location, [&] {
+            bind_arguments(*planned.node, *planned.op, now, true);
+            planned.op->check();
+        });
+    }
+}
+
+void Evaluator::take_columns()
+{
+    for (std::size_t s = 0; s < simulations_.size(); ++s) {
+        simulations_[s]->columns = plan_.columns_of(s);
+        simulations_[s]->groups = plan_.groups_of(s);
+    }
 }
 
 // From the state, and from the results that nobody has taken yet.

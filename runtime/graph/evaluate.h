@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "runtime/graph/plan.h"
+#include "runtime/graph/snapshot.h"
 
 namespace rapid {
 
@@ -60,7 +61,18 @@ public:
     // does not move. The evaluator can't be used afterwards. Error: as advance().
     FrameFigures examine();
 
+    // All that the next frames depend on, after the last one; its columns are shared until either side writes them.
+    Snapshot save() const;
+    // Goes on behind a snapshot of the same graph: the next frames are those of the evaluator that made it, to the bit.
+    // Error: it is of another graph; the evaluator can't be used afterwards.
+    void load(const Snapshot& snapshot);
+
 private:
+    void evaluate_constants(const Snapshot& snapshot);
+    bool adopts_once(std::size_t node) const;
+    // Calls the functions of the frame, `left` sub-frames before its end.
+    void call_functions(std::int64_t frame, int left);
+    void take_columns();
     // Evaluates a sub-frame of the next frame, `left` sub-frames before its end. results: by node; readers: of each
     // result, those that have not taken it yet.
     void advance_subframe(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers, FrameResult& frame);

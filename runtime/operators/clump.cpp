@@ -6,6 +6,7 @@
 // A bond that breaks is gone; the points stick again when they have been apart and touch once more. A bond only pulls:
 // that points do not sink into each other is the matter of contact.
 #include "runtime/graph/node.h"
+#include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/rows.h"
@@ -26,6 +27,12 @@ struct Bond {
     static constexpr bool rests = true;
 
     double rest = 0;  // m
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(rest);
+    }
 
     double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
     {
@@ -50,8 +57,20 @@ public:
         std::vector<float> reach;
 
         bool operator==(const Searched&) const = default;
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(ids, at, reach);
+        }
     };
     Searched searched;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        Rows<Bond>::serialize(keep);
+        keep(strength, parted, searched);
+    }
 
     void solve_velocities(Substep& step) override
     {
@@ -60,22 +79,17 @@ public:
     }
 };
 
-class ClumpConstraint : public Constraint {
+class ClumpConstraint : public RememberingConstraint<ClumpConstraint, Bonds> {
 public:
-    std::shared_ptr<Bonds> bonds;
     std::optional<PerPoint<float>> radius;
     double strength = 0;
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
         bond(points);
-        bonds->follow(points, group);
-        if (strength < std::exchange(bonds->strength, strength)) bonds->wake_all();
-        return bonds;
-    }
-    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
-    {
-        return twin_of(*this, &ClumpConstraint::bonds, before);
+        memory->follow(points, group);
+        if (strength < std::exchange(memory->strength, strength)) memory->wake_all();
+        return memory;
     }
 
 private:
@@ -97,7 +111,7 @@ private:
             at[i] = points.P()[i].cast<double>();
             largest = std::max(largest, reach[i]);
         }
-        if (now == bonds->searched) return;
+        if (now == memory->searched) return;
         Pairs near;
         ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, largest / 4, 8), near,
                              {fmt::format("radius = {:g} m", largest / touch), "give a smaller radius", bytes_a_bond});
@@ -106,15 +120,15 @@ private:
         for (std::size_t i = 0; i < n; ++i)
             for (const std::uint32_t j : near.of(i)) {
                 const std::array<std::int64_t, 2> pair{std::min(id[i], id[j]), std::max(id[i], id[j])};
-                if (bonds->parted.count(pair)) {
+                if (memory->parted.count(pair)) {
                     touching.insert(pair);
-                } else if (!bonds->has(pair)) {
+                } else if (!memory->has(pair)) {
                     const double touch_at = double(given[i]) + double(given[j]);
-                    bonds->add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
+                    memory->add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
                 }
             }
-        bonds->parted = std::move(touching);
-        bonds->searched = std::move(now);
+        memory->parted = std::move(touching);
+        memory->searched = std::move(now);
     }
 };
 
@@ -138,10 +152,18 @@ struct Clump {
     std::shared_ptr<const Constraint> dynamic(const Evaluation& now) const
     {
         auto constraint = dynamic_of<ClumpConstraint>(now, group);
-        constraint->bonds = bonds_;
+        constraint->memory = bonds_;
         constraint->radius = radius;
         constraint->strength = strength;
         return constraint;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<Clump>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(*bonds_);
     }
 
 private:

@@ -3,7 +3,9 @@
 // Pairs are found in sparse grids of cells, one for each cluster of radii: `max_difference` and `max_grids` trade the
 // time of many grids for that of wide cells (Algorithm 1; solver/constraints/radius_grids.h).
 #include "runtime/graph/node.h"
+#include "runtime/graph/stateful.h"
 #include "runtime/solver/constraints/contact_forces.h"
+#include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/constraints/contacts.h"
 #include "runtime/solver/constraints/spin.h"
 #include "runtime/solver/constraints/twin.h"
@@ -14,21 +16,16 @@ namespace {
 // Above it points that are born in one another may fly: 10 m/s at 5, 2,700 at 8, for 1 and 10 kg in 0.02 m.
 constexpr double most_scaling = 4;
 
-class ContactConstraint : public Constraint {
+class ContactConstraint : public RememberingConstraint<ContactConstraint, Contacts> {
 public:
-    std::shared_ptr<Contacts> contacts;
     ContactOptions options;
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
-        contacts->follow(points, options, group);
-        return contacts;
+        memory->follow(points, options, group);
+        return memory;
     }
     std::optional<PerPoint<float>> radius() const override { return options.radius; }
-    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
-    {
-        return twin_of(*this, &ContactConstraint::contacts, before);
-    }
 };
 
 struct ContactNode {
@@ -95,10 +92,18 @@ struct ContactNode {
     std::shared_ptr<const Constraint> dynamic(const Evaluation& now) const
     {
         auto constraint = dynamic_of<ContactConstraint>(now, group);
-        constraint->contacts = contacts_;
+        constraint->memory = contacts_;
         constraint->options = {radius,       bounce, friction, max_difference, max_grids,
                                mass_scaling, record, spin,     rolling};
         return constraint;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<ContactNode>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(*contacts_);
     }
 
 private:

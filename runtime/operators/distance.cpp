@@ -4,6 +4,7 @@
 //
 // Chains and trees of pairs are solved directly whatever their length (solver/constraints/tree_solver.h).
 #include "runtime/graph/node.h"
+#include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/rows.h"
@@ -39,6 +40,12 @@ struct Tie {
     double rest = 0;                                        // m
     double most = std::numeric_limits<double>::infinity();  // m, at which it breaks
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(rest, most);
+    }
+
     double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
     {
         const Vec3d d = P[0] - P[1];
@@ -61,22 +68,13 @@ struct Tie {
     bool breaks(double residual) const { return residual > most; }
 };
 
-class TieConstraint : public Constraint {
+class TieConstraint : public RememberingConstraint<TieConstraint, Rows<Tie>> {
 public:
-    explicit TieConstraint(std::shared_ptr<Rows<Tie>> rows) : rows_(std::move(rows)) {}
-
     std::shared_ptr<Coupling> begin(const PointSet& points, double) const override
     {
-        rows_->follow(points, group);
-        return rows_->size() > 0 || rows_->wakes() ? rows_ : nullptr;
+        memory->follow(points, group);
+        return memory->size() > 0 || memory->wakes() ? memory : nullptr;
     }
-    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
-    {
-        return twin_of(*this, &TieConstraint::rows_, before);
-    }
-
-private:
-    std::shared_ptr<Rows<Tie>> rows_;
 };
 
 struct Distance {
@@ -118,9 +116,21 @@ struct Distance {
         Flow flow = std::move(inputs[0]);
         if (!rows_ && !flow.points.empty()) rows_ = tie(flow.points);
         if (!rows_) return flow;
-        auto constraint = dynamic_of<TieConstraint>(now, group, rows_);
+        auto constraint = dynamic_of<TieConstraint>(now, group);
+        constraint->memory = rows_;
         flow.dynamics.add(std::move(constraint));
         return flow;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<Distance>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        bool has_rows = rows_ != nullptr;
+        keep(has_rows);
+        if constexpr (Archive::is_loading::value) rows_ = has_rows ? std::make_shared<Rows<Tie>>() : nullptr;
+        if (has_rows) keep(*rows_);
     }
 
 private:

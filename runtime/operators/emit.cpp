@@ -23,7 +23,7 @@
 
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/stateful.h"
 #include "runtime/memory_budget.h"
 #include "runtime/operators/emit/birth_age.h"
 #include "runtime/operators/emit/birth_source.h"
@@ -31,6 +31,7 @@
 #include "runtime/operators/emit/birth_velocity.h"
 #include "runtime/operators/emit/births.h"
 #include "runtime/operators/emit/draws.h"
+#include "runtime/operators/emit/emit_source.h"
 #include "runtime/operators/emit/inheritance.h"
 #include "runtime/operators/emit/interval.h"
 #include "runtime/operators/emit/parent_emitter.h"
@@ -48,19 +49,6 @@ constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness i
 
 // Of a point with the attributes that most have, in the state and in what is made of it within a frame.
 constexpr double bytes_a_birth = 2 * 64;
-
-struct EmitSource {
-    static constexpr std::string_view param_type = "mesh, level set, shape, points or node";
-    ObjectPtr object;
-    bool is_node = false;
-};
-
-void read_value(const Param& param, const Value& value, EmitSource& field)
-{
-    read_value(param, value, field.object);
-    if (!field.object) wrong_type(param, value);
-    field.is_node = std::dynamic_pointer_cast<const NodeHandle>(field.object) != nullptr;
-}
 
 // The newborn points' part of the columns in which each has a value of its own, shape [n]; the others are empty.
 struct NewbornColumns {
@@ -248,6 +236,14 @@ struct Emit {
         move_source(*flow.simulation, now);
         emit(flow, births(flow.simulation->clock().step_at(now.frame), flow.simulation->clock()), now);
         return flow;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<Emit>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(clock_, warned_unmatched_, source_, parents_);
     }
 
 private:

@@ -11,6 +11,7 @@
 // The result has the columns and groups of all inputs. A point whose own chain lacks a column gets the column's value
 // for points without one.
 #include "runtime/graph/node.h"
+#include "runtime/graph/stateful.h"
 
 #include <fmt/format.h>
 
@@ -80,9 +81,13 @@ struct Merge {
             .writes("id");
     }
 
-    Flow start(std::span<Flow> inputs, const Evaluation& now) const { return evaluate(inputs, now); }
+    Flow start(std::span<Flow> inputs, const Evaluation& now)
+    {
+        adopted_.clear();
+        return evaluate(inputs, now);
+    }
 
-    Flow evaluate(std::span<Flow> inputs, const Evaluation& now) const
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
     {
         Flow result = std::move(inputs[0]);
         IdSet ids_in_result;
@@ -90,7 +95,7 @@ struct Merge {
         for (std::size_t i = 0; i < result.points.size(); ++i) ids_in_result.insert(ids[i]);
         for (std::size_t i = 1; i < inputs.size(); ++i) {
             try {
-                append_input(result, ids_in_result, std::move(inputs[i]), now);
+                append_input(result, ids_in_result, i, std::move(inputs[i]), now);
             } catch (Error& error) {
                 throw Error(fmt::format("input {}: {}", i + 1, error.message()));
             }
@@ -98,8 +103,49 @@ struct Merge {
         return result;
     }
 
+    static std::unique_ptr<Operator> make() { return stateful<Merge>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(adopted_);
+    }
+    void resume(const NodeSimulations& simulations) const
+    {
+        for (const Run& run : adopted_) {
+            if (run.input >= simulations.inputs.size()) StateReader::fail();
+            AdoptedIds& ids = simulations.own.adopted[simulations.inputs[run.input]];
+            for (std::int64_t k = 0; k < run.size; ++k) {
+                std::int64_t next = run.adopted + k;
+                ids.of(run.first + k, next);
+            }
+        }
+    }
+
 private:
-    static void append_input(Flow& result, IdSet& ids_in_result, Flow input, const Evaluation& now)
+    // Points that this node has adopted, with consecutive ids.
+    struct Run {
+        std::uint64_t input;
+        std::int64_t first, size;  // ids in the simulation of the input
+        std::int64_t adopted;      // of the first, here
+
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(input, first, size, adopted);
+        }
+    };
+
+    void note_adopted(std::size_t input, std::int64_t id, std::int64_t adopted)
+    {
+        Run* last = adopted_.empty() ? nullptr : &adopted_.back();
+        if (last && last->input == input && last->first + last->size == id && last->adopted + last->size == adopted)
+            ++last->size;
+        else
+            adopted_.push_back({input, id, 1, adopted});
+    }
+
+    void append_input(Flow& result, IdSet& ids_in_result, std::size_t number, Flow input, const Evaluation& now)
     {
         Simulation& here = *result.simulation;
         const Simulation& there = *input.simulation;
@@ -109,7 +155,10 @@ private:
         PointSet& points = input.points;
         if (&there != &here && !points.empty()) {
             AdoptedIds& adopted = here.adopted[&there];
-            for (std::int64_t& id : points.id().write()) id = adopted.of(id, here.next_id);
+            for (std::int64_t& id : points.id().write()) {
+                const std::int64_t next = here.next_id, there_id = std::exchange(id, adopted.of(id, here.next_id));
+                if (here.next_id != next) note_adopted(number, there_id, next);
+            }
         }
         std::vector<std::uint8_t> fresh(points.size());
         const Strided<std::int64_t> ids = std::as_const(points).id().read();
@@ -119,6 +168,8 @@ private:
 
         result.dynamics.merge(input.dynamics);
     }
+
+    std::vector<Run> adopted_;  // in this run, for snapshots
 };
 RAPID_NODE(Merge);
 

@@ -3,6 +3,7 @@
 // Rigid, a pinned point is kinematic: its position and velocity are prescribed, and no other constraint moves it. With
 // a compliance it is held by three springs, one along each axis.
 #include "runtime/graph/node.h"
+#include "runtime/graph/stateful.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/members.h"
 #include "runtime/shapes/motion/animated.h"
@@ -39,13 +40,25 @@ struct Pin {
     Vec3d rest = Vec3d::Zero();                      // on a body that moves: in its rest frame
     Vec3d now = Vec3d::Zero();
     bool taken = false;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(from, to, rest, now, taken);
+    }
 };
 
 struct Along {
     static constexpr int points = 1;
     static constexpr bool rests = true;  // PinCoupling sees to targets that move
-    const Pin* pin;
+    const Pin* pin;                      // Pins sees to it
     int axis;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(axis);
+    }
 
     double residual(const std::array<Vec3d, 1>& P, std::array<Vec3d, 1>& gradient) const
     {
@@ -57,11 +70,19 @@ struct Along {
 struct Pins {
     Pins() = default;
     // The springs of a copy draw to its own pins.
-    Pins(const Pins& other) : by_id(other.by_id), held(other.held), springs(other.springs)
+    Pins(const Pins& other) : by_id(other.by_id), held(other.held), springs(other.springs) { attach_springs(); }
+    Pins& operator=(const Pins&) = delete;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(by_id, held, springs);
+        if constexpr (Archive::is_loading::value) attach_springs();
+    }
+    void attach_springs()
     {
         springs.for_each([&](const auto& ids, Along& along) { along.pin = &by_id.at(ids[0]); });
     }
-    Pins& operator=(const Pins&) = delete;
 
     std::map<std::int64_t, Pin> by_id;  // addresses of pins are stable
     std::vector<std::int64_t> held;     // in the last frame
@@ -133,16 +154,15 @@ bool is_still(const MotionTrack& track)
     });
 }
 
-class PinConstraint : public Constraint {
+class PinConstraint : public RememberingConstraint<PinConstraint, Pins> {
 public:
-    std::shared_ptr<Pins> pins;
     std::optional<PerPoint<Vec3f>> place;
     std::shared_ptr<const MotionTrack> track;
     double compliance = 0;
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double h) const override
     {
-        auto coupling = std::make_shared<PinCoupling>(pins, track, compliance == 0, h);
+        auto coupling = std::make_shared<PinCoupling>(memory, track, compliance == 0, h);
         const Strided<std::uint8_t> members = members_of(points, group);
         const Strided<Vec3f> P = points.P().read();
         const Strided<std::int64_t> id = points.id().read();
@@ -152,13 +172,13 @@ public:
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!members[i]) continue;
             held.push_back(id[i]);
-            Pin& pin = pins->by_id[id[i]];
+            Pin& pin = memory->by_id[id[i]];
             const Vec3d to = target[i].cast<double>();
             if (!pin.taken) {
                 pin.from = pin.to = pin.now = to;
                 if (track) pin.rest = track->at(0).inverse() * to;
                 for (int axis = 0; compliance > 0 && axis < 3; ++axis)
-                    pins->springs.add({id[i]}, {&pin, axis}, compliance);
+                    memory->springs.add({id[i]}, {&pin, axis}, compliance);
                 pin.taken = true;
             } else if (place) {
                 pin.from = pin.to;
@@ -167,16 +187,12 @@ public:
             coupling->hold_at(i, pin);
             if (moves || pin.from != pin.to) coupling->keep_awake(static_cast<std::uint32_t>(i));
         }
-        pins->springs.follow(points, group);
+        memory->springs.follow(points, group);
         std::sort(held.begin(), held.end());
-        if (held != pins->held) keep_changed_awake(*coupling, IdIndex(points.id()), held);
-        const bool any = !held.empty() || !pins->held.empty();
-        pins->held = std::move(held);
+        if (held != memory->held) keep_changed_awake(*coupling, IdIndex(points.id()), held);
+        const bool any = !held.empty() || !memory->held.empty();
+        memory->held = std::move(held);
         return any ? coupling : nullptr;
-    }
-    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
-    {
-        return twin_of(*this, &PinConstraint::pins, before);
     }
 
 private:
@@ -184,7 +200,7 @@ private:
     void keep_changed_awake(PinCoupling& coupling, const IdIndex& index, const std::vector<std::int64_t>& held) const
     {
         std::vector<std::int64_t> changed;
-        std::set_symmetric_difference(held.begin(), held.end(), pins->held.begin(), pins->held.end(),
+        std::set_symmetric_difference(held.begin(), held.end(), memory->held.begin(), memory->held.end(),
                                       std::back_inserter(changed));
         for (const std::int64_t id : changed)
             if (index[id] != IdIndex::none) coupling.keep_awake(index[id]);
@@ -222,7 +238,7 @@ struct PinNode {
     {
         Flow flow = std::move(inputs[0]);
         auto pin = dynamic_of<PinConstraint>(now, group);
-        pin->pins = pins_;
+        pin->memory = pins_;
         pin->place = target.place;
         pin->compliance = compliance;
         if (const MotionPtr motion = transform ? transform : target.motion)
@@ -231,6 +247,14 @@ struct PinNode {
                                               now.frame.number - 1.0 / flow.simulation->subframes, now.frame.number);
         flow.dynamics.add(std::move(pin));
         return flow;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<PinNode>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(*pins_);
     }
 
 private:

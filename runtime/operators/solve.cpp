@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "runtime/graph/node.h"
+#include "runtime/graph/stateful.h"
 #include "runtime/operators/solve/aging.h"
 #include "runtime/operators/solve/air_resistance.h"
 #include "runtime/operators/solve/changing_dynamics.h"
@@ -14,7 +15,7 @@
 #include "runtime/operators/solve/step_recorder.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/collision/stuck_columns.h"
-#include "runtime/solver/constraints/shape_contacts.h"
+#include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/estimate/coupled_errors.h"
 #include "runtime/solver/estimate/energy_drift.h"
 #include "runtime/solver/estimate/error_control.h"
@@ -109,6 +110,14 @@ struct Solve {
         now.figures.died += age_points(flow.points, group, now.frame.dt, &recorder);
         feed_back(flow);
         return flow;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<Solve>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(shapes_, shadows_, coupled_errors_, drift_, tolerance_check_, loads_, sleep_records_);
     }
 
 private:

@@ -69,6 +69,13 @@ public:
         return column[static_cast<std::size_t>(place.element)];
     }
 
+    // Where the points of a set that is another at each step come from.
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        if (is_of_points_ && !moving_points_) keep(before_, earlier_, is_fresh_);
+    }
+
 private:
     void take_mesh(const MeshPtr& mesh);
     void take_shape(const ShapePtr& shape);

@@ -33,6 +33,12 @@ public:
     // Of the `count` births of a frame, those of its part number `part`, from 0, of `parts`.
     Births at_once(std::size_t count, double fps, int part = 0, int parts = 1);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(total_, rate_, anchor_, carry_, born_);
+    }
+
 private:
     double due_by(std::int64_t frame, double fps) const;
 

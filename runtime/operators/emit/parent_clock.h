@@ -44,12 +44,24 @@ public:
     // The broods of a step, in the order of the parents, then of time. Called for the steps in their order.
     std::vector<Brood> births(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(ids_, states_);
+    }
+
 private:
     struct State {
         double due = 0;          // of a birth, in [0, 1)
         std::uint64_t born = 0;  // births so far
         bool is_known = false;   // whether it has borne in a step before, so that `due` counts
         bool held = false;       // whether the comparison, or the test, was true at the end of the last step
+
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(due, born, is_known, held);
+        }
     };
     class Tally;
 

@@ -26,6 +26,12 @@ public:
     // The births of a step, appended to the flow. from: the source's result; most: births, of a trial.
     void bear(Flow& flow, const Flow& from, const ParentOptions& options, std::size_t most, const Evaluation& now);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(clock_);
+    }
+
 private:
     ParentClock clock_;
 };

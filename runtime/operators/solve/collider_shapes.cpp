@@ -89,29 +89,50 @@ void ColliderShapes::prepare(Dynamics& dynamics, const PointSet& points, const F
 
 void ColliderShapes::widen(Dynamics& dynamics, const PointSet& points, int substeps, const Evaluation& now)
 {
-    std::map<ShapePtr, LevelSetPtr> widened;
+    std::map<ShapePtr, Widened> widened;
+    std::map<std::string, Band> bands;
     for (std::size_t i = 0; i < dynamics.colliders().size(); ++i) {
         const std::shared_ptr<const Collider> collider = dynamics.colliders()[i];
         const auto level_set = std::dynamic_pointer_cast<const LevelSet>(collider->shape);
         if (!level_set) continue;
         const double needed =
             needed_band(*collider, dynamics, points, level_set->voxel(), level_set->bounds(), now.frame.dt, substeps);
-        const auto known = widened_.find(collider->shape);
-        LevelSetPtr shape = known == widened_.end() ? level_set : known->second;
         const Stopwatch stopwatch;
-        if (const auto other = widened.find(collider->shape); other != widened.end() && other->second->band() >= needed)
-            shape = other->second;
-        const bool builds = shape->band() < needed;
-        if (builds) shape = widened_to(shape, needed, *collider);
-        widened[collider->shape] = shape;
+        Widened made = known(*collider, level_set);
+        if (const auto other = widened.find(collider->shape);
+            other != widened.end() && other->second.shape->band() >= needed)
+            made = other->second;
+        const bool builds = made.shape->band() < needed;
+        if (builds) made = {widened_to(made.shape, needed, *collider), needed};
+        const LevelSetPtr shape = made.shape;
+        widened[collider->shape] = made;
         now.figures.bands.push_back(
             {collider->node, shape->band(), shape->active_voxels(), builds ? stopwatch.seconds() : 0});
         if (shape == level_set) continue;
+        bands[collider->node] = {made.band, level_set->voxel(), level_set->bounds().min(), level_set->bounds().max(),
+                                 level_set->active_voxels()};
         auto replacement = std::make_shared<Collider>(*collider);
         replacement->shape = shape;
         dynamics.replace_collider(i, std::move(replacement));
     }
     widened_ = std::move(widened);
+    bands_ = std::move(bands);
+    restored_.clear();
+}
+
+bool ColliderShapes::Band::is_of(const LevelSet& shape) const
+{
+    return voxel == shape.voxel() && min == shape.bounds().min() && max == shape.bounds().max() &&
+           voxels == shape.active_voxels();
+}
+
+// As the step before has left it.
+ColliderShapes::Widened ColliderShapes::known(const Collider& collider, const LevelSetPtr& shape) const
+{
+    if (const auto found = widened_.find(collider.shape); found != widened_.end()) return found->second;
+    const auto found = restored_.find(collider.node);
+    if (found == restored_.end() || !found->second.is_of(*shape)) return {shape, 0};
+    return {widened_to(shape, found->second.band, collider), found->second.band};
 }
 
 void ColliderShapes::set_in_motion(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
@@ -123,9 +144,10 @@ void ColliderShapes::set_in_motion(Dynamics& dynamics, const PointSet& points, c
     const auto deformed = [&](const Collider& collider, const PathOptions& options,
                               std::optional<Jump>& jump) -> ShapePtr {
         const auto known = deformations_.find(collider.node);
-        const bool same = known != deformations_.end() && known->second.body() == collider.deforming;
+        const bool same = known != deformations_.end() && known->second.is_of(collider.deforming);
         Deformation& body =
             deformations.emplace(collider.node, same ? known->second : Deformation(collider.deforming)).first->second;
+        body.set_body(collider.deforming);
         const double band = needed_band(collider, dynamics, points, collider.deforming->voxel(),
                                         collider.deforming->bounds(), now.frame.dt, substeps);
         const Stopwatch stopwatch;

@@ -1,7 +1,8 @@
 // The shapes of colliders as one step needs them (paper §4.3, §4.4): level sets with a band as wide as the points
 // require, and moving or deforming shapes along their paths through the step.
 //
-// A level set is widened once and kept from step to step, as a deforming one is.
+// A level set is widened once and kept from step to step, as a deforming one is. A snapshot holds how wide they were,
+// not the grids: points would come to other bits among narrower ones.
 #pragma once
 
 #include <map>
@@ -20,12 +21,40 @@ public:
     void prepare(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
                  const Evaluation& now);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        std::map<std::string, Band> bands = restored_.empty() ? bands_ : restored_;
+        keep(bands, deformations_);
+        if constexpr (Archive::is_loading::value) widened_.clear(), bands_.clear(), restored_ = std::move(bands);
+    }
+
 private:
+    struct Widened {
+        LevelSetPtr shape;
+        double band;  // m, that it was asked to have
+    };
+    // The band that a shape was given, and by what it is known.
+    struct Band {
+        double band = 0, voxel = 0;  // m
+        Vec3d min = Vec3d::Zero(), max = Vec3d::Zero();
+        std::uint64_t voxels = 0;
+
+        bool is_of(const LevelSet& shape) const;
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(band, voxel, min, max, voxels);
+        }
+    };
+
+    Widened known(const Collider& collider, const LevelSetPtr& shape) const;
     void widen(Dynamics& dynamics, const PointSet& points, int substeps, const Evaluation& now);
     void set_in_motion(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
                        const Evaluation& now);
 
-    std::map<ShapePtr, LevelSetPtr> widened_;          // by the shape given
+    std::map<ShapePtr, Widened> widened_;              // by the shape given
+    std::map<std::string, Band> bands_, restored_;     // by collide node: of the last step; of a snapshot before it
     std::map<std::string, Deformation> deformations_;  // by collide node
 };
 

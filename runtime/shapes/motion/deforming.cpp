@@ -48,6 +48,12 @@ LevelSetPtr DeformingLevelSet::build(const MeshPtr& mesh, double band) const
     return level_set_of_same_faces(mesh, options, open_);
 }
 
+LevelSetPtr Deformation::build(const MeshPtr& mesh, double band)
+{
+    band_ = band;
+    return body_->build(mesh, band);
+}
+
 Deformation::Interval Deformation::over(const FrameClock& clock, double from, double to, const MotionPtr& motion,
                                         const PathOptions& options, double band)
 {
@@ -55,8 +61,9 @@ Deformation::Interval Deformation::over(const FrameClock& clock, double from, do
     const AnimatedMesh& mesh = moved ? *moved : body_->mesh();
     const auto frame = static_cast<std::int64_t>(std::ceil(to));
     const FramePath path = path_of(mesh, clock, frame, options);
+    if (!at_end_ && end_ == from) at_end_ = build(mesh.at(clock, static_cast<std::int64_t>(from)), band_);
     if (path.kind == FramePath::Still) {
-        if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = body_->build(mesh.at(clock, frame), band);
+        if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = build(mesh.at(clock, frame), band);
         end_ = to;
         return {at_end_, path.jump};
     }
@@ -72,8 +79,7 @@ Deformation::Interval Deformation::over(const FrameClock& clock, double from, do
         else
             begin = body_->build(mesh_of(*mesh.rest(), curves, 0), band);
     }
-    at_end_ =
-        body_->build(to == static_cast<double>(frame) ? mesh.at(clock, frame) : mesh_of(*mesh.rest(), curves, 1), band);
+    at_end_ = build(to == static_cast<double>(frame) ? mesh.at(clock, frame) : mesh_of(*mesh.rest(), curves, 1), band);
     end_ = to;
     return {deforming_shape(begin, at_end_, body_->tree(), std::move(curves), (to - from) / clock.fps), path.jump};
 }

@@ -51,7 +51,7 @@ using DeformingLevelSetPtr = std::shared_ptr<const DeformingLevelSet>;
 // Advances a deforming level set through the frames, and keeps what the next interval needs.
 class Deformation {
 public:
-    explicit Deformation(DeformingLevelSetPtr body) : body_(std::move(body)) {}
+    explicit Deformation(DeformingLevelSetPtr body = nullptr) : body_(std::move(body)) {}
 
     struct Interval {
         ShapePtr shape;            // times are in seconds since its beginning
@@ -62,13 +62,25 @@ public:
     Interval over(const FrameClock& clock, double from, double to, const MotionPtr& motion, const PathOptions& options,
                   double band);
 
-    const DeformingLevelSetPtr& body() const { return body_; }
+    // Whether it is of this body; or of a snapshot, and has none yet.
+    bool is_of(const DeformingLevelSetPtr& body) const { return !body_ || body_ == body; }
+    void set_body(DeformingLevelSetPtr body) { body_ = std::move(body); }
     const LevelSetPtr& at_end() const { return at_end_; }  // of the last interval
 
+    // That of the last interval is built again, as wide as it was.
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(end_, band_);
+    }
+
 private:
+    LevelSetPtr build(const MeshPtr& mesh, double band);
+
     DeformingLevelSetPtr body_;
     double end_ = std::numeric_limits<double>::quiet_NaN();  // of the last interval
     LevelSetPtr at_end_;
+    double band_ = 0;  // m, that it was asked to have
 };
 
 }  // namespace rapid

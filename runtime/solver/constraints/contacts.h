@@ -47,6 +47,14 @@ public:
     void correct_penetration(Substep& step) override;
     Residual close(Substep& step) override;
 
+    // All that the search of the last frame has found, as the next may do without one.
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(ids_, material_, grids_, list_, blocks_, impulses_, reach_, list_is_stale_, backwards_, per_dt_);
+        if constexpr (Archive::is_loading::value) packs_.resize(blocks_.size());
+    }
+
 private:
     void renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index);
     void search(const Substep& step);

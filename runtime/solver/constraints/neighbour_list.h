@@ -34,6 +34,13 @@ public:
     // Blocks are wider than the points of any pair are apart. Block coordinates of a point:
     const std::array<std::int32_t, 3>& block(std::size_t i) const { return coordinates_[i]; }
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(pairs_, age_, short_lived_, edge_, far_, at_, reach_, slack_, coordinates_, block_of_, begin_, points_,
+             neighbouring_, frames_);
+    }
+
 private:
     void store_positions(const Substep& step, std::span<const float> radius);
     void cut_blocks(std::span<const float> radius);
@@ -59,6 +66,12 @@ private:
     struct Frame {
         Vec3d shift = Vec3d::Zero();  // m, the mean of its points
         double excess = 0;            // m, the most that one of them goes beyond its slack
+
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(shift, excess);
+        }
     };
     std::vector<Frame> frames_;  // of the blocks
 };

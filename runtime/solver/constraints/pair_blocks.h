@@ -41,6 +41,12 @@ public:
         }
     }
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(begin_, colours_);
+    }
+
 private:
     template <class F>
     void run(std::size_t from, std::size_t to, const F& f) const

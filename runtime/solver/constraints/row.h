@@ -61,6 +61,13 @@ struct Row {
     double resting_residual = std::numeric_limits<double>::quiet_NaN();
     bool resting_residual_exact = false;
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(function, compliance, ids, points, impulse, first, reference, added, has_yielded, is_resolved, softness,
+             direction, active, was_active, asleep, resting_residual, resting_residual_exact);
+    }
+
     // Finds its points by id. It acts while all of them are in the group. True where it acts otherwise than before.
     bool find_points(const IdIndex& index, const Strided<std::uint8_t>& members)
     {

@@ -10,6 +10,7 @@
 //                                                 but their positions and its own members; false if not said
 //       void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
 //                              std::array<Vec3d, 2>& gradient) const;   where it has one (row.h)
+//       template <class Archive> void serialize(Archive&);       its members, for snapshots (points/state_archive.h)
 //   };
 //
 // Two-sided rows carry their forces first, as part of the points' free motion: those over two points that form trees
@@ -114,6 +115,14 @@ public:
     }
 
     bool has_forces() const override { return !Traits::one_sided; }
+
+    // The schedule follows from the rows.
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(rows_, known_, known_is_complete_, dt_);
+        if constexpr (Archive::is_loading::value) changed_ = true;
+    }
 
     bool keeps_momentum() const override { return arity > 1; }
     // at: positions; where these are empty, of the points as they are.

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/constraint.h"
 
 namespace rapid {
@@ -17,5 +18,27 @@ std::shared_ptr<const Constraint> twin_of(const C& constraint, std::shared_ptr<M
     twin.get()->*memory = known ? known->*memory : std::make_shared<Memory>(*(constraint.*memory));
     return twin;
 }
+
+// Of a constraint with a state: that of what it remembers.
+class Remembering {
+public:
+    virtual ~Remembering() = default;
+    virtual void save(StateWriter& to) const = 0;
+    virtual void load(StateReader& from) const = 0;
+};
+
+// The base of a constraint C whose memory is its node's.
+template <class C, class Memory>
+class RememberingConstraint : public Constraint, public Remembering {
+public:
+    std::shared_ptr<Memory> memory;
+
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of<C, Memory>(static_cast<const C&>(*this), &C::memory, before);
+    }
+    void save(StateWriter& to) const override { to(*memory); }
+    void load(StateReader& from) const override { from(*memory); }
+};
 
 }  // namespace rapid

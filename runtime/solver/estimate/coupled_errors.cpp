@@ -8,6 +8,8 @@
 #include <type_traits>
 
 #include "runtime/points/id_index.h"
+#include "runtime/points/state_archive.h"
+#include "runtime/solver/constraints/twin.h"
 
 namespace rapid {
 namespace {
@@ -85,6 +87,7 @@ void CoupledErrors::stop()
     ids_ = Column<std::int64_t>();
     differences_.clear();
     twins_.clear();
+    memories_.clear();
     loads_ = {};
     sleep_records_ = {};
 }
@@ -141,15 +144,38 @@ bool CoupledErrors::make_twins(const Dynamics& dynamics)
         if constexpr (std::is_same_v<std::decay_t<decltype(*dynamic)>, Constraint>) {
             const auto same = std::find_if(before.begin(), before.end(),
                                            [&](const auto& twin) { return twin->node == dynamic->node; });
-            if (auto twin = dynamic->twin(same == before.end() ? nullptr : same->get()))
-                dynamics_.add(twins_.emplace_back(std::move(twin)));
-            else
+            const std::shared_ptr<const Constraint> twin = dynamic->twin(same == before.end() ? nullptr : same->get());
+            if (!twin) {
                 unknown_ = fmt::format("all points, as the constraint \"{}\" has no twin", dynamic->node);
+                return;
+            }
+            const auto saved = memories_.find(dynamic->node);
+            const auto* remembering = dynamic_cast<const Remembering*>(twin.get());
+            if (saved != memories_.end() && remembering) {
+                StateReader reader(saved->second);
+                remembering->load(reader);
+                reader.finish();
+            }
+            twins_.push_back(twin);
+            dynamics_.add(twin);
         } else {
             dynamics_.add(dynamic);
         }
     });
+    memories_.clear();
     return twins_.size() == dynamics.constraints().size();
+}
+
+std::map<std::string, SavedState> CoupledErrors::memories_of_twins() const
+{
+    std::map<std::string, SavedState> memories = memories_;
+    for (const auto& twin : twins_)
+        if (const auto* remembering = dynamic_cast<const Remembering*>(twin.get())) {
+            StateWriter writer;
+            remembering->save(writer);
+            memories[twin->node] = writer.take();
+        }
+    return memories;
 }
 
 std::vector<double> CoupledErrors::compare(const PointSet& solved)

@@ -9,11 +9,13 @@
 // this frame; a sum over frames would leave out how later motion damps or spreads it.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "runtime/points/saved_state.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/solve.h"
 
@@ -37,11 +39,27 @@ public:
     // Call after Solve: advances the shadows.
     Errors end(const PointSet& solved);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(unknown_, frames_, runs_, solved_, shadows_, differences_, loads_, sleep_records_);
+        std::map<std::string, SavedState> memories;
+        if constexpr (Archive::is_saving::value) memories = memories_of_twins();
+        keep(memories);
+        if constexpr (Archive::is_loading::value) twins_.clear(), memories_ = std::move(memories);
+    }
+
 private:
     // Of a point: what its shadow differs by.
     struct Difference {
         Vec3d P = Vec3d::Zero(), v = Vec3d::Zero();  // shadow minus point, after Solve
         bool is_known = true;                        // both have lived so far
+
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(P, v, is_known);
+        }
     };
 
     void start(const SolveOptions& options);
@@ -49,6 +67,7 @@ private:
     void apply_differences(const PointSet& points);
     void take_attributes(const PointSet& points);
     bool make_twins(const Dynamics& dynamics);
+    std::map<std::string, SavedState> memories_of_twins() const;
     std::vector<double> compare(const PointSet& solved);
 
     std::string unknown_;      // why there are no shadows since birth any more; empty while there are
@@ -59,6 +78,7 @@ private:
     Column<std::int64_t> ids_;             // of the points, from begin() to end()
     std::vector<Difference> differences_;  // in their order
     std::vector<std::shared_ptr<const Constraint>> twins_;
+    std::map<std::string, SavedState> memories_;  // of a snapshot, for twins that are not made yet; by node
     ShapeLoads loads_;
     SleepRecords sleep_records_;
 

@@ -24,6 +24,12 @@ public:
     // nothing where it is not defined.
     std::optional<std::vector<double>> end(const PointSet& solved, const Shadows& shadows, const Dynamics& dynamics);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(ids_, drift_);
+    }
+
 private:
     std::vector<std::int64_t> ids_;  // ascending
     std::vector<double> drift_;      // J/kg

@@ -54,12 +54,24 @@ public:
     // which its position is known. touches: it may meet shapes, with which it is flush within two ulps.
     double rounding(bool touches) const;
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(threshold_, next_id_, ids_, indices_, dP_, dv_, rounding_, off_);
+    }
+
 private:
     // Of a point: its state before Solve, with P after it; the time that it moves, s; how rounding has displaced it, m.
     struct Rounding {
         Vec3f P = Vec3f::Zero(), v = Vec3f::Zero();
         double dt = 0;
         Vec3d displacement = Vec3d::Zero();
+
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(P, v, dt, displacement);
+        }
     };
 
     void find(const PointSet& solved);

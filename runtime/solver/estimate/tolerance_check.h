@@ -19,6 +19,12 @@ public:
     std::uint64_t beyond(const PointSet& sample, const PointSet& solved, const Dynamics& dynamics,
                          const SolveOptions& options, double tolerance, int max_substeps);
 
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(frames_, part_);
+    }
+
 private:
     int frames_ = 0;
     double part_ = 0;

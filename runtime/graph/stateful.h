@@ -1,0 +1,57 @@
+// Operators of nodes that keep something from frame to frame. A node's struct names all that later frames depend on in
+// serialize() (points/state_archive.h), and makes its operator by stateful():
+//
+//   static std::unique_ptr<Operator> make() { return stateful<Emit>(); }
+//
+//   template <class Archive>
+//   void serialize(Archive& keep)
+//   {
+//       keep(clock_, parents_);
+//   }
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "runtime/graph/operator_of.h"
+#include "runtime/points/state_archive.h"
+
+namespace rapid {
+
+// The simulations of a node: its own, and those of its inputs.
+struct NodeSimulations {
+    Simulation& own;
+    std::span<Simulation* const> inputs;
+};
+
+class Stateful {
+public:
+    virtual ~Stateful() = default;
+
+    // Between two frames. Error of load(): it is the state of another graph.
+    virtual void save(StateWriter& to) const = 0;
+    virtual void load(StateReader& from, const NodeSimulations& simulations) = 0;
+};
+
+// A struct with resume(const NodeSimulations&) is told of them once it is loaded.
+template <class T>
+class StatefulOperatorOf final : public detail::OperatorOf<T>, public Stateful {
+public:
+    void save(StateWriter& to) const override { to(this->node()); }
+    void load(StateReader& from, const NodeSimulations& simulations) override
+    {
+        from(node());
+        if constexpr (requires { node().resume(simulations); }) node().resume(simulations);
+    }
+
+private:
+    T& node() const { return *static_cast<T*>(const_cast<StatefulOperatorOf*>(this)->fields()); }
+};
+
+template <class T>
+std::unique_ptr<Operator> stateful()
+{
+    return std::make_unique<StatefulOperatorOf<T>>();
+}
+
+}  // namespace rapid

@@ -1,0 +1,43 @@
+// Files of a SavedState, as a cache of a run holds them. In the order of the file, numbers as the machine has them:
+//
+//   "\x89RAPID\r\n"    what the file is
+//   8 bytes            the length of the header
+//   the header         JSON: what its writer says of it, "format", and "blocks": each with "type", "values" and "bytes"
+//   the blocks         the bytes of the state, then its columns, each compressed by zstd
+//   8 bytes            XXH3 of all that is before
+//
+// The checksum finds damage. It is no protection from those who mean harm: take snapshots of your own runs only.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "runtime/files/input_file.h"
+#include "runtime/files/output_file.h"
+#include "runtime/points/saved_state.h"
+
+namespace rapid {
+
+// Compresses on all threads. header: an object. The caller finishes the file.
+void write_state(OutputFile& file, nlohmann::ordered_json header, const SavedState& state);
+
+class StateFile {
+public:
+    // Reads and checks the whole file. Error: it can't be read; it is no such file, torn or damaged.
+    explicit StateFile(const std::filesystem::path& path);
+
+    const nlohmann::ordered_json& header() const { return header_; }
+    std::uint64_t bytes() const { return file_.bytes().size(); }
+    // Decompresses, on all threads. Error: it is damaged.
+    SavedState state() const;
+
+    // Whether the file begins as one, and so is to be read as one.
+    static bool is_one(const std::filesystem::path& path);
+
+private:
+    InputFile file_;
+    nlohmann::ordered_json header_;
+    std::size_t blocks_at_ = 0;
+};
+
+}  // namespace rapid

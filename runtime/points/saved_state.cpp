@@ -1,0 +1,105 @@
+#include "runtime/points/saved_state.h"
+
+#include <cstring>
+
+#include "runtime/error.h"
+#include "runtime/points/state_archive.h"
+
+namespace rapid {
+
+std::size_t SavedState::size() const
+{
+    std::size_t sum = bytes.size();
+    for (const KeptColumn& any : columns) sum += std::visit([](const auto& column) { return column.bytes(); }, any);
+    return sum;
+}
+
+bool SavedState::operator==(const SavedState& other) const
+{
+    if (bytes != other.bytes || columns.size() != other.columns.size()) return false;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+        const bool same = std::visit(
+            []<class A, class B>(const A& a, const B& b) {
+                if constexpr (std::is_same_v<A, B>)
+                    return a.size() == b.size() && std::memcmp(a.read().data, b.read().data, a.bytes()) == 0;
+                else
+                    return false;
+            },
+            columns[k], other.columns[k]);
+        if (!same) return false;
+    }
+    return true;
+}
+
+void StateReader::fail() { throw Error("the snapshot is of another graph, or damaged"); }
+
+void StateReader::read(void* data, std::size_t bytes)
+{
+    if (bytes > state_.bytes.size() - done_) fail();
+    if (bytes == 0) return;
+    std::memcpy(data, state_.bytes.data() + done_, bytes);
+    done_ += bytes;
+}
+
+void StateReader::require(std::uint64_t elements) const
+{
+    if (elements > state_.bytes.size() - done_) fail();
+}
+
+void StateReader::finish() const
+{
+    if (done_ != state_.bytes.size()) fail();
+}
+
+void save(StateWriter& to, const PointSet& points)
+{
+    to(points.size(), points.columns(), points.groups(), points.details);
+}
+
+void load(StateReader& from, PointSet& points)
+{
+    std::size_t size = 0;
+    PointSet::Columns columns;
+    PointSet::Groups groups;
+    PointSet loaded;
+    from(size, columns, groups, loaded.details);
+    loaded.append(size);
+    for (auto& [name, any] : columns) {
+        if (std::visit([](const auto& column) { return column.size(); }, any) != size) StateReader::fail();
+        loaded.set(name, std::move(any));
+    }
+    for (auto& [name, members] : groups) {
+        if (members.size() != size) StateReader::fail();
+        loaded.group(name) = std::move(members);
+    }
+    points = std::move(loaded);
+}
+
+void save(StateWriter& to, const SavedState& state)
+{
+    to(state.bytes, state.columns.size());
+    for (const KeptColumn& any : state.columns)
+        std::visit(
+            [&]<class T>(const Column<T>& column) { to(static_cast<std::uint8_t>(any.index()), to.place_of(column)); },
+            any);
+}
+
+void load(StateReader& from, SavedState& state)
+{
+    std::size_t count = 0;
+    from(state.bytes, count);
+    from.require(count);
+    state.columns.assign(count, Column<float>());
+    for (KeptColumn& any : state.columns) {
+        std::uint8_t type = 0;
+        std::uint32_t place = 0;
+        from(type, place);
+        const auto take = [&]<class T>(const Column<T>&) { any = from.column_at<T>(place); };
+        const KeptColumn of_type[] = {Column<float>(),        Column<Vec3f>(), Column<std::int32_t>(),
+                                      Column<std::int64_t>(), Column<Quatf>(), Column<std::uint8_t>()};
+        if (type >= std::size(of_type)) StateReader::fail();
+        std::visit(take, of_type[type]);
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,26 @@
+// What a node, a constraint or a simulation keeps from frame to frame, written down (state_archive.h writes it).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+#include "runtime/points/column.h"
+
+namespace rapid {
+
+using KeptColumn = std::variant<Column<float>, Column<Vec3f>, Column<std::int32_t>, Column<std::int64_t>, Column<Quatf>,
+                                Column<std::uint8_t>>;
+
+struct SavedState {
+    std::vector<char> bytes;
+    // Shared with those whose state it is, until they write them; each has values of its own for its points.
+    std::vector<KeptColumn> columns;
+
+    std::size_t size() const;  // bytes, with those of the columns
+    // To the bit.
+    bool operator==(const SavedState& other) const;
+};
+
+}  // namespace rapid

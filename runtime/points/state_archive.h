@@ -1,0 +1,215 @@
+// Archives of cereal for a SavedState. What has a state says so in one member function, which both of them call:
+//
+//   template <class Archive>
+//   void serialize(Archive& keep)
+//   {
+//       keep(clock_, ids_, impulses_);
+//   }
+//
+// Numbers go in as the machine has them. Columns are shared, not copied.
+#pragma once
+
+#include <cereal/cereal.hpp>
+#include <cereal/types/array.hpp>
+#include <cereal/types/map.hpp>
+#include <cereal/types/optional.hpp>
+#include <cereal/types/set.hpp>
+#include <cereal/types/string.hpp>
+#include <cereal/types/utility.hpp>
+#include <cereal/types/variant.hpp>
+#include <cereal/types/vector.hpp>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include "runtime/points/point_set.h"
+#include "runtime/points/saved_state.h"
+
+namespace rapid {
+
+class StateWriter : public cereal::OutputArchive<StateWriter, cereal::AllowEmptyClassElision> {
+public:
+    StateWriter() : OutputArchive(this) {}
+
+    SavedState take() { return std::move(state_); }
+
+    void write(const void* data, std::size_t bytes)
+    {
+        const char* first = static_cast<const char*>(data);
+        state_.bytes.insert(state_.bytes.end(), first, first + bytes);
+    }
+    // The place of the column's values among those of the state; the same for columns that share them.
+    template <class T>
+    std::uint32_t place_of(const Column<T>& column)
+    {
+        for (std::size_t k = 0; k < state_.columns.size(); ++k) {
+            const auto* known = std::get_if<Column<T>>(&state_.columns[k]);
+            if (known && known->shares_values_with(column) && known->size() == column.size())
+                return static_cast<std::uint32_t>(k);
+        }
+        state_.columns.push_back(column);
+        return static_cast<std::uint32_t>(state_.columns.size() - 1);
+    }
+
+private:
+    SavedState state_;
+};
+
+class StateReader : public cereal::InputArchive<StateReader, cereal::AllowEmptyClassElision> {
+public:
+    // The state outlives it.
+    explicit StateReader(const SavedState& state) : InputArchive(this), state_(state) {}
+
+    // Error: there is less.
+    void read(void* data, std::size_t bytes);
+    // Error: there is no room for so many elements, of at least a byte each, in what is left.
+    void require(std::uint64_t elements) const;
+    // Error: the state holds something else, or more than was read.
+    void finish() const;
+
+    template <class T>
+    const Column<T>& column_at(std::uint32_t place) const
+    {
+        const auto* column = place < state_.columns.size() ? std::get_if<Column<T>>(&state_.columns[place]) : nullptr;
+        if (!column) fail();
+        return *column;
+    }
+    [[noreturn]] static void fail();
+
+private:
+    const SavedState& state_;
+    std::size_t done_ = 0;  // bytes
+};
+
+template <class Archive>
+concept StateArchive = std::is_same_v<Archive, StateWriter> || std::is_same_v<Archive, StateReader>;
+
+template <class T>
+constexpr bool is_number_or_vector = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
+template <class S, int rows, int columns, int options>
+constexpr bool is_number_or_vector<Eigen::Matrix<S, rows, columns, options, rows, columns>> = true;
+template <>
+inline constexpr bool is_number_or_vector<Quatf> = true;
+
+// Values whose bytes hold nothing else: a list of them is written at once.
+template <class T>
+constexpr bool is_plain = is_number_or_vector<T>;
+template <class T, std::size_t n>
+constexpr bool is_plain<std::array<T, n>> = is_plain<T>;
+
+template <class T>
+requires is_number_or_vector<T>
+void save(StateWriter& to, const T& value) { to.write(&value, sizeof value); }
+template <class T>
+requires is_number_or_vector<T>
+void load(StateReader& from, T& value) { from.read(static_cast<void*>(&value), sizeof value); }
+
+// A byte that is neither 0 nor 1 would be no bool.
+inline void save(StateWriter& to, const bool& value) { save(to, static_cast<std::uint8_t>(value)); }
+inline void load(StateReader& from, bool& value)
+{
+    std::uint8_t byte = 0;
+    load(from, byte);
+    value = byte != 0;
+}
+
+template <class T>
+requires(is_plain<T> && !std::is_arithmetic_v<T>) void save(StateWriter& to, const std::vector<T>& values)
+{
+    to(cereal::make_size_tag(static_cast<cereal::size_type>(values.size())));
+    to.write(values.data(), values.size() * sizeof(T));
+}
+template <class T>
+requires(is_plain<T> && !std::is_arithmetic_v<T>) void load(StateReader& from, std::vector<T>& values)
+{
+    cereal::size_type size = 0;
+    from(cereal::make_size_tag(size));
+    values.resize(static_cast<std::size_t>(size));
+    from.read(static_cast<void*>(values.data()), values.size() * sizeof(T));
+}
+
+template <class T>
+void save(StateWriter& to, const Column<T>& column)
+{
+    const bool is_uniform = column.is_uniform();
+    to(column.size(), column.fallback(), is_uniform);
+    if (is_uniform)
+        to(*column.read().data);
+    else
+        to(to.place_of(column));
+}
+template <class T>
+void load(StateReader& from, Column<T>& column)
+{
+    std::size_t size = 0;
+    T fallback = Column<T>::zero();
+    bool is_uniform = false;
+    from(size, fallback, is_uniform);
+    if (is_uniform) {
+        T value = Column<T>::zero();
+        from(value);
+        column = Column<T>(size, value, fallback);
+        return;
+    }
+    std::uint32_t place = 0;
+    from(place);
+    column = from.column_at<T>(place);
+    column.set_fallback(fallback);
+    if (column.size() != size) StateReader::fail();
+}
+
+void save(StateWriter& to, const PointSet& points);
+void load(StateReader& from, PointSet& points);
+
+// A state within another.
+void save(StateWriter& to, const SavedState& state);
+void load(StateReader& from, SavedState& state);
+
+// What cereal wraps values in.
+template <StateArchive Archive, class T>
+void serialize(Archive& keep, cereal::NameValuePair<T>& pair)
+{
+    keep(pair.value);
+}
+template <class T>
+void save(StateWriter& to, const cereal::SizeTag<T>& tag)
+{
+    to(static_cast<cereal::size_type>(tag.size));
+}
+template <class T>
+void load(StateReader& from, cereal::SizeTag<T>& tag)
+{
+    from(tag.size);
+    from.require(tag.size);
+}
+template <class T>
+void save(StateWriter& to, const cereal::BinaryData<T>& data)
+{
+    to.write(data.data, static_cast<std::size_t>(data.size));
+}
+template <class T>
+void load(StateReader& from, cereal::BinaryData<T>& data)
+{
+    from.read(data.data, static_cast<std::size_t>(data.size));
+}
+
+// The state of what has serialize().
+template <class T>
+SavedState state_of(const T& kept)
+{
+    StateWriter writer;
+    writer(kept);
+    return writer.take();
+}
+// Error: it is the state of something else.
+template <class T>
+void restore(T& kept, const SavedState& state)
+{
+    StateReader reader(state);
+    reader(kept);
+    reader.finish();
+}
+
+}  // namespace rapid
+
+CEREAL_SETUP_ARCHIVE_TRAITS(rapid::StateReader, rapid::StateWriter)

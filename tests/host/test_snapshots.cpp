@@ -1,0 +1,247 @@
+// A run that goes on behind a snapshot, in a session or a process of its own, is the run that was not interrupted: the
+// same bits in frames, statistics, estimated errors and what is kept. For nodes of all types.
+#include <cstdlib>
+#include <set>
+
+#include "bindings/host/session.h"
+#include "runtime/graph/evaluate.h"
+#include "runtime/graph/stateful.h"
+#include "runtime/io/state_file.h"
+#include "runtime/report/statistics.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/host/scenes_with_state.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A node that counts frames, and says so or not.
+template <bool says_so>
+struct Counting {
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Counting>(says_so ? "counting_openly" : "counting_secretly", "Counts its frames, for this test.")
+            .varies()
+            .writes("v");
+    }
+    static std::unique_ptr<Operator> make()
+    {
+        if constexpr (says_so) return stateful<Counting>();
+        return std::make_unique<detail::OperatorOf<Counting>>();
+    }
+    void edit(PointSet& points, const Evaluation&)
+    {
+        ++frames_;
+        for (Vec3f& v : points.v().write()) v.x() += static_cast<float>(frames_);
+    }
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(frames_);
+    }
+
+private:
+    int frames_ = 0;
+};
+using CountingOpenly = Counting<true>;
+using CountingSecretly = Counting<false>;
+RAPID_NODE(CountingOpenly);
+RAPID_NODE(CountingSecretly);
+
+// A scene that is read anew.
+class Run {
+public:
+    explicit Run(const fs::path& file)
+        : session_(file, {}), plan_(session_.graph(), PlanOptions{}), evaluator_(plan_, [](auto&&...) {})
+    {
+    }
+
+    Evaluator& evaluator() { return evaluator_; }
+    const Plan& plan() const { return plan_; }
+
+private:
+    Session session_;
+    Plan plan_;
+    Evaluator evaluator_;
+};
+
+// What a frame is, without times: statistics as text, every estimated error, and the points.
+struct Seen {
+    std::string statistics;
+    std::vector<double> errors, frame_errors, energy_drift;
+    std::map<std::string, SavedState> outputs;
+
+    explicit Seen(const FrameResult& result)
+        : errors(result.figures.errors),
+          frame_errors(result.figures.frame_errors),
+          energy_drift(result.figures.energy_drift)
+    {
+        FrameStatistics figures = statistics_of(result);
+        figures.seconds = {};
+        for (BandFigures& band : figures.bands) band.seconds = 0;
+        if (figures.contact_search) figures.contact_search->seconds = 0;
+        statistics = json_line(figures, true);
+        for (const auto& [name, points] : result.outputs) outputs[name] = state_of(points);
+    }
+    // The first that differs; empty where nothing does.
+    std::string difference(const Seen& other) const
+    {
+        for (const auto& [name, points] : outputs)
+            if (!(points == other.outputs.at(name))) return "the points of " + name;
+        if (statistics != other.statistics) return statistics + "\n" + other.statistics;
+        if (errors != other.errors || frame_errors != other.frame_errors) return "errors";
+        return energy_drift != other.energy_drift ? "energy drift" : "";
+    }
+};
+
+std::string difference(const Snapshot& a, const Snapshot& b)
+{
+    for (const auto& [parts, others] : {std::pair(&a.simulations, &b.simulations), std::pair(&a.nodes, &b.nodes)}) {
+        if (parts->size() != others->size()) return "the nodes that keep something";
+        for (const auto& [name, state] : *parts)
+            if (!others->count(name) || !(others->at(name) == state)) return "what " + name + " keeps";
+    }
+    return "";
+}
+
+// Runs a scene, and again from snapshots at some of its frames. What differs, with the frame; empty where nothing does.
+std::string difference_after_snapshots(const fs::path& file, std::int64_t frames,
+                                       std::set<std::string>* types = nullptr)
+{
+    std::map<std::int64_t, Snapshot> snapshots;
+    std::map<std::int64_t, Seen> seen;
+    Run whole(file);
+    for (const PlannedNode& planned : whole.plan().nodes)
+        if (types) types->insert(planned.node->type->name);
+    const std::int64_t first = whole.plan().first_frame();
+    const std::set<std::int64_t> cuts = {0, 1, 4, frames / 2};
+    for (std::int64_t k = 0; k < frames; ++k) {
+        seen.emplace(k, whole.evaluator().advance());
+        if (cuts.count(k)) snapshots.emplace(k, whole.evaluator().save());
+    }
+    const Snapshot end = whole.evaluator().save();
+    for (const auto& [cut, snapshot] : snapshots) {
+        Run rest(file);
+        rest.evaluator().load(snapshot);
+        const std::string after = "from frame " + std::to_string(first + cut) + ": ";
+        if (const std::string what = difference(rest.evaluator().save(), snapshot); !what.empty())
+            return after + what + " as it is read back";
+        for (std::int64_t k = cut + 1; k < frames; ++k)
+            if (const std::string what = Seen(rest.evaluator().advance()).difference(seen.at(k)); !what.empty())
+                return after + "frame " + std::to_string(first + k) + ": " + what;
+        if (const std::string what = difference(rest.evaluator().save(), end); !what.empty())
+            return after + what + " at the end";
+    }
+    return "";
+}
+
+}  // namespace
+
+TEST_CASE("a run behind a snapshot is the run that was not interrupted, for nodes of every type", "[snapshot]")
+{
+    std::set<std::string> types;
+    for (const auto& [name, text] : test::scenes_with_state) {
+        CAPTURE(name);
+        const test::TemporaryFolder folder;
+        CHECK(difference_after_snapshots(folder.write("scene.lua", "local rapid = require \"rapid\"\n" + text), 14,
+                                         &types) == "");
+    }
+    for (const auto& entry : fs::directory_iterator(fs::path(RAPID_SOURCE_DIR) / "graphs/nodes")) {
+        if (entry.path().extension() != ".lua") continue;
+        CAPTURE(entry.path().string());
+        CHECK(difference_after_snapshots(entry.path(), 6, &types) == "");
+    }
+    const Registry registry = Session::all_node_types();
+    for (const NodeType* type : registry.types()) {
+        const bool is_of_nodes = !type->defined_in.empty() && !type->find("kernel");
+        if (is_of_nodes || type->name.rfind("counting_", 0) == 0) continue;
+        CAPTURE(type->name);
+        CHECK(types.count(type->name) == 1);  // else: add a scene of it to scenes_with_state.h
+    }
+}
+
+// What follows from the state in a file after some frames goes into another. In a process of its own: see below.
+TEST_CASE("goes on behind the snapshot that RAPID_TEST_SNAPSHOT names", "[.]")
+{
+    const fs::path folder = std::getenv("RAPID_TEST_SNAPSHOT");
+    Snapshot snapshot;
+    restore(snapshot, StateFile(folder / "before").state());
+    Run run(folder / "scene.lua");
+    run.evaluator().load(snapshot);
+    for (int k = 0; k < 6; ++k) run.evaluator().advance();
+    OutputFile file(folder / "after");
+    write_state(file, {{"frame", run.evaluator().next_frame() - 1}}, state_of(run.evaluator().save()));
+    file.finish();
+}
+
+TEST_CASE("a run behind a snapshot in another process is the run that was not interrupted", "[snapshot]")
+{
+    for (const auto& [name, text] : test::scenes_with_state) {
+        CAPTURE(name);
+        const test::TemporaryFolder folder;
+        Run whole(folder.write("scene.lua", "local rapid = require \"rapid\"\n" + text));
+        for (int k = 0; k < 5; ++k) whole.evaluator().advance();
+        OutputFile file(folder / "before");
+        write_state(file, {{"frame", 5}}, state_of(whole.evaluator().save()));
+        file.finish();
+        for (int k = 0; k < 6; ++k) whole.evaluator().advance();
+
+        const std::string program = fs::read_symlink("/proc/self/exe").string();
+        const std::string command = "RAPID_TEST_SNAPSHOT='" + folder.path().string() + "' '" + program +
+                                    "' 'goes on behind the snapshot that RAPID_TEST_SNAPSHOT names' >/dev/null";
+        REQUIRE(std::system(command.c_str()) == 0);
+        Snapshot after;
+        restore(after, StateFile(folder / "after").state());
+        CHECK(difference(after, whole.evaluator().save()) == "");
+    }
+}
+
+TEST_CASE("a node that keeps something and does not say it is found", "[snapshot]")
+{
+    const auto scene = [](const std::string& node) {
+        return "local rapid = require \"rapid\"\n"
+               "return rapid.create { points = rapid.points.from { P = { {0, 0, 0} } } } :" +
+               node + " {} :solve {}";
+    };
+    const test::TemporaryFolder folder;
+    CHECK(difference_after_snapshots(folder.write("openly.lua", scene("counting_openly")), 8) == "");
+    CHECK(difference_after_snapshots(folder.write("secretly.lua", scene("counting_secretly")), 8) ==
+          "from frame 2: frame 3: the points of main");
+}
+
+TEST_CASE("a snapshot of another graph is refused", "[snapshot]")
+{
+    const test::TemporaryFolder folder;
+    const auto scene = [&](const std::string& name, const std::string& chain) {
+        return folder.write(name, "local rapid = require \"rapid\"\nreturn rapid.create {}" + chain + ":solve {}");
+    };
+    Run one(scene("one.lua", ":emit { source = rapid.mesh.sphere {}, rate = 100 }"));
+    one.evaluator().advance();
+    Run other(scene("other.lua", ":emit { source = rapid.mesh.sphere {}, rate = 100 } :contact {}"));
+    CHECK_THROWS_AS(other.evaluator().load(one.evaluator().save()), Error);
+}
+
+TEST_CASE("a snapshot shares the columns that no frame has changed since", "[snapshot]")
+{
+    const test::TemporaryFolder folder;
+    Run run(folder.write("scene.lua", R"(local rapid = require "rapid"
+        return rapid.create {} :emit { source = rapid.mesh.sphere {}, impulse = { [1] = 1000 },
+                                       attributes = { heat = {0, 1} } } :gravity {} :solve {})"));
+    run.evaluator().advance();
+    run.evaluator().advance();
+    const auto heat_of = [](const FrameResult& frame) { return frame.outputs.at("main").column<float>("heat"); };
+    const Column<float> heat = heat_of(run.evaluator().advance());
+    const Snapshot snapshot = run.evaluator().save();
+    const auto& columns = snapshot.simulations.at("create1").columns;
+    CHECK(std::any_of(columns.begin(), columns.end(), [&](const KeptColumn& any) {
+        const auto* column = std::get_if<Column<float>>(&any);
+        return column && column->shares_values_with(heat);
+    }));
+    CHECK(heat_of(run.evaluator().advance()).shares_values_with(heat));
+}
+
+}  // namespace rapid

@@ -1,0 +1,93 @@
+// Files of a state: what was written is read, and what is damaged is refused before it is used.
+#include "runtime/io/state_file.h"
+
+#include "runtime/points/state_archive.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/io/random_points.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+PointSet some_points()
+{
+    test::Points points({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}});
+    points.set<float>("heat", {1, 2, 3}).set<std::int32_t>("bin", {-1, 0, 7}).group("hot", {0, 2});
+    points.PointSet::set("orient", Column<Quatf>(std::vector<Quatf>(3, Quatf(0.5f, 0.5f, 0.5f, 0.5f))));
+    points.add({"pscale", 0.25f});
+    return points;
+}
+
+fs::path written(const test::TemporaryFolder& folder, const SavedState& state)
+{
+    OutputFile file(folder / "state");
+    write_state(file, {{"rapid", "0.1.0"}, {"frame", 12}}, state);
+    file.finish();
+    return folder / "state";
+}
+
+}  // namespace
+
+TEST_CASE("a state that is read from its file is the one that was written", "[state]")
+{
+    const test::TemporaryFolder folder;
+    for (const SavedState& state : {state_of(some_points()), SavedState(), state_of(PointSet())}) {
+        const StateFile file(written(folder, state));
+        CHECK(file.state() == state);
+        CHECK(file.header().at("frame") == 12);
+        CHECK(StateFile::is_one(folder / "state"));
+        PointSet points;
+        if (!state.bytes.empty()) restore(points, file.state());
+    }
+}
+
+TEST_CASE("the header of a state's file can be read as text", "[state]")
+{
+    const test::TemporaryFolder folder;
+    const std::string text = test::file_text(written(folder, state_of(some_points())));
+    CHECK(text.substr(0, 8) == "\x89RAPID\r\n");
+    CHECK(text.find("\"frame\": 12") != std::string::npos);
+    CHECK(text.find("\"type\": \"vec3\"") != std::string::npos);
+}
+
+TEST_CASE("equal values are stored in less than they take", "[state]")
+{
+    const test::TemporaryFolder folder;
+    PointSet points;
+    points.append(100000);
+    for (std::int64_t& id : points.id().write()) id = 5;
+    CHECK(fs::file_size(written(folder, state_of(points))) < points.id().bytes() / 16);
+}
+
+TEST_CASE("a file with any bit flipped, or torn anywhere, is refused", "[state]")
+{
+    const test::TemporaryFolder folder;
+    const std::string text = test::file_text(written(folder, state_of(some_points())));
+    const auto refused = [&](const std::string& other) {
+        const fs::path path = folder.write("damaged", other);
+        return !test::error_of([&] { StateFile(path).state(); }).empty();
+    };
+    std::size_t accepted = 0;
+    for (std::size_t at = 0; at < text.size(); ++at)
+        for (int bit = 0; bit < 8; bit += 3) {
+            std::string other = text;
+            other[at] = static_cast<char>(other[at] ^ (1 << bit));
+            accepted += !refused(other);
+        }
+    CHECK(accepted == 0);
+    for (std::size_t size = 0; size < text.size(); ++size) accepted += !refused(text.substr(0, size));
+    CHECK(accepted == 0);
+    CHECK(refused(text + "more"));
+    CHECK(!refused(text));
+}
+
+TEST_CASE("what is no file of a state is said to be none", "[state]")
+{
+    const test::TemporaryFolder folder;
+    const fs::path path = folder.write("points.csv", "P.x,P.y,P.z\n1,2,3\n");
+    CHECK(!StateFile::is_one(path));
+    CHECK(test::error_of([&] { StateFile file(path); }) == "it does not begin as one; it is no whole snapshot");
+}
+
+}  // namespace rapid

@@ -34,6 +34,8 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
         std::error_code none;
         if (!fs::exists(argument, none)) throw Error("no such file or folder").at({argument, 0});
         if (!fs::is_directory(argument)) {
+            // Each process of a file reads it again, and a pipe would be waited for.
+            if (!fs::is_regular_file(argument)) throw Error("it is not a regular file").at({argument, 0});
             files.emplace_back(argument);
             continue;
         }

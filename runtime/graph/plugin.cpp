@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <string>
 
+#include "runtime/files/input_file.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {
@@ -17,12 +16,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::string text_of(const std::string& file)
+{
+    try {
+        return std::string(InputFile(file).text());
+    } catch (const Error& error) {
+        throw Error(fmt::format("{}: the plugin {}", file, error.message()));
+    }
+}
+
 // The mark of RAPID_PLUGIN in a file; empty where there is none.
 std::string mark_of(const std::string& file)
 {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw Error(fmt::format("{}: the plugin can't be read: {}", file, std::strerror(errno)));
-    const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    const std::string bytes = text_of(file);
     const std::size_t at = bytes.find(RAPID_PLUGIN_MARK);
     if (at == std::string::npos) return "";
     const std::size_t begin = at + std::strlen(RAPID_PLUGIN_MARK);

@@ -43,6 +43,24 @@ describe("a pipe or a device", function()
     end
   end)
 
+  it("is no plugin and no test", function()
+    local folder = folder_with(nothing)
+    command.shell("mkdir plugins tests; mkfifo pipe.so plugins/pipe.so test_pipe.lua tests/test_pipe.lua; " ..
+      "ln -s /dev/zero zero.so; ln -s /dev/zero test_zero.lua", { cwd = folder.path })
+    for words, message in pairs {
+      ['"$RAPID" nodes --plugin pipe.so'] = "pipe.so: the plugin can't be read: it is not a regular file",
+      ['"$RAPID" nodes --plugin zero.so'] = "zero.so: the plugin can't be read: it is not a regular file",
+      ['RAPID_PLUGIN_PATH=plugins "$RAPID" nodes'] = "plugins/pipe.so: the plugin can't be read: it is not a regular",
+      ['"$RAPID" test test_pipe.lua'] = "test_pipe.lua: it is not a regular file",
+      ['"$RAPID" test test_zero.lua'] = "test_zero.lua: it is not a regular file",
+      ['"$RAPID" test tests'] = "tests: no tests in this folder",
+    } do
+      local result = command.shell("timeout -k 1 60 env " .. words, { cwd = folder.path })
+      assert.equal(2, result.status, words .. ": " .. result.stderr)
+      assert.equal(1, result.stderr:find(message, 1, true), result.stderr)
+    end
+  end)
+
   it("is neither written nor waited for in the place of a frame or of an unfinished one", function()
     local result = run(nothing, "-o out/a.####.csv")
     assert.equal(1, result.status)

@@ -42,18 +42,27 @@ void RunReport::line(const std::string& text)
     progress_->line(text);
 }
 
-void RunReport::warning(const std::string& text, std::optional<std::int64_t> frame)
+void RunReport::warning(const std::string& text)
 {
     const std::lock_guard lock(mutex_);
     if (!warned_.insert(text).second) return;
     if (progress_) progress_->finish();
-    print_warning(frame ? fmt::format("frame {}: {}", *frame, text) : text);
+    print_warning(text);
+}
+
+void RunReport::warning(const std::string& text, std::int64_t frame)
+{
+    const std::lock_guard lock(mutex_);
+    if (warned_.contains(text) || !frame_warnings_.add(text, frame)) return;
+    if (progress_) progress_->finish();
+    print_warning(fmt::format("frame {}: {}", frame, text));
 }
 
 void RunReport::finish()
 {
     const std::lock_guard lock(mutex_);
     if (progress_) progress_->finish();
+    tell_untold();
     write_statistics();
     if (options_.quiet) return;
     print(summary(run_, totals_));
@@ -63,6 +72,7 @@ int RunReport::fail(const Error& error)
 {
     const std::lock_guard lock(mutex_);
     if (progress_) progress_->finish();
+    tell_untold();
     print_error(error, options_.verbose);
     try {
         write_statistics();
@@ -77,6 +87,7 @@ void RunReport::abandon(int status, const std::string& why)
     // The run's own thread holds the lock only briefly, unless its terminal is stopped; then do without it.
     if (mutex_.try_lock_for(std::chrono::seconds(1))) {
         if (progress_) progress_->finish();
+        tell_untold();
         print_error(Error(why), false);
         try {
             write_statistics();
@@ -104,6 +115,11 @@ void RunReport::write_statistics()
     run_.peak_bytes = peak_memory();
     add_writing();
     if (statistics_) statistics_->finish(run_);
+}
+
+void RunReport::tell_untold()
+{
+    for (const std::string& line : frame_warnings_.untold()) print_warning(line);
 }
 
 }  // namespace rapid

@@ -9,6 +9,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/statistics_file.h"
+#include "runtime/report/frame_warnings.h"
 #include "runtime/report/progress.h"
 #include "runtime/report/totals.h"
 #include "runtime/stopwatch.h"
@@ -30,8 +31,11 @@ public:
     void begin(std::int64_t first, std::int64_t last);
     void frame(const FrameResult& result);
     void line(const std::string& text);
-    // Each text once, with its frame if it has one: warnings tend to repeat in the next frames.
-    void warning(const std::string& text, std::optional<std::int64_t> frame = {});
+    // Each text once.
+    void warning(const std::string& text);
+    // Of a frame. Warnings tend to repeat in the next ones: of those that differ in numbers alone the first are told as
+    // they come, and the rest is counted for the end.
+    void warning(const std::string& text, std::int64_t frame);
 
     // The statistics file and the summary. Error: the file can't be written.
     void finish();
@@ -44,6 +48,7 @@ public:
 private:
     void add_writing();
     void write_statistics();
+    void tell_untold();
     double now() const;
 
     const Options options_;
@@ -55,7 +60,8 @@ private:
     RunTotals totals_;
     std::optional<StatisticsFile> statistics_;
     std::optional<Progress> progress_;
-    std::set<std::string> warned_;
+    std::set<std::string> warned_;  // of no frame: as many as the scene makes
+    FrameWarnings frame_warnings_;
 };
 
 }  // namespace rapid

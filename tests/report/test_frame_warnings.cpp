@@ -1,0 +1,51 @@
+// Warnings of frames: what is told as it comes, and what is counted.
+#include <fmt/format.h>
+
+#include "runtime/report/frame_warnings.h"
+#include "tests/test.h"
+
+using namespace rapid;
+
+TEST_CASE("the kind of a warning has its place and its names, and none of its numbers", "[report]")
+{
+    CHECK(kind_of_warning("a.lua:12: node \"drag2\": moved 1.5e-06 m in 3 steps") ==
+          "a.lua:12: node \"drag2\": moved # m in # steps");
+    CHECK(kind_of_warning("from -1e+20 to 7.") == "from # to #.");
+    CHECK(kind_of_warning("mesh \"a.12.obj\": 5e of 6") == "mesh \"a.12.obj\": #e of #");
+    CHECK(kind_of_warning("a voxel of 5 m: it is 1 m long") == "a voxel of # m: it is # m long");
+    CHECK(kind_of_warning("size 3: so") == "size #: so");
+    CHECK(kind_of_warning("") == "");
+    CHECK(kind_of_warning("12") == "#");
+}
+
+TEST_CASE("of warnings that differ in numbers ten are told, and the last of the rest with its frame", "[report]")
+{
+    FrameWarnings warnings;
+    int told = 0;
+    for (int frame = 1; frame <= 1000; ++frame) {
+        told += warnings.add(fmt::format("node \"a\": off by {} m", frame), frame);
+        told += warnings.add("node \"b\": the same", frame);
+        if (frame == 5) told += warnings.add("node \"c\": 1", frame);
+    }
+    CHECK(told == 12);
+    CHECK(warnings.untold() ==
+          std::vector<std::string>{"990 more of this kind, the last in frame 1000: node \"a\": off by 1000 m"});
+}
+
+TEST_CASE("what was told is not told again, after others of its kind either", "[report]")
+{
+    FrameWarnings warnings;
+    CHECK(warnings.add("off by 1 m", 1));
+    CHECK(warnings.add("off by 2 m", 2));
+    CHECK_FALSE(warnings.add("off by 1 m", 3));
+    CHECK(warnings.untold().empty());
+}
+
+TEST_CASE("kinds of warnings without end are counted", "[report]")
+{
+    FrameWarnings warnings;
+    std::size_t told = 0;
+    for (int i = 0; i < 5000; ++i) told += warnings.add(fmt::format("mesh \"{}\" is open", i), i);
+    CHECK(told == FrameWarnings::most_kinds);
+    CHECK(warnings.untold() == std::vector<std::string>{"4000 more of other kinds"});
+}

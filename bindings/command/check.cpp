@@ -1,10 +1,11 @@
 // rapid check: finds all errors that can be found before the first frame, and stiff nodes, without running a frame;
-// with --races, runs two frames to find kernels that keep state from point to point.
+// with --races, runs frames to find kernels that keep state from point to point.
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
+#include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/races.h"
 #include "bindings/command/untrusted.h"
@@ -24,7 +25,10 @@ public:
         graph_.declare(app);
         files_.declare(app);
         app.add_flag("--races", races_,
-                     "runs two frames in other orders of the points and in two states, and compares the bits");
+                     "runs frames in other orders of the points and in two states, and compares the bits");
+        app.add_option("-f,--frames", frames_text_,
+                       "with --races: the frames that are compared, 24-26 [default: the two after the first]")
+            ->type_name("FIRST-LAST");
         untrusted_.declare(app, "graph");
     }
 
@@ -37,6 +41,8 @@ public:
     {
         if (races_ && common.threads > 1)
             throw Error("--races goes over the points in orders of its own, on one thread; leave --threads out");
+        if (!races_ && !frames_text_.empty())
+            throw Error("-f chooses the frames of --races; without it no frame is run: give both, or leave it out");
         Threads threads(races_ ? 1 : common.threads);
         return threads.run([&] {
             const auto on_timeout = [&](const std::string& message) {
@@ -50,6 +56,11 @@ public:
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) print_warning(warning);
             files_.resolve(plan, true);
+            frames_ = {plan.first_frame() + 1, plan.first_frame() + 2};
+            if (!frames_text_.empty()) frames_ = read_frames(frames_text_);
+            if (races_ && frames_.last < plan.first_frame())
+                throw Error(
+                    fmt::format("-f {} ends before the scene begins, at frame {}", frames_text_, plan.first_frame()));
             if (races_ && !is_free_of_races(plan, options, on_timeout, common.verbose)) return status_failed;
             print(text_of(*session, plan));
             if (!races_) print(advice_on(plan));
@@ -62,9 +73,15 @@ private:
                           const std::function<void(const std::string& message)>& on_timeout, bool verbose) const
     {
         try {
-            const std::optional<Error> race = find_race(graph_, plan, options, on_timeout);
-            if (race) print_error(*race, verbose);
-            return !race;
+            const Races races = find_races(graph_, plan, options, frames_, on_timeout);
+            if (races.found)
+                print_error(*races.found, verbose);
+            else if (!races.compared)
+                print_warning(
+                    fmt::format("there is no point in frames {} to {}, and nothing to compare; choose later "
+                                "frames, as -f {}-{}",
+                                frames_.first, frames_.last, frames_.last + 22, frames_.last + 24));
+            return !races.found;
         } catch (const Error& error) {  // while a frame ran
             print_error(error, verbose);
             return false;
@@ -98,7 +115,7 @@ private:
                             fmt::join(outputs, ", "));
         if (races_)
             text += fmt::format("frames {} to {}: the same bits in every order of the points, and in two states\n",
-                                plan.first_frame() + 1, plan.first_frame() + frames_compared);
+                                frames_.first, frames_.last);
         return text;
     }
 
@@ -106,6 +123,8 @@ private:
     FrameFiles files_;
     UntrustedOptions untrusted_;
     bool races_ = false;
+    std::string frames_text_;
+    FrameSelection frames_{1, 1};
 };
 RAPID_COMMAND(Check);
 

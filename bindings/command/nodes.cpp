@@ -7,7 +7,7 @@
 #include "bindings/command/annotations.h"
 #include "bindings/command/command.h"
 #include "bindings/command/param_facts.h"
-#include "bindings/host/session.h"
+#include "bindings/host/own_nodes.h"
 
 namespace rapid {
 namespace {
@@ -108,7 +108,9 @@ public:
 
     int run(const CommonOptions&) override
     {
-        const Registry registry = Session::all_node_types();
+        const NodeTypes types = with_own_nodes();
+        for (const std::string& fault : types.faults) print_warning(fault);
+        const Registry& registry = types.registry;
         if (annotations_) {
             if (!name_.empty()) throw Error("rapid nodes: --annotations is of all nodes; leave out " + name_);
             print(annotations_of(registry));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
@@ -108,24 +109,25 @@ std::optional<Difference> compare(const PointSet& a, const PointSet& b)
     return compare_details(a, b);
 }
 
-void advance_all(Evaluator& evaluator)
+void advance_all(Evaluator& evaluator, const Plan& plan, const FrameSelection& frames)
 {
-    for (std::int64_t frame = 0; frame <= frames_compared; ++frame) evaluator.advance();
+    for (std::int64_t frame = plan.first_frame(); frame <= frames.last; ++frame) evaluator.advance();
 }
 
-std::vector<Result> results_in_order(const Plan& plan)
+std::vector<Result> results_in_order(const Plan& plan, const FrameSelection& frames)
 {
     std::vector<Result> results;
     Evaluator evaluator(plan, {}, [&](const Node& node, std::int64_t frame, const PointSet& points) {
-        results.push_back({node.name, node.location, frame, points});
+        if (frames.contains(frame)) results.push_back({node.name, node.location, frame, points});
     });
-    advance_all(evaluator);
+    advance_all(evaluator, plan, frames);
     return results;
 }
 
 struct Trials {
     const GraphOptions& graph;
     const PlanOptions& options;
+    const FrameSelection& frames;
     const std::function<void(const std::string& message)>& on_timeout;
     const std::vector<Result>& expected;
 
@@ -136,13 +138,14 @@ struct Trials {
         const Plan plan(session->graph(), options);
         std::optional<Difference> first;
         std::size_t next = 0;
-        Evaluator evaluator(plan, {}, [&](const Node&, std::int64_t, const PointSet& points) {
+        Evaluator evaluator(plan, {}, [&](const Node&, std::int64_t frame, const PointSet& points) {
+            if (!frames.contains(frame)) return;
             const Result& result = expected[next++];
             if (first) return;
             first = compare(result.points, points);
             if (first) first->result = &result;
         });
-        advance_all(evaluator);
+        advance_all(evaluator, plan, frames);
         return first;
     }
 };
@@ -174,11 +177,14 @@ std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan
 
 }  // namespace
 
-std::optional<Error> find_race(const GraphOptions& graph, const Plan& plan, const PlanOptions& options,
-                               const std::function<void(const std::string& message)>& on_timeout)
+Races find_races(const GraphOptions& graph, const Plan& plan, const PlanOptions& options, const FrameSelection& frames,
+                 const std::function<void(const std::string& message)>& on_timeout)
 {
-    const std::vector<Result> expected = results_in_order(plan);
-    const Trials trials{graph, options, on_timeout, expected};
+    const std::vector<Result> expected = results_in_order(plan, frames);
+    Races races;
+    races.compared =
+        std::any_of(expected.begin(), expected.end(), [](const Result& result) { return !result.points.empty(); });
+    const Trials trials{graph, options, frames, on_timeout, expected};
     for (const KernelOrder::Sequence sequence : {KernelOrder::Reversed, KernelOrder::TwoStates}) {
         const KernelOrder order{sequence, ""};
         const std::optional<Difference> seen = trials.run(order);
@@ -193,9 +199,10 @@ std::optional<Error> find_race(const GraphOptions& graph, const Plan& plan, cons
             sequence == KernelOrder::Reversed ? "in reverse order"
                                               : "where every other point is worked on in another state"));
         error.at(culprit->location).in_node(culprit->name);
-        return error;
+        races.found = std::move(error);
+        return races;
     }
-    return std::nullopt;
+    return races;
 }
 
 }  // namespace rapid

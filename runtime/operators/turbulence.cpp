@@ -44,6 +44,7 @@ struct Turbulence {
     static NodeType declare()
     {
         return node<Turbulence>("turbulence", "Pushes points along the swirls of a random field.")
+            .stage(Stage::Forces)
             .param(&Turbulence::amplitude, "amplitude", 1.0, any_number(), "m/s²", "root mean square acceleration")
             .param(&Turbulence::size, "size", 1.0, above(0), "m", "of the largest swirls")
             .param(&Turbulence::speed, "speed", 0.0, at_least(0), "1/s", "how fast the field changes")

@@ -242,4 +242,13 @@ describe("rapid explain --against", function()
     assert.truthy(here < heat and heat < there and there < life, text)
     assert.truthy(explain("falls.lua --against falls.lua").stdout:find("  nothing\n", 1, true))
   end)
+
+  it("counts turbulence among the forces", function()
+    local folder = command.folder()
+    folder:write("scene.lua", [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.grid {} } :turbulence {} :solve {}]])
+    local plan = command.rapid("explain scene.lua", { cwd = folder.path }).stdout
+    assert.truthy(plan:find("\n  forces +turbulence1\n"), plan)
+  end)
 end)

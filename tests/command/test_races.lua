@@ -85,6 +85,25 @@ describe("rapid check --races", function()
     assert.equal(1, result.status)
   end)
 
+  it("compares the frames of -f, and says so where there was no point in them", function()
+    local text = [[
+local held = { { n = 0 } } ballast = {} for i = 1, 20000 do ballast[i] = i end
+return rapid.create {} :emit { source = rapid.points.from { P = {{0, 0, 0}} }, impulse = { [9] = 3 },
+    attributes = { n = 0 } }
+  :points("count", function(p) local kept = held[1] kept.n = kept.n + 1 p.n = kept.n end) :solve {}]]
+    local early = scene.command("check", text, "--races")
+    assert.equal("warning: there is no point in frames 2 to 3, and nothing to compare; choose later frames, " ..
+      "as -f 25-27\n", early.stderr)
+    assert.equal(0, early.status)
+    local late = scene.command("check", text, "--races -f 8-10")
+    assert.truthy(late.stderr:find('node "count": frame 9: n of point id 0 is', 1, true), late.stderr)
+    assert.equal(1, late.status)
+    local without = scene.command("check", text, "-f 8-10")
+    assert.equal("-f chooses the frames of --races; without it no frame is run: give both, or leave it out\n",
+      without.stderr)
+    assert.equal(2, without.status)
+  end)
+
   it("takes no number of threads", function()
     local result = check(":solve {}", nil, "--races --threads 2")
     assert.equal("--races goes over the points in orders of its own, on one thread; leave --threads out\n",

@@ -1,0 +1,18 @@
+// The nodes written in Lua that lie in the current folder, and on RAPID_PATH.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "runtime/graph/registry.h"
+
+namespace rapid {
+
+struct NodeTypes {
+    Registry registry;                // these, and those of Session::all_node_types()
+    std::vector<std::string> faults;  // of files that define a node with a mistake in it
+};
+
+NodeTypes with_own_nodes();
+
+}  // namespace rapid

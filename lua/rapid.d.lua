@@ -566,7 +566,7 @@ function Node:assign_goals(params) end
 ---@class rapid.params.attract
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field center? rapid.Place|rapid.Attribute|fun(frame: rapid.Frame): rapid.Place  where to [vec3, m, default {0, 0, 0}, takes rapid.attr]
----@field shape? rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  to its surface, in place of center [shape]
+---@field shape? rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  to its surface, in place of center; also a mesh [shape at rest or moving]
 ---@field strength? number|rapid.Attribute|fun(frame: rapid.Frame): number  acceleration; negative: away [number, m/s² at 1 m, default 1, takes rapid.attr]
 ---@field falloff? number|fun(frame: rapid.Frame): number  power of the distance by which it falls [number, default 2]
 ---@field core? number|fun(frame: rapid.Frame): number  within about this distance it grows no more [number, m, at least 0, default 0]
@@ -588,7 +588,7 @@ function Node:attribute(params) end
 
 ---@class rapid.params.avoid
 ---@field distance? number|fun(frame: rapid.Frame): number  where it begins to act [number, m, at least 1e-06, default 0.5]
----@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape, required]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape at rest or moving, required]
 ---@field strength? number|fun(frame: rapid.Frame): number  acceleration at the surface [number, m/s², default 10]
 ---@field group? string  acts on this group only [string]
 ---@field name? string  what the node is called in messages [string]
@@ -852,7 +852,7 @@ function Node:group_by_bounds(params) end
 ---@class rapid.params.group_by_shape
 ---@field distance? number|fun(frame: rapid.Frame): number  how far from the surface is in; negative is deep inside [number, m, default 0]
 ---@field into string  the group [name of a group, required]
----@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape, required]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape at rest or moving, required]
 ---@field group? string  acts on this group only [string]
 ---@field name? string  what the node is called in messages [string]
 
@@ -878,9 +878,14 @@ function Node:impact_spin(params) end
 ---@field cohesion? number|rapid.Attribute|fun(frame: rapid.Frame): number  draws them together, most at half the radius [number, m/s², at least 0, default 0, takes rapid.attr]
 ---@field alignment? number|rapid.Attribute|fun(frame: rapid.Frame): number  rate at which their velocities become equal [number, 1/s, at least 0, default 0, takes rapid.attr]
 ---@field drag? number|rapid.Attribute|fun(frame: rapid.Frame): number  rate at which they stop approaching and parting; what turns about them goes on [number, 1/s, at least 0, default 0, takes rapid.attr]
+---@field avoidance? number|rapid.Attribute|fun(frame: rapid.Frame): number  turns them aside from those that they would come too near to [number, m/s², at least 0, default 0, takes rapid.attr]
+---@field foresight? number|fun(frame: rapid.Frame): number  how far ahead they look for that [number, s, above 0, default 1]
+---@field clearance? number|fun(frame: rapid.Frame): number  at which they pass each other; half the radius, where it is not given [number, m, above 0]
+---@field view? number|fun(frame: rapid.Frame): number  the angle about their velocity within which they see others [number, deg, from 0 to 360, default 360]
+---@field most? integer|fun(frame: rapid.Frame): integer  neighbours that each heeds, the nearest of those that it sees; 0: all [integer, from 0 to 1000000000, default 0]
 ---@field name? string  what the node is called in messages [string]
 
----Moves points by their neighbours: apart, together, in step, without haste.
+---Moves points by their neighbours: apart, together, in step, without haste, aside.
 ---@param params rapid.params.interact
 ---@return rapid.Node
 function Node:interact(params) end
@@ -930,7 +935,7 @@ function Node:limit_speed(params) end
 
 ---@class rapid.params.look_ahead
 ---@field clearance? number|fun(frame: rapid.Frame): number  from the surface at which they pass [number, m, at least 0, default 0.1]
----@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape, required]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape or a level set [shape at rest or moving, required]
 ---@field strength? number|fun(frame: rapid.Frame): number  greatest acceleration [number, m/s², at least 0, default 20]
 ---@field time? number|fun(frame: rapid.Frame): number  how far ahead they see [number, s, at least 1e-06, default 1]
 ---@field group? string  acts on this group only [string]
@@ -949,9 +954,20 @@ function Node:look_ahead(params) end
 ---@return rapid.Node
 function Node:merge(...) end
 
+---@class rapid.params.nearest_place
+---@field into? string  a vec3, for the place [name of an attribute, default "goal"]
+---@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape, a level set or a mesh, at rest, moving or deforming [shape at rest or moving, required]
+---@field group? string  acts on this group only [string]
+---@field name? string  what the node is called in messages [string]
+
+---Writes the nearest place of a surface to an attribute.
+---@param params rapid.params.nearest_place
+---@return rapid.Node
+function Node:nearest_place(params) end
+
 ---@class rapid.params.pin
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a moving shape that carries them; where not given, where each point is first pinned [vec3, attribute or moving shape, m]
+---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape or mesh that moves or deforms, and carries them; where not given, where each point is first pinned [vec3, attribute or moving shape, m]
 ---@field transform? rapid.Motion|fun(frame: rapid.Frame): rapid.Motion  carries the points: a motion, a function of the frame that returns one, or keys by frame [motion]
 ---@field compliance? number  give by force; 0: rigid [number, m/N, at least 0, default 0]
 ---@field name? string  what the node is called in messages [string]
@@ -1027,7 +1043,7 @@ function Node:spin(params) end
 
 ---@class rapid.params.spring
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape, m, default {0, 0, 0}]
+---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape at rest or moving, m, default {0, 0, 0}]
 ---@field stiffness? number|rapid.Attribute|fun(frame: rapid.Frame): number  force a metre [number, N/m, at least 0, default 1, takes rapid.attr]
 ---@field damping? number|rapid.Attribute|fun(frame: rapid.Frame): number  force by speed [number, N s/m, at least 0, default 0, takes rapid.attr]
 ---@field name? string  what the node is called in messages [string]

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <lua.hpp>
 
+#include "bindings/host/kernel_moment.h"
 #include "runtime/noise.h"
 #include "runtime/random.h"
 #include "runtime/shapes/level_set/vector_grid.h"
-#include "runtime/shapes/shape.h"
 
 namespace rapid {
 namespace {
@@ -41,13 +41,19 @@ void curl_noise_at(double x, double y, double z, double time, double octaves, do
     Eigen::Map<Vec3d>(curl, 3) = curl_noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
 }
 
-// lua/shape.lua keeps the shape alive.
+// lua/shape.lua keeps the shape alive, or the pass a StepShape.
 double shape_distance(const void* shape, double x, double y, double z, double* gradient)
 {
     const Vec3d P(x, y, z);
     double phi = 0;
     Vec3d slope;
-    static_cast<const Shape*>(shape)->distance({&P, 1}, {&phi, 1}, {&slope, 1});
+    const auto* known = static_cast<const Shape*>(shape);
+    if (const auto* step = known->moves() ? dynamic_cast<const StepShape*>(known) : nullptr) {
+        const double since = KernelMoment::since_begin(*step);
+        step->distance_at({&P, 1}, {&since, 1}, {&phi, 1}, {&slope, 1});
+    } else {
+        known->distance({&P, 1}, {&phi, 1}, {&slope, 1});
+    }
     Eigen::Map<Vec3d>(gradient, 3) = slope;
     return phi;
 }

@@ -9,6 +9,7 @@
 
 #include "bindings/host/detail.h"
 #include "bindings/host/kernel.h"
+#include "bindings/host/kernel_moment.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/values.h"
 #include "runtime/points/point_text.h"
@@ -102,6 +103,7 @@ void KernelPass::call_runner(State& state, const Call& call) const
     lua_rawgeti(state.lua(), LUA_REGISTRYINDEX, runner.run);
     try {
         const State::InKernel in_kernel(state);
+        const KernelMoment moment(runner.chunk->times, &runner.chunk->at);
         state.call(0, 0);
     } catch (const Error& error) {
         const rapid_chunk after = *runner.chunk;

@@ -7,8 +7,8 @@
 
 #include "bindings/host/ramp.h"
 #include "bindings/host/script_operator.h"
+#include "runtime/graph/step_shape.h"
 #include "runtime/points/point_names.h"
-#include "runtime/shapes/shape.h"
 
 namespace rapid {
 namespace {
@@ -78,7 +78,7 @@ const std::map<std::string, DeclaredType>& declared_types()
         {"int", {"integer", keep_as<int>, true}},
         {"ramp", {Ramp::param_type, keep_ramp, true}},
         {"read", {attribute_type, keep_name<Access::Reads>, false, true}},
-        {"shape", {Shape::param_type, keep_as<ShapePtr>}},
+        {"shape", {StepShape::param_type, keep_as<ShapePtr>}},
         {"string", {"string", keep_as<std::string>}},
         {"vec3", {"vec3", keep_as<Vec3d>, true}},
         {"vec3s", {"list of vec3", keep_list<Vec3d>, true}},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "runtime/graph/step_shape.h"
 #include "runtime/points/attribute_like.h"
 
 namespace rapid {
@@ -31,13 +32,14 @@ std::string unknown(const NodeType& type, const std::string& name)
 }
 
 // Calls a function of the frame; its Errors name the frame.
-void assign_at(const Param& param, Operator& op, const FrameFunction& function, const Frame& frame)
+void assign_at(const Param& param, Operator& op, const FrameFunction& function, const FrameClock& clock,
+               const Frame& frame)
 {
     try {
         const Value result = function.call(frame);
         if (result.is_nil() && !param.may_be_nil) wrong_type(param, result);
         if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
-        param.assign(param, op.fields(), result);
+        param.assign(param, op.fields(), in_step(param, result, clock, frame));
     } catch (const Error& error) {
         Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
         placed.at(error.location()).with_trace(error.trace());
@@ -47,7 +49,7 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
 
 }  // namespace
 
-void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions)
+void bind_arguments(const Node& node, Operator& op, const FrameClock& clock, const Frame& frame, bool only_changing)
 {
     for (const auto& [name, value] : node.arguments) {
         const Param* param = node.type->find(name);
@@ -61,12 +63,12 @@ void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool onl
         if (const FrameFunction* function = value.function(); function && !param->keeps_function) {
             if (!param->of_the_frame)
                 throw Error(fmt::format("{} can't be a function of the frame; it must be a constant", name));
-            assign_at(*param, op, *function, frame);
-        } else if (!only_functions) {
-            param->assign(*param, op.fields(), value);
+            assign_at(*param, op, *function, clock, frame);
+        } else if (!only_changing || differs_by_step(*param, value)) {
+            param->assign(*param, op.fields(), in_step(*param, value, clock, frame));
         }
     }
-    if (only_functions) return;
+    if (only_changing) return;
     for (const Param& param : node.type->params) {
         if (node.arguments.count(param.name)) continue;
         if (param.required) throw Error(fmt::format("{} is missing: {}", param.name, param.doc));

@@ -9,9 +9,10 @@
 
 namespace rapid {
 
-// Puts the arguments into the fields, with functions of the frame called at `frame`. A fresh operator gets all of them;
-// later calls only those that are functions. Error: an argument that is unknown, missing or illegal.
-void bind_arguments(const Node& node, Operator& op, const Frame& frame, bool only_functions);
+// Puts the arguments into the fields, with functions of the frame called at `frame`, and shapes that move as they go
+// through the step that ends there (step_shape.h). A fresh operator gets all of them; later calls only these. Error: an
+// argument that is unknown, missing or illegal.
+void bind_arguments(const Node& node, Operator& op, const FrameClock& clock, const Frame& frame, bool only_changing);
 
 // A number that is never a function: the argument, or the parameter's default.
 double constant_argument(const Node& node, std::string_view param);

@@ -116,7 +116,7 @@ void Evaluator::call_functions(std::int64_t frame, int left)
         const Simulation& simulation = *simulations_[planned.simulation];
         const Frame now = simulation.frame(simulation.clock().step_of(frame) - left);
         name_errors(planned.node->name, planned.node->location, [&] {
-            bind_arguments(*planned.node, *planned.op, now, true);
+            bind_arguments(*planned.node, *planned.op, simulation.clock(), now, true);
             planned.op->check();
         });
     }

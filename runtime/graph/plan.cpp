@@ -211,7 +211,7 @@ void Plan::start_simulation(PlannedNode& create)
     const Node& node = *create.node;
     PlannedSimulation simulation;
     simulation.create = create.node;
-    name_errors(node.name, node.location, [&] { bind_arguments(node, *create.op, {}, false); });
+    name_errors(node.name, node.location, [&] { bind_arguments(node, *create.op, {}, {}, false); });
     simulation.fps = constant_argument(node, "fps");
     simulation.start = static_cast<std::int64_t>(constant_argument(node, "start"));
     simulation.subframes = static_cast<int>(constant_argument(node, "subframes"));
@@ -249,9 +249,8 @@ void Plan::bind_all()
         name_errors(planned.node->name, planned.node->location, [&] {
             find_made_by_sources(planned);
             const PlannedSimulation& simulation = simulations[planned.simulation];
-            const Frame start =
-                FrameClock{simulation.fps, simulation.start, simulation.subframes}.at_step(simulation.start);
-            bind_arguments(*planned.node, *planned.op, start, false);
+            const FrameClock clock{simulation.fps, simulation.start, simulation.subframes};
+            bind_arguments(*planned.node, *planned.op, clock, clock.at_step(simulation.start), false);
             planned.op->check();
         });
 }

@@ -6,13 +6,14 @@
 #include <cmath>
 
 #include "runtime/graph/node.h"
+#include "runtime/graph/step_shape.h"
 
 namespace rapid {
 namespace {
 
 struct Attract {
     PerPoint<Vec3f> center;
-    ShapePtr shape;
+    AnyShape shape;
     PerPoint<float> strength;
     double falloff, core;
     std::string group;
@@ -21,7 +22,8 @@ struct Attract {
     {
         return node<Attract>("attract", "Draws points to a place, or to the surface of a shape.")
             .param(&Attract::center, "center", Vec3d(0, 0, 0), any_number(), "m", "where to")
-            .param(&Attract::shape, "shape", Value(), any_number(), "", "to its surface, in place of center")
+            .param(&Attract::shape, "shape", Value(), any_number(), "",
+                   "to its surface, in place of center; also a mesh")
             .param(&Attract::strength, "strength", 1.0, any_number(), "m/s² at 1 m", "acceleration; negative: away")
             .param(&Attract::falloff, "falloff", 2.0, any_number(), "", "power of the distance by which it falls")
             .param(&Attract::core, "core", 0.0, at_least(0), "m", "within about this distance it grows no more");
@@ -32,7 +34,7 @@ struct Attract {
         std::vector<Vec3d> towards(chunk.size());
         if (shape) {
             std::vector<double> phi(chunk.size());
-            shape->distance(chunk.P, phi, towards);
+            shape.distance(chunk, phi, towards);
             for (std::size_t i = 0; i < chunk.size(); ++i) {
                 const double slope = towards[i].norm();
                 if (slope > 0) towards[i] *= -phi[i] / slope;

@@ -1,4 +1,5 @@
-// pin: holds points at a position, at one that each has as an attribute, or on a body that moves.
+// pin: holds points at a position, at one that each has as an attribute, or on a body that moves or deforms: there each
+// keeps to the nearest face, at its barycentric place and its height above it.
 //
 // Rigid, a pinned point is kinematic: its position and velocity are prescribed, and no other constraint moves it. With
 // a compliance it is held by three springs, one along each axis.
@@ -6,8 +7,8 @@
 #include "runtime/graph/stateful.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/members.h"
-#include "runtime/shapes/motion/animated.h"
-#include "runtime/shapes/motion/motion.h"
+#include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/mesh_surface.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/twin.h"
@@ -22,6 +23,7 @@ struct PinTarget {
 
     std::optional<PerPoint<Vec3f>> place;
     MotionPtr motion;
+    std::shared_ptr<const AnimatedMesh> deforming;
 };
 
 void read_value(const Param& param, const Value& value, PinTarget& target)
@@ -30,6 +32,12 @@ void read_value(const Param& param, const Value& value, PinTarget& target)
     if (value.is_nil()) return;
     if (auto shape = value.object<AnimatedShape>())
         target.motion = shape->motion();
+    else if (auto body = value.object<DeformingLevelSet>())
+        target.deforming = std::shared_ptr<const AnimatedMesh>(body, &body->mesh());
+    else if (auto mesh = value.object<AnimatedMesh>(); mesh && mesh->deforms())
+        target.deforming = mesh;
+    else if (mesh)
+        target.motion = mesh->motion();
     else
         read_value(param, value, target.place.emplace());
 }
@@ -37,14 +45,14 @@ void read_value(const Param& param, const Value& value, PinTarget& target)
 // Where points are held; by id, over a run.
 struct Pin {
     Vec3d from = Vec3d::Zero(), to = Vec3d::Zero();  // at the frame's beginning and end, m
-    Vec3d rest = Vec3d::Zero();                      // on a body that moves: in its rest frame
+    MaterialPoint on;                                // of a body that moves
     Vec3d now = Vec3d::Zero();
     bool taken = false;
 
     template <class Archive>
     void serialize(Archive& keep)
     {
-        keep(from, to, rest, now, taken);
+        keep(from, to, on.face, on.at, now, taken);
     }
 };
 
@@ -89,10 +97,39 @@ struct Pins {
     Rows<Along> springs;                // where pins have a compliance
 };
 
+// A body that carries points through a step: by a motion, or by the faces of a mesh. Times are in seconds since the
+// step began.
+struct PinBody {
+    std::shared_ptr<const MotionTrack> track;
+    MovingBodyPtr surface;
+
+    explicit operator bool() const { return track || surface; }
+
+    MaterialPoint attach(const Vec3d& P) const
+    {
+        return surface ? surface->material_at(P, 0) : MaterialPoint{MaterialPoint::rigid, track->at(0).inverse() * P};
+    }
+    Vec3d place(const Pin& pin, double since) const
+    {
+        return surface ? surface->follow(pin.on, since).P : track->at(since) * pin.on.at;
+    }
+    Vec3d velocity(const Pin& pin, double since) const
+    {
+        return surface ? surface->follow(pin.on, since).v : track->velocity_at(since).at(pin.now);
+    }
+    bool moves() const
+    {
+        if (surface) return surface->moves();
+        return track && std::any_of(track->pieces().begin(), track->pieces().end(), [](const auto& piece) {
+                   return !(piece.only_translates() && piece.v.isZero(0) && piece.a.isZero(0));
+               });
+    }
+};
+
 class PinCoupling : public Coupling {
 public:
-    PinCoupling(std::shared_ptr<Pins> pins, std::shared_ptr<const MotionTrack> track, bool rigid, double h)
-        : pins_(std::move(pins)), track_(std::move(track)), rigid_(rigid), h_(h)
+    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, bool rigid, double h)
+        : pins_(std::move(pins)), body_(std::move(body)), rigid_(rigid), h_(h)
     {
     }
 
@@ -123,7 +160,7 @@ public:
         if (!rigid_) return;
         for (const auto& [i, pin] : held_) {
             step.points[i] = {pin->now, 0};
-            step.v[i] = track_ ? track_->velocity_at(since).at(pin->now) : Vec3d((pin->to - pin->from) / h_);
+            step.v[i] = body_ ? body_.velocity(*pin, since) : Vec3d((pin->to - pin->from) / h_);
         }
     }
     void advance(Substep& step) override { pins_->springs.advance(step); }
@@ -136,38 +173,31 @@ private:
     void aim(double since)
     {
         for (const auto& [i, pin] : held_)
-            pin->now = track_ ? track_->at(since) * pin->rest : Vec3d(pin->from + since / h_ * (pin->to - pin->from));
+            pin->now = body_ ? body_.place(*pin, since) : Vec3d(pin->from + since / h_ * (pin->to - pin->from));
     }
 
     std::shared_ptr<Pins> pins_;
-    std::shared_ptr<const MotionTrack> track_;
+    PinBody body_;
     bool rigid_;
     double h_;  // s, the frame's length
     std::vector<std::pair<std::size_t, Pin*>> held_;
     std::vector<std::uint32_t> awake_;
 };
 
-bool is_still(const MotionTrack& track)
-{
-    return std::all_of(track.pieces().begin(), track.pieces().end(), [](const MotionTrack::Piece& piece) {
-        return piece.only_translates() && piece.v.isZero(0) && piece.a.isZero(0);
-    });
-}
-
 class PinConstraint : public RememberingConstraint<PinConstraint, Pins> {
 public:
     std::optional<PerPoint<Vec3f>> place;
-    std::shared_ptr<const MotionTrack> track;
+    PinBody body;
     double compliance = 0;
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double h) const override
     {
-        auto coupling = std::make_shared<PinCoupling>(memory, track, compliance == 0, h);
+        auto coupling = std::make_shared<PinCoupling>(memory, body, compliance == 0, h);
         const Strided<std::uint8_t> members = members_of(points, group);
         const Strided<Vec3f> P = points.P().read();
         const Strided<std::int64_t> id = points.id().read();
         const Strided<Vec3f> target = place ? place->read(points) : P;
-        const bool moves = track && !is_still(*track);
+        const bool moves = body.moves();
         std::vector<std::int64_t> held;
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!members[i]) continue;
@@ -176,7 +206,7 @@ public:
             const Vec3d to = target[i].cast<double>();
             if (!pin.taken) {
                 pin.from = pin.to = pin.now = to;
-                if (track) pin.rest = track->at(0).inverse() * to;
+                if (body) pin.on = body.attach(to);
                 for (int axis = 0; compliance > 0 && axis < 3; ++axis)
                     memory->springs.add({id[i]}, {&pin, axis}, compliance);
                 pin.taken = true;
@@ -220,8 +250,9 @@ struct PinNode {
             .stage(Stage::Constraints)
             .takes("mass")
             .param(&PinNode::target, "target", Value(), any_number(), "m",
-                   "a place, rapid.attr \"NAME\" for each point's own, or a moving shape that carries them; where not "
-                   "given, where each point is first pinned")
+                   "a place, rapid.attr \"NAME\" for each point's own, or a shape or mesh that moves or deforms, and "
+                   "carries "
+                   "them; where not given, where each point is first pinned")
             .param(&PinNode::transform, "transform", Value(), any_number(), "",
                    "carries the points: a motion, a function of the frame that returns one, or keys by frame")
             .param(&PinNode::compliance, "compliance", 0.0, at_least(0), "m/N", "give by force; 0: rigid")
@@ -230,7 +261,7 @@ struct PinNode {
 
     void check() const
     {
-        if (transform && (target.place || target.motion))
+        if (transform && (target.place || target.motion || target.deforming))
             throw Error("it has both target and transform; give one of them");
     }
 
@@ -241,10 +272,12 @@ struct PinNode {
         pin->memory = pins_;
         pin->place = target.place;
         pin->compliance = compliance;
+        const FrameClock clock = flow.simulation->clock();
+        if (target.deforming)
+            pin->body.surface = mesh_surface_in_step(*target.deforming, clock, clock.step_at(now.frame));
         if (const MotionPtr motion = transform ? transform : target.motion)
-            pin->track =
-                std::make_shared<MotionTrack>(*motion, flow.simulation->clock(),
-                                              now.frame.number - 1.0 / flow.simulation->subframes, now.frame.number);
+            pin->body.track = std::make_shared<MotionTrack>(
+                *motion, clock, now.frame.number - 1.0 / flow.simulation->subframes, now.frame.number);
         flow.dynamics.add(std::move(pin));
         return flow;
     }

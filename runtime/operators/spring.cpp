@@ -3,24 +3,26 @@
 //   F = -stiffness (P - target) - damping v        accelerates a point by its mass; both parts are exact at any step
 //
 // The target on a shape is the nearest position, wherever the point goes: exact on planes, of second order on curved
-// surfaces, and at any step without a gain of energy (solver/surface_springs.h).
+// surfaces, and at any step without a gain of energy (solver/surface_springs.h). On a shape that moves, and on a mesh,
+// it is the position nearest to the point in the middle of the sub-step, where that is then.
 #include "runtime/graph/node.h"
+#include "runtime/graph/step_shape.h"
 
 namespace rapid {
 namespace {
 
 struct SpringTarget {
-    static constexpr std::string_view param_type = "vec3, attribute or shape";
+    static constexpr std::string_view param_type = "vec3, attribute or shape at rest or moving";
 
     PerPoint<Vec3f> position;
-    ShapePtr shape;
+    AnyShape shape;
 };
 
 void read_value(const Param& param, const Value& value, SpringTarget& target)
 {
     target = {};
-    if (auto shape = value.object<Shape>())
-        target.shape = std::move(shape);
+    if (value.object<Shape>())
+        read_value(param, value, target.shape);
     else
         rapid::read_value(param, value, target.position);
 }
@@ -45,10 +47,16 @@ struct Spring {
         const Strided<Vec3f> place = chunk.read(target.position);
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
         const Strided<float> mass = masses_of(chunk.points);
+        std::vector<double> phi(target.shape.step ? chunk.size() : 0);
+        std::vector<Vec3d> gradient(phi.size());
+        if (target.shape.step) target.shape.distance(chunk, phi, gradient);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             const double m = mass[chunk.first + i];
-            if (target.shape)
-                forces.add_surface_spring(i, k[i] / m, *target.shape);
+            if (target.shape.step) {
+                if (const double slope2 = gradient[i].squaredNorm(); slope2 > 0)
+                    forces.add_spring(i, k[i] / m, chunk.P[i] - phi[i] / slope2 * gradient[i]);
+            } else if (target.shape)
+                forces.add_surface_spring(i, k[i] / m, *target.shape.shape);
             else
                 forces.add_spring(i, k[i] / m, place[i].cast<double>());
             forces.add_drag(i, d[i] / m, Vec3d::Zero());
@@ -57,11 +65,12 @@ struct Spring {
 
     bool add_potential(const Chunk& chunk, std::span<double> energy) const
     {
+        if (target.shape.step) return false;
         const Strided<Vec3f> place = chunk.read(target.position);
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
         std::vector<double> phi(target.shape ? chunk.size() : 0);
         std::vector<Vec3d> gradient(phi.size());
-        if (target.shape) target.shape->distance(chunk.P, phi, gradient);
+        if (target.shape) target.shape.distance(chunk, phi, gradient);
         const Strided<float> mass = masses_of(chunk.points);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             if (d[i] > 0) return false;

@@ -37,7 +37,9 @@ public:
           separation_(interaction.separation.read(points)),
           cohesion_(interaction.cohesion.read(points)),
           alignment_(interaction.alignment.read(points)),
-          drag_(interaction.drag.read(points))
+          drag_(interaction.drag.read(points)),
+          avoidance_(interaction.avoidance.read(points)),
+          avoids_(!interaction.avoidance.attribute.empty() || interaction.avoidance.constant > 0)
     {
         if (const auto* masses = points.find<float>("mass")) mass_ = masses->read();
         if (const auto* own = points.find<float>("dt")) own_dt_ = own->read();
@@ -59,6 +61,8 @@ public:
         if (members_.empty()) return;
         grid_ = index_neighbours(places, interaction.radius);
         require_affordable(at.steps, kicks);
+        if (!interaction.sees_all())
+            for (const std::uint32_t i : members_) headings_.push_back(v_[i]);
         weights_.assign(members_.size(), 0);
         for_all([&](std::size_t m, std::size_t other) { weights_[m] += weight_at(distance(m, other)); });
     }
@@ -105,10 +109,33 @@ private:
             for (std::size_t m = begin; m < end; ++m) {
                 // Rounded as the grid has it: of two points each finds the other.
                 grid_->find(P_[members_[m]].template cast<float>().template cast<double>(), near);
+                if (interaction_.is_selective()) select(m, near);
                 for (const std::uint32_t other : near)
                     if (other != m) f(m, other);
             }
         });
+    }
+
+    // Leaves those that a member heeds, in their order.
+    void select(std::size_t m, std::vector<std::uint32_t>& near) const
+    {
+        std::erase_if(near, [&](std::uint32_t other) { return other == m || !sees(m, other); });
+        const auto most = static_cast<std::size_t>(interaction_.most);
+        if (most == 0 || near.size() <= most) return;
+        const auto nearer = [&](std::uint32_t a, std::uint32_t b) {
+            const double to_a = between(m, a).squaredNorm(), to_b = between(m, b).squaredNorm();
+            return to_a < to_b || (to_a == to_b && a < b);
+        };
+        std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(most), near.end(), nearer);
+        near.resize(most);
+        std::sort(near.begin(), near.end());
+    }
+    // As it goes at the beginning, through all kicks.
+    bool sees(std::size_t m, std::size_t other) const
+    {
+        if (headings_.empty()) return true;
+        const Vec3d d = between(m, other), &heading = headings_[m];
+        return d.dot(heading) >= cos_view_ * d.norm() * heading.norm();
     }
 
     Vec3d between(std::size_t m, std::size_t other) const { return P_[members_[other]] - P_[members_[m]]; }
@@ -142,9 +169,28 @@ private:
         const double along = exchanged(mean(alignment_) + mean(drag_), t);
         const Vec3d along_n = n * n.dot(u);
 
-        const double share = 1 / std::max({1.0, weights_[m], weights_[other]});
+        const double share = 1 / std::max({1.0, weights_[m], interaction_.is_selective() ? 0.0 : weights_[other]});
         const double part = 2.0 * mass_[j] / (double(mass_[i]) + mass_[j]);
-        return part * share * (t * (draw - push) * n + w * (align * u + (along - align) * along_n));
+        Vec3d change = t * (draw - push) * n + w * (align * u + (along - align) * along_n);
+        if (avoids_) change += t * mean(avoidance_) * aside(d, u, id_[i], id_[j]);
+        return part * share * change;
+    }
+
+    // Away from where the other will be at the nearest approach; from one that it would meet, to any side.
+    Vec3d aside(const Vec3d& d, const Vec3d& u, std::int64_t i, std::int64_t j) const
+    {
+        const double closing = -d.dot(u);
+        if (!(closing > 0)) return Vec3d::Zero();
+        const double time = std::min(closing / u.squaredNorm(), interaction_.foresight);
+        Vec3d e = d + time * u;
+        const double passes = e.norm();
+        if (passes >= interaction_.clearance) return Vec3d::Zero();
+        const double urgency = (1 - passes / interaction_.clearance) * (1 - time / interaction_.foresight);
+        if (!(passes > 1e-9 * interaction_.clearance)) {
+            const Vec3d any = direction(i, j);
+            e = any - any.dot(u) / u.squaredNorm() * u;
+        }
+        return -urgency * e.stableNormalized();
     }
 
     // Of coincident points: any direction, and the opposite one for the other point.
@@ -161,11 +207,14 @@ private:
     double h_, steps_;
     std::span<const Vec3d> P_, v_;
     Strided<std::int64_t> id_;
-    Strided<float> separation_, cohesion_, alignment_, drag_;
+    Strided<float> separation_, cohesion_, alignment_, drag_, avoidance_;
+    bool avoids_;
     Strided<float> mass_{&unit_mass, 0}, own_dt_{nullptr, 0};
     std::vector<std::uint32_t> members_;      // their places in the set
     std::unique_ptr<const Neighbours> grid_;  // of the members
     std::vector<double> weights_;             // Σ w, of each member
+    double cos_view_ = std::cos(0.5 * interaction_.view);
+    std::vector<Vec3d> headings_;  // velocities at first; empty where all see all around
 };
 
 }  // namespace

@@ -9,6 +9,15 @@
 // which is an average over the neighbours, as for flocks, and the same for both: it conserves momentum, and except for
 // alignment also angular momentum. Unequal masses get 2 m_j / (m_i + m_j) of it, with the mean of their strengths.
 //
+// Points that look ahead also turn aside from those that they would pass nearer than `clearance`. With u = v_j - v_i,
+// the time of the nearest approach τ = -d·u / u², up to `foresight`, and what is then between them, e = d n + τ u:
+//
+//   a_i = share (-avoidance (1 - |e| / clearance) (1 - τ / foresight) e / |e|)
+//
+// Where a point does not see all (an angle of `view` about its velocity, at rest all around), or heeds only the nearest
+// few, the share is 1 / max(1, Σ w of i) over those that it heeds: they need not heed it, and momentum is not
+// conserved.
+//
 // It is applied as a kick of half a step before the points move and one of half a step after: second order in the
 // step's length by position, first order in alignment and drag. The step is the sub-step, at whose ends neighbours are
 // found; with a tolerance, where each point has sub-steps of its own, the frame. However strong, a kick makes
@@ -30,6 +39,13 @@ public:
     double radius = 1;                                 // m
     PerPoint<float> separation{0.0f}, cohesion{0.0f};  // m/s²
     PerPoint<float> alignment{0.0f}, drag{0.0f};       // 1/s
+    PerPoint<float> avoidance{0.0f};                   // m/s²
+    double foresight = 1, clearance = 0.5;             // s, m
+    double view = 2 * EIGEN_PI;                        // rad
+    int most = 0;                                      // neighbours that a point heeds; 0: all
+
+    bool sees_all() const { return view >= 2 * EIGEN_PI * (1 - 1e-9); }
+    bool is_selective() const { return !sees_all() || most > 0; }
 };
 
 // Points within a frame; shapes [n].

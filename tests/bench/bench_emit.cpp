@@ -77,7 +77,7 @@ void emit(benchmark::State& state, std::map<std::string, Value> arguments)
     std::vector<std::string> warnings;
     const std::function<void(const std::string&, const PointSet&)> no_write;
     std::int64_t frame = 1;
-    bind_arguments(node, *op, simulation->frame(frame), false);
+    bind_arguments(node, *op, simulation->clock(), simulation->frame(frame), false);
     op->check();
 
     tbb::task_arena arena(static_cast<int>(state.range(0)));
@@ -131,7 +131,7 @@ void parents(benchmark::State& state, const char* birth, const char* event)
     FrameFigures figures;
     std::vector<std::string> warnings;
     const std::function<void(const std::string&, const PointSet&)> no_write;
-    bind_arguments(node, *op, own->frame(1), false);
+    bind_arguments(node, *op, own->clock(), own->frame(1), false);
     op->check();
     tbb::task_arena arena(static_cast<int>(state.range(0)));
     for (auto _ : state) {

@@ -28,7 +28,7 @@ Dynamics force(const std::string& type, Arguments arguments)
     FrameFigures figures;
     std::vector<std::string> warnings;
     const std::function<void(const std::string&, const PointSet&)> no_write;
-    bind_arguments(node, *op, simulation->frame(2), false);
+    bind_arguments(node, *op, simulation->clock(), simulation->frame(2), false);
     const Evaluation now{simulation->frame(2),    false,   node.name, node.location,
                          RandomKey(0, node.name), figures, warnings,  no_write};
     Flow input{PointSet(), {}, simulation};

@@ -244,11 +244,11 @@ describe("rapid explain --against", function()
   end)
 
   it("counts turbulence among the forces", function()
-    local folder = command.folder()
-    folder:write("scene.lua", [[
+    local own = command.folder()
+    own:write("scene.lua", [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid {} } :turbulence {} :solve {}]])
-    local plan = command.rapid("explain scene.lua", { cwd = folder.path }).stdout
+    local plan = command.rapid("explain scene.lua", { cwd = own.path }).stdout
     assert.truthy(plan:find("\n  forces +turbulence1\n"), plan)
   end)
 end)

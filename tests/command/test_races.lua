@@ -87,10 +87,11 @@ describe("rapid check --races", function()
 
   it("compares the frames of -f, and says so where there was no point in them", function()
     local text = [[
-local held = { { n = 0 } } ballast = {} for i = 1, 20000 do ballast[i] = i end
+local box = { n = 0 } ballast = {} for i = 1, 20000 do ballast[i] = i end
 return rapid.create {} :emit { source = rapid.points.from { P = {{0, 0, 0}} }, impulse = { [9] = 3 },
     attributes = { n = 0 } }
-  :points("count", function(p) local kept = held[1] kept.n = kept.n + 1 p.n = kept.n end) :solve {}]]
+  :points("count", function(p)
+    local held = { box } local kept = held[1] kept.n = kept.n + 1 p.n = kept.n end) :solve {}]]
     local early = scene.command("check", text, "--races")
     assert.equal("warning: there is no point in frames 2 to 3, and nothing to compare; choose later frames, " ..
       "as -f 25-27\n", early.stderr)

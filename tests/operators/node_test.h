@@ -105,7 +105,7 @@ public:
           node_{&registry_.at(type), name.empty() ? type + "1" : name, {}, 0, {}, std::move(arguments)},
           op_(node_.type->make())
     {
-        bind_arguments(node_, *op_, simulation_->frame(simulation_->start), false);
+        bind_arguments(node_, *op_, simulation_->clock(), simulation_->frame(simulation_->start), false);
         op_->check();
     }
 
@@ -146,7 +146,7 @@ private:
     Flow call(std::int64_t number, const F& f)
     {
         const Frame frame = simulation_->frame(number);
-        bind_arguments(node_, *op_, frame, true);
+        bind_arguments(node_, *op_, simulation_->clock(), frame, true);
         op_->check();
         const Evaluation now{frame,
                              number <= simulation_->start,

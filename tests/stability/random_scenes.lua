@@ -48,7 +48,14 @@ function values.motion()
 end
 function values.boolean() return pick { "true", "false" } end
 values["vec3"] = function() return vector(-4, 4) end
-values["vec3, attribute or shape"] = function() return pick { vector(-4, 4), values.shape() } end
+values["shape at rest or moving"] = function()
+  return pick { values.shape(), values.shape(), ("solid:transform(%s)"):format(values.motion()),
+    "rapid.mesh.box { size = {1, 0.1, 1} }",
+    ("rapid.mesh.sphere { radius = 0.4 }:transform(%s)"):format(values.motion()) }
+end
+values["vec3, attribute or shape at rest or moving"] = function()
+  return pick { vector(-4, 4), values["shape at rest or moving"]() }
+end
 values["vec3, attribute or moving shape"] = values.vec3
 values["vector grid"] = function() return "flow" end
 values["false or number"] = function() return pick { "false", "0", "1" } end

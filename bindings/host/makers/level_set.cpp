@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <memory>
+#include <mutex>
+#include <tuple>
+
 #include "bindings/host/maker.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
@@ -40,6 +45,12 @@ void read_value(const Param& param, const Value& value, AnyMesh& mesh)
     if (!(mesh.moving = value.object<AnimatedMesh>())) rapid::read_value(param, value, mesh.still);
 }
 
+// What has been made of a mesh with these options, and is in use.
+struct MadeFromMesh {
+    std::weak_ptr<const Object> mesh, result;
+};
+using Made = std::map<std::tuple<const Object*, double, double>, MadeFromMesh>;
+
 struct FromMesh : Grid {
     AnyMesh mesh;
 
@@ -51,7 +62,22 @@ struct FromMesh : Grid {
         Grid::declare(declaration);
         return declaration;
     }
+    // The same mesh with the same options is one level set, however often it is asked for.
     ObjectPtr make(MakeContext& context) const
+    {
+        static std::mutex mutex;
+        static Made made;
+        const ObjectPtr from = mesh.moving ? ObjectPtr(mesh.moving) : ObjectPtr(mesh.still);
+        const std::lock_guard lock(mutex);
+        std::erase_if(made, [](const auto& entry) { return entry.second.result.expired(); });
+        MadeFromMesh& known = made[{from.get(), voxel, half_width}];
+        ObjectPtr result = known.result.lock();
+        if (!result || known.mesh.lock() != from) known = {from, result = build(context)};
+        return result;
+    }
+
+private:
+    ObjectPtr build(MakeContext& context) const
     {
         if (!mesh.moving) return level_set_from_mesh(mesh.still, options(), context.warnings);
         if (mesh.moving->deforms())

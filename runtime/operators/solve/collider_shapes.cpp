@@ -58,17 +58,6 @@ LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& 
     return shape->with_band(needed);
 }
 
-// The shape of a rigid collider along its path through a step.
-ShapePtr moving_shape(const Collider& collider, const FrameClock& clock, std::int64_t step, double from, double to,
-                      const PathOptions& options, std::optional<Jump>& jump)
-{
-    const FramePath path = path_of(AnimatedShape(collider.shape, collider.motion), clock, step, options);
-    jump = path.jump;
-    if (path.kind == FramePath::AfterCut)
-        return moving(collider.shape, *going_back(collider.motion, clock, to, path.after), clock, from, to);
-    return moving(collider.shape, *collider.motion, clock, from, to);
-}
-
 void warn_of_jump(const Collider& collider, const Jump& jump, double frame, const Evaluation& now)
 {
     const auto number = static_cast<std::int64_t>(std::ceil(frame));
@@ -166,8 +155,14 @@ void ColliderShapes::set_in_motion(Dynamics& dynamics, const PointSet& points, c
         options.cuts = collider->cuts;
         std::optional<Jump> jump;
         try {
-            in_motion->shape = collider->deforming ? deformed(*collider, options, jump)
-                                                   : moving_shape(*collider, clock, step, from, to, options, jump);
+            if (collider->deforming) {
+                in_motion->shape = deformed(*collider, options, jump);
+            } else {
+                const AnimatedShape body(collider->shape, collider->motion);
+                MovingStep moved = moving_in_step(body, clock, step, options);
+                in_motion->shape = std::move(moved.shape);
+                jump = moved.jump;
+            }
         } catch (Error& error) {
             error.in_node(collider->node).at(collider->location);
             throw;

@@ -3,17 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/shapes/motion/cubic_part.h"
 #include "runtime/shapes/motion/deforming_shape.h"
 
 namespace rapid {
 namespace {
-
-// A cubic between two of its times, as one from 0 to 1.
-Cubic<Vec3d> part(const Cubic<Vec3d>& curve, double from, double to)
-{
-    const double d = to - from;
-    return {curve.at(from), d * curve.derivative(from), d * d * (curve.c2 + 3 * from * curve.c3), d * d * d * curve.c3};
-}
 
 MeshPtr mesh_of(const Mesh& rest, std::span<const Cubic<Vec3d>> curves, double t)
 {
@@ -38,7 +32,21 @@ DeformingLevelSetPtr DeformingLevelSet::transformed(const MotionPtr& motion) con
 {
     auto moved = std::make_shared<DeformingLevelSet>(*this);
     moved->mesh_ = mesh_->transformed(motion);
+    moved->built_ = std::make_shared<Built>();
     return moved;
+}
+
+LevelSetPtr DeformingLevelSet::at(const FrameClock& clock, std::int64_t frame, double band) const
+{
+    const FrameRange range = mesh_->range();
+    if (!range.empty()) frame = std::llround(std::clamp(static_cast<double>(frame), range.first, range.last));
+    const std::lock_guard lock(built_->mutex);
+    auto& by_frame = built_->by_frame;
+    std::erase_if(by_frame, [](const auto& entry) { return entry.second.expired(); });
+    std::weak_ptr<const LevelSet>& known = by_frame[{clock.fps, clock.start, frame}];
+    LevelSetPtr level_set = known.lock();
+    if (!level_set || !(level_set->band() >= band)) known = level_set = build(mesh_->at(clock, frame), band);
+    return level_set;
 }
 
 LevelSetPtr DeformingLevelSet::build(const MeshPtr& mesh, double band) const
@@ -61,25 +69,32 @@ Deformation::Interval Deformation::over(const FrameClock& clock, double from, do
     const AnimatedMesh& mesh = moved ? *moved : body_->mesh();
     const auto frame = static_cast<std::int64_t>(std::ceil(to));
     const FramePath path = path_of(mesh, clock, frame, options);
+    const auto at_frame = [&](std::int64_t whole) {
+        if (moved) return build(mesh.at(clock, whole), band);
+        band_ = band;
+        return body_->at(clock, whole, band);
+    };
     if (!at_end_ && end_ == from) at_end_ = build(mesh.at(clock, static_cast<std::int64_t>(from)), band_);
     if (path.kind == FramePath::Still) {
-        if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = build(mesh.at(clock, frame), band);
+        if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = at_frame(frame);
         end_ = to;
         return {at_end_, path.jump};
     }
 
     std::vector<Cubic<Vec3d>> curves = vertex_curves(mesh, clock, frame, path);
     const double whole = static_cast<double>(frame) - 1;
-    for (Cubic<Vec3d>& curve : curves) curve = part(curve, from - whole, to - whole);
+    for (Cubic<Vec3d>& curve : curves) curve = cubic_part(curve, from - whole, to - whole);
     const bool jumped = path.kind == FramePath::AfterCut && from == whole;
     LevelSetPtr begin;
     if (!jumped) {
         if (at_end_ && end_ == from && at_end_->band() >= band)
             begin = at_end_;
+        else if (!moved && from == whole)
+            begin = body_->at(clock, frame - 1, band);
         else
             begin = body_->build(mesh_of(*mesh.rest(), curves, 0), band);
     }
-    at_end_ = build(to == static_cast<double>(frame) ? mesh.at(clock, frame) : mesh_of(*mesh.rest(), curves, 1), band);
+    at_end_ = to == static_cast<double>(frame) ? at_frame(frame) : build(mesh_of(*mesh.rest(), curves, 1), band);
     end_ = to;
     return {deforming_shape(begin, at_end_, body_->tree(), std::move(curves), (to - from) / clock.fps), path.jump};
 }

@@ -7,8 +7,11 @@
 #pragma once
 
 #include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <tuple>
 
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/motion/animated.h"
@@ -36,6 +39,9 @@ public:
 
     // The level set of the mesh with other positions. Its band is at least so wide, m.
     LevelSetPtr build(const MeshPtr& mesh, double band) const;
+    // That at a whole frame. Where somebody has it still, with such a band, it is not built again: several nodes share
+    // those of a body. From any thread, but where the motion is a script.
+    LevelSetPtr at(const FrameClock& clock, std::int64_t frame, double band) const;
     const std::shared_ptr<const TriangleTree>& tree() const { return tree_; }
 
 private:
@@ -44,6 +50,13 @@ private:
     Box3d bounds_;
     Mesh::Openness open_;  // of all frames
     std::shared_ptr<const TriangleTree> tree_;
+
+    // What is in use; by fps, start and frame.
+    struct Built {
+        std::mutex mutex;
+        std::map<std::tuple<double, std::int64_t, std::int64_t>, std::weak_ptr<const LevelSet>> by_frame;
+    };
+    std::shared_ptr<Built> built_ = std::make_shared<Built>();
 };
 
 using DeformingLevelSetPtr = std::shared_ptr<const DeformingLevelSet>;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 
 #include "runtime/shapes/contact_walk.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
@@ -12,6 +14,15 @@ namespace rapid {
 namespace {
 
 using GridPtr = std::shared_ptr<const GridLevelSet>;
+
+// The acceleration of a point that keeps to a face, by a difference of velocities, which are polynomials of second
+// degree but for the turning normal; m an interval².
+Vec3d by_difference(const MovingTriangles& faces, const MaterialPoint& point, double t)
+{
+    constexpr double step = 0x1p-10;
+    return (faces.velocity(point.face, point.at, t + step) - faces.velocity(point.face, point.at, t - step)) /
+           (2 * step);
+}
 
 // The distance from a surface that goes from one level set to the next along the curves of its vertices.
 class DeformingDistance {
@@ -121,13 +132,9 @@ public:
     }
 
 private:
-    // By a difference of velocities, which are polynomials of second degree but for the turning normal.
     Vec3d acceleration(const MaterialPoint& point, double t) const
     {
-        constexpr double step = 0x1p-10;
-        const Vec3d change =
-            faces_.velocity(point.face, point.at, t + step) - faces_.velocity(point.face, point.at, t - step);
-        return change / (2 * step * duration_ * duration_);
+        return by_difference(faces_, point, t) / (duration_ * duration_);
     }
 
     double part_of(double time) const { return std::clamp(time / duration_, 0.0, 1.0); }
@@ -314,7 +321,102 @@ private:
     Box3d bounds_;
 };
 
-std::shared_ptr<const TriangleTree> tree_of(const MeshPtr& mesh) { return std::make_shared<TriangleTree>(mesh); }
+// The surface of a mesh, without an inside.
+class DeformingSurface final : public MovingBody {
+public:
+    DeformingSurface(MovingTriangles faces, double duration) : faces_(std::move(faces)), duration_(duration) {}
+
+    std::string_view kind() const override { return "mesh"; }
+    Box3d bounds() const override { return faces_.bounds(); }
+    bool moves() const override { return faces_.fastest() > 0; }
+
+    void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
+    {
+        for (std::size_t i = 0; i < P.size(); ++i) sample(i, P, duration_, phi, gradient);
+    }
+    void distance_at(std::span<const Vec3d> P, std::span<const double> time, std::span<double> phi,
+                     std::span<Vec3d> gradient) const override
+    {
+        for (std::size_t i = 0; i < P.size(); ++i) sample(i, P, time[i], phi, gradient);
+    }
+
+    Vec3d velocity_at(const Vec3d& P, double time) const override
+    {
+        const double t = part_of(time);
+        return faces_.velocity(faces_.nearest(P, t), t) / duration_;
+    }
+    Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const override
+    {
+        const double t = part_of(time);
+        const MaterialPoint point = material_at(P, time);
+        const Vec3d slip = v - faces_.velocity(point.face, point.at, t) / duration_;
+        return acceleration(point, t) + 2 / duration_ * faces_.turning(point.face, slip, t);
+    }
+    MaterialPoint material_at(const Vec3d& P, double time) const override
+    {
+        const double t = part_of(time);
+        const std::int32_t face = faces_.nearest(P, t).triangle;
+        return {face, faces_.coordinates(face, P, t)};
+    }
+    bool has(const MaterialPoint& point) const override
+    {
+        return point.face >= 0 && static_cast<std::size_t>(point.face) < faces_.triangles();
+    }
+    State follow(const MaterialPoint& point, double time) const override
+    {
+        const double t = part_of(time);
+        return {faces_.at(point.face, point.at, t), faces_.velocity(point.face, point.at, t) / duration_,
+                acceleration(point, t)};
+    }
+
+    // Nothing is kept out of what has no inside.
+    void first_contact(std::span<const Path>, std::span<Contact> contacts) const override
+    {
+        std::fill(contacts.begin(), contacts.end(), Contact());
+    }
+
+private:
+    double part_of(double time) const { return std::clamp(time / duration_, 0.0, 1.0); }
+
+    // On the surface the gradient is the normal of the face.
+    void sample(std::size_t i, std::span<const Vec3d> P, double time, std::span<double> phi,
+                std::span<Vec3d> gradient) const
+    {
+        const double t = part_of(time);
+        const MovingTriangles::Place place = faces_.nearest(P[i], t);
+        phi[i] = place.distance;
+        if (gradient.empty()) return;
+        if (place.distance > 0)
+            gradient[i] = (P[i] - place.P) / place.distance;
+        else
+            gradient[i] = faces_.frame(place.triangle, t).col(2);
+    }
+    Vec3d acceleration(const MaterialPoint& point, double t) const
+    {
+        return by_difference(faces_, point, t) / (duration_ * duration_);
+    }
+
+    MovingTriangles faces_;
+    double duration_;  // s
+};
+
+// Of a mesh that several users have, once.
+std::shared_ptr<const TriangleTree> tree_of(const MeshPtr& mesh)
+{
+    static std::mutex mutex;
+    static std::map<std::weak_ptr<const Mesh>, std::weak_ptr<const TriangleTree>, std::owner_less<>> known;
+    const std::lock_guard lock(mutex);
+    std::erase_if(known, [](const auto& entry) { return entry.second.expired(); });
+    std::shared_ptr<const TriangleTree> tree = known[mesh].lock();
+    if (!tree) known[mesh] = tree = std::make_shared<TriangleTree>(mesh);
+    return tree;
+}
+
+std::shared_ptr<const MovingBody> surface(const std::shared_ptr<const TriangleTree>& tree,
+                                          std::vector<Cubic<Vec3d>> curves, double duration)
+{
+    return std::make_shared<DeformingSurface>(MovingTriangles(tree, std::move(curves)), duration);
+}
 
 ShapePtr between(const LevelSetPtr& begin, const LevelSetPtr& end, const std::shared_ptr<const TriangleTree>& tree,
                  std::vector<Cubic<Vec3d>> curves, double duration)
@@ -324,7 +426,8 @@ ShapePtr between(const LevelSetPtr& begin, const LevelSetPtr& end, const std::sh
                                                               MovingTriangles(tree, std::move(curves)), duration));
 }
 
-const bool defined = triangle_tree.define(tree_of) && deforming_shape.define(between);
+const bool defined =
+    triangle_tree.define(tree_of) && deforming_shape.define(between) && deforming_surface.define(surface);
 
 }  // namespace
 }  // namespace rapid

@@ -10,6 +10,7 @@
 
 namespace rapid {
 
+class MovingBody;
 struct TriangleTree;
 
 // The hierarchy of faces, for nearest-face queries; the same for all frames of a mesh.
@@ -20,5 +21,9 @@ RAPID_DEFERRED(triangle_tree, std::shared_ptr<const TriangleTree>(const MeshPtr&
 RAPID_DEFERRED(deforming_shape, ShapePtr(const LevelSetPtr& begin, const LevelSetPtr& end,
                                          const std::shared_ptr<const TriangleTree>& tree,
                                          std::vector<Cubic<Vec3d>> curves, double duration));
+
+// The surface alone, of faces that may be open (mesh_surface.h).
+RAPID_DEFERRED(deforming_surface, std::shared_ptr<const MovingBody>(const std::shared_ptr<const TriangleTree>& tree,
+                                                                    std::vector<Cubic<Vec3d>> curves, double duration));
 
 }  // namespace rapid

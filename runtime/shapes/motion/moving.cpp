@@ -153,4 +153,14 @@ ShapePtr moving(const ShapePtr& rest, const Motion& motion, const FrameClock& cl
     return std::make_shared<MovingShape>(rest, MotionTrack(motion, clock, from, to));
 }
 
+MovingStep moving_in_step(const AnimatedShape& shape, const FrameClock& clock, std::int64_t step,
+                          const PathOptions& options)
+{
+    const FramePath path = path_of(shape, clock, step, options);
+    const double from = clock.at_step(step - 1).number, to = clock.at_step(step).number;
+    const MotionPtr motion =
+        path.kind == FramePath::AfterCut ? going_back(shape.motion(), clock, to, path.after) : shape.motion();
+    return {moving(shape.rest(), *motion, clock, from, to), path.jump};
+}
+
 }  // namespace rapid

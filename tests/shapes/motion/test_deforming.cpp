@@ -233,6 +233,22 @@ TEST_CASE("before and after its files a body is at rest, and built once", "[defo
     CHECK_FALSE(deformation.over(clock_24, 20, 21, nullptr, {}, 0).shape->moves());
 }
 
+TEST_CASE("users of a deforming level set share those of whole frames, as far as their bands reach", "[deforming]")
+{
+    const Body ball = fast_ball();
+    const DeformingLevelSetPtr body = ball.level_set(voxel);
+    Deformation one(body), other(body), wide(body);
+    const Deformation::Interval interval = one.over(clock_24, 2, 3, nullptr, {}, 0);
+    other.over(clock_24, 2, 3, nullptr, {}, 0);
+    CHECK(one.at_end() == other.at_end());
+    wide.over(clock_24, 2, 3, nullptr, {}, 5 * voxel);
+    CHECK(wide.at_end() != one.at_end());
+    CHECK(wide.at_end()->band() >= 5 * voxel * (1 - 1e-6));
+    const auto moved = body->transformed(constant_motion({Vec3d(0, 1, 0), Eigen::Quaterniond::Identity(), 1}));
+    CHECK(moved->at(clock_24, 3, 0)->bounds().center().y() > 0.9);
+    CHECK(std::abs(body->at(clock_24, 3, 0)->bounds().center().y()) < 0.1);
+}
+
 TEST_CASE("parts of a frame are parts of its curve", "[deforming]")
 {
     const Body ball = fast_ball();

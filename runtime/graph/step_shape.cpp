@@ -1,0 +1,99 @@
+#include "runtime/graph/step_shape.h"
+
+#include <vector>
+
+#include "runtime/shapes/level_set/level_set_tools.h"
+#include "runtime/shapes/level_set/placed.h"
+#include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/mesh_surface.h"
+#include "runtime/shapes/motion/moving.h"
+
+namespace rapid {
+namespace {
+
+// The step that ends at a frame, in frames.
+struct Step {
+    const FrameClock& clock;
+    std::int64_t number;
+
+    bool is_start() const { return number <= clock.start; }
+    double from() const { return clock.at_step(number - 1).number; }
+    double to() const { return clock.at_step(number).number; }
+};
+
+ShapePtr rigid_in_step(const AnimatedShape& shape, const Step& step)
+{
+    if (!step.is_start()) return moving_in_step(shape, step.clock, step.number, {}).shape;
+    const Pose pose = shape.motion()->at(step.clock.at_step(step.clock.start));
+    if (const auto level_set = std::dynamic_pointer_cast<const LevelSet>(shape.rest()))
+        return move_level_set(level_set, pose);
+    return placed(shape.rest(), pose);
+}
+
+ShapePtr deforming_in_step(const DeformingLevelSetPtr& body, const Step& step)
+{
+    const FrameClock frames{step.clock.fps, step.clock.start};
+    if (step.is_start()) return body->at(frames, step.clock.start, 0);
+    return Deformation(body).over(frames, step.from(), step.to(), nullptr, {}, 0).shape;
+}
+
+ShapePtr shape_in_step(const ObjectPtr& object, const Step& step)
+{
+    if (const auto shape = std::dynamic_pointer_cast<const AnimatedShape>(object)) return rigid_in_step(*shape, step);
+    if (const auto body = std::dynamic_pointer_cast<const DeformingLevelSet>(object))
+        return deforming_in_step(body, step);
+    if (const auto mesh = std::dynamic_pointer_cast<const AnimatedMesh>(object))
+        return step.is_start() ? mesh_surface_at_start(*mesh, step.clock)
+                               : mesh_surface_in_step(*mesh, step.clock, step.number);
+    if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) return mesh_surface(mesh);
+    return nullptr;
+}
+
+bool takes_step_shape(const Param& param) { return param.type.ends_with(StepShape::param_type); }
+
+}  // namespace
+
+bool is_moving_shape(const Object& object)
+{
+    return dynamic_cast<const AnimatedShape*>(&object) || dynamic_cast<const DeformingLevelSet*>(&object) ||
+           dynamic_cast<const AnimatedMesh*>(&object);
+}
+
+std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const FrameClock& clock, const Frame& frame)
+{
+    const Step step{clock, clock.step_at(frame)};
+    const ShapePtr shape = shape_in_step(object, step);
+    if (!shape) return nullptr;
+    if (step.is_start()) return std::make_shared<StepShape>(shape, 0, 0);
+    return std::make_shared<StepShape>(shape, clock.at_step(step.number - 1).time, 1 / clock.steps_per_second());
+}
+
+Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame)
+{
+    const ObjectPtr* object = value.get<ObjectPtr>();
+    if (!object || !takes_step_shape(param)) return value;
+    const auto shape = step_shape(*object, clock, frame);
+    return shape ? Value(ObjectPtr(shape)) : value;
+}
+
+bool differs_by_step(const Param& param, const Value& value)
+{
+    const ObjectPtr* object = value.get<ObjectPtr>();
+    return object && *object && takes_step_shape(param) && is_moving_shape(**object);
+}
+
+void AnyShape::distance(const Chunk& chunk, std::span<double> phi, std::span<Vec3d> gradient) const
+{
+    if (!step) return shape->distance(chunk.P, phi, gradient);
+    std::vector<double> since(chunk.time.begin(), chunk.time.end());
+    for (double& time : since) time -= step->begin();
+    step->distance_at(chunk.P, since, phi, gradient);
+}
+
+void read_value(const Param& param, const Value& value, AnyShape& field)
+{
+    read_value(param, value, field.shape);
+    field.step = std::dynamic_pointer_cast<const StepShape>(field.shape);
+}
+
+}  // namespace rapid

@@ -1,0 +1,82 @@
+// A shape that moves or deforms, or the surface of a mesh, as it goes through one step: what a parameter holds that
+// takes shapes of all kinds. It is made ahead, on the calling thread, when functions of the frame are called.
+#pragma once
+
+#include "runtime/frame.h"
+#include "runtime/graph/param.h"
+#include "runtime/shapes/shape.h"
+#include "runtime/solver/forces.h"
+
+namespace rapid {
+
+class StepShape final : public Shape {
+public:
+    // The type of a parameter that takes one ends with this.
+    static constexpr std::string_view param_type = "shape at rest or moving";
+
+    // shape: with times in seconds since the step began. begin: of the step, s since the start of the simulation.
+    StepShape(ShapePtr shape, double begin, double duration)
+        : shape_(std::move(shape)), begin_(begin), duration_(duration)
+    {
+    }
+
+    double begin() const { return begin_; }
+    double duration() const { return duration_; }  // s; 0 at the start, where nothing moves
+
+    std::string_view kind() const override { return shape_->kind(); }
+    Box3d bounds() const override { return shape_->bounds(); }
+    double band() const override { return shape_->band(); }
+    double slope_bound() const override { return shape_->slope_bound(); }
+    double smallest_feature() const override { return shape_->smallest_feature(); }
+    bool moves() const override { return true; }
+    std::shared_ptr<const Mesh> surface() const override { return shape_->surface(); }
+
+    // At the end of the step.
+    void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
+    {
+        shape_->distance(P, phi, gradient);
+    }
+    void distance_at(std::span<const Vec3d> P, std::span<const double> time, std::span<double> phi,
+                     std::span<Vec3d> gradient) const override
+    {
+        shape_->distance_at(P, time, phi, gradient);
+    }
+    Vec3d velocity_at(const Vec3d& P, double time) const override { return shape_->velocity_at(P, time); }
+    void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
+    {
+        shape_->first_contact(paths, contacts);
+    }
+
+private:
+    ShapePtr shape_;
+    double begin_, duration_;
+};
+
+// Whether an object is a shape that moves or deforms, or a mesh that does.
+bool is_moving_shape(const Object& object);
+
+// A shape that moves, or a mesh, in the step that ends at `frame`; null for any other object. At the start, where no
+// step has been made, nothing moves. On one thread, as motions may be scripts. Error: of a motion, or of a file of a
+// sequence.
+std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const FrameClock& clock, const Frame& frame);
+
+// An argument as a parameter gets it in that step: a step_shape() where it takes one, else the value itself.
+Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame);
+
+// Whether that differs from step to step.
+bool differs_by_step(const Param& param, const Value& value);
+
+// A parameter of a force that takes shapes of all kinds.
+struct AnyShape {
+    static constexpr std::string_view param_type = StepShape::param_type;
+
+    ShapePtr shape;                         // null where none is given
+    std::shared_ptr<const StepShape> step;  // the same, where it moves or is the surface of a mesh
+
+    explicit operator bool() const { return shape != nullptr; }
+    // Of the points of a chunk, each at its own time.
+    void distance(const Chunk& chunk, std::span<double> phi, std::span<Vec3d> gradient) const;
+};
+void read_value(const Param& param, const Value& value, AnyShape& field);
+
+}  // namespace rapid

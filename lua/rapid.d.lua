@@ -721,6 +721,7 @@ function Node:drag(params) end
 ---@class rapid.params.emit
 ---@field source rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, points or node, required]
 ---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  where on the source; without it "points" of points, else "surface". A mesh's points are its vertices. With count or impulse points are taken in order, so that as many births as points take each once; with rate at random [string, one of surface, volume, points]
+---@field density? string|fun(frame: rapid.Frame): string  an attribute of the source's points, or of a mesh's vertices: births are drawn in proportion to it [string]
 ---@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second; of a node, by each of its points [number or rapid.attr, 1/s, at least 0]
 ---@field count? integer|rapid.Attribute|fun(frame: rapid.Frame): integer|rapid.Attribute  points born a frame; of a node, by each of its points, a frame or an event [integer or rapid.attr, at least 0]
 ---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]

@@ -76,7 +76,7 @@ std::span<float> expanded(Column<float>& column)
 
 struct Emit {
     EmitSource source;
-    std::string from, birth, joins;
+    std::string from, density, birth, joins;
     std::optional<Amount<double>> rate;
     std::optional<Amount<int>> count;
     std::optional<std::map<std::int64_t, double>> impulse;
@@ -119,6 +119,8 @@ struct Emit {
                    "vertices. With count or impulse points are taken in order, so that as many births as points take "
                    "each once; with rate at random")
             .choices({"surface", "volume", "points"})
+            .param(&Emit::density, "density", Value(), any_number(), "",
+                   "an attribute of the source's points, or of a mesh's vertices: births are drawn in proportion to it")
             .param(&Emit::rate, "rate", Value(), at_least(0), "1/s",
                    "points born a second; of a node, by each of its points")
             .param(&Emit::count, "count", Value(), at_least(0), "",
@@ -200,8 +202,8 @@ struct Emit {
         check_attributes();
         check_kind();
         if (source.is_node) return;
-        if (!source_.is(source.object, from)) {
-            BirthSource next(source.object, from);
+        if (!source_.is(source.object, from, density)) {
+            BirthSource next(source.object, from, density);
             next.follow(source_);
             source_ = std::move(next);
         }
@@ -550,9 +552,10 @@ void Emit::check_kind() const
                                                     {inherit_velocity.has_value(), "inherit_velocity"},
                                                     {rate && !rate->attribute.empty(), "rate = rapid.attr"},
                                                     {count && !count->attribute.empty(), "count = rapid.attr"}};
-    const std::pair<bool, const char*> of_others[] = {{!from.empty(), "from"},  {impulse.has_value(), "impulse"},
-                                                      {age.has_value(), "age"}, {motion != "spline", "motion"},
-                                                      {alpha != 0.5, "alpha"},  {cut.has_value(), "cut"}};
+    const std::pair<bool, const char*> of_others[] = {{!from.empty(), "from"},        {impulse.has_value(), "impulse"},
+                                                      {!density.empty(), "density"},  {age.has_value(), "age"},
+                                                      {motion != "spline", "motion"}, {alpha != 0.5, "alpha"},
+                                                      {cut.has_value(), "cut"}};
     for (const auto& [given, name] : of_node)
         if (given && !source.is_node)
             throw Error(fmt::format("{} is for a source that is a node; give one, or leave it out", name));

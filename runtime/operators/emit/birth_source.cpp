@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "runtime/graph/value.h"
 #include "runtime/operators/emit/point_path.h"
 #include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/scatter/scatter_by_density.h"
 
 namespace rapid {
 namespace {
@@ -50,7 +53,8 @@ Vec3f direction(const Vec3f& normal)
 
 }  // namespace
 
-BirthSource::BirthSource(ObjectPtr object, std::string from) : object_(std::move(object)), from_(std::move(from))
+BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density)
+    : object_(std::move(object)), from_(std::move(from)), density_(std::move(density))
 {
     const auto points = std::dynamic_pointer_cast<const PointsObject>(object_);
     moving_points_ = std::dynamic_pointer_cast<const AnimatedPoints>(object_);
@@ -81,6 +85,9 @@ void BirthSource::take_shape(const ShapePtr& shape)
             fmt::format("from = \"points\" needs points or a mesh, and source is {}; take \"surface\" or "
                         "\"volume\"",
                         describe(object_)));
+    if (!density_.empty())
+        throw Error(fmt::format("density = \"{}\" is an attribute of points or of a mesh's vertices, and {} has none",
+                                density_, describe(object_)));
     has_normals_ = from_ != "volume";
     scatter_ = from_ == "volume" ? scatter_in_volume(shape) : scatter_on_surface(shape);
 }
@@ -166,16 +173,54 @@ void BirthSource::take_mesh(const MeshPtr& mesh)
 {
     has_normals_ = from_ != "volume";
     if (from_ == "volume") {
+        if (!density_.empty())
+            throw Error(
+                fmt::format("density = \"{}\" is an attribute of vertices, which a volume does not have; take "
+                            "from = \"surface\" or \"points\"",
+                            density_));
         scatter_ = scatter_in_volume(mesh);
         return;
     }
     values_ = vertices_of(*mesh);
     if (from_ == "points") {
         normals_ = vertex_normals(*mesh);
+        take_chances();
         return;
     }
     mesh_ = mesh;
-    scatter_ = scatter_on_surface(mesh);
+    scatter_ = density_.empty() ? scatter_on_surface(mesh) : scatter_by_density(mesh, densities());
+}
+
+std::vector<float> BirthSource::densities() const
+{
+    const Column<float>* column = std::as_const(values_).find<float>(density_);
+    if (!column) {
+        std::vector<std::string> floats;
+        for (const auto& [name, any] : values_.columns())
+            if (type_of(any) == AttributeType::Float) floats.push_back(name);
+        throw Error(fmt::format("density = \"{}\": the source has no float of that name{}", density_,
+                                floats.empty() ? "; it has none" : did_you_mean(density_, floats)));
+    }
+    std::vector<float> densities(values_.size());
+    for (std::size_t i = 0; i < densities.size(); ++i) {
+        densities[i] = (*column)[i];
+        if (!(densities[i] >= 0 && std::isfinite(densities[i])))
+            throw Error(fmt::format("{} is {} at point {} of the source; a density must be at least 0, and finite",
+                                    density_, densities[i], i));
+    }
+    return densities;
+}
+
+void BirthSource::take_chances()
+{
+    chances_ = AliasTable();
+    if (density_.empty() || values_.empty()) return;
+    const std::vector<float> values = densities();
+    const std::vector<double> weights(values.begin(), values.end());
+    const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+    if (!(sum > 0))
+        throw Error(fmt::format("{} is 0 at all points of the source; it must be above 0 somewhere", density_));
+    chances_ = AliasTable(weights, sum);
 }
 
 void BirthSource::take_points(PointSet points)
@@ -186,6 +231,7 @@ void BirthSource::take_points(PointSet points)
         normals_ = *normals;
         has_normals_ = true;
     }
+    take_chances();
 }
 
 std::vector<std::string> BirthSource::inherited() const
@@ -206,7 +252,10 @@ void BirthSource::place(RandomKey key, std::uint64_t first, bool in_order, std::
     const Strided<Vec3f> P = values_.P().read(), N = normals_.read();
     for (std::size_t i = 0; i < out.size(); ++i) {
         std::uint64_t point = (first + i) % n;
-        if (!in_order) {
+        if (!chances_.empty()) {
+            const auto u = uniform4(key, first + i, pick_use);
+            point = static_cast<std::uint64_t>(chances_.draw(u[0], u[1]));
+        } else if (!in_order) {
             const auto u = uniform4(key, first + i, pick_use);
             point = std::min(n - 1, static_cast<std::uint64_t>((u[0] + u[1] * 0x1p-32) * static_cast<double>(n)));
         }

@@ -13,6 +13,7 @@
 #include "runtime/points/point_set.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/motion/body_path.h"
+#include "runtime/shapes/scatter/alias_table.h"
 #include "runtime/shapes/scatter/scatter.h"
 
 namespace rapid {
@@ -21,10 +22,13 @@ class BirthSource {
 public:
     BirthSource() = default;
     // from: "surface", "volume", "points" (a mesh's vertices), or empty for the object's default. Error: an object that
-    // is no source, or none of that kind.
-    BirthSource(ObjectPtr object, std::string from);
+    // is no source, or none of that kind. density: the attribute by which places are drawn, or empty.
+    BirthSource(ObjectPtr object, std::string from, std::string density = "");
 
-    bool is(const ObjectPtr& object, const std::string& from) const { return object_ == object && from_ == from; }
+    bool is(const ObjectPtr& object, const std::string& from, const std::string& density) const
+    {
+        return object_ == object && from_ == from && density_ == density;
+    }
     // Points that take the place of those of `last`, which was the source until now: they travel from there to here.
     void follow(const BirthSource& last);
 
@@ -52,7 +56,7 @@ public:
     std::vector<std::string> inherited() const;
 
     // Places birth number first + i at out[i]; N has the length 1, or 0 where there is no normal. Source points are
-    // taken in order, cyclically, or at random. Draws from the uses 0 to 15 and 17 of the key.
+    // taken in order, cyclically, or at random; by a density at random. Draws from the uses 0 to 15 and 17 of the key.
     void place(RandomKey key, std::uint64_t first, bool in_order, std::span<Birthplace> out) const;
 
     // A column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
@@ -80,11 +84,13 @@ private:
     void take_mesh(const MeshPtr& mesh);
     void take_shape(const ShapePtr& shape);
     void take_points(PointSet points);
+    std::vector<float> densities() const;
+    void take_chances();
     Move move_points_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
     FramePath path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const;
 
     ObjectPtr object_;
-    std::string from_;
+    std::string from_, density_;
     std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, where it is one
     std::shared_ptr<const AnimatedShape> moving_shape_;  // likewise
     BodyPathPtr path_;
@@ -92,6 +98,7 @@ private:
     MeshPtr mesh_;        // birthplaces refer to its triangles
     PointSet values_;
     Column<Vec3f> normals_;  // of the points
+    AliasTable chances_;     // of the points, by their density
     bool has_normals_ = false;
 
     // Of points: their motion, or the sets before, where a function of the frame gives another at each step.

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "runtime/deferred.h"
@@ -13,8 +15,9 @@ namespace rapid {
 // has the same corners in each file, and is merged as its first file is.
 struct MeshFile {
     std::vector<Vec3f> positions;
-    std::vector<Vec3f> colours;  // empty, or shape [positions]
-    std::vector<float> alphas;   // empty, or shape [positions]
+    std::vector<Vec3f> colours;                        // empty, or shape [positions]
+    std::vector<float> alphas;                         // empty, or shape [positions]
+    std::map<std::string, Mesh::VertexValues> values;  // others, each of shape [positions]; of PLY
     std::vector<Mesh::Triangle> triangles;
 };
 

@@ -1,9 +1,11 @@
-// Meshes from PLY files: the element "vertex" with x y z and, where there are some, red green blue (alpha); the element
-// "face" with a list of indices, vertex_indices or vertex_index.
+// Meshes from PLY files: the element "vertex" with x y z and, where there are some, red green blue (alpha), and any
+// other number: nx ny nz is N, NAMEx NAMEy NAMEz a vec3, the others are floats; the element "face" with a list of
+// indices, vertex_indices or vertex_index. Other properties of faces are left out.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
@@ -52,6 +54,51 @@ private:
     double scale_ = 1;
 };
 
+// What is read apart from the others, or is none of a vertex alone.
+bool is_known(const std::string& name)
+{
+    static const std::set<std::string> names = {"x", "y", "z", "red", "green", "blue", "alpha"};
+    return names.count(name) != 0;
+}
+
+// The name of a vec3 whose components are this property and the two after it, NAMEx NAMEy NAMEz; nx ny nz is N. Empty
+// where they are none.
+std::string vec3_name(const std::vector<PlyProperty>& properties, std::size_t at)
+{
+    const std::string& first = properties[at].name;
+    if (first.size() < 2 || at + 2 >= properties.size()) return "";
+    const std::string stem = first.substr(0, first.size() - 1);
+    for (std::size_t c = 0; c < 3; ++c) {
+        const PlyProperty& property = properties[at + c];
+        if (property.name != stem + "xyz"[c] || !is_floating(property.type)) return "";
+    }
+    return stem == "n" ? "N" : stem;
+}
+
+void read_values(const PlyElement& vertex, const PlyRecords& records, MeshFile& mesh)
+{
+    const std::vector<PlyProperty>& properties = vertex.properties;
+    for (std::size_t p = 0; p < properties.size(); ++p) {
+        if (is_known(properties[p].name)) continue;
+        const auto values_of = [&](std::size_t property) {
+            return Property(vertex, records, properties[property].name, false);
+        };
+        if (const std::string name = vec3_name(properties, p); !name.empty()) {
+            const Property x = values_of(p), y = values_of(p + 1), z = values_of(p + 2);
+            std::vector<Vec3f> values;
+            values.reserve(vertex.count);
+            for (std::size_t i = 0; i < vertex.count; ++i) values.emplace_back(x[i], y[i], z[i]);
+            mesh.values.emplace(name, std::move(values));
+            p += 2;
+        } else {
+            const Property number = values_of(p);
+            std::vector<float> values(vertex.count);
+            for (std::size_t i = 0; i < vertex.count; ++i) values[i] = number[i];
+            mesh.values.emplace(properties[p].name, std::move(values));
+        }
+    }
+}
+
 void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
 {
     if (vertex.has_lists()) throw Error("vertices with list properties can't be read");
@@ -65,6 +112,7 @@ void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
     if (!x || !y || !z) throw Error("the vertices have no x y z");
     mesh.positions.reserve(vertex.count);
     for (std::size_t i = 0; i < vertex.count; ++i) mesh.positions.emplace_back(x[i], y[i], z[i]);
+    read_values(vertex, records, mesh);
 
     const Property red = property("red", true), green = property("green", true), blue = property("blue", true),
                    alpha = property("alpha", true);

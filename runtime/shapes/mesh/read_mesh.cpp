@@ -118,9 +118,11 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
     mesh->name = std::move(name);
     std::vector<Vec3f> colours;
     std::vector<float> alphas;
+    std::vector<std::size_t> first_corners;  // of each vertex
     for (std::size_t i = 0; i < file.positions.size(); ++i) {
         if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its vertex
         mesh->positions.push_back(file.positions[i]);
+        first_corners.push_back(i);
         if (!file.colours.empty()) {
             colours.push_back(file.colours[i]);
             alphas.push_back(file.alphas[i]);
@@ -139,6 +141,14 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
     if (std::any_of(alphas.begin(), alphas.end(), [](float alpha) { return alpha != 1.0f; }))
         mesh->values.emplace("Alpha", std::move(alphas));
     if (!colours.empty()) mesh->values.emplace("Cd", std::move(colours));
+    for (const auto& [key, values] : file.values)
+        std::visit(
+            [&, &attribute = key](const auto& of_corners) {
+                std::decay_t<decltype(of_corners)> of_vertices;
+                for (const std::size_t corner : first_corners) of_vertices.push_back(of_corners[corner]);
+                mesh->values.emplace(attribute, std::move(of_vertices));
+            },
+            values);
     return mesh;
 }
 

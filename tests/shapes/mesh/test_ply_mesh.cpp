@@ -103,3 +103,23 @@ TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[
         CHECK((b - a).cross(c - a).z() > 0);
     }
 }
+
+TEST_CASE("every number of the vertices of a PLY is a value of the mesh; three that belong together are a vec3",
+          "[mesh][ply]")
+{
+    const PlyFolder folder;
+    const MeshPtr mesh = folder.read("ply\nformat ascii 1.0\nelement vertex 3\n" + xyz +
+                                     "property float nx\nproperty float ny\nproperty float nz\nproperty uchar kind\n"
+                                     "property float flowx\nproperty float flowy\nproperty float flowz\n"
+                                     "property double heat\nproperty int ax\nproperty int ay\nproperty int az\n"
+                                     "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                                     "0 0 0 0 1 0 7 1 2 3 0.5 1 2 3\n1 0 0 0 0 1 8 4 5 6 0.25 4 5 6\n"
+                                     "0 1 0 1 0 0 9 7 8 9 -1 7 8 9\n3 0 1 2\n");
+    std::vector<std::string> names;
+    for (const auto& [name, values] : mesh->values) names.push_back(name);
+    CHECK(names == std::vector<std::string>{"N", "ax", "ay", "az", "flow", "heat", "kind"});
+    CHECK(std::get<std::vector<float>>(mesh->values.at("heat")) == std::vector<float>{0.5f, 0.25f, -1});
+    CHECK(std::get<std::vector<float>>(mesh->values.at("kind")) == std::vector<float>{7, 8, 9});
+    CHECK_THAT(std::get<std::vector<Vec3f>>(mesh->values.at("flow"))[1], close_to(Vec3f(4, 5, 6), 0));
+    CHECK_THAT(std::get<std::vector<Vec3f>>(mesh->values.at("N"))[2], close_to(Vec3f(1, 0, 0), 0));
+}

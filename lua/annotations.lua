@@ -143,6 +143,8 @@ function LevelSet:intersect(other) end
 ---@return rapid.LevelSet
 function LevelSet:subtract(other) end
 
+---@class rapid.Fog  a volume of a density
+
 ---@class rapid.Grid  of vectors
 local Grid = {}
 ---Between the voxels' values.
@@ -152,7 +154,7 @@ function Grid:sample(P) end
 
 ---@class rapid
 local rapid = {}
-rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
+rapid.mesh, rapid.levelset, rapid.grid, rapid.fog, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}, {}
 
 ---A value that --set can replace.
 ---@generic T

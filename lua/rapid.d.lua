@@ -139,6 +139,8 @@ function LevelSet:intersect(other) end
 ---@return rapid.LevelSet
 function LevelSet:subtract(other) end
 
+---@class rapid.Fog  a volume of a density
+
 ---@class rapid.Grid  of vectors
 local Grid = {}
 ---Between the voxels' values.
@@ -148,7 +150,7 @@ function Grid:sample(P) end
 
 ---@class rapid
 local rapid = {}
-rapid.mesh, rapid.levelset, rapid.grid, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}
+rapid.mesh, rapid.levelset, rapid.grid, rapid.fog, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}, {}
 
 ---A value that --set can replace.
 ---@generic T
@@ -244,6 +246,15 @@ function rapid.math.rotation(axis, degrees) end
 ---@param to rapid.Vec3
 ---@return rapid.Quat
 function rapid.math.rotation_between(from, to) end
+
+---@class rapid.options.fog_read
+---@field grid? string  its name; the only fog of floats, when not given [string]
+
+---Reads a fog, in which points are born by density, from a .vdb file.
+---@param path string  relative to the graph file [string, required]
+---@param options? rapid.options.fog_read
+---@return rapid.Fog
+function rapid.fog.read(path, options) end
 
 ---@class rapid.options.grid_from
 ---@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once [function of a place, required]
@@ -719,7 +730,7 @@ function Node:distance(params) end
 function Node:drag(params) end
 
 ---@class rapid.params.emit
----@field source rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, points or node, required]
+---@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, fog, points or node, required]
 ---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  where on the source; without it "points" of points, else "surface". A mesh's points are its vertices. With count or impulse points are taken in order, so that as many births as points take each once; with rate at random [string, one of surface, volume, points]
 ---@field density? string|fun(frame: rapid.Frame): string  an attribute of the source's points, or of a mesh's vertices: births are drawn in proportion to it [string]
 ---@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second; of a node, by each of its points [number or rapid.attr, 1/s, at least 0]

@@ -110,6 +110,7 @@ local function make(native, load_node, numeric, shapes, studies)
     read = maker("grid.read", "path"),
     from = grid_from,
   }
+  rapid.fog = { read = maker("fog.read", "path") }
   rapid.shape = {}
   for _, name in ipairs(native.maker_names "shape") do rapid.shape[name] = maker("shape." .. name) end
   rapid.points = {

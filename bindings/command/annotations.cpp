@@ -49,7 +49,7 @@ std::string lua_type(const Param& param)
         {"list of vec3", "rapid.Place[]"},
         {"level set", "rapid.Shape"},
         {"mesh", "rapid.Mesh"},
-        {"mesh, level set, shape, points or node", "rapid.Mesh|rapid.Shape|rapid.Points|rapid.Node"},
+        {"mesh, level set, shape, fog, points or node", "rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node"},
         {"motion", "rapid.Motion"},
         {"name of a group", "string"},
         {"name of an attribute", "string"},
@@ -157,7 +157,7 @@ std::string node_of(const NodeType& type)
 std::string maker_of(const Maker& maker)
 {
     static const std::map<std::string_view, std::string_view> results = {
-        {"mesh", "rapid.Mesh"},   {"levelset", "rapid.LevelSet"}, {"grid", "rapid.Grid"},
+        {"mesh", "rapid.Mesh"},   {"levelset", "rapid.LevelSet"}, {"grid", "rapid.Grid"},    {"fog", "rapid.Fog"},
         {"shape", "rapid.Shape"}, {"points", "rapid.Points"},     {"motion", "rapid.Motion"}};
     const std::size_t dot = maker.name.find('.');
     const std::string family = maker.name.substr(0, dot), own = maker.name.substr(dot + 1);

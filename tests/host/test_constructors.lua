@@ -276,6 +276,9 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.points.grid { spacing = 0 }"] = "spacing = 0 is out of range; it must be above 0",
       ["rapid.points.grid { spacing = 1e-6 }"] = "at most 2^31 can be",
       ["rapid.points.read 'none.vdb'"] = "rapid.points.read: none.vdb: can't be read: No such file or directory",
+      ["rapid.fog.read 'none.vdb'"] = "rapid.fog.read: there is no file",
+      ["rapid.levelset.sphere { radius = 1, voxel = 0.2 }:write 'ball.vdb' rapid.fog.read 'ball.vdb'"] =
+        "there is no fog of floats",
       ["rapid.translate(1, 2)"] = "rapid.translate takes three numbers: rapid.translate(x, y, z)",
       ["rapid.rotate({0, 0, 0}, 90)"] = "rapid.rotate: the axis has length 0; it needs a direction",
       ["rapid.rotate({0, 1, 0})"] = "rapid.rotate: the degrees is missing",

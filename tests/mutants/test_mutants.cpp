@@ -18,6 +18,7 @@
 
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
+#include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/mesh/mesh.h"
@@ -49,6 +50,12 @@ void use_vector_grid(const Path& path)
     read_vector_grid(path, "")->sample({&P, 1}, {&value, 1});
 }
 
+void use_density_grid(const Path& path)
+{
+    std::vector<Birthplace> births(10);
+    read_density_grid(path, "")->scatter()->place(RandomKey(1, "a"), 0, births);
+}
+
 // Writes a whole file of the format.
 void write_points_of(const Path& path) { write_points(path, random_points({.size = 40, .wide = false})); }
 void write_level_set(const Path& path) { level_set_sphere(1, Vec3d::Zero(), {0.2, 3})->write(path, "surface"); }
@@ -59,6 +66,16 @@ void write_vector_grid(const Path& path)
     const auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3s(0, 1, 0));
     grid->setName("v");
     for (int i = 0; i < 20; ++i) grid->tree().setValue({i, 2 * i, 0}, openvdb::Vec3s(1, 2, static_cast<float>(i)));
+    openvdb::io::File(path.string()).write({grid});
+}
+
+void write_density_grid(const Path& path)
+{
+    openvdb::initialize();
+    const auto grid = openvdb::FloatGrid::create();
+    grid->setName("density");
+    grid->tree().addTile(1, {64, 0, 0}, 0.5f, true);
+    for (int i = 0; i < 20; ++i) grid->tree().setValue({i, 2 * i, 0}, static_cast<float>(i));
     openvdb::io::File(path.string()).write({grid});
 }
 
@@ -144,6 +161,7 @@ const std::vector<Reader>& readers()
         {"mesh .glb", "a.glb", glb(), nullptr, use_mesh},
         {"level set .vdb", "a.vdb", "", write_level_set, use_level_set},
         {"vector grid .vdb", "a.vdb", "", write_vector_grid, use_vector_grid},
+        {"fog .vdb", "a.vdb", "", write_density_grid, use_density_grid},
     };
     return all;
 }

@@ -8,6 +8,7 @@
 
 #include "runtime/graph/value.h"
 #include "runtime/operators/emit/point_path.h"
+#include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/scatter/scatter_by_density.h"
 
@@ -70,12 +71,28 @@ BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density
         take_shape(moving_shape_->rest());
     } else if (const auto shape = std::dynamic_pointer_cast<const Shape>(object_)) {
         take_shape(shape);
+    } else if (const auto fog = std::dynamic_pointer_cast<const DensityGrid>(object_)) {
+        take_fog(*fog);
     } else if (std::dynamic_pointer_cast<const DeformingLevelSet>(object_)) {
         throw Error("source = a deforming level set can't bear points; give the mesh that it was made from");
     } else {
-        throw Error(fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape or points",
-                                describe(object_)));
+        throw Error(
+            fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape, a fog "
+                        "or points",
+                        describe(object_)));
     }
+}
+
+void BirthSource::take_fog(const DensityGrid& fog)
+{
+    if (!from_.empty() && from_ != "volume")
+        throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of a fog take \"volume\"", from_));
+    if (!density_.empty())
+        throw Error(
+            fmt::format("density = \"{}\" is an attribute of points or of a mesh's vertices; a fog bears by "
+                        "its own",
+                        density_));
+    scatter_ = fog.scatter();
 }
 
 void BirthSource::take_shape(const ShapePtr& shape)

@@ -1,4 +1,4 @@
-// The source of an emitter: a mesh, a level set, an analytic shape, or points; at rest, moving or deforming.
+// The source of an emitter: a mesh, a level set, an analytic shape, a fog, or points; at rest, moving or deforming.
 //
 // It gives the place of a birth, the normal there, and the attribute values that newborn points inherit. All of these
 // depend only on the random key and the birth's number.
@@ -17,6 +17,8 @@
 #include "runtime/shapes/scatter/scatter.h"
 
 namespace rapid {
+
+class DensityGrid;
 
 class BirthSource {
 public:
@@ -83,6 +85,7 @@ public:
 private:
     void take_mesh(const MeshPtr& mesh);
     void take_shape(const ShapePtr& shape);
+    void take_fog(const DensityGrid& fog);
     void take_points(PointSet points);
     std::vector<float> densities() const;
     void take_chances();

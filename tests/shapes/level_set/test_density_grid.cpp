@@ -1,0 +1,121 @@
+#include "runtime/shapes/level_set/density_grid.h"
+
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+
+#include <cmath>
+
+#include "runtime/error.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+namespace {
+
+struct Folder : TemporaryFolder {
+    Folder() { openvdb::initialize(); }
+
+    DensityGridPtr read(const openvdb::GridPtrVec& grids, const std::string& name = "") const
+    {
+        openvdb::io::File((*this / "fog.vdb").string()).write(grids);
+        return read_density_grid(*this / "fog.vdb", name);
+    }
+    // Without the text that names the file.
+    std::string error(const openvdb::GridPtrVec& grids, const std::string& name = "") const
+    {
+        return error_of([&] { read(grids, name); });
+    }
+};
+
+openvdb::FloatGrid::Ptr fog(const char* name = "density")
+{
+    auto grid = openvdb::FloatGrid::create();
+    grid->setName(name);
+    grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    return grid;
+}
+
+std::vector<Vec3f> births(const DensityGrid& grid, std::size_t n)
+{
+    std::vector<Birthplace> out(n);
+    grid.scatter()->place(RandomKey(1, "emit1"), 0, out);
+    std::vector<Vec3f> places;
+    for (const Birthplace& birth : out) {
+        CHECK(birth.element == -1);
+        places.push_back(birth.P);
+    }
+    return places;
+}
+
+}  // namespace
+
+TEST_CASE("births in a fog are as many at each voxel as its density says, spread by its hat", "[density_grid]")
+{
+    const Folder folder;
+    const auto grid = fog();
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
+    grid->tree().setValue({0, 0, 0}, 1.0f);
+    grid->tree().setValue({10, 2, -4}, 3.0f);
+    grid->tree().setValue({5, 5, 5}, 0.0f);
+    constexpr std::size_t n = 40'000;
+    std::size_t dense = 0;
+    Vec3d sum = Vec3d::Zero(), squares = Vec3d::Zero();
+    for (const Vec3f& P : births(*folder.read({grid}), n)) {
+        const bool at_dense = P.x() > 2.5f;
+        dense += at_dense;
+        const Vec3d away = P.cast<double>() - (at_dense ? Vec3d(5, 1, -2) : Vec3d(0, 0, 0));
+        CHECK(away.cwiseAbs().maxCoeff() <= 0.5);
+        sum += away;
+        squares += away.cwiseProduct(away);
+    }
+    CHECK(std::abs(double(dense) - 0.75 * n) < 5 * std::sqrt(n * 0.75 * 0.25));
+    // A hat of the half width h has the mean 0 and the variance h²/6, and of that the variance 7 h⁴/180.
+    const double h = 0.5, variance = h * h / 6;
+    for (int axis = 0; axis < 3; ++axis) {
+        CHECK(std::abs(sum[axis] / n) < 5 * std::sqrt(variance / n));
+        CHECK(std::abs(squares[axis] / n - variance) < 5 * std::sqrt(7 * std::pow(h, 4) / 180 / n));
+    }
+}
+
+TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
+{
+    const Folder folder;
+    const auto grid = fog();
+    grid->tree().addTile(1, {0, 0, 0}, 2.0f, true);  // 8 voxels an edge
+    grid->tree().setValue({100, 0, 0}, 1024.0f);     // as dense as all of them
+    constexpr std::size_t n = 40'000;
+    std::size_t in_tile = 0;
+    Vec3d sum = Vec3d::Zero();
+    for (const Vec3f& P : births(*folder.read({grid}), n)) {
+        if (P.x() > 50) continue;
+        ++in_tile;
+        sum += P.cast<double>();
+    }
+    CHECK(std::abs(double(in_tile) - 0.5 * n) < 5 * std::sqrt(n * 0.25));
+    // Voxels 0 to 7: the mean is 3.5, the variance (8² - 1)/12 and the hat's.
+    const double deviation = std::sqrt((63.0 / 12 + 1.0 / 6) / double(in_tile));
+    for (int axis = 0; axis < 3; ++axis) CHECK(std::abs(sum[axis] / double(in_tile) - 3.5) < 5 * deviation);
+}
+
+TEST_CASE("what is no fog is an error that says what is, and what is in the file", "[density_grid]")
+{
+    const Folder folder;
+    const auto one = fog("smoke"), other = fog("heat"), negative = fog(), empty = fog();
+    for (const auto& grid : {one, other}) grid->tree().setValue({0, 0, 0}, 1.0f);
+    negative->tree().setValue({1, 2, 3}, -1.0f);
+    empty->tree().setValue({1, 2, 3}, 0.0f);
+    const auto surface = fog("surface");
+    surface->setGridClass(openvdb::GRID_LEVEL_SET);
+    CHECK_THAT(folder.error({one, other}), Catch::Contains("there are 2 fogs") && Catch::Contains("name one by grid"));
+    CHECK(births(*folder.read({one, other}, "heat"), 1).size() == 1);
+    CHECK_THAT(folder.error({one}, "smok"), Catch::Contains("did you mean \"smoke\"?"));
+    CHECK_THAT(folder.error({surface}), Catch::Contains("there is no fog of floats"));
+    CHECK_THAT(folder.error({surface}, "surface"),
+               Catch::Contains("is a level set of float; it must be a fog of floats: rapid.levelset.read takes level"));
+    CHECK_THAT(folder.error({negative}),
+               Catch::EndsWith("grid \"density\" is -1 at voxel 1 2 3; a density must be at least 0"));
+    CHECK_THAT(folder.error({empty}), Catch::EndsWith("has no density above 0; nothing can be born in it"));
+    CHECK_THAT(error_of([&] { read_density_grid(folder / "none.vdb", ""); }), Catch::Contains("there is no file"));
+}

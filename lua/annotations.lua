@@ -106,6 +106,8 @@ local Points = {}
 ---@return rapid.Points
 function Points:transform(motion) end
 
+---@class rapid.Camera
+
 ---@class rapid.Motion  a * b moves by b, and then by a
 ---@operator mul(rapid.Motion): rapid.Motion
 

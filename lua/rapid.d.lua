@@ -102,6 +102,8 @@ local Points = {}
 ---@return rapid.Points
 function Points:transform(motion) end
 
+---@class rapid.Camera
+
 ---@class rapid.Motion  a * b moves by b, and then by a
 ---@operator mul(rapid.Motion): rapid.Motion
 
@@ -246,6 +248,17 @@ function rapid.math.rotation(axis, degrees) end
 ---@param to rapid.Vec3
 ---@return rapid.Quat
 function rapid.math.rotation_between(from, to) end
+
+---@class rapid.options.camera_camera
+---@field position? rapid.Place  its place [vec3, m]
+---@field target? rapid.Place  where it looks [vec3, m]
+---@field fov? number  vertical angle of view, degrees; 35 without it [number, from 1 to 170]
+---@field group? string  a group of points that it frames and follows, in place of the scene [string]
+
+---From where pictures are taken; what it leaves open is fitted.
+---@param options? rapid.options.camera_camera
+---@return rapid.Camera
+function rapid.camera(options) end
 
 ---@class rapid.options.fog_read
 ---@field grid? string  its name; the only fog of floats, when not given [string]
@@ -977,6 +990,20 @@ function Node:merge(...) end
 ---@return rapid.Node
 function Node:nearest_place(params) end
 
+---@class rapid.params.picture
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field blend? "over"|"add"|fun(frame: rapid.Frame): "over"|"add"  "add": points shine, add their light, and cast no shadow [string, one of over, add, default "over"]
+---@field shutter? number|fun(frame: rapid.Frame): number  part of the frame for which the picture is exposed: what moves leaves a streak [number, from 0 to 1, default 0]
+---@field camera? rapid.Camera|table<integer, rapid.Camera>|fun(frame: rapid.Frame): rapid.Camera|table<integer, rapid.Camera>  rapid.camera, a function of the frame that returns one, or keys; without it, fitted to the scene [camera]
+---@field emitters? boolean|fun(frame: rapid.Frame): boolean  whether shapes that bear points are shown [boolean, default true]
+---@field colliders? boolean|fun(frame: rapid.Frame): boolean  whether colliders and planes are shown [boolean, default true]
+---@field name? string  what the node is called in messages [string]
+
+---Says how points look in pictures; they stay as they are.
+---@param params? rapid.params.picture
+---@return rapid.Node
+function Node:picture(params) end
+
 ---@class rapid.params.pin
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape or mesh that moves or deforms, and carries them; where not given, where each point is first pinned [vec3, attribute or moving shape, m]
@@ -1087,6 +1114,15 @@ function Node:swirl(params) end
 ---@param params? rapid.params.torque
 ---@return rapid.Node
 function Node:torque(params) end
+
+---@class rapid.params.trail
+---@field places? integer  frames that a trail is long [integer, from 1 to 256, default 12]
+---@field name? string  what the node is called in messages [string]
+
+---Keeps the last places of each point: trail1 is that of a frame ago, and so on.
+---@param params? rapid.params.trail
+---@return rapid.Node
+function Node:trail(params) end
 
 ---@class rapid.params.tumble
 ---@field drag? number|fun(frame: rapid.Frame): number  rate at which w falls [number, 1/s, at least 0, default 0]

@@ -132,6 +132,7 @@ local function make(native, load_node, numeric, shapes, studies)
   end
   rapid.rotate = maker("motion.rotate", "axis", "degrees")
   rapid.scale = maker("motion.scale", "factor")
+  rapid.camera = maker "camera"
 
   function rapid.attr(name)
     return native.attribute(name)

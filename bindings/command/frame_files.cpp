@@ -75,7 +75,7 @@ void FrameFiles::declare(CLI::App& app)
                for (const std::string& text : texts) targets_.push_back({parse_output_target(text), text, {}});
            },
            "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
-           ".usda .npz .csv .png); "
+           ".usda .npz .csv .png, films: .mp4 .webm .gif); "
            "attributes behind a colon are written besides P, v and id, without them all are")
         ->type_name("PATTERN[:ATTR,ATTR]")
         ->allow_extra_args(false);
@@ -116,11 +116,27 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
     return options;
 }
 
+bool FrameFiles::makes_films() const
+{
+    return std::any_of(targets_.begin(), targets_.end(),
+                       [](const Target& target) { return format_of(target.to.pattern).film; });
+}
+
 std::vector<std::string> FrameFiles::names() const
 {
     std::vector<std::string> names;
     for (const Target& target : targets_) names.push_back(target.text);
     return names;
+}
+
+void FrameFiles::check_film(const Format& format, const std::string& pattern) const
+{
+    if (FramePattern(pattern).has_frame())
+        throw Error("a film is one file of all frames; leave the frame's number out of its name");
+    if (needs_even_edges(format.extension) && (picture_->width % 2 != 0 || picture_->height % 2 != 0))
+        throw Error(fmt::format("a {} film has even edges; give a --size other than {}x{}", format.extension,
+                                picture_->width, picture_->height));
+    require_ffmpeg();
 }
 
 void FrameFiles::resolve(const Plan& plan, bool several_frames)
@@ -132,8 +148,10 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
             if (attribute.kept && !attribute.group && !of_scene.count(attribute.name)) unasked_.insert(attribute.name);
     std::set<std::string> patterns;
     const auto check = [&](const std::string& pattern) {
-        format_of(pattern);
-        if (several_frames && !FramePattern(pattern).has_frame())
+        const Format& format = format_of(pattern);
+        if (format.film)
+            check_film(format, pattern);
+        else if (several_frames && !FramePattern(pattern).has_frame())
             throw Error("several frames go to one file; put the frame's number into its name, as ####");
         if (!patterns.insert(pattern).second)
             throw Error("the same files are written twice; give each its own pattern");
@@ -192,7 +210,8 @@ FrameInfo FrameFiles::info_of(std::int64_t number, double time, double fps, cons
     info.time = time;
     info.fps = fps;
     info.picture = picture_;
-    if (format_of(to.pattern).extension == ".png") info.scene = scene_->at(number);
+    if (const Format& format = format_of(to.pattern); format.film || format.extension == ".png")
+        info.scene = scene_->at(number);
     return info;
 }
 
@@ -231,12 +250,12 @@ void FrameFiles::write_node(const std::string& pattern, const PointSet& points, 
     submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main");
 }
 
-void FrameFiles::finish()
+void FrameFiles::finish(bool complete)
 {
     // All writers, even after a failure, so that the frames that the others hold are not lost.
     std::exception_ptr first;
     for (auto& [key, writer] : writers_) try {
-            writer->finish();
+            writer->finish(complete);
         } catch (...) {
             if (!first) first = std::current_exception();
         }

@@ -29,6 +29,9 @@ public:
     // Options of the plan, which must keep all attributes that -o names.
     PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
 
+    // Whether -o asks for films, which a program of its own writes.
+    bool makes_films() const;
+
     // The -o as the user gave them.
     std::vector<std::string> names() const;
 
@@ -41,8 +44,8 @@ public:
     // Queues the file of a `:write` node.
     void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
 
-    // Waits until all files are written. Error: one could not be.
-    void finish();
+    // Waits until all files are written; complete: with all frames, else there are no films. Error: one could not be.
+    void finish(bool complete = true);
 
     // The first name of each pattern and output, once it is known; then no more.
     std::vector<std::string> take_first_names() { return std::exchange(first_names_, {}); }
@@ -59,6 +62,7 @@ private:
         std::vector<std::string> outputs;  // whose points it takes
     };
     void resolve(Target& target, const Plan& plan) const;
+    void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
     void remove_unasked(PointSet& points) const;
     void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output);

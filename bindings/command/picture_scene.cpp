@@ -1,10 +1,13 @@
 #include "bindings/command/picture_scene.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
 
+#include "runtime/graph/param.h"
+#include "runtime/operators/picture.h"
 #include "runtime/shapes/motion/deforming.h"
 
 namespace rapid {
@@ -23,6 +26,31 @@ std::optional<PictureScene::Plane> plane_of(const Shape& shape)
     const bool linear = std::abs(plane.normal.dot(P[4]) - plane.offset - phi[4]) <= 100 * rounding;
     if (!linear || std::abs(plane.normal.norm() - 1) > rounding) return std::nullopt;
     return plane;
+}
+
+// What a `:picture` says in this frame.
+PictureNode picture_at(const Node& node, const Frame& now)
+{
+    std::map<std::string, Value> arguments = node.arguments;
+    for (auto& [name, value] : arguments)
+        if (const FrameFunction* function = value.function()) value = function->call(now);
+    PictureNode picture;
+    assign_arguments(node.type->params, arguments, &picture);
+    return picture;
+}
+
+bool has_functions(const Node& node)
+{
+    return std::any_of(node.arguments.begin(), node.arguments.end(),
+                       [](const auto& argument) { return argument.second.function() != nullptr; });
+}
+
+// fps: of the points, whose frame may have several steps.
+void add_look(PictureScene& scene, const PictureNode& picture, const Frame& now, double fps)
+{
+    scene.styles.push_back({picture.group, picture.blend == "add", picture.shutter / fps});
+    if (const CameraPtr camera = picture.camera.at(now.number))
+        scene.camera = {camera->position, camera->target, camera->fov, camera->group};
 }
 
 }  // namespace
@@ -57,7 +85,7 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
     if (still_) return still_;
     surfaces_before_ = std::exchange(surfaces_, {});
     auto scene = std::make_shared<PictureScene>();
-    bool moves = false;
+    bool moves = false, emitters = true, colliders = true;
     for (const PlannedNode& planned : plan_.nodes) {
         // Shapes of dynamics are colliders; those of all other nodes emit points.
         const auto role =
@@ -65,6 +93,14 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
         const PlannedSimulation& simulation = plan_.simulations[planned.simulation];
         const FrameClock clock{simulation.fps, simulation.start, simulation.subframes};
         const Frame now = clock.at(static_cast<double>(frame));
+        if (planned.node->type->name == "picture") {
+            const PictureNode picture = picture_at(*planned.node, now);
+            add_look(*scene, picture, now, simulation.fps);
+            emitters = emitters && picture.emitters;
+            colliders = colliders && picture.colliders;
+            moves = moves || picture.camera.keys.size() > 1 || has_functions(*planned.node);
+            continue;
+        }
         Eigen::Affine3d place = Eigen::Affine3d::Identity();
         if (const auto transform = planned.node->arguments.find("transform");
             transform != planned.node->arguments.end()) {
@@ -92,6 +128,10 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
             }
         }
     }
+    std::erase_if(scene->bodies, [&](const PictureScene::Body& body) {
+        return !(body.role == PictureScene::Body::Emitter ? emitters : colliders);
+    });
+    if (!colliders) scene->planes.clear();
     if (!moves) still_ = scene;
     return scene;
 }

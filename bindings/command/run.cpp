@@ -50,6 +50,8 @@ public:
     {
         if (watch_ && untrusted_.asked())
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
+        if (untrusted_.asked() && files_.makes_films())
+            throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
         untrusted_.confine([&] { return access(); }, common);
     }
     // --watch runs the graph in processes of its own.
@@ -138,7 +140,7 @@ private:
     void finish_files(const Error& reason, RunReport& report)
     {
         try {
-            files_.finish();
+            files_.finish(false);
         } catch (const std::exception& error) {
             if (std::string_view(error.what()) != reason.what()) report.warning(error.what());
         }

@@ -34,6 +34,8 @@ public:
     // Writes after the bytes appended so far; from one thread.
     void append(const void* data, std::size_t bytes);
     std::uint64_t appended() const { return appended_; }
+    // For another program that writes the file.
+    int descriptor() const { return descriptor_.number(); }
 
     // Names the file, in place of any other of that name. Error: whatever the file system kept back until now.
     void finish();

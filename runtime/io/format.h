@@ -22,6 +22,8 @@ struct Format {
     // Null where the format can't be read (.png). Text and matrices are skipped; an attribute of n other numbers
     // becomes the floats or integers NAME0 ... NAMEn-1. Without an id in the file, points are numbered from 0.
     PointSet (*read)(const std::filesystem::path& path);
+    // Whether a file shows all frames of a sequence, one after another (film.h).
+    bool film = false;
 };
 
 // All formats, in order of extension.

@@ -3,6 +3,7 @@
 #include <system_error>
 #include <utility>
 
+#include "runtime/picture/frame_picture.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -15,8 +16,9 @@ constexpr std::size_t most_waiting = 100;  // pictures; each may hold the shapes
 FrameWriter::FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting) : waiting_(waiting)
 {
     for (const OutputTarget& target : targets) {
-        const bool picture = format_of(target.pattern).extension == ".png";
-        targets_.push_back({FramePattern(target.pattern), target.attributes, picture});
+        const Format& format = format_of(target.pattern);
+        const bool picture = format.film || format.extension == ".png";
+        targets_.push_back({FramePattern(target.pattern), target.attributes, picture, format.film});
     }
     thread_ = std::thread([this] { run(); });
 }
@@ -42,15 +44,33 @@ void FrameWriter::submit(PointSet points, FrameInfo frame, std::string output)
     changed_.notify_all();
 }
 
-void FrameWriter::finish()
+void FrameWriter::finish(bool complete)
 {
     {
         std::unique_lock lock(mutex_);
         changed_.wait(lock, [&] { return error_ || (jobs_.empty() && !busy_); });
         if (error_) std::rethrow_exception(error_);
     }
-    for (auto& [output, pictures] : pictures_)
+    for (auto& [output, pictures] : pictures_) {
         if (!pictures.waiting.empty()) write_without_points(pictures);
+        pictures.painter.reset();  // it holds the shapes of the last frame
+    }
+    const auto films = std::exchange(films_, {});
+    if (!complete) return;
+    for (const auto& [path, running] : films) try {
+            running->film.finish();
+            running->file.finish();
+        } catch (Error& error) {
+            throw error.at({path, 0});
+        }
+}
+
+void FrameWriter::add_to_film(const std::string& path, const PointSet& points, const FrameInfo& frame)
+{
+    const Picture picture = picture_of(points, frame);
+    std::unique_ptr<RunningFilm>& running = films_[path];
+    if (!running) running = std::make_unique<RunningFilm>(path, picture, frame.fps);
+    running->film.add(picture);
 }
 
 std::vector<FrameWriter::Written> FrameWriter::take_written()
@@ -131,8 +151,17 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     const std::string path = target.pattern.expand(job.frame.number, job.output);
     FrameInfo frame = job.frame;
     frame.view = std::move(view);
+    if (target.picture) {
+        std::shared_ptr<Painter>& painter = pictures_[job.output].painter;
+        if (!painter) painter = std::make_shared<Painter>();
+        frame.painter = painter;
+    }
     try {
-        write_points(path, target.attributes ? select_attributes(job.points, *target.attributes) : job.points, frame);
+        const PointSet points = target.attributes ? select_attributes(job.points, *target.attributes) : job.points;
+        if (target.film)
+            add_to_film(path, points, frame);
+        else
+            write_points(path, points, frame);
     } catch (Error& error) {
         throw error.at({path, 0});
     }

@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "runtime/io/film.h"
 #include "runtime/io/format.h"
 #include "runtime/io/frame_pattern.h"
 #include "runtime/picture/picture_fit.h"
@@ -37,8 +38,9 @@ public:
 
     // Queues a frame of one output for all targets. Throws the first error of an earlier frame.
     void submit(PointSet points, FrameInfo frame, std::string output = "main");
-    // Waits until all frames are written. Throws the first error.
-    void finish();
+    // Waits until all frames are written. Throws the first error. complete: whether they are all that there should be;
+    // a film of some of them is dropped.
+    void finish(bool complete = true);
 
     // The files that are complete since the last call, in order: a run of many frames keeps none of them.
     std::vector<Written> take_written();
@@ -49,7 +51,7 @@ private:
     struct Target {
         FramePattern pattern;
         std::optional<std::vector<std::string>> attributes;
-        bool picture;
+        bool picture, film;
     };
     struct Job {
         PointSet points;
@@ -60,17 +62,30 @@ private:
     // hold none, but the shapes of their frame: a hundred wait, and where no points come they show the shapes alone.
     struct Pictures {
         PictureFit fit;
+        std::shared_ptr<Painter> painter;
         std::vector<std::pair<const Target*, Job>> waiting;
+    };
+    struct RunningFilm {
+        OutputFile file;
+        Film film;
+
+        RunningFilm(const std::string& path, const Picture& first, double fps)
+            : file(path), film(file, format_of(path).extension, first.width, first.height, fps)
+        {
+        }
     };
     void run();
     void write(const Job& job);
     void write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view);
+    void add_to_film(const std::string& path, const PointSet& points, const FrameInfo& frame);
     void write_without_points(Pictures& pictures);
     void write_waiting(Pictures& pictures, const std::shared_ptr<const PictureView>& view);
 
     std::vector<Target> targets_;
     const std::size_t waiting_;
     std::map<std::string, Pictures> pictures_;  // by output; used by the thread, and by finish() while that is idle
+
+    std::map<std::string, std::unique_ptr<RunningFilm>> films_;  // by file; likewise
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;

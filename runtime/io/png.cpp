@@ -6,8 +6,7 @@
 #include <string>
 
 #include "runtime/io/format.h"
-#include "runtime/picture/picture.h"
-#include "runtime/picture/picture_fit.h"
+#include "runtime/picture/frame_picture.h"
 
 namespace rapid {
 namespace {
@@ -57,15 +56,8 @@ void encode(const Picture& picture, PngOutput& output)
 
 void write_png(OutputFile& file, const PointSet& points, const FrameInfo& frame)
 {
-    static const PictureOptions usual;
-    static const PictureScene nothing;
-    const PictureOptions& options = frame.picture ? *frame.picture : usual;
-    if (options.width < 1 || options.height < 1 || options.width > 16384 || options.height > 16384)
-        throw Error(fmt::format("a picture of {} x {} can't be made; each side must be from 1 to 16384 pixels",
-                                options.width, options.height));
-    const PictureView view = frame.view ? *frame.view : PictureFit().next(points, frame);
     PngOutput output;
-    encode(render(points, options, frame.scene ? *frame.scene : nothing, view), output);
+    encode(picture_of(points, frame), output);
     if (!output.error.empty()) throw Error(fmt::format("can't be written: {}", output.error));
 
     file.append(output.bytes.data(), output.bytes.size());

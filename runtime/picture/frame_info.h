@@ -5,6 +5,7 @@
 
 namespace rapid {
 
+class Painter;
 struct PictureOptions;
 struct PictureScene;
 struct PictureView;
@@ -14,10 +15,12 @@ struct FrameInfo {
     double time = 0;  // s since the start
     double fps = 24;
 
-    // For pictures (picture.h). Null: the usual ones; the points alone; fitted to this one frame.
+    // For pictures (picture.h). Null: the usual ones; the points alone; fitted to this one frame. FrameWriter keeps a
+    // view and a painter over a sequence.
     std::shared_ptr<const PictureOptions> picture = nullptr;
     std::shared_ptr<const PictureScene> scene = nullptr;
-    std::shared_ptr<const PictureView> view = nullptr;  // FrameWriter keeps one over a sequence
+    std::shared_ptr<const PictureView> view = nullptr;
+    std::shared_ptr<Painter> painter = nullptr;  // null: one for this frame alone
 };
 
 }  // namespace rapid

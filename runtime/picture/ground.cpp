@@ -44,8 +44,8 @@ float Ground::depth(const Vec3f& origin, const Vec3f& ray) const
     return towards != 0 && t > 0 && std::isfinite(t) ? t : std::numeric_limits<float>::infinity();
 }
 
-Vec3f Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,
-                    const Light& light) const
+ShadedSample Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,
+                           const Light& light) const
 {
     const float slope = std::max(0.02f, std::abs(normal.dot(ray.normalized())));
     const float pixel = t / focal;
@@ -58,12 +58,12 @@ Vec3f Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, cons
     };
     const float lines = std::max(line(along.dot(u), width(u)), line(along.dot(v), width(v)));
     const float fade = std::exp(-(P - center).squaredNorm() / (extent * extent));
-    if (!solid) return behind + (grid_colour - behind) * (0.55f * lines * fade);
+    if (!solid) return {behind + (grid_colour - behind) * (0.55f * lines * fade), Vec3f::Zero()};
 
-    const float lamp = std::abs(light.direction().dot(normal)) * light.past_meshes(P, normal) * light.past_points(P);
-    const Vec3f lit = ground_albedo * (light_from_sky + (1 - light_from_sky) * lamp);
-    const Vec3f ground = lit + (grid_colour - lit) * (0.45f * lines);
-    return behind + (ground - behind) * fade;
+    const float seen = std::abs(light.direction().dot(normal)) * light.past_meshes(P, normal);
+    const Vec3f lamp = ground_albedo * ((1 - light_from_sky) * seen * (1 - 0.45f * lines));
+    const Vec3f ground = ground_albedo * (light_from_sky * (1 - 0.45f * lines)) + grid_colour * (0.45f * lines) + lamp;
+    return {behind + (ground - behind) * fade, lamp * fade};
 }
 
 }  // namespace rapid

@@ -5,6 +5,12 @@
 
 namespace rapid {
 
+// A place of a surface as it is seen.
+struct ShadedSample {
+    Vec3f colour;  // where no point shades it
+    Vec3f lamp;    // the part of that which points can take
+};
+
 // Lines on a ground plane, a round number of metres apart, that fade out far from the scene.
 struct Ground {
     Vec3f normal, u, v;
@@ -22,8 +28,9 @@ struct Ground {
     // Whether it is a wall between the eye and the scene, seen from behind: then it is transparent.
     bool stands_before(const Vec3f& eye) const { return normal.dot(eye) < offset && normal.dot(center) >= offset; }
 
-    // The colour at P, at depth t on the ray, over the colour `behind` it.
-    Vec3f shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind, const Light& light) const;
+    // At P, at depth t on the ray, over the colour `behind` it.
+    ShadedSample shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,
+                       const Light& light) const;
 
 private:
     float line(float x, float pixel) const;

@@ -3,7 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -16,6 +16,7 @@ namespace {
 constexpr int shadow_size = 1024;  // texels across the shadow map of the meshes
 constexpr int cells = 160;         // across the shadow grid of the points
 constexpr int slices = 64;         // and along the light
+constexpr float cells_a_texel = static_cast<float>(cells) / shadow_size;
 constexpr std::size_t slice = std::size_t{cells} * cells;
 
 Vec3f light_direction(const Camera& camera)
@@ -29,8 +30,7 @@ Vec3f light_direction(const Camera& camera)
 
 }  // namespace
 
-Light::Light(const PointSet& points, const PictureOptions& options, const PictureScene& scene, const PictureView& view)
-    : direction_(light_direction(view.camera))
+Light::Light(const PictureScene& scene, const PictureView& view) : direction_(light_direction(view.camera))
 {
     const float radius = std::max(1e-6f, 0.7f * static_cast<float>(view.bounds.diagonal().norm()));
     depth_range_ = 2 * radius;
@@ -41,80 +41,130 @@ Light::Light(const PointSet& points, const PictureOptions& options, const Pictur
     lens_.focal = 0.5f * shadow_size / radius;
     lens_.center_x = lens_.center_y = 0.5f * shadow_size;
     lens_.parallel = true;
-
-    const Lens eye = Lens::of_camera(view.camera, options.width, options.height);
-    const double distance = (view.camera.target - view.camera.position).norm();
     draw_meshes(scene);
-    gather_points(points, static_cast<float>(view.least_radius * distance) / eye.focal);
 }
 
 void Light::draw_meshes(const PictureScene& scene)
 {
-    mesh_depth_.assign(std::size_t{shadow_size} * shadow_size, std::numeric_limits<float>::infinity());
     for (const PictureScene::Body& body : scene.bodies) {
         if (body.role != PictureScene::Body::Collider) continue;
+        if (mesh_depth_.empty())
+            mesh_depth_.assign(std::size_t{shadow_size} * shadow_size, std::numeric_limits<float>::infinity());
         const ScreenMesh mesh(*body.mesh, lens_, 0);
         for_each_band(shadow_size, [&](int begin, int end) {
-            mesh.cover(shadow_size, begin, end, [&](int x, int y, const Vec3f&, float depth, const ScreenTriangle&) {
-                float& nearest = mesh_depth_[static_cast<std::size_t>(y) * shadow_size + x];
-                nearest = std::min(nearest, depth);
-            });
+            for (const ScreenTriangle& triangle : mesh.triangles())
+                mesh.cover(triangle, {0, begin, shadow_size, end}, [&](int x, int y, const Vec3f&, float depth) {
+                    float& nearest = mesh_depth_[static_cast<std::size_t>(y) * shadow_size + x];
+                    nearest = std::min(nearest, depth);
+                });
         });
     }
 }
 
-void Light::gather_points(const PointSet& points, float least_radius)
+void Light::Range::extend(int low, int high)
 {
-    // Integers, so that a sum does not depend on the order in which threads add.
+    const bool none = begin == end;
+    begin = none ? low : std::min(begin, low);
+    end = none ? high + 1 : std::max(end, high + 1);
+}
+
+void Light::gather(const PointSet& points, std::span<const float> opacity, float least_radius)
+{
     constexpr float unit = 4096;
-    constexpr float cells_a_texel = static_cast<float>(cells) / shadow_size;
-    std::vector<std::atomic<std::uint64_t>> sums(slice * slices);
+    constexpr std::size_t count = slice * slices;
+    if (!sums_) {
+        if (points.empty()) return;
+        sums_ = std::make_unique<std::atomic<std::uint64_t>[]>(count);
+        covered_.assign(count, 0);
+        spread_.assign(count, 0);
+    }
+    // What the frame before has left.
+    const auto for_each_row = [&](const auto& f) {
+        tbb::parallel_for(z_.begin, z_.end, [&](int k) {
+            for (int y = y_.begin; y < y_.end; ++y)
+                f(static_cast<std::size_t>(k) * slice + static_cast<std::size_t>(y) * cells);
+        });
+    };
+    for_each_row([&](std::size_t row) { std::fill_n(&covered_[row + x_.begin], x_.end - x_.begin, 0.0f); });
+
     const Strided<Vec3f> P = points.P().read();
     const Column<float>* pscale = points.find<float>("pscale");
     const float cells_a_metre = lens_.focal * cells_a_texel;
+    const std::size_t chunks = (points.size() + chunk_size - 1) / chunk_size;
+    std::vector<std::array<Range, 3>> reached(chunks);
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+        std::array<Range, 3>& range = reached[begin / chunk_size];
         for (std::size_t i = begin; i < end; ++i) {
             const Vec3f s = lens_.project(P[i]);
             const float x = s.x() * cells_a_texel, y = s.y() * cells_a_texel, z = s.z() / depth_range_ * slices;
             if (!(x >= 0 && y >= 0 && z >= 0 && x < cells && y < cells && z < slices)) continue;
+            const float taken = opacity.empty() ? 1 : opacity[i];
+            if (taken == 0) continue;
             const float r = std::max(least_radius, pscale ? (*pscale)[i] : 0.0f) * cells_a_metre;
-            const float share = std::min(3.14159f * r * r, 16.0f);
-            const std::size_t cell =
-                static_cast<std::size_t>(z) * slice + static_cast<std::size_t>(y) * cells + static_cast<std::size_t>(x);
-            sums[cell].fetch_add(static_cast<std::uint64_t>(unit * share + 0.5f), std::memory_order_relaxed);
+            const float share = taken * std::min(3.14159f * r * r, 16.0f);
+            const Eigen::Vector3i cell = Vec3f(x, y, z).cast<int>();
+            for (int axis = 0; axis < 3; ++axis) range[axis].extend(cell[axis], cell[axis]);
+            sums_[static_cast<std::size_t>(cell.z()) * slice + static_cast<std::size_t>(cell.y()) * cells +
+                  static_cast<std::size_t>(cell.x())]
+                .fetch_add(static_cast<std::uint64_t>(unit * share + 0.5f), std::memory_order_relaxed);
         }
     });
-    covered_.resize(sums.size());
-    for (std::size_t i = 0; i < covered_.size(); ++i) covered_[i] = static_cast<float>(sums[i].load()) / unit;
-
+    x_ = y_ = z_ = Range();
+    for (const auto& [x, y, z] : reached) {
+        if (x.begin == x.end) continue;
+        x_.extend(std::max(x.begin - 2, 0), std::min(x.end + 1, cells - 1));
+        y_.extend(std::max(y.begin - 2, 0), std::min(y.end + 1, cells - 1));
+        z_.extend(z.begin, slices - 1);
+    }
+    for_each_row([&](std::size_t row) {
+        for (std::size_t i = row + x_.begin; i < row + x_.end; ++i)
+            covered_[i] = static_cast<float>(sums_[i].exchange(0, std::memory_order_relaxed)) / unit;
+    });
     blur_covered();
-    for (std::size_t i = slice; i < covered_.size(); ++i) covered_[i] += covered_[i - slice];
+    tbb::parallel_for(y_.begin, y_.end, [&](int y) {
+        for (int k = z_.begin + 1; k < z_.end; ++k) {
+            const std::size_t row = static_cast<std::size_t>(k) * slice + static_cast<std::size_t>(y) * cells;
+            for (std::size_t i = row + x_.begin; i < row + x_.end; ++i) covered_[i] += covered_[i - slice];
+        }
+    });
 }
 
-// Over the neighbours, twice along each axis, so that cells do not show.
+// Over the neighbours, twice along each axis, so that cells do not show: weights 1, 4, 6, 4, 1. What is beyond the
+// range is 0.
 void Light::blur_covered()
 {
-    std::vector<float> spread(covered_.size());
-    for (int pass = 0; pass < 4; ++pass) {
-        const bool along_x = pass % 2 == 0;
-        const std::size_t step = along_x ? 1 : cells;
-        tbb::parallel_for(0, slices, [&](int k) {
-            for (int y = 0; y < cells; ++y)
-                for (int x = 0; x < cells; ++x) {
-                    const std::size_t here =
-                        static_cast<std::size_t>(k) * slice + static_cast<std::size_t>(y) * cells + x;
-                    const int at = along_x ? x : y;
-                    const float before = at > 0 ? covered_[here - step] : 0;
-                    const float after = at + 1 < cells ? covered_[here + step] : 0;
-                    spread[here] = 0.25f * before + 0.5f * covered_[here] + 0.25f * after;
+    tbb::parallel_for(z_.begin, z_.end, [&](int k) {
+        const auto blur = [&](const std::vector<float>& from, std::vector<float>& to, const Range& along,
+                              std::size_t step, std::size_t row) {
+            for (int x = x_.begin; x < x_.end; ++x) to[row + x] = 0.375f * from[row + x];
+            const int at = step == 1 ? 0 : static_cast<int>(row % slice / cells);
+            for (const int away : {-2, -1, 1, 2}) {
+                const float weight = away * away == 1 ? 0.25f : 0.0625f;
+                const std::ptrdiff_t offset = away * static_cast<std::ptrdiff_t>(step);
+                int begin = x_.begin, end = x_.end;
+                if (step == 1) {
+                    begin = std::max(begin, along.begin - away);
+                    end = std::min(end, along.end - away);
+                } else if (at + away < along.begin || at + away >= along.end) {
+                    continue;
                 }
-        });
-        std::swap(covered_, spread);
-    }
+                const float* source = from.data() + static_cast<std::ptrdiff_t>(row) + offset;
+                float* const target = to.data() + row;
+                for (int x = begin; x < end; ++x) target[x] += weight * source[x];
+            }
+        };
+        const auto for_each_y = [&](const auto& f) {
+            for (int y = y_.begin; y < y_.end; ++y)
+                f(static_cast<std::size_t>(k) * slice + static_cast<std::size_t>(y) * cells);
+        };
+        for_each_y([&](std::size_t row) { blur(covered_, spread_, x_, 1, row); });
+        for_each_y([&](std::size_t row) { blur(spread_, covered_, y_, cells, row); });
+    });
 }
 
 float Light::past_meshes(const Vec3f& P, const Vec3f& n) const
 {
+    if (mesh_depth_.empty()) return 1;
     // A little in front of the surface, or the raster of the shadow map would show on it.
     const float texel = 1 / lens_.focal;
     const Vec3f s = lens_.project(P + n * (2 * texel));
@@ -131,25 +181,38 @@ float Light::past_meshes(const Vec3f& P, const Vec3f& n) const
     return open / 4;
 }
 
-float Light::past_points(const Vec3f& P) const
+Vec3f Light::cell_of(const Vec3f& P) const
 {
     const Vec3f s = lens_.project(P);
-    constexpr float cells_a_texel = static_cast<float>(cells) / shadow_size;
-    const Vec3f at(s.x() * cells_a_texel - 0.5f, s.y() * cells_a_texel - 0.5f,
-                   std::min(s.z() / depth_range_ * slices - 1, static_cast<float>(slices) - 1.001f));
-    if (!(at.x() >= 0 && at.y() >= 0 && at.z() >= 0 && at.x() < cells - 1 && at.y() < cells - 1)) return 1;
-    const Eigen::Vector3i cell = at.cast<int>();
-    const Vec3f part = at - cell.cast<float>();
-    float covered = 0;
-    for (int k = 0; k < 2; ++k)
-        for (int j = 0; j < 2; ++j)
-            for (int i = 0; i < 2; ++i) {
-                const float weight =
-                    (i ? part.x() : 1 - part.x()) * (j ? part.y() : 1 - part.y()) * (k ? part.z() : 1 - part.z());
-                covered += weight * covered_[(static_cast<std::size_t>(cell.z() + k) * cells + cell.y() + j) * cells +
-                                             static_cast<std::size_t>(cell.x() + i)];
-            }
-    return std::exp(-0.7f * covered);
+    return {s.x() * cells_a_texel - 0.5f, s.y() * cells_a_texel - 0.5f,
+            std::min(s.z() / depth_range_ * slices - 1, static_cast<float>(slices) - 1.001f)};
+}
+
+bool Light::may_shade(const Box3f& box) const
+{
+    if (z_.begin == z_.end) return false;
+    const Vec3f low(static_cast<float>(x_.begin - 1), static_cast<float>(y_.begin - 1),
+                    static_cast<float>(z_.begin - 1));
+    const Vec3f high(static_cast<float>(x_.end), static_cast<float>(y_.end), static_cast<float>(z_.end));
+    return box.intersects(Box3f(low, high));
+}
+
+float Light::past_points(const Vec3f& cell) const
+{
+    if (z_.begin == z_.end) return 1;
+    if (!(cell.x() >= 0 && cell.y() >= 0 && cell.z() >= 0 && cell.x() < cells - 1 && cell.y() < cells - 1)) return 1;
+    const Eigen::Vector3i corner = cell.cast<int>();
+    const Vec3f part = cell - corner.cast<float>();
+    const float* c = &covered_[(static_cast<std::size_t>(corner.z()) * cells + corner.y()) * cells +
+                               static_cast<std::size_t>(corner.x())];
+    const auto of_slice = [&](const float* at) {
+        const float low = at[0] + part.x() * (at[1] - at[0]);
+        const float high = at[cells] + part.x() * (at[cells + 1] - at[cells]);
+        return low + part.y() * (high - low);
+    };
+    const float near = of_slice(c);
+    const float covered = near + part.z() * (of_slice(c + slice) - near);
+    return covered > 0 ? std::exp(-0.7f * covered) : 1;
 }
 
 }  // namespace rapid

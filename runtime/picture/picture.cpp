@@ -3,72 +3,95 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <cstring>
 
-#include "runtime/picture/discs.h"
+#include "runtime/picture/marks.h"
+#include "runtime/picture/tone.h"
 
 namespace rapid {
-namespace {
 
-float srgb(float light) { return light <= 0.0031308f ? 12.92f * light : 1.055f * std::pow(light, 1 / 2.4f) - 0.055f; }
+// What was drawn for a view and its shapes, and for which.
+struct Painter::StillLayer {
+    PictureOptions options;
+    std::shared_ptr<const PictureScene> scene;
+    Camera camera;
+    Box3d bounds;
+    std::vector<bool> vessels;
+    Light light;
+    std::vector<SurfaceTile> tiles;
 
-// Unchanged up to 0.8; brighter light is compressed below 1 instead of being cut off.
-float tone(float light) { return light < 0.8f ? light : 1 - 0.2f * std::exp(-(light - 0.8f) / 0.2f); }
-
-// Bayer's dither thresholds, 0 to 63, against banding in dark gradients.
-int bayer(int x, int y)
-{
-    int threshold = 0;
-    for (int bit = 0; bit < 3; ++bit) {
-        const int a = x >> bit & 1, b = y >> bit & 1;
-        threshold |= ((a ^ b) << 1 | b) << (2 * (2 - bit));
+    StillLayer(const PictureOptions& of, const std::shared_ptr<const PictureScene>& in, const PictureView& view,
+               std::vector<bool> which)
+        : options(of),
+          scene(in),
+          camera(view.camera),
+          bounds(view.bounds),
+          vessels(std::move(which)),
+          light(*in, view),
+          tiles(draw_surfaces(of, *in, view, vessels, light))
+    {
     }
-    return threshold;
-}
 
-std::uint8_t quantize(float light, int x, int y)
-{
-    const float wanted = 255 * srgb(tone(std::max(0.0f, light)));
-    return static_cast<std::uint8_t>(
-        std::clamp(std::floor(wanted + (static_cast<float>(bayer(x, y)) + 0.5f) / 64), 0.0f, 255.0f));
-}
+    bool is_of(const PictureOptions& of, const std::shared_ptr<const PictureScene>& in, const PictureView& view,
+               const std::vector<bool>& which) const
+    {
+        return options.width == of.width && options.height == of.height && options.grid == of.grid && scene == in &&
+               camera.position == view.camera.position && camera.target == view.camera.target &&
+               camera.fov == view.camera.fov && bounds.min() == view.bounds.min() &&
+               bounds.max() == view.bounds.max() && vessels == which;
+    }
+};
 
-// Averages the samples of each pixel.
-std::vector<Vec3f> resolve(const Surfaces& surfaces, int width, int height)
+Painter::Painter() = default;
+Painter::~Painter() = default;
+
+Picture Painter::draw(const PointSet& points, const PictureOptions& options,
+                      const std::shared_ptr<const PictureScene>& scene, const PictureView& view)
 {
-    std::vector<Vec3f> colours(static_cast<std::size_t>(width) * height);
-    tbb::parallel_for(0, height, [&](int y) {
-        for (int x = 0; x < width; ++x) {
-            Vec3f sum = Vec3f::Zero();
-            for (int j = 0; j < surface_samples; ++j)
-                for (int i = 0; i < surface_samples; ++i)
-                    sum += surfaces.colour[static_cast<std::size_t>(y * surface_samples + j) * surfaces.width +
-                                           x * surface_samples + i];
-            colours[static_cast<std::size_t>(y) * width + x] = sum / (surface_samples * surface_samples);
+    std::vector<bool> vessels;
+    for (const PictureScene::Body& body : scene->bodies)
+        vessels.push_back(body.role == PictureScene::Body::Collider && holds_points(*body.mesh, points));
+    if (!still_ || !still_->is_of(options, scene, view, vessels)) {
+        still_.reset();  // first: a large picture's are gigabytes
+        still_ = std::make_unique<StillLayer>(options, scene, view, std::move(vessels));
+    }
+    Light& light = still_->light;
+    const Lens lens = Lens::of_camera(view.camera, options.width, options.height);
+    const double distance = (view.camera.target - view.camera.position).norm();
+    light.gather(points, shadow_opacity(points, *scene), static_cast<float>(view.least_radius * distance) / lens.focal);
+    const TileGrid tiles{options.width, options.height};
+    const Marks marks = make_marks(points, tiles, *scene, view, light);
+
+    Picture picture{options.width, options.height, {}};
+    picture.rgb.resize(3 * static_cast<std::size_t>(options.width) * options.height);
+    tbb::parallel_for(0, tiles.count(), [&](int tile) {
+        const SurfaceTile& still = still_->tiles[tile];
+        const bool shaded = light.may_shade(still.cells), empty = marks.first[tile] == marks.first[tile + 1];
+        const int left = tiles.left(tile), top = tiles.top(tile), across = tiles.right(tile) - left;
+        const auto row = [&](int y) { return &picture.rgb[3 * (static_cast<std::size_t>(y) * options.width + left)]; };
+        if (empty && !shaded) {
+            for (int y = top; y < tiles.bottom(tile); ++y)
+                std::memcpy(row(y), &still.bytes[3 * static_cast<std::size_t>((y - top) * tile_size)], 3 * across);
+            return;
         }
+        std::array<Vec3f, tile_pixels> colour;
+        std::copy(still.colour.begin(), still.colour.end(), colour.begin());
+        if (shaded)
+            for (const SurfaceTile::Lit& lit : still.lit)
+                colour[lit.pixel] -= (1 - light.past_points(lit.cell)) * lit.lamp;
+        if (!empty) draw_marks(marks, tiles, tile, still, lens, light, colour);
+        for (int y = top; y < tiles.bottom(tile); ++y)
+            for (int x = 0; x < across; ++x)
+                write_pixel(colour[static_cast<std::size_t>((y - top) * tile_size + x)], left + x, y, row(y) + 3 * x);
     });
-    return colours;
+    return picture;
 }
-
-}  // namespace
 
 Picture render(const PointSet& points, const PictureOptions& options, const PictureScene& scene,
                const PictureView& view)
 {
-    const Light light(points, options, scene, view);
-    const Surfaces surfaces = draw_surfaces(points, options, scene, view, light);
-    const int width = options.width, height = options.height;
-    std::vector<Vec3f> colours = resolve(surfaces, width, height);
-    draw_points(points, options, view, light, surfaces, colours);
-
-    Picture picture{width, height, std::vector<std::uint8_t>(3 * colours.size())};
-    tbb::parallel_for(0, height, [&](int y) {
-        for (int x = 0; x < width; ++x) {
-            const std::size_t here = static_cast<std::size_t>(y) * width + x;
-            for (int c = 0; c < 3; ++c) picture.rgb[3 * here + c] = quantize(colours[here][c], x, y);
-        }
-    });
-    return picture;
+    return Painter().draw(points, options, std::make_shared<PictureScene>(scene), view);
 }
 
 }  // namespace rapid

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/points/members.h"
+
 namespace rapid {
 namespace {
 
@@ -11,17 +13,22 @@ namespace {
 constexpr double gravity = 9.81;
 constexpr double look_ahead = 0.5;  // s: how far points are followed along their velocity in the first frame
 constexpr double glide = 0.35;      // s: how soon the camera has done most of its way back
+constexpr double follow = 0.2;      // s: the same of the way to the group that it frames
 constexpr double margin = 1.06;     // of the bounds, left free around them
+constexpr double room = 1.25;       // by how much the bounds grow beyond what has left them
+constexpr double usual_fov = 0.61;  // radians
 const Vec3d view_from = Vec3d(0.55, 0.32, 1.0).normalized();  // from the scene to the camera
 
 // Bounds of the points but the outermost hundredth along each axis: a stray does not make the rest small. With where
 // they go in the time ahead, but not below `floor`.
-Box3d trimmed_bounds(const PointSet& points, double ahead, double floor)
+Box3d trimmed_bounds(const PointSet& points, const std::string& group, double ahead, double floor)
 {
+    const Strided<std::uint8_t> members = members_of(points, group);
     constexpr std::size_t sample_size = 20000;
     const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
     std::vector<double> along[3];
-    for (std::size_t i = 0; i < points.size(); i += step) {
+    for (std::size_t i = 0; i < points.size(); i += group.empty() ? step : 1) {
+        if (!members[i]) continue;
         const Vec3d P = points.P()[i].cast<double>();
         Vec3d later = P + ahead * points.v()[i].cast<double>();
         later.y() = std::max(later.y(), std::min(P.y(), floor));
@@ -67,6 +74,12 @@ Box3d about(const Box3d& box, double factor)
     return Box3d(box.center() - half, box.center() + half);
 }
 
+Box3d scaled(const Box3d& box, double factor)
+{
+    const Vec3d half = 0.5 * factor * box.sizes();
+    return Box3d(box.center() - half, box.center() + half);
+}
+
 // Of the scene's shapes: emitters as they are, colliders as far as they are near what moves. A floor of a hundred
 // metres is no reason to stand a hundred metres away.
 Box3d shape_bounds(const PictureScene& scene, const Box3d& moving)
@@ -99,17 +112,17 @@ double floor_of(const PictureScene& scene)
     return floor;
 }
 
-// The position from which the box just fits, looking at its centre.
-Camera fitted(const Box3d& bounds, const PictureOptions& options)
+// As it is given; where it is not, where the box just fits, looking at its centre.
+Camera fitted(const Box3d& bounds, const PictureOptions& options, const SceneCamera& of_scene)
 {
     Camera camera;
-    camera.fov = options.fov;
-    camera.target = options.target.value_or(bounds.center());
-    if (options.position) {
-        camera.position = *options.position;
+    camera.fov = options.fov.value_or(of_scene.fov.value_or(usual_fov));
+    camera.target = options.target.value_or(of_scene.target.value_or(bounds.center()));
+    if (const auto& given = options.position ? options.position : of_scene.position) {
+        camera.position = *given;
         return camera;
     }
-    const double vertical = std::tan(0.5 * options.fov);
+    const double vertical = std::tan(0.5 * camera.fov);
     const double horizontal = vertical * options.width / options.height;
     camera.position = camera.target + view_from;
     const Vec3d forward = -view_from, right = forward.cross(Vec3d::UnitY()).normalized(), up = right.cross(forward);
@@ -127,6 +140,16 @@ Camera fitted(const Box3d& bounds, const PictureOptions& options)
 
 }  // namespace
 
+// The part of the way to the goal; the last hundredth is not seen, and ends the motion.
+void PictureFit::approach(double part)
+{
+    Box3d& bounds = view_->bounds;
+    bounds.min() += part * (goal_.min() - bounds.min());
+    bounds.max() += part * (goal_.max() - bounds.max());
+    const double left = std::max((goal_.min() - bounds.min()).norm(), (goal_.max() - bounds.max()).norm());
+    if (left < 0.01 * goal_.diagonal().norm()) bounds = goal_;
+}
+
 PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
 {
     static const PictureOptions usual;
@@ -135,8 +158,9 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     const PictureScene& scene = frame.scene ? *frame.scene : nothing;
 
     const bool first = !settled();
-    const Box3d moving = trimmed_bounds(points, first ? look_ahead : 0, floor_of(scene));
-    Box3d content = shape_bounds(scene, moving);
+    const std::string& group = scene.camera.group;
+    const Box3d moving = trimmed_bounds(points, group, first ? look_ahead : 0, floor_of(scene));
+    Box3d content = group.empty() ? shape_bounds(scene, moving) : moving;
     if (!content.isEmpty()) {
         // A single point, a flat sheet: a metre or a tenth of the rest, so that there is something to look at.
         const double least = content.diagonal().norm() > 0 ? 0.1 * content.diagonal().norm() : 1.0;
@@ -146,20 +170,26 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
                 content.min()[axis] -= missing;
                 content.max()[axis] += missing;
             }
-        seen_.extend(content);
+        if (group.empty())
+            seen_.extend(content);
+        else
+            seen_ = content;
     }
-    const Box3d goal = seen_.isEmpty() ? Box3d(Vec3d::Constant(-1), Vec3d::Constant(1)) : seen_;
-
+    const Box3d all = seen_.isEmpty() ? Box3d(Vec3d::Constant(-1), Vec3d::Constant(1)) : seen_;
+    const double passed = std::max(0.0, frame.time - time_);
+    time_ = frame.time;
     if (first) {
         view_.emplace();
-        view_->bounds = goal;
+        view_->bounds = goal_ = all;
+    } else if (!group.empty()) {
+        goal_ = all;
+        approach(1 - std::exp(-passed / follow));
     } else {
-        const double part = 1 - std::exp(-std::max(0.0, frame.time - time_) / glide);
-        view_->bounds.min() += part * (goal.min() - view_->bounds.min());
-        view_->bounds.max() += part * (goal.max() - view_->bounds.max());
+        // It holds still while everything is in view. Then it goes back at once as far as will do for a while.
+        if (!scaled(goal_, margin).contains(all)) goal_ = scaled(goal_.merged(all), room);
+        approach(1 - std::exp(-passed / glide));
     }
-    time_ = frame.time;
-    view_->camera = fitted(view_->bounds, options);
+    view_->camera = fitted(view_->bounds, options, scene.camera);
 
     const double fall = std::sqrt(gravity * view_->bounds.diagonal().norm());
     view_->full_speed = std::max({first ? 0.0 : view_->full_speed, fast_speed(points), 0.7 * fall, 1e-6});

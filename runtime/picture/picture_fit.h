@@ -1,7 +1,8 @@
 // The camera of a sequence.
 //
-// The later frames are unknown when the first is drawn, and a camera that jumps makes a sequence useless. So the first
-// frame with points is framed with room for where they go, and later the camera only glides back.
+// The later frames are unknown when the first is drawn, and a camera that jumps or drifts makes a sequence useless. So
+// the first frame with points is framed with room for where they go, and the camera holds still until something leaves
+// its view; then it glides back far enough to hold still again.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +14,9 @@
 
 namespace rapid {
 
-// Chooses the view of each frame from the ones before it: the camera is fitted to the first frame that has points
-// (to them, to where they will be half a second later, and to the shapes), and from then on only glides back when
-// points come near the edge of what it sees.
+// Chooses the view of each frame from the ones before it. The camera of the options is taken, or else that of the
+// scene; what these leave open is fitted: to the first frame that has points (to them, to where they will be half a
+// second later, and to the shapes), or to a group of the points, which is then followed.
 class PictureFit {
 public:
     PictureView next(const PointSet& points, const FrameInfo& frame);
@@ -24,8 +25,11 @@ public:
     bool settled() const { return most_points_ > 0; }
 
 private:
+    void approach(double part);
+
     std::optional<PictureView> view_;
-    Box3d seen_;  // the bounds of everything so far
+    Box3d seen_;  // the bounds of everything so far, or of the group that is framed
+    Box3d goal_;  // to which those of the view glide
     double time_ = 0;
     std::size_t most_points_ = 0;
 };

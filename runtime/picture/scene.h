@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "runtime/shapes/mesh/mesh.h"
@@ -14,11 +15,25 @@ struct PictureOptions {
     int width = 1280, height = 720;
     std::optional<Vec3d> position = {};  // of the camera, m
     std::optional<Vec3d> target = {};    // where it looks
-    double fov = 0.61;                   // radians, from the lower to the upper edge
+    std::optional<double> fov = {};      // radians, from the lower to the upper edge
     bool grid = true;                    // lines on the ground, unless a plane of the scene is the ground
 };
 
-// What is drawn besides the points of a frame, in world space.
+// How points look.
+struct PointStyle {
+    std::string group = {};  // whose points; empty: all
+    bool additive = false;   // they shine: they add light, and take none
+    double shutter = 0;      // s that the picture is exposed, up to the frame's time
+};
+
+// A camera as a scene gives it; what it leaves open is fitted.
+struct SceneCamera {
+    std::optional<Vec3d> position = {}, target = {};  // m
+    std::optional<double> fov = {};                   // radians, vertical
+    std::string group = {};                           // whose points are framed; empty: the scene
+};
+
+// What is drawn besides the points of a frame, in world space, and how those are drawn.
 struct PictureScene {
     struct Body {
         MeshPtr mesh;
@@ -30,6 +45,8 @@ struct PictureScene {
     };
     std::vector<Body> bodies;
     std::vector<Plane> planes;
+    std::vector<PointStyle> styles;  // of two that a point has, the later one counts
+    SceneCamera camera;
 };
 
 struct Camera {

@@ -27,6 +27,14 @@ struct ScreenCorner {
 struct ScreenTriangle {
     ScreenCorner corners[3];
     float low_y, high_y;
+
+    float low_x() const { return std::min({corners[0].screen.x(), corners[1].screen.x(), corners[2].screen.x()}); }
+    float high_x() const { return std::max({corners[0].screen.x(), corners[1].screen.x(), corners[2].screen.x()}); }
+};
+
+// Samples from x0 to before x1, and so on.
+struct RasterPart {
+    int x0, y0, x1, y1;
 };
 
 // The triangles of a mesh on the raster, clipped at the near plane. A corner has the normal of its vertex, unless the
@@ -35,24 +43,13 @@ class ScreenMesh {
 public:
     ScreenMesh(const Mesh& mesh, const Lens& lens, float near);
 
-    // Calls f(x, y, weights of the corners, depth, triangle) for every sample whose centre a triangle covers, in the
-    // order of the triangles; rows [begin, end).
-    template <class F>
-    void cover(int width, int begin, int end, const F& f) const
-    {
-        for (const ScreenTriangle& triangle : triangles_) {
-            if (triangle.high_y < static_cast<float>(begin) || triangle.low_y > static_cast<float>(end)) continue;
-            cover(triangle, width, begin, end, f);
-        }
-    }
+    const std::vector<ScreenTriangle>& triangles() const { return triangles_; }
 
-private:
-    void add(const ScreenCorner& a, const ScreenCorner& b, const ScreenCorner& c);
-    void add_clipped(const ScreenCorner (&corners)[3]);
-
+    // Calls f(x, y, weights of the corners, depth) for every sample of the part whose centre the triangle covers.
     template <class F>
-    void cover(const ScreenTriangle& triangle, int width, int begin, int end, const F& f) const
+    void cover(const ScreenTriangle& triangle, const RasterPart& part, const F& f) const
     {
+        if (triangle.high_y < static_cast<float>(part.y0) || triangle.low_y > static_cast<float>(part.y1)) return;
         const Vec3f &a = triangle.corners[0].screen, &b = triangle.corners[1].screen, &c = triangle.corners[2].screen;
         const auto edge = [](const Vec3f& p, const Vec3f& q, float x, float y) {
             return (q.x() - p.x()) * (y - p.y()) - (q.y() - p.y()) * (x - p.x());
@@ -62,10 +59,10 @@ private:
         const auto clamp_to = [](float value, int low, int high) {
             return static_cast<int>(std::clamp(value, static_cast<float>(low), static_cast<float>(high)));
         };
-        const int y0 = clamp_to(std::floor(triangle.low_y), begin, end);
-        const int y1 = clamp_to(std::ceil(triangle.high_y), begin, end);
-        const int x0 = clamp_to(std::floor(std::min({a.x(), b.x(), c.x()})), 0, width);
-        const int x1 = clamp_to(std::ceil(std::max({a.x(), b.x(), c.x()})), 0, width);
+        const int y0 = clamp_to(std::floor(triangle.low_y), part.y0, part.y1);
+        const int y1 = clamp_to(std::ceil(triangle.high_y), part.y0, part.y1);
+        const int x0 = clamp_to(std::floor(triangle.low_x()), part.x0, part.x1);
+        const int x1 = clamp_to(std::ceil(triangle.high_x()), part.x0, part.x1);
         for (int y = y0; y < y1; ++y)
             for (int x = x0; x < x1; ++x) {
                 const float at_x = static_cast<float>(x) + 0.5f, at_y = static_cast<float>(y) + 0.5f;
@@ -75,9 +72,13 @@ private:
                 const float z = weights.dot(Vec3f(a.z(), b.z(), c.z()));
                 // Weights on the screen become weights on the triangle.
                 if (!lens_.parallel) weights = weights.cwiseProduct(Vec3f(a.z(), b.z(), c.z())) / z;
-                f(x, y, weights, lens_.parallel ? z : 1 / z, triangle);
+                f(x, y, weights, lens_.parallel ? z : 1 / z);
             }
     }
+
+private:
+    void add(const ScreenCorner& a, const ScreenCorner& b, const ScreenCorner& c);
+    void add_clipped(const ScreenCorner (&corners)[3]);
 
     const Lens& lens_;
     float near_;

@@ -3,11 +3,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "runtime/picture/ground.h"
 #include "runtime/picture/screen_mesh.h"
+#include "runtime/picture/tone.h"
 
 namespace rapid {
 namespace {
@@ -20,14 +23,15 @@ const Vec3f horizon(0.0080f, 0.0090f, 0.0115f);  // at the lower edge
 const Vec3f collider_albedo(0.105f, 0.112f, 0.125f);
 const Vec3f emitter_glow(0.10f, 0.085f, 0.05f);
 
-Vec3f shade_collider(const Vec3f& P, const Vec3f& n, const Vec3f& to_eye, const Light& light)
+ShadedSample shade_collider(const Vec3f& P, const Vec3f& n, const Vec3f& to_eye, const Light& light)
 {
     const float lamp = std::max(0.0f, n.dot(light.direction()));
-    const float seen = lamp > 0 ? lamp * light.past_meshes(P, n) * light.past_points(P) : 0;
+    const float seen = lamp > 0 ? lamp * light.past_meshes(P, n) : 0;
     const float from_sky = 0.6f + 0.4f * n.y();
     const float facing = std::clamp(n.dot(to_eye), 0.0f, 1.0f);
-    const float rim = std::pow(1 - facing, 4.0f);
-    return collider_albedo * (light_from_sky * from_sky + 1.2f * seen) + Vec3f(0.045f, 0.052f, 0.066f) * rim;
+    const float rim = (1 - facing) * (1 - facing) * (1 - facing) * (1 - facing);
+    const Vec3f of_lamp = collider_albedo * (1.2f * seen);
+    return {collider_albedo * (light_from_sky * from_sky) + Vec3f(0.045f, 0.052f, 0.066f) * rim + of_lamp, of_lamp};
 }
 
 // What is behind everything: a gradient, darker to the sides.
@@ -38,7 +42,250 @@ Vec3f backdrop(int x, int y, const PictureOptions& options)
     return (sky + (horizon - sky) * down) * (1 - 0.3f * aside * aside);
 }
 
-// Whether most points are inside the mesh: then it is a vessel, and what lies between them and the viewer is left out.
+// A body on the raster of samples, and which of its triangles may be in which tile.
+struct DrawnBody {
+    const PictureScene::Body* body;
+    bool vessel;
+    ScreenMesh mesh;
+    std::vector<std::uint32_t> first, triangles;  // of each tile, in their order; and the end
+
+    DrawnBody(const PictureScene::Body& drawn, bool is_vessel, const Lens& lens, float near, const TileGrid& tiles)
+        : body(&drawn), vessel(is_vessel), mesh(*drawn.mesh, lens, near), first(tiles.count() + 1, 0)
+    {
+        constexpr float size = tile_size * surface_samples;
+        const auto for_each_tile = [&](const ScreenTriangle& triangle, const auto& f) {
+            const auto tile = [](float at, int count) {
+                return static_cast<int>(std::clamp(std::floor(at / size), 0.0f, static_cast<float>(count - 1)));
+            };
+            if (triangle.high_y < 0 || triangle.low_y > size * static_cast<float>(tiles.down)) return;
+            if (triangle.high_x() < 0 || triangle.low_x() > size * static_cast<float>(tiles.across)) return;
+            for (int j = tile(triangle.low_y, tiles.down); j <= tile(triangle.high_y, tiles.down); ++j)
+                for (int i = tile(triangle.low_x(), tiles.across); i <= tile(triangle.high_x(), tiles.across); ++i)
+                    f(static_cast<std::size_t>(j * tiles.across + i));
+        };
+        const std::vector<ScreenTriangle>& all = mesh.triangles();
+        for (const ScreenTriangle& triangle : all) for_each_tile(triangle, [&](std::size_t t) { ++first[t]; });
+        std::uint32_t total = 0;
+        for (std::uint32_t& count : first) total += std::exchange(count, total);
+        triangles.resize(total);
+        std::vector<std::uint32_t> next = first;
+        for (std::size_t i = 0; i < all.size(); ++i)
+            for_each_tile(all[i], [&](std::size_t t) { triangles[next[t]++] = static_cast<std::uint32_t>(i); });
+    }
+};
+
+// What is nearest at a sample.
+struct Sample {
+    Vec3f colour, lamp, P;
+    float depth;
+    const ScreenTriangle* triangle;  // null: the background
+    Vec3f weights;                   // of its corners
+};
+
+class SurfacePainter {
+public:
+    SurfacePainter(const PictureOptions& options, const PictureScene& scene, const PictureView& view,
+                   const std::vector<bool>& vessels, const Light& light)
+        : options_(options),
+          light_(light),
+          tiles_{options.width, options.height},
+          lens_(Lens::of_camera(view.camera, options.width * surface_samples, options.height * surface_samples)),
+          near_scene_(view.bounds.cast<float>()),
+          extent_(std::max(1e-6f, near_scene_.diagonal().norm()))
+    {
+        const float near = 1e-3f * static_cast<float>((view.camera.target - view.camera.position).norm());
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+            auto& drawn = scene.bodies[b].role == PictureScene::Body::Collider ? colliders_ : emitters_;
+            drawn.emplace_back(scene.bodies[b], vessels[b], lens_, near, tiles_);
+        }
+        for (const PictureScene::Plane& plane : scene.planes) {
+            const Ground ground(plane, view.bounds, true);
+            if (!ground.stands_before(lens_.origin)) grounds_.push_back(ground);
+        }
+        if (scene.planes.empty() && options.grid) grounds_.emplace_back(PictureScene::Plane(), view.bounds, false);
+    }
+
+    SurfaceTile draw(int tile) const
+    {
+        constexpr int across = tile_size * surface_samples;
+        thread_local std::vector<Sample> samples;
+        samples.resize(across * across);
+        const RasterPart part{tiles_.left(tile) * surface_samples, tiles_.top(tile) * surface_samples,
+                              tiles_.right(tile) * surface_samples, tiles_.bottom(tile) * surface_samples};
+        const auto sample = [&](int x, int y) -> Sample& {
+            return samples[static_cast<std::size_t>((y - part.y0) * across + x - part.x0)];
+        };
+        for (int y = tiles_.top(tile); y < tiles_.bottom(tile); ++y)
+            for (int x = tiles_.left(tile); x < tiles_.right(tile); ++x) draw_background(x, y, sample);
+        for (const DrawnBody& body : colliders_) draw_collider(body, tile, part, sample);
+        for (int y = part.y0; y < part.y1; ++y)
+            for (int x = part.x0; x < part.x1; ++x)
+                if (sample(x, y).triangle) shade(sample(x, y), x, y);
+        for (const DrawnBody& body : emitters_) draw_emitter(body, tile, part, sample);
+        return condensed(tile, samples);
+    }
+
+    const TileGrid& tiles() const { return tiles_; }
+
+private:
+    // Backdrop and grounds, shaded once a pixel: lines on the ground are computed smooth. Depths are a sample's own.
+    template <class Samples>
+    void draw_background(int x, int y, const Samples& sample) const
+    {
+        constexpr float to_sample = surface_samples;
+        const Vec3f ray =
+            lens_.ray((static_cast<float>(x) + 0.5f) * to_sample, (static_cast<float>(y) + 0.5f) * to_sample);
+        const Vec3f open = backdrop(x, y, options_);
+        const Ground* nearest = nullptr;
+        float t = infinite;
+        for (const Ground& ground : grounds_)
+            if (const float depth = ground.depth(lens_.origin, ray); depth < t) t = depth, nearest = &ground;
+        ShadedSample shaded{open, Vec3f::Zero()};
+        Vec3f P = Vec3f::Zero();
+        if (nearest) {
+            P = lens_.origin + ray * t;
+            shaded = nearest->shade(P, t, lens_.focal / to_sample, ray, open, light_);
+        }
+        for (int j = 0; j < surface_samples; ++j)
+            for (int i = 0; i < surface_samples; ++i) {
+                const int sx = x * surface_samples + i, sy = y * surface_samples + j;
+                float depth = infinite;
+                if (nearest && nearest->solid)
+                    depth = nearest->depth(lens_.origin,
+                                           lens_.ray(static_cast<float>(sx) + 0.5f, static_cast<float>(sy) + 0.5f));
+                sample(sx, sy) = {shaded.colour, shaded.lamp, P, depth, nullptr, Vec3f::Zero()};
+            }
+    }
+
+    // Calls f(sample, weights, depth, triangle) for the samples of a body that nothing drawn before hides.
+    template <class Samples, class F>
+    static void for_each_sample(const DrawnBody& body, int tile, const RasterPart& part, const Samples& sample,
+                                const F& f)
+    {
+        for (std::uint32_t i = body.first[tile]; i < body.first[tile + 1]; ++i) {
+            const ScreenTriangle& triangle = body.mesh.triangles()[body.triangles[i]];
+            body.mesh.cover(triangle, part, [&](int x, int y, const Vec3f& weights, float depth) {
+                Sample& here = sample(x, y);
+                if (depth < here.depth) f(here, weights, depth, triangle);
+            });
+        }
+    }
+
+    static Vec3f face_of(const ScreenTriangle& triangle)
+    {
+        const ScreenCorner* c = triangle.corners;
+        return (c[1].P - c[0].P).cross(c[2].P - c[0].P);
+    }
+
+    // Which triangle is nearest. Of a vessel the sides towards the viewer are left out.
+    template <class Samples>
+    void draw_collider(const DrawnBody& body, int tile, const RasterPart& part, const Samples& sample) const
+    {
+        for_each_sample(body, tile, part, sample,
+                        [&](Sample& here, const Vec3f& weights, float depth, const ScreenTriangle& triangle) {
+                            if (body.vessel && face_of(triangle).dot(lens_.origin - triangle.corners[0].P) > 0) return;
+                            here.depth = depth;
+                            here.triangle = &triangle;
+                            here.weights = weights;
+                        });
+    }
+
+    void shade(Sample& here, int x, int y) const
+    {
+        const ScreenCorner* c = here.triangle->corners;
+        const Vec3f& w = here.weights;
+        here.P = w[0] * c[0].P + w[1] * c[1].P + w[2] * c[2].P;
+        const Vec3f smooth = (w[0] * c[0].n + w[1] * c[1].n + w[2] * c[2].n).normalized();
+        const Vec3f to_eye = (lens_.origin - here.P).normalized();
+        const Vec3f n = face_of(*here.triangle).dot(to_eye) > 0 ? smooth : Vec3f(-smooth);
+        const ShadedSample shaded = shade_collider(here.P, n, to_eye, light_);
+        // Far from the scene, as in the distant part of a floor, it dissolves into the backdrop.
+        const float away = near_scene_.exteriorDistance(here.P) / extent_, fade = std::exp(-away * away);
+        const Vec3f open = backdrop(x / surface_samples, y / surface_samples, options_);
+        here.colour = open + (shaded.colour - open) * fade;
+        here.lamp = shaded.lamp * fade;
+    }
+
+    // An emitter shows where points come from, and must not hide them: only its outline glows, over what is behind it.
+    template <class Samples>
+    void draw_emitter(const DrawnBody& body, int tile, const RasterPart& part, const Samples& sample) const
+    {
+        for_each_sample(body, tile, part, sample,
+                        [&](Sample& here, const Vec3f& w, float, const ScreenTriangle& triangle) {
+                            const ScreenCorner* c = triangle.corners;
+                            const Vec3f P = w[0] * c[0].P + w[1] * c[1].P + w[2] * c[2].P;
+                            const Vec3f n = (w[0] * c[0].n + w[1] * c[1].n + w[2] * c[2].n).normalized();
+                            const float facing = std::abs(n.dot((lens_.origin - P).normalized()));
+                            here.colour += emitter_glow * (0.06f + 0.5f * (1 - facing) * (1 - facing));
+                        });
+    }
+
+    // From samples to pixels.
+    SurfaceTile condensed(int tile, const std::vector<Sample>& samples) const
+    {
+        constexpr int a_pixel = surface_samples * surface_samples, across = tile_size * surface_samples;
+        SurfaceTile result;
+        result.colour.resize(tile_pixels, Vec3f::Zero());
+        result.bytes.resize(3 * tile_pixels);
+        result.depth.resize(tile_pixels * a_pixel, infinite);
+        result.nearest = infinite;
+        result.farthest = 0;
+        for (int y = 0; y < tiles_.bottom(tile) - tiles_.top(tile); ++y)
+            for (int x = 0; x < tiles_.right(tile) - tiles_.left(tile); ++x) {
+                const auto pixel = static_cast<std::size_t>(y * tile_size + x);
+                std::array<const Sample*, a_pixel> of_pixel;
+                for (int k = 0; k < a_pixel; ++k)
+                    of_pixel[k] =
+                        &samples[static_cast<std::size_t>((y * surface_samples + k / surface_samples) * across +
+                                                          x * surface_samples + k % surface_samples)];
+                for (int k = 0; k < a_pixel; ++k) {
+                    result.colour[pixel] += of_pixel[k]->colour / a_pixel;
+                    result.depth[pixel * a_pixel + k] = of_pixel[k]->depth;
+                    result.nearest = std::min(result.nearest, of_pixel[k]->depth);
+                    result.farthest = std::max(result.farthest, of_pixel[k]->depth);
+                }
+                add_lit(result, static_cast<std::uint32_t>(pixel), of_pixel);
+                write_pixel(result.colour[pixel], tiles_.left(tile) + x, tiles_.top(tile) + y,
+                            &result.bytes[3 * pixel]);
+            }
+        if (result.nearest == infinite) result.depth = {};
+        result.lit.shrink_to_fit();
+        return result;
+    }
+
+    // Samples that are near each other among the cells of shadows share an entry.
+    template <std::size_t N>
+    void add_lit(SurfaceTile& tile, std::uint32_t pixel, const std::array<const Sample*, N>& samples) const
+    {
+        const std::size_t first = tile.lit.size();
+        for (const Sample* sample : samples) {
+            if (sample->lamp.isZero(0)) continue;
+            const Vec3f cell = light_.cell_of(sample->P);
+            const auto same = std::find_if(
+                tile.lit.begin() + static_cast<std::ptrdiff_t>(first), tile.lit.end(),
+                [&](const SurfaceTile::Lit& other) { return (other.cell - cell).squaredNorm() < 0.25f * 0.25f; });
+            const Vec3f lamp = sample->lamp / N;
+            if (same != tile.lit.end()) {
+                same->lamp += lamp;
+                continue;
+            }
+            tile.lit.push_back({pixel, lamp, cell});
+            tile.cells.extend(cell);
+        }
+    }
+
+    const PictureOptions& options_;
+    const Light& light_;
+    TileGrid tiles_;
+    Lens lens_;
+    std::vector<DrawnBody> colliders_, emitters_;
+    std::vector<Ground> grounds_;
+    Box3f near_scene_;
+    float extent_;  // m, of the scene
+};
+
+}  // namespace
+
 // A point is inside when a ray from it crosses the mesh an odd number of times.
 bool holds_points(const Mesh& mesh, const PointSet& points)
 {
@@ -74,143 +321,13 @@ bool holds_points(const Mesh& mesh, const PointSet& points)
     return sampled > 0 && 2 * inside > sampled;
 }
 
-class SurfacePainter {
-public:
-    SurfacePainter(const PictureOptions& options, const PictureScene& scene, const PictureView& view,
-                   const Light& light)
-        : options_(options),
-          scene_(scene),
-          view_(view),
-          light_(light),
-          surfaces_{options.width * surface_samples, options.height * surface_samples, {}, {}},
-          lens_(Lens::of_camera(view.camera, surfaces_.width, surfaces_.height)),
-          near_(1e-3f * static_cast<float>((view.camera.target - view.camera.position).norm())),
-          near_scene_(view.bounds.cast<float>()),
-          extent_(std::max(1e-6f, near_scene_.diagonal().norm()))
-    {
-        surfaces_.colour.resize(static_cast<std::size_t>(surfaces_.width) * surfaces_.height);
-        surfaces_.depth.assign(surfaces_.colour.size(), infinite);
-    }
-
-    Surfaces draw(const PointSet& points)
-    {
-        draw_background();
-        for (const PictureScene::Body& body : scene_.bodies)
-            if (body.role == PictureScene::Body::Collider) draw_collider(*body.mesh, holds_points(*body.mesh, points));
-        for (const PictureScene::Body& body : scene_.bodies)
-            if (body.role == PictureScene::Body::Emitter) draw_emitter(*body.mesh);
-        return std::move(surfaces_);
-    }
-
-private:
-    // Backdrop and grounds, shaded once a pixel: lines on the ground are computed smooth. Depths are a sample's own.
-    void draw_background()
-    {
-        std::vector<Ground> grounds;
-        for (const PictureScene::Plane& plane : scene_.planes) {
-            const Ground ground(plane, view_.bounds, true);
-            if (!ground.stands_before(lens_.origin)) grounds.push_back(ground);
-        }
-        if (scene_.planes.empty() && options_.grid) grounds.emplace_back(PictureScene::Plane(), view_.bounds, false);
-        for_each_band(options_.height, [&](int begin, int end) {
-            for (int y = begin; y < end; ++y)
-                for (int x = 0; x < options_.width; ++x) draw_background(x, y, grounds);
-        });
-    }
-
-    void draw_background(int x, int y, const std::vector<Ground>& grounds)
-    {
-        constexpr float to_sample = surface_samples;
-        const Vec3f ray =
-            lens_.ray((static_cast<float>(x) + 0.5f) * to_sample, (static_cast<float>(y) + 0.5f) * to_sample);
-        const Vec3f open = backdrop(x, y, options_);
-        const Ground* nearest = nullptr;
-        float t = infinite;
-        for (const Ground& ground : grounds)
-            if (const float depth = ground.depth(lens_.origin, ray); depth < t) t = depth, nearest = &ground;
-        const Vec3f colour =
-            nearest ? nearest->shade(lens_.origin + ray * t, t, lens_.focal / to_sample, ray, open, light_) : open;
-        for (int j = 0; j < surface_samples; ++j)
-            for (int i = 0; i < surface_samples; ++i) {
-                const int sx = x * surface_samples + i, sy = y * surface_samples + j;
-                const std::size_t here = static_cast<std::size_t>(sy) * surfaces_.width + sx;
-                surfaces_.colour[here] = colour;
-                if (nearest && nearest->solid)
-                    surfaces_.depth[here] = nearest->depth(
-                        lens_.origin, lens_.ray(static_cast<float>(sx) + 0.5f, static_cast<float>(sy) + 0.5f));
-            }
-    }
-
-    // A sample of a mesh that nothing drawn before hides.
-    struct Fragment {
-        std::size_t sample;
-        int x, y;  // of the sample
-        float depth;
-        Vec3f P, n, face;  // n: interpolated, unit; face: the triangle's normal, of any length
-    };
-
-    // Calls f(fragment) for those of a mesh.
-    template <class F>
-    void for_each_fragment(const Mesh& mesh, const F& f)
-    {
-        const ScreenMesh on_screen(mesh, lens_, near_);
-        const int width = surfaces_.width;
-        for_each_band(surfaces_.height, [&](int begin, int end) {
-            on_screen.cover(width, begin, end,
-                            [&](int x, int y, const Vec3f& w, float depth, const ScreenTriangle& triangle) {
-                                const std::size_t here = static_cast<std::size_t>(y) * width + x;
-                                if (depth >= surfaces_.depth[here]) return;
-                                const ScreenCorner* c = triangle.corners;
-                                const Vec3f P = w[0] * c[0].P + w[1] * c[1].P + w[2] * c[2].P;
-                                const Vec3f n = (w[0] * c[0].n + w[1] * c[1].n + w[2] * c[2].n).normalized();
-                                const Vec3f face = (c[1].P - c[0].P).cross(c[2].P - c[0].P);
-                                f(Fragment{here, x, y, depth, P, n, face});
-                            });
-        });
-    }
-
-    // vessel: the sides towards the viewer are left out.
-    void draw_collider(const Mesh& mesh, bool vessel)
-    {
-        for_each_fragment(mesh, [&](const Fragment& fragment) {
-            const Vec3f to_eye = (lens_.origin - fragment.P).normalized();
-            const bool front = fragment.face.dot(to_eye) > 0;
-            if (vessel && front) return;
-            const Vec3f n = front ? fragment.n : Vec3f(-fragment.n);
-            surfaces_.depth[fragment.sample] = fragment.depth;
-            // Far from the scene, as in the distant part of a floor, it dissolves into the backdrop.
-            const float fade = std::exp(-std::pow(near_scene_.exteriorDistance(fragment.P) / extent_, 2.0f));
-            const Vec3f open = backdrop(fragment.x / surface_samples, fragment.y / surface_samples, options_);
-            surfaces_.colour[fragment.sample] = open + (shade_collider(fragment.P, n, to_eye, light_) - open) * fade;
-        });
-    }
-
-    // An emitter shows where points come from, and must not hide them: only its outline glows, over what is behind it.
-    void draw_emitter(const Mesh& mesh)
-    {
-        for_each_fragment(mesh, [&](const Fragment& fragment) {
-            const float facing = std::abs(fragment.n.dot((lens_.origin - fragment.P).normalized()));
-            surfaces_.colour[fragment.sample] += emitter_glow * (0.06f + 0.5f * (1 - facing) * (1 - facing));
-        });
-    }
-
-    const PictureOptions& options_;
-    const PictureScene& scene_;
-    const PictureView& view_;
-    const Light& light_;
-    Surfaces surfaces_;
-    Lens lens_;
-    float near_;
-    Box3f near_scene_;
-    float extent_;  // m, of the scene
-};
-
-}  // namespace
-
-Surfaces draw_surfaces(const PointSet& points, const PictureOptions& options, const PictureScene& scene,
-                       const PictureView& view, const Light& light)
+std::vector<SurfaceTile> draw_surfaces(const PictureOptions& options, const PictureScene& scene,
+                                       const PictureView& view, const std::vector<bool>& vessels, const Light& light)
 {
-    return SurfacePainter(options, scene, view, light).draw(points);
+    const SurfacePainter painter(options, scene, view, vessels, light);
+    std::vector<SurfaceTile> tiles(painter.tiles().count());
+    tbb::parallel_for(0, painter.tiles().count(), [&](int tile) { tiles[tile] = painter.draw(tile); });
+    return tiles;
 }
 
 }  // namespace rapid

@@ -1,6 +1,8 @@
-// The part of a picture that is not points: background, ground and the meshes of the scene.
+// The part of a picture that is not points: background, ground and the meshes of the scene. It is drawn once for a view
+// and its shapes; a frame adds what changes, the shadows of its points.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "runtime/picture/light.h"
@@ -10,14 +12,45 @@ namespace rapid {
 // Samples along each edge of a pixel: surfaces are drawn that much larger, and averaged.
 constexpr int surface_samples = 2;
 
-// Linear colours and depths, shape [height][width] in samples.
-struct Surfaces {
-    int width, height;
-    std::vector<Vec3f> colour;
-    std::vector<float> depth;  // m; infinite where there is nothing
+// The picture is drawn in squares, each by one thread.
+constexpr int tile_size = 32;  // pixels
+constexpr int tile_pixels = tile_size * tile_size;
+
+// The squares of a picture, row by row from the top; those at its right and lower edge may be cut.
+struct TileGrid {
+    int width, height;  // of the picture
+    int across = (width + tile_size - 1) / tile_size, down = (height + tile_size - 1) / tile_size;
+
+    int count() const { return across * down; }
+    int left(int tile) const { return tile % across * tile_size; }
+    int top(int tile) const { return tile / across * tile_size; }
+    int right(int tile) const { return std::min(left(tile) + tile_size, width); }
+    int bottom(int tile) const { return std::min(top(tile) + tile_size, height); }
 };
 
-Surfaces draw_surfaces(const PointSet& points, const PictureOptions& options, const PictureScene& scene,
-                       const PictureView& view, const Light& light);
+struct SurfaceTile {
+    std::vector<Vec3f> colour;        // linear, where no point shades it; shape [tile_size][tile_size]
+    std::vector<std::uint8_t> bytes;  // of that, as they are in the picture: three a pixel
+
+    // m; shape [tile_pixels][samples of a pixel]; empty where there are no surfaces.
+    std::vector<float> depth;
+    float nearest, farthest;  // of these
+
+    // Light that points can take from a pixel, and where they would be among the cells of their shadows. A pixel on an
+    // edge has several.
+    struct Lit {
+        std::uint32_t pixel;
+        Vec3f lamp, cell;
+    };
+    std::vector<Lit> lit;
+    Box3f cells;  // bounds of the places
+};
+
+// Whether a mesh is a vessel: most points are inside, and the sides between them and the viewer are left out.
+bool holds_points(const Mesh& mesh, const PointSet& points);
+
+// The tiles of the picture. vessels: of each body, whether it is one.
+std::vector<SurfaceTile> draw_surfaces(const PictureOptions& options, const PictureScene& scene,
+                                       const PictureView& view, const std::vector<bool>& vessels, const Light& light);
 
 }  // namespace rapid

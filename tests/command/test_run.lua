@@ -166,8 +166,8 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
     local folder = new_folder()
     local result = folder:run "-f 1-4 -o a.####.xyz"
     assert.equal(2, result.status)
-    assert.equal('-o a.####.xyz: unknown extension ".xyz"; it must be one of .bgeo, .csv, .npz, .ply, .png, .prt, ' ..
-      '.usda, .vdb, .vtp\n', result.stderr)
+    assert.equal('-o a.####.xyz: unknown extension ".xyz"; it must be one of .bgeo, .csv, .gif, .mp4, .npz, .ply, ' ..
+      '.png, .prt, .usda, .vdb, .vtp, .webm\n', result.stderr)
     assert.equal("", result.stdout)
   end)
 
@@ -400,6 +400,54 @@ return scene:solve {}
     local wrong = folder:run "-f 1 --camera 0,3,6,0,1"
     assert.equal(2, wrong.status)
     assert.truthy(wrong.stderr:find('--camera = "0,3,6,0,1"; it must be PX,PY,PZ,TX,TY,TZ', 1, true), wrong.stderr)
+  end)
+
+  it("is taken by the scene's camera, is blended and shows shapes as :picture says", function()
+    local folder = new_folder(ball)
+    local function picture(name, says, options)
+      local text = ball:gsub("return scene:solve {}", "return scene:solve {}:picture { " .. says .. " }")
+      folder:write(name .. ".lua", text)
+      local result = command.rapid(("run %s.lua -f 3 -o %s.png --size 64x48 %s"):format(name, name, options or ""),
+        { cwd = folder.path })
+      assert.equal(0, result.status, result.stderr)
+      return folder:read(name .. ".png")
+    end
+    local camera = "camera = rapid.camera { position = {0, 3, 6}, target = {0, 1, 0}, fov = 35 }"
+    local usual = picture("usual", "", "--camera 0,3,6,0,1,0,35")
+    assert.is_true(usual == picture("same", camera))
+    local other = "camera = rapid.camera { position = {9, 9, 9} }"
+    assert.is_true(usual == picture("option", other, "--camera 0,3,6,0,1,0,35"))
+    local keyed = "camera = { [1] = rapid.camera { position = {0, 3, 6}, target = {0, 1, 0}, fov = 35 }, " ..
+      "[5] = rapid.camera { position = {0, 3, 4}, target = {0, 1, 0}, fov = 35 } }"
+    assert.is_true(picture("keyed", keyed) == picture("between", (camera:gsub("{0, 3, 6}", "{0, 3, 5}"))))
+    assert.is_true(usual == picture("called", "camera = function(frame) return rapid.camera { " ..
+      "position = {0, 3, 2 * frame.number}, target = {0, 1, 0}, fov = 35 } end"))
+    assert.is_true(usual ~= picture("add", camera .. ", blend = 'add'"))
+    assert.is_true(usual ~= picture("shutter", camera .. ", shutter = 1"))
+    assert.is_true(picture("bare", camera .. ", colliders = false") ~= usual)
+  end)
+
+  it("becomes a film of all frames", function()
+    local folder = new_folder(ball)
+    assert.equal(0, folder:run("-f 1-6x2 -o 'films/{output}.mp4' --size 64x48").status)
+    local frames = command.shell("ffprobe -v error -count_frames -show_entries stream=nb_read_frames,r_frame_rate " ..
+      "-of csv=p=0 films/main.mp4", { cwd = folder.path }).stdout
+    assert.equal("24/1,3\n", frames)
+    local function refused(arguments, message)
+      local result = folder:run(arguments)
+      assert.equal(2, result.status)
+      assert.truthy(result.stderr:find(message, 1, true), result.stderr)
+    end
+    refused("-f 1-2 -o a.####.mp4", "a film is one file of all frames; leave the frame's number out of its name")
+    refused("-f 1-2 -o a.mp4 --size 63x48", "a .mp4 film has even edges; give a --size other than 63x48")
+    refused("-f 1-2 -o a.mp4 --untrusted", "films are made by a program of its own, which --untrusted forbids")
+  end)
+
+  it("becomes no film where a frame fails", function()
+    local folder = new_folder(ball:gsub("return scene:solve {}",
+      "return scene:solve {}:points('fails', function(p, frame) if frame.number == 4 then error 'four' end end)"))
+    assert.equal(1, folder:run("-f 1-6 -o a.mp4 --size 64x48").status)
+    assert.same({ "scene.lua" }, folder:list())
   end)
 
   it("shows the shapes that the points collide with", function()

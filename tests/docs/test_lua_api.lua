@@ -99,14 +99,15 @@ describe("docs/lua-api.md", function()
 
   it("shows scenes that run", function()
     local folder = command.folder()
-    local scene, generations, node = unpack(document.blocks(page, "lua"))
+    local scene, generations, picture, node = unpack(document.blocks(page, "lua"))
     folder:write("scene.lua", scene)
     folder:write("generations.lua", generations)
+    folder:write("picture.lua", picture)
     folder:write("swirl.lua", node)
     folder:write("turned.lua", [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :solve {}]])
-    for _, name in ipairs { "scene", "generations", "turned" } do
+    for _, name in ipairs { "scene", "generations", "picture", "turned" } do
       local result = command.rapid(("run %s.lua -f 1-3 --quiet"):format(name), { cwd = folder.path })
       assert.equal(0, result.status, result.stderr)
     end
@@ -114,7 +115,7 @@ return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :s
 
   it("shows a test that passes", function()
     local folder = command.folder()
-    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[4])
+    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[5])
     assert.equal(0, command.rapid("test " .. command.quoted(file)).status)
   end)
 end)

@@ -1,0 +1,39 @@
+// rapid.camera: from where pictures are taken.
+#include "bindings/host/maker.h"
+#include "runtime/operators/picture.h"
+
+namespace rapid {
+namespace {
+
+struct MakeCamera {
+    std::optional<Vec3d> position, target;
+    std::optional<double> fov;  // deg
+    std::string group;
+
+    static Maker declare()
+    {
+        return maker<MakeCamera>("camera", "From where pictures are taken; what it leaves open is fitted.")
+            .param(&MakeCamera::position, "position", Value(), any_number(), "m", "its place")
+            .param(&MakeCamera::target, "target", Value(), any_number(), "m", "where it looks")
+            .param(&MakeCamera::fov, "fov", Value(), between(1, 170), "",
+                   "vertical angle of view, degrees; 35 without it")
+            .param(&MakeCamera::group, "group", Value(), any_number(), "",
+                   "a group of points that it frames and follows, in place of the scene");
+    }
+
+    ObjectPtr make(MakeContext&) const
+    {
+        if (position && target && *position == *target)
+            throw Error("position and target are the same place; the camera must be elsewhere than what it looks at");
+        auto camera = std::make_shared<CameraObject>();
+        camera->position = position;
+        camera->target = target;
+        if (fov) camera->fov = *fov * EIGEN_PI / 180;
+        camera->group = group;
+        return camera;
+    }
+};
+RAPID_MAKER(MakeCamera);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,193 @@
+#include "runtime/io/film.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+constexpr int input = STDIN_FILENO, output = 3;  // of ffmpeg
+
+std::string path_of_ffmpeg()
+{
+    const char* const path = std::getenv("PATH");
+    std::istringstream folders(path ? path : "/usr/bin");
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        const std::string file = (folder.empty() ? "." : folder) + "/ffmpeg";
+        if (access(file.c_str(), X_OK) == 0) return file;
+    }
+    throw Error(
+        "films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
+}
+
+// Constant quality, that of a picture nearly; the matrix and the primaries of HD video, which players assume.
+std::vector<std::string> encoder_for(std::string_view extension)
+{
+    const std::vector<std::string> hd = {"-vf",
+                                         "scale=out_color_matrix=bt709:out_range=tv",
+                                         "-pix_fmt",
+                                         "yuv420p",
+                                         "-colorspace",
+                                         "bt709",
+                                         "-color_primaries",
+                                         "bt709",
+                                         "-color_trc",
+                                         "bt709"};
+    std::vector<std::string> arguments;
+    if (extension == ".mp4") {
+        arguments = {"-c:v", "libx264", "-crf", "17", "-movflags", "+faststart", "-f", "mp4"};
+        arguments.insert(arguments.begin(), hd.begin(), hd.end());
+    } else if (extension == ".webm") {
+        arguments = {"-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-row-mt", "1", "-f", "webm"};
+        arguments.insert(arguments.begin(), hd.begin(), hd.end());
+    } else {
+        // A palette for each picture: one for all of them would have to wait for the last.
+        arguments = {"-filter_complex", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1", "-f",
+                     "gif"};
+    }
+    return arguments;
+}
+
+struct SpawnActions {
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+
+    SpawnActions()
+    {
+        posix_spawn_file_actions_init(&actions);
+        posix_spawnattr_init(&attributes);
+        // Signals as a program expects them: those of this thread may be blocked, for a thread that waits for them.
+        sigset_t none, all;
+        sigemptyset(&none);
+        sigfillset(&all);
+        posix_spawnattr_setsigmask(&attributes, &none);
+        posix_spawnattr_setsigdefault(&attributes, &all);
+        posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    }
+    ~SpawnActions()
+    {
+        posix_spawn_file_actions_destroy(&actions);
+        posix_spawnattr_destroy(&attributes);
+    }
+};
+
+}  // namespace
+
+void require_ffmpeg() { path_of_ffmpeg(); }
+
+bool needs_even_edges(std::string_view extension) { return extension == ".mp4" || extension == ".webm"; }
+
+Film::Film(OutputFile& file, std::string_view extension, int width, int height, double fps)
+{
+    if (needs_even_edges(extension) && (width % 2 != 0 || height % 2 != 0))
+        throw Error(
+            fmt::format("a {} film of {} x {} can't be made; both edges must be even", extension, width, height));
+    const std::string program = path_of_ffmpeg();
+    std::vector<std::string> words = {"ffmpeg",
+                                      "-nostdin",
+                                      "-hide_banner",
+                                      "-loglevel",
+                                      "error",
+                                      "-f",
+                                      "rawvideo",
+                                      "-pix_fmt",
+                                      "rgb24",
+                                      "-s",
+                                      fmt::format("{}x{}", width, height),
+                                      "-r",
+                                      fmt::format("{}", fps),
+                                      "-i",
+                                      "pipe:0",
+                                      "-an"};
+    for (std::string& word : encoder_for(extension)) words.push_back(std::move(word));
+    // By its descriptor: the file has no name yet.
+    for (const char* word : {"-y", "/proc/self/fd/3"}) words.emplace_back(word);
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+
+    int ends[2];
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+        throw Error(fmt::format("no connection to ffmpeg: {}", std::strerror(errno)));
+    frames_ = Descriptor(ends[0]);
+    const Descriptor theirs(ends[1]);
+    messages_ = Descriptor(memfd_create("ffmpeg", MFD_CLOEXEC));
+    if (!messages_) throw Error(fmt::format("no connection to ffmpeg: {}", std::strerror(errno)));
+
+    SpawnActions spawn;
+    posix_spawn_file_actions_adddup2(&spawn.actions, messages_.number(), STDERR_FILENO);
+    posix_spawn_file_actions_adddup2(&spawn.actions, messages_.number(), STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&spawn.actions, theirs.number(), input);
+    posix_spawn_file_actions_adddup2(&spawn.actions, file.descriptor(), output);
+    const int failed =
+        posix_spawn(&ffmpeg_, program.c_str(), &spawn.actions, &spawn.attributes, arguments.data(), environ);
+    if (failed) {
+        ffmpeg_ = -1;
+        throw Error(fmt::format("{} can't be started: {}", program, std::strerror(failed)));
+    }
+}
+
+Film::~Film()
+{
+    if (ffmpeg_ < 0) return;
+    kill(ffmpeg_, SIGKILL);
+    wait();
+}
+
+void Film::add(const Picture& picture)
+{
+    for (std::size_t sent = 0; sent < picture.rgb.size();) {
+        const ssize_t count =
+            send(frames_.number(), picture.rgb.data() + sent, picture.rgb.size() - sent, MSG_NOSIGNAL);
+        if (count > 0)
+            sent += static_cast<std::size_t>(count);
+        else if (errno != EINTR)
+            fail();
+    }
+}
+
+void Film::finish()
+{
+    frames_ = Descriptor();  // the end of its input
+    const int status = wait();
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) fail();
+}
+
+int Film::wait()
+{
+    int status = 0;
+    while (waitpid(ffmpeg_, &status, 0) < 0 && errno == EINTR) {
+    }
+    ffmpeg_ = -1;
+    return status;
+}
+
+void Film::fail()
+{
+    if (ffmpeg_ >= 0) {
+        frames_ = Descriptor();
+        wait();
+    }
+    char text[1000];
+    const ssize_t count = pread(messages_.number(), text, sizeof text, 0);
+    std::string said(text, count > 0 ? static_cast<std::size_t>(count) : 0);
+    while (!said.empty() && said.back() == '\n') said.pop_back();
+    throw Error(fmt::format("ffmpeg failed: {}", said.empty() ? "it says nothing" : said));
+}
+
+}  // namespace rapid

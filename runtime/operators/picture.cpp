@@ -1,0 +1,87 @@
+// picture: how points look in pictures, from where, and which shapes are shown.
+#include "runtime/operators/picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace rapid {
+namespace {
+
+// Both are between the same two keys: what one of them leaves open is so on the whole way.
+template <class T>
+std::optional<T> on_the_way(const std::optional<T>& a, const std::optional<T>& b, double part)
+{
+    if (!a || !b) return part < 1 ? a : b;
+    return T(*a + part * (*b - *a));
+}
+
+}  // namespace
+
+CameraPtr CameraTrack::at(double frame) const
+{
+    if (keys.empty()) return nullptr;
+    const auto next = std::find_if(keys.begin(), keys.end(),
+                                   [&](const auto& key) { return static_cast<double>(key.first) >= frame; });
+    if (next == keys.begin()) return next->second;
+    if (next == keys.end()) return keys.rbegin()->second;
+    const auto [first, a] = *std::prev(next);
+    const auto [last, b] = *next;
+    const double t = (frame - static_cast<double>(first)) / static_cast<double>(last - first);
+    const double part = t * t * (3 - 2 * t);  // at rest at both keys
+    auto camera = std::make_shared<CameraObject>();
+    camera->position = on_the_way(a->position, b->position, part);
+    camera->target = on_the_way(a->target, b->target, part);
+    camera->fov = on_the_way(a->fov, b->fov, part);
+    camera->group = part < 1 ? a->group : b->group;
+    return camera;
+}
+
+void read_value(const Param& param, const Value& value, CameraTrack& field)
+{
+    field.keys.clear();
+    if (value.is_nil()) return;
+    if (CameraPtr camera = value.object<CameraObject>()) {
+        field.keys[0] = std::move(camera);
+        return;
+    }
+    const auto fault = [&] {
+        return Error(
+            fmt::format("{} = {}; it must be a rapid.camera {{ ... }}, keys {{[1] = a, [48] = b}} of such, or "
+                        "a function of the frame that returns one",
+                        param.name, describe(value)));
+    };
+    const Table* table = value.table();
+    if (!table || !table->named.empty()) throw fault();
+    std::int64_t frame = 0;
+    for (const Value& key : table->list) field.keys[++frame] = key.object<CameraObject>();
+    for (const auto& [number, key] : table->numbered) field.keys[number] = key.object<CameraObject>();
+    for (const auto& [number, camera] : field.keys)
+        if (!camera) throw fault();
+    if (field.keys.empty()) throw fault();
+}
+
+void PictureNode::uses(Uses& uses) const
+{
+    for (const auto& [frame, key] : camera.keys)
+        if (!key->group.empty()) uses.reads_groups.push_back(key->group);
+}
+
+NodeType PictureNode::declare()
+{
+    return node<PictureNode>("picture", "Says how points look in pictures; they stay as they are.")
+        .takes("age")
+        .param(&PictureNode::blend, "blend", std::string("over"), any_number(), "",
+               "\"add\": points shine, add their light, and cast no shadow")
+        .choices({"over", "add"})
+        .param(&PictureNode::shutter, "shutter", 0.0, between(0, 1), "",
+               "part of the frame for which the picture is exposed: what moves leaves a streak")
+        .param(&PictureNode::camera, "camera", Value(), any_number(), "",
+               "rapid.camera, a function of the frame that returns one, or keys; without it, fitted to the scene")
+        .param(&PictureNode::emitters, "emitters", true, any_number(), "", "whether shapes that bear points are shown")
+        .param(&PictureNode::colliders, "colliders", true, any_number(), "", "whether colliders and planes are shown");
+}
+
+RAPID_NODE(PictureNode);
+
+}  // namespace rapid

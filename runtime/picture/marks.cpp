@@ -1,0 +1,443 @@
+// Points are sorted into tiles; each tile sorts its own by depth and composites them front to back, until a pixel is
+// covered.
+#include "runtime/picture/marks.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include "runtime/parallel.h"
+#include "runtime/points/members.h"
+#include "runtime/points/trail.h"
+
+namespace rapid {
+namespace {
+
+// Dark blue over teal to light yellow: lightness grows evenly with speed, and stands out on the background all along.
+// sRGB, at even steps.
+constexpr std::array<std::array<float, 3>, 6> speed_ramp = {{{0.17f, 0.25f, 0.62f},
+                                                             {0.16f, 0.42f, 0.80f},
+                                                             {0.18f, 0.62f, 0.82f},
+                                                             {0.38f, 0.79f, 0.75f},
+                                                             {0.72f, 0.91f, 0.66f},
+                                                             {1.00f, 0.97f, 0.74f}}};
+
+float linear(float srgb) { return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f); }
+
+// The ramp in linear light, finer than 8 bits can show.
+const std::vector<Vec3f>& speed_colours()
+{
+    static const std::vector<Vec3f> colours = [] {
+        std::vector<Vec3f> table(1024);
+        for (std::size_t i = 0; i < table.size(); ++i) {
+            const float at = static_cast<float>(i) / static_cast<float>(table.size() - 1) * (speed_ramp.size() - 1);
+            const std::size_t step = std::min<std::size_t>(static_cast<std::size_t>(at), speed_ramp.size() - 2);
+            const float t = at - static_cast<float>(step);
+            for (int c = 0; c < 3; ++c)
+                table[i][c] = linear((1 - t) * speed_ramp[step][c] + t * speed_ramp[step + 1][c]);
+        }
+        return table;
+    }();
+    return colours;
+}
+
+// The style of each point: an index into `styles`, the first of which is the usual one; empty: all have that.
+std::vector<std::uint8_t> styles_of(const PointSet& points, const PictureScene& scene)
+{
+    if (scene.styles.empty()) return {};
+    std::vector<std::uint8_t> result(points.size(), 0);
+    for (std::size_t k = 0; k < scene.styles.size(); ++k) {
+        const Strided<std::uint8_t> members = members_of(points, scene.styles[k].group);
+        for (std::size_t i = 0; i < result.size(); ++i)
+            if (members[i]) result[i] = static_cast<std::uint8_t>(k + 1);
+    }
+    return result;
+}
+
+const PointStyle& style(const PictureScene& scene, std::uint8_t index)
+{
+    static const PointStyle usual;
+    return index == 0 ? usual : scene.styles[index - 1];
+}
+
+// How much brighter than white a colour is, up to 1.
+float glow(const Vec3f& colour) { return std::clamp(colour.maxCoeff() - 1, 0.0f, 1.0f); }
+
+float opacity_of(const Column<float>* Alpha, std::size_t i)
+{
+    if (!Alpha) return 1;
+    const float alpha = (*Alpha)[i];
+    return alpha >= 0 ? std::min(alpha, 1.0f) : 0;  // NaN: 0
+}
+
+// How points look in this picture.
+struct PointLook {
+    const PointSet& points;
+    const PictureScene& scene;
+    const PictureView& view;
+    const Light& light;
+    const TileGrid& tiles;
+    Lens lens;
+    float far;  // m, the depth at which colours have faded halfway to the background
+    std::vector<std::uint8_t> styles;
+    const Column<Vec3f>* Cd;
+    const Column<float>*Alpha, *pscale, *age;
+    Trails trails;
+
+    PointLook(const PointSet& drawn, const TileGrid& grid, const PictureScene& in, const PictureView& from,
+              const Light& lit)
+        : points(drawn),
+          scene(in),
+          view(from),
+          light(lit),
+          tiles(grid),
+          lens(Lens::of_camera(from.camera, grid.width, grid.height)),
+          far(static_cast<float>((from.camera.target - from.camera.position).norm())),
+          styles(styles_of(drawn, in)),
+          Cd(drawn.find<Vec3f>("Cd")),
+          Alpha(drawn.find<float>("Alpha")),
+          pscale(drawn.find<float>("pscale")),
+          age(drawn.find<float>("age")),
+          trails(drawn)
+    {
+    }
+
+    Vec3f colour(std::size_t i) const
+    {
+        if (Cd) {
+            const Vec3f c = (*Cd)[i].cwiseMax(0.0f).cwiseMin(1e4f);
+            if (c.allFinite()) return c;
+        }
+        const float speed = points.v()[i].norm() / static_cast<float>(view.full_speed);
+        const std::vector<Vec3f>& table = speed_colours();
+        // A square root: most points are slow, and differences among them show.
+        const float at = std::isfinite(speed) ? std::sqrt(std::clamp(speed, 0.0f, 1.0f)) : 1;
+        return table[static_cast<std::size_t>(at * static_cast<float>(table.size() - 1))];
+    }
+
+    // Piece k of the trail, from 1: from its place k - 1 to k. It fades to its end.
+    Mark piece(std::size_t i, int k, Mark m) const
+    {
+        m.radius = 0;
+        if (k > trails.count(i)) return m;
+        const Vec3f from = lens.project(trails.at(i, k - 1)), to = lens.project(trails.at(i, k));
+        if (!from.allFinite() || !to.allFinite() || std::min(from.z(), to.z()) < 1e-3f * far) return m;
+        m.x = from.x();
+        m.y = from.y();
+        m.depth = from.z();
+        m.dx = to.x() - from.x();
+        m.dy = to.y() - from.y();
+        m.ddepth = to.z() - from.z();
+        m.length = std::hypot(m.dx, m.dy);
+        m.opacity *= 1 - (static_cast<float>(k) - 0.5f) / static_cast<float>(trails.places());
+        m.line = true;
+        if (m.length > 0 && m.length < static_cast<float>(tiles.width + tiles.height)) size(m);
+        return m;
+    }
+
+    // The radius, if the mark may be in the picture.
+    void size(Mark& m) const
+    {
+        const auto least = static_cast<float>(view.least_radius);
+        const auto width = static_cast<float>(tiles.width), height = static_cast<float>(tiles.height);
+        const float radius = std::min(std::max(least, m.metres * lens.focal / m.depth), 0.5f * height);
+        const float reach = radius + 0.5f;
+        if (m.x + std::max(0.0f, m.dx) + reach > 0 && m.y + std::max(0.0f, m.dy) + reach > 0 &&
+            m.x + std::min(0.0f, m.dx) - reach < width && m.y + std::min(0.0f, m.dy) - reach < height)
+            m.radius = radius;
+    }
+
+    // The way back to where the point was when the shutter opened, or was born after.
+    void expose(std::size_t i, const PointStyle& how, const Vec3f& P, Mark& m) const
+    {
+        const float open = std::min(static_cast<float>(how.shutter),
+                                    age ? std::max(0.0f, (*age)[i]) : static_cast<float>(how.shutter));
+        const Vec3f before = lens.project(P - open * points.v()[i]);
+        if (!before.allFinite() || before.z() < 1e-3f * far) return;
+        const float dx = before.x() - m.x, dy = before.y() - m.y, length = std::hypot(dx, dy);
+        constexpr float shortest = 0.5f;  // pixels
+        const auto longest = static_cast<float>(tiles.width + tiles.height);
+        if (!(length > shortest && length < longest)) return;
+        m.dx = dx;
+        m.dy = dy;
+        m.ddepth = before.z() - m.depth;
+        m.length = length;
+    }
+
+    Mark mark(std::size_t i) const
+    {
+        Mark m{};
+        const Vec3f P = points.P()[i];
+        const Vec3f s = lens.project(P);
+        if (!s.allFinite() || s.z() < 1e-3f * far) return m;
+        m.opacity = opacity_of(Alpha, i);
+        if (m.opacity == 0) return m;
+        m.x = s.x();
+        m.y = s.y();
+        m.depth = s.z();
+        m.metres = pscale && (*pscale)[i] > 0 ? (*pscale)[i] : 0;
+        const PointStyle& how = style(scene, styles.empty() ? 0 : styles[i]);
+        if (how.shutter > 0) expose(i, how, P, m);
+        size(m);
+        if (m.radius == 0 && trails.count(i) == 0) return m;
+        m.additive = how.additive;
+        const float fog = std::exp(-0.35f * std::max(0.0f, s.z() / far - 1));
+        const Vec3f own = colour(i);
+        m.colour = own * fog;
+        // A colour brighter than white shines, and no shadow dims it.
+        const float shining = m.additive ? 1 : glow(own);
+        if (shining < 1) {
+            const float lamp = light.past_meshes(P, Vec3f::Zero()) * light.past_points(light.cell_of(P));
+            const float lit = 0.30f + 0.80f * lamp;
+            m.colour *= lit + shining * (1 - lit);
+        }
+        return m;
+    }
+};
+
+template <class F>
+void for_each_tile_of(const Mark& m, const TileGrid& tiles, const F& f)
+{
+    const float reach = m.radius + 0.5f;
+    const auto tile = [](float at, int count) {
+        return static_cast<int>(std::clamp(std::floor(at / tile_size), 0.0f, static_cast<float>(count - 1)));
+    };
+    const float left = m.x + std::min(0.0f, m.dx) - reach, right = m.x + std::max(0.0f, m.dx) + reach;
+    const float top = m.y + std::min(0.0f, m.dy) - reach, bottom = m.y + std::max(0.0f, m.dy) + reach;
+    for (int j = tile(top, tiles.down); j <= tile(bottom, tiles.down); ++j)
+        for (int i = tile(left, tiles.across); i <= tile(right, tiles.across); ++i) f(j * tiles.across + i);
+}
+
+// A pixel while points are composited front to back.
+struct Pixel {
+    Vec3f colour = Vec3f::Zero();
+    float open = 1;  // transmittance: the part of what is behind that shows
+};
+
+class TilePainter {
+public:
+    TilePainter(const TileGrid& tiles, int tile, const SurfaceTile& surfaces, const Lens& lens, const Light& light)
+        : surfaces_(surfaces),
+          lens_(lens),
+          light_(light),
+          x0_(tiles.left(tile)),
+          y0_(tiles.top(tile)),
+          x1_(tiles.right(tile)),
+          y1_(tiles.bottom(tile))
+    {
+    }
+
+    void composite(const Mark& m)
+    {
+        // The tile as a whole tells of most marks that no surface hides them.
+        const float first = m.depth + std::min(0.0f, m.ddepth) - m.metres;
+        const float last = m.depth + std::max(0.0f, m.ddepth);
+        if (surfaces_.farthest <= first) return;
+        const bool hidden = surfaces_.nearest <= last;
+        if (m.line)
+            hidden ? line<true>(m) : line<false>(m);
+        else if (m.length > 0)
+            hidden ? streak<true>(m) : streak<false>(m);
+        else
+            hidden ? disc<true>(m) : disc<false>(m);
+    }
+
+    void finish(std::span<Vec3f> colour) const
+    {
+        for (std::size_t i = 0; i < pixels_.size(); ++i) colour[i] = pixels_[i].colour + pixels_[i].open * colour[i];
+    }
+
+private:
+    // Calls f(pixel, its place in the tile, x and y from the mark's to its centre) for those of a box around the mark.
+    template <class F>
+    void for_each_pixel(const Mark& m, const F& f)
+    {
+        const float reach = m.radius + 0.5f;
+        const auto clamped = [](float at, int low, int high) {
+            return static_cast<int>(std::clamp(at, static_cast<float>(low), static_cast<float>(high)));
+        };
+        const int left = clamped(std::floor(m.x + std::min(0.0f, m.dx) - reach), x0_, x1_);
+        const int right = clamped(std::ceil(m.x + std::max(0.0f, m.dx) + reach), x0_, x1_);
+        const int top = clamped(std::floor(m.y + std::min(0.0f, m.dy) - reach), y0_, y1_);
+        const int bottom = clamped(std::ceil(m.y + std::max(0.0f, m.dy) + reach), y0_, y1_);
+        for (int y = top; y < bottom; ++y)
+            for (int x = left; x < right; ++x) {
+                const auto place = static_cast<std::size_t>((y - y0_) * tile_size + x - x0_);
+                Pixel& pixel = pixels_[place];
+                if (pixel.open < 1.0f / 512) continue;
+                f(pixel, place, static_cast<float>(x) + 0.5f - m.x, static_cast<float>(y) + 0.5f - m.y);
+            }
+    }
+
+    // The part of the pixel's samples that no surface nearer than `depth` hides.
+    float past_surfaces(std::size_t pixel, float depth) const
+    {
+        constexpr int samples = surface_samples * surface_samples;
+        const float* of_pixel = &surfaces_.depth[samples * pixel];
+        int past = 0;
+        for (int k = 0; k < samples; ++k) past += of_pixel[k] > depth;
+        return static_cast<float>(past) / samples;
+    }
+
+    static void add(Pixel& pixel, const Mark& m, float cover, const Vec3f& colour)
+    {
+        pixel.colour += pixel.open * cover * colour;
+        if (!m.additive) pixel.open *= 1 - cover;
+    }
+
+    // hidden: maybe, by surfaces.
+    template <bool hidden>
+    void disc(const Mark& m)
+    {
+        const float reach = m.radius + 0.5f, inverse = 1 / m.radius;
+        // Only discs of a few pixels are shaded as balls.
+        const float roundness = m.additive ? 0 : std::clamp((m.radius - 1.2f) / 2.5f, 0.0f, 1.0f);
+        const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
+            const float squared = dx * dx + dy * dy;
+            if (squared >= reach * reach) return;
+            const float away = std::sqrt(squared);
+            float cover = m.opacity * std::min(reach - away, 1.0f);
+            // The ball's surface is nearer than its centre.
+            const float edge = std::min(1.0f, away * inverse);
+            const float bulge = std::sqrt(1 - edge * edge);
+            if constexpr (hidden) cover *= past_surfaces(place, m.depth - bulge * m.metres);
+            if (roundness == 0) return add(pixel, m, cover, flat);
+            const float shaded = shade(dx * inverse, dy * inverse, bulge);
+            add(pixel, m, cover, m.colour * (0.85f + roundness * (shaded - 0.85f)));
+        });
+    }
+
+    // A disc of the radius R that moves evenly along L: at the distance w from its line a pixel is behind it while
+    // |u - s L| <= sqrt(R² - w²), s from 0 to 1. Over the pixel's width that root is averaged, so that no line is
+    // brighter for where it falls among the pixels.
+    template <bool hidden>
+    void streak(const Mark& m)
+    {
+        const float ux = m.dx / m.length, uy = m.dy / m.length, R = m.radius, inverse = 1 / m.length;
+        // The integral of sqrt(R² - w²).
+        const auto area = [&](float w) {
+            const float t = std::clamp(w / R, -1.0f, 1.0f);
+            return 0.5f * R * R * (t * std::sqrt(1 - t * t) + std::asin(t));
+        };
+        const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
+            const float w = std::abs(ux * dy - uy * dx), u = ux * dx + uy * dy;
+            if (w >= R + 0.5f) return;
+            const float half = area(w + 0.5f) - area(w - 0.5f);
+            const float time = (std::min(u + half, m.length) - std::max(u - half, 0.0f)) * inverse;
+            if (time <= 0) return;
+            float cover = m.opacity * std::min(time, 1.0f);
+            if constexpr (hidden)
+                cover *= past_surfaces(place, m.depth + std::clamp(u * inverse, 0.0f, 1.0f) * m.ddepth - m.metres);
+            add(pixel, m, cover, flat);
+        });
+    }
+
+    // A pixel is on one of two pieces that follow each other, never on both.
+    template <bool hidden>
+    void line(const Mark& m)
+    {
+        const float ux = m.dx / m.length, uy = m.dy / m.length, inverse = 1 / m.length;
+        const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
+            const float w = std::abs(ux * dy - uy * dx), u = ux * dx + uy * dy;
+            if (u < 0 || u >= m.length || w >= m.radius + 0.5f) return;
+            float cover = m.opacity * std::min(m.radius + 0.5f - w, 1.0f);
+            if constexpr (hidden) cover *= past_surfaces(place, m.depth + u * inverse * m.ddepth - m.metres);
+            add(pixel, m, cover, flat);
+        });
+    }
+
+    // Of a ball, where its normal in the view is (nx right, ny down, nz to the viewer).
+    float shade(float nx, float ny, float nz) const
+    {
+        const Vec3f n = lens_.right * nx - lens_.up * ny - lens_.forward * nz;
+        const float lamp = 0.5f + 0.5f * n.dot(light_.direction());
+        return 0.25f + 0.95f * lamp * lamp;
+    }
+
+    const SurfaceTile& surfaces_;
+    const Lens& lens_;
+    const Light& light_;
+    int x0_, y0_, x1_, y1_;  // of the tile in the picture
+    std::array<Pixel, tile_pixels> pixels_;
+};
+
+}  // namespace
+
+std::vector<float> shadow_opacity(const PointSet& points, const PictureScene& scene)
+{
+    const auto* Cd = points.find<Vec3f>("Cd");
+    const auto* Alpha = points.find<float>("Alpha");
+    if (!Cd && !Alpha && scene.styles.empty()) return {};
+    const std::vector<std::uint8_t> styles = styles_of(points, scene);
+    std::vector<float> opacity(points.size());
+    for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const bool shines = !styles.empty() && style(scene, styles[i]).additive;
+            const float dark = Cd ? 1 - glow((*Cd)[i]) : 1;
+            opacity[i] = shines || !(dark > 0) ? 0 : dark * opacity_of(Alpha, i);
+        }
+    });
+    return opacity;
+}
+
+// A counting sort in two passes over blocks of points: each block has its own range in every tile.
+Marks make_marks(const PointSet& points, const TileGrid& tiles, const PictureScene& scene, const PictureView& view,
+                 const Light& light)
+{
+    const PointLook look(points, tiles, scene, view, light);
+    Marks marks;
+    const std::size_t size = points.size(), n = size * (1 + look.trails.places());
+    const auto count = static_cast<std::size_t>(tiles.count());
+    marks.all.resize(n);
+    constexpr std::size_t block = 16 * chunk_size;
+    const std::size_t blocks = (n + block - 1) / block;
+    std::vector<std::vector<std::uint32_t>> next_in(blocks, std::vector<std::uint32_t>(count, 0));
+    const auto for_each_block = [&](const auto& f) {
+        tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t b) {
+            for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i) f(i, next_in[b]);
+        });
+    };
+    for_each_block([&](std::size_t i, std::vector<std::uint32_t>& counts) {
+        marks.all[i] = i < size ? look.mark(i) : look.piece(i % size, static_cast<int>(i / size), look.mark(i % size));
+        if (marks.all[i].radius > 0) for_each_tile_of(marks.all[i], tiles, [&](int t) { ++counts[t]; });
+    });
+    std::uint32_t total = 0;
+    for (std::size_t t = 0; t < count; ++t) {
+        marks.first.push_back(total);
+        for (std::size_t b = 0; b < blocks; ++b) total += std::exchange(next_in[b][t], total);
+    }
+    marks.first.push_back(total);
+    marks.of_tiles.resize(total);
+    for_each_block([&](std::size_t i, std::vector<std::uint32_t>& next) {
+        if (marks.all[i].radius > 0)
+            for_each_tile_of(marks.all[i], tiles,
+                             [&](int t) { marks.of_tiles[next[t]++] = static_cast<std::uint32_t>(i); });
+    });
+    return marks;
+}
+
+void draw_marks(const Marks& marks, const TileGrid& tiles, int tile, const SurfaceTile& surfaces, const Lens& lens,
+                const Light& light, std::span<Vec3f> colour)
+{
+    // Depths are positive: their bits are in their order.
+    thread_local std::vector<std::uint64_t> order;
+    order.clear();
+    for (std::uint32_t i = marks.first[tile]; i < marks.first[tile + 1]; ++i) {
+        const std::uint32_t mark = marks.of_tiles[i];
+        order.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(marks.all[mark].depth)} << 32 | mark);
+    }
+    std::sort(order.begin(), order.end());
+    TilePainter painter(tiles, tile, surfaces, lens, light);
+    for (const std::uint64_t key : order) painter.composite(marks.all[static_cast<std::uint32_t>(key)]);
+    painter.finish(colour);
+}
+
+}  // namespace rapid

@@ -1,0 +1,130 @@
+#include "runtime/io/film.h"
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string>
+
+#include "runtime/io/frame_writer.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/io/random_points.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+namespace {
+
+constexpr int width = 160, height = 90, pixels = width * height;
+
+// The pictures of a film, as another run of ffmpeg decodes them.
+std::vector<std::vector<std::uint8_t>> pictures_of(const std::filesystem::path& film)
+{
+    const std::string command =
+        "ffmpeg -v error -i '" + film.string() + "' -vsync passthrough -f rawvideo -pix_fmt rgb24 -";
+    const std::unique_ptr<std::FILE, decltype(&pclose)> pipe(popen(command.c_str(), "r"), &pclose);
+    std::vector<std::vector<std::uint8_t>> pictures;
+    std::vector<std::uint8_t> picture(3 * pixels);
+    while (std::fread(picture.data(), 1, picture.size(), pipe.get()) == picture.size()) pictures.push_back(picture);
+    return pictures;
+}
+
+// Grey, lighter from frame to frame.
+Picture grey(int frame)
+{
+    return {width, height, std::vector<std::uint8_t>(3 * pixels, static_cast<std::uint8_t>(40 + 20 * frame))};
+}
+
+// Sets PATH for as long as it lives.
+class Path {
+public:
+    explicit Path(const std::string& path) : before_(std::getenv("PATH")) { setenv("PATH", path.c_str(), 1); }
+    ~Path() { setenv("PATH", before_.c_str(), 1); }
+
+private:
+    std::string before_;
+};
+
+}  // namespace
+
+TEST_CASE("a film has the pictures that it was given, in their order", "[io][film]")
+{
+    const std::string extension = GENERATE(".mp4", ".webm", ".gif");
+    CAPTURE(extension);
+    const TemporaryFolder folder;
+    {
+        OutputFile file(folder / ("a" + extension));
+        Film film(file, extension, width, height, 25);
+        for (int frame = 0; frame < 8; ++frame) film.add(grey(frame));
+        CHECK(file_names(folder.path()).empty());
+        film.finish();
+        file.finish();
+    }
+    const auto pictures = pictures_of(folder / ("a" + extension));
+    REQUIRE(pictures.size() == 8);
+    // Codecs lose a little: a step and a half of a byte's range of 219 levels, in both directions.
+    for (int frame = 0; frame < 8; ++frame)
+        for (const std::size_t byte : {std::size_t{0}, std::size_t{3 * pixels / 2}, std::size_t{3 * pixels - 1}})
+            CHECK(std::abs(pictures[frame][byte] - grey(frame).rgb[byte]) <= 3);
+}
+
+TEST_CASE("a film that is not finished leaves nothing", "[io][film]")
+{
+    const TemporaryFolder folder;
+    {
+        OutputFile file(folder / "a.mp4");
+        Film film(file, ".mp4", width, height, 24);
+        film.add(grey(0));
+    }
+    CHECK(file_names(folder.path()).empty());
+}
+
+TEST_CASE("without ffmpeg a film is an error that names the package", "[io][film]")
+{
+    const TemporaryFolder folder;
+    const Path path(folder.path().string());
+    CHECK(error_of([] { require_ffmpeg(); }) ==
+          "films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
+    CHECK(
+        error_of([&] { write_points(folder / "a.gif", PointSet()); }) ==
+        (folder / "a.gif").string() +
+            ": films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
+    CHECK(file_names(folder.path()).empty());
+}
+
+TEST_CASE("what ffmpeg says is in the error", "[io][film]")
+{
+    const TemporaryFolder folder, programs;
+    programs.write("ffmpeg", "#!/bin/sh\necho 'no such codec' >&2\nexit 1\n");
+    std::filesystem::permissions(programs / "ffmpeg", std::filesystem::perms::owner_all);
+    const Path path(programs.path().string() + ":" + std::getenv("PATH"));
+    CHECK(error_of([&] { write_points(folder / "a.mp4", PointSet()); }) ==
+          (folder / "a.mp4").string() + ": ffmpeg failed: no such codec");
+    CHECK(file_names(folder.path()).empty());
+}
+
+TEST_CASE("a film with odd edges is refused where its colours are halved", "[io][film]")
+{
+    const TemporaryFolder folder;
+    const auto odd = std::make_shared<PictureOptions>(PictureOptions{.width = 33, .height = 20});
+    CHECK(error_of([&] { write_points(folder / "a.webm", PointSet(), {.picture = odd}); }) ==
+          (folder / "a.webm").string() + ": a .webm film of 33 x 20 can't be made; both edges must be even");
+    write_points(folder / "a.gif", PointSet(), {.picture = odd});
+    CHECK(file_names(folder.path()).size() == 1);
+}
+
+TEST_CASE("a writer makes one film of all frames, and none of a part of them", "[io][film][writer]")
+{
+    const bool complete = GENERATE(true, false);
+    const TemporaryFolder folder;
+    const auto size = std::make_shared<PictureOptions>(PictureOptions{.width = width, .height = height});
+    FrameWriter writer({{(folder / "{output}.mp4").string(), {}}});
+    for (int frame = 1; frame <= 5; ++frame)
+        writer.submit(frame < 3 ? PointSet() : random_points({.size = 50}), {.number = frame, .picture = size},
+                      "stars");
+    writer.finish(complete);
+    CHECK(writer.first_unwritten() == std::nullopt);
+    CHECK(file_names(folder.path()).size() == (complete ? 1 : 0));
+    if (complete) CHECK(pictures_of(folder / "stars.mp4").size() == 5);
+}

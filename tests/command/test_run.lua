@@ -85,6 +85,25 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
     assert.same({ 0, 1, 1, 1 }, counts)
   end)
 
+  it("tells ten warnings of a kind as they come, and of the rest the number and the last", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
+  :collide { shape = rapid.shape.sphere { radius = 0.5 }, transform = function(frame)
+    return rapid.translate(0.01 * frame.number + 10 * math.floor(frame.number / 6), 0, 0) end } :solve {}
+]]
+    local result = folder:run "-f 1-91 --quiet"
+    assert.equal(0, result.status)
+    local lines = {}
+    for line in result.stderr:gmatch "[^\n]+" do lines[#lines + 1] = line end
+    assert.equal(11, #lines, result.stderr)
+    for place = 1, 10 do
+      assert.truthy(lines[place]:find(("warning: frame %d: scene.lua:3: "):format(6 * place), 1, true), lines[place])
+    end
+    assert.truthy(lines[11]:find("warning: 5 more of this kind, the last in frame 90: scene.lua:3: ", 1, true),
+      lines[11])
+  end)
+
   it("is silent with --quiet", function()
     local result = new_folder():run "-f 1-4 --quiet -o a.####.csv"
     assert.equal(0, result.status)

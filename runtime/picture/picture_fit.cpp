@@ -13,7 +13,7 @@ namespace {
 constexpr double gravity = 9.81;
 constexpr double look_ahead = 0.5;  // s: how far points are followed along their velocity in the first frame
 constexpr double glide = 0.35;      // s: how soon the camera has done most of its way back
-constexpr double follow = 0.2;      // s: the same of the way to the group that it frames
+constexpr double zoom = 0.2;        // s: the same of the size of a group that it frames
 constexpr double margin = 1.06;     // of the bounds, left free around them
 constexpr double room = 1.25;       // by how much the bounds grow beyond what has left them
 constexpr double usual_fov = 0.61;  // radians
@@ -182,8 +182,10 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
         view_.emplace();
         view_->bounds = goal_ = all;
     } else if (!group.empty()) {
+        // Its middle is followed at once, its size as a camera zooms.
+        view_->bounds.translate(all.center() - goal_.center());
         goal_ = all;
-        approach(1 - std::exp(-passed / follow));
+        approach(1 - std::exp(-passed / zoom));
     } else {
         // It holds still while everything is in view. Then it goes back at once as far as will do for a while.
         if (!scaled(goal_, margin).contains(all)) goal_ = scaled(goal_.merged(all), room);

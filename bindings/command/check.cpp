@@ -50,7 +50,7 @@ public:
                 _exit(status_failed);
             };
             const std::unique_ptr<Session> session = graph_.load(false, on_timeout);
-            for (const std::string& warning : session->warnings()) print_warning(warning);
+            for (const std::string& warning : session->take_warnings()) print_warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = races_;  // an attribute that no file needs may show the race
             const Plan plan(session->graph(), options);

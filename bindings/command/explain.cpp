@@ -221,9 +221,9 @@ public:
     }
 
 private:
-    Explanation explained(const Session& session)
+    Explanation explained(Session& session)
     {
-        for (const std::string& warning : session.warnings()) print_warning(warning);
+        for (const std::string& warning : session.take_warnings()) print_warning(warning);
         PlanOptions options = files_.plan_options(graph_.seed());
         // Without -o: as an output that names no attributes.
         if (files_.names().empty()) options.all_made = true;

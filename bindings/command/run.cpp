@@ -70,7 +70,7 @@ public:
             const std::unique_ptr<Session> session = graph_.load(
                 true, [&](const std::string& message) { report.abandon(status_failed, message); },
                 tell_ ? Watch::tell : nullptr);
-            for (const std::string& warning : session->warnings()) report.warning(warning);
+            for (const std::string& warning : session->take_warnings()) report.warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = keep_all_;
             events_.check();
@@ -81,7 +81,7 @@ public:
             const FrameSelection frames = range_of(plan);
             files_.resolve(plan, !frames.single());
             report.begin(plan.first_frame(), frames.last);
-            return compute(plan, frames, report);
+            return compute(*session, plan, frames, report);
         });
     }
 
@@ -106,7 +106,7 @@ private:
         return range;
     }
 
-    int compute(const Plan& plan, const FrameSelection& frames, RunReport& report)
+    int compute(Session& session, const Plan& plan, const FrameSelection& frames, RunReport& report)
     {
         try {
             Evaluator evaluator(
@@ -116,6 +116,7 @@ private:
             if (quiet_ && stats_.empty()) evaluator.leave_out_errors();
             while (evaluator.next_frame() <= frames.last) {
                 const FrameResult result = evaluator.advance();
+                for (const std::string& warning : session.take_warnings()) report.warning(warning, result.frame);
                 for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
                 if (frames.contains(result.frame)) files_.write(result);
                 for (const std::string& name : files_.take_first_names()) report.line("writing " + name);

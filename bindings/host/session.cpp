@@ -1,5 +1,7 @@
 #include "bindings/host/session.h"
 
+#include <utility>
+
 #include "bindings/host/script_host.h"
 
 namespace rapid {
@@ -14,7 +16,7 @@ Session::~Session() = default;
 const Graph& Session::graph() const { return host_->graph; }
 const Registry& Session::registry() const { return host_->registry; }
 const std::vector<Session::Parameter>& Session::parameters() const { return host_->parameters; }
-const std::vector<std::string>& Session::warnings() const { return host_->warnings; }
+std::vector<std::string> Session::take_warnings() { return std::exchange(host_->warnings, {}); }
 
 Registry Session::all_node_types()
 {

@@ -67,8 +67,9 @@ public:
     // In the order in which the file declares them.
     const std::vector<Parameter>& parameters() const;
 
-    // Of the file's makers, such as that a mesh has holes.
-    const std::vector<std::string>& warnings() const;
+    // Of the file's makers, such as that a mesh has holes, since they were last taken: functions of the frame make
+    // objects, too.
+    std::vector<std::string> take_warnings();
 
     // Of a study file: its description; its closed form, with ids from 0 in order, for a row of these knobs; and its
     // own measure of error, of points that are matched place by place. Error: what the script raised or returned.

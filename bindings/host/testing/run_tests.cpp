@@ -86,7 +86,7 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
 {
     Threads threads(run.threads);
     return threads.run([&] {
-        const Session session(run.graph, run.session);
+        Session session(run.graph, run.session);
         const Plan plan(session.graph(), {run.seed, {}});
         if (run.first < plan.first_frame())
             throw Error(fmt::format("frames: {} is before the scene's first frame, {}", run.first, plan.first_frame()));
@@ -95,13 +95,14 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
             for (const std::string& warning : found)
                 if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end()) warnings.push_back(warning);
         };
-        add(session.warnings());
+        add(session.take_warnings());
         add(plan.warnings);
         Evaluator evaluator(plan);
         evaluator.leave_out_errors();
         if (run.check_declarations) evaluator.check_declarations();
         while (evaluator.next_frame() <= run.last) {
             FrameResult result = evaluator.advance();
+            add(session.take_warnings());
             add(result.warnings);
             if (result.frame >= run.first) keep(result);
         }

@@ -158,8 +158,9 @@ std::string node_of(const NodeType& type)
 std::string maker_of(const Maker& maker)
 {
     static const std::map<std::string_view, std::string_view> results = {
-        {"mesh", "rapid.Mesh"},     {"levelset", "rapid.LevelSet"}, {"grid", "rapid.Grid"},     {"fog", "rapid.Fog"},
-        {"shape", "rapid.Shape"},   {"points", "rapid.Points"},     {"motion", "rapid.Motion"}, {"camera", "rapid.Camera"}};
+        {"mesh", "rapid.Mesh"},     {"levelset", "rapid.LevelSet"}, {"grid", "rapid.Grid"},
+        {"fog", "rapid.Fog"},       {"shape", "rapid.Shape"},       {"points", "rapid.Points"},
+        {"motion", "rapid.Motion"}, {"camera", "rapid.Camera"}};
     const std::size_t dot = maker.name.find('.');
     const std::string family = maker.name.substr(0, dot), own = maker.name.substr(dot + 1);
     const std::string called = family == "motion" ? own : maker.name;

@@ -16,7 +16,7 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
           :gravity {} :drag { linear = 0.3, quadratic = 0.1 } :wind { velocity = {1, 0, 0}, drag = 0.2 }
           :turbulence { amplitude = 2 } :vortex { strength = 1 } :attract { center = {0, 1, 0}, strength = 0.5 }
           :delete { where = function(p) return p.P.y < -0.4 end }
-          :attribute { pscale = 0.01 }
+          :attribute { pscale = 0.01 } :trail { places = 3 } :picture { shutter = 0.5 }
           :solve { substeps = 2 })"},
     {"sources that move, and sets of points that are another at each frame", R"(
         local moving = function(frame)

@@ -104,6 +104,26 @@ return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
       lines[11])
   end)
 
+  it("tells what makers warn of within frames", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
+  :collide { shape = function(frame)
+    local size = 0.5 + frame.number / 1024
+    return rapid.levelset.from_mesh(rapid.mesh.box { size = {size, size, size} }, { voxel = 0.5 })
+  end } :solve {}
+]]
+    local result = folder:run "-f 1-40 --quiet"
+    assert.equal(0, result.status)
+    local lines = {}
+    for line in result.stderr:gmatch "[^\n]+" do lines[#lines + 1] = line end
+    assert.equal(11, #lines, result.stderr)
+    for place = 1, 10 do
+      assert.match("^warning: frame %d+: .*a voxel of 0.5 m is half as large as mesh", lines[place])
+    end
+    assert.match("^warning: %d%d more of this kind, the last in frame 40: .* it is 0.539062 m long", lines[11])
+  end)
+
   it("is silent with --quiet", function()
     local result = new_folder():run "-f 1-4 --quiet -o a.####.csv"
     assert.equal(0, result.status)

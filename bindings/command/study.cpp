@@ -20,8 +20,8 @@
 #include "bindings/command/study_run.h"
 #include "bindings/command/swept_setting.h"
 #include "bindings/command/untrusted.h"
+#include "bindings/command/whole_file.h"
 #include "bindings/host/graph_parameter.h"
-#include "runtime/files/output_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"
 
@@ -30,17 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-void write_text(const fs::path& path, const std::string& text)
-{
-    try {
-        OutputFile file(path);
-        file.append(text.data(), text.size());
-        file.finish();
-    } catch (Error& error) {
-        throw error.at({path.string(), 0});
-    }
-}
 
 // One line on standard error: redrawn on a terminal, one a row elsewhere.
 class StudyProgress {
@@ -175,8 +164,8 @@ public:
         }
         const std::string text =
             to_json(result).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
-        write_text(fs::path(folder_) / "study.json", text);
-        write_text(fs::path(folder_) / "study.svg", to_svg(result));
+        write_whole(fs::path(folder_) / "study.json", text);
+        write_whole(fs::path(folder_) / "study.svg", to_svg(result));
         print(json_ ? text : to_text(result));
         return status_of(result);
     }

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "runtime/files/output_file.h"
+#include "bindings/command/whole_file.h"
 #include "runtime/io/frame_pattern.h"
 #include "runtime/picture/contact_sheet.h"
 #include "runtime/picture/png_file.h"
@@ -21,17 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using nlohmann::ordered_json;
-
-void write_bytes(const fs::path& path, const std::string& bytes)
-{
-    try {
-        OutputFile file(path);
-        file.append(bytes.data(), bytes.size());
-        file.finish();
-    } catch (Error& error) {
-        throw error.at({path.string(), 0});
-    }
-}
 
 // The picture of the last frame up to `last` that has one; empty: there is none, or the files are no pictures.
 fs::path last_picture(const std::string& output, std::optional<std::int64_t> last)
@@ -144,7 +133,7 @@ void WedgeReport::write_json() const
                             {"frame", result.error->frame}};
         wedge["rows"].push_back(std::move(row));
     }
-    write_bytes(folder_ / "wedge.json", wedge.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+    write_whole(folder_ / "wedge.json", wedge.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
 }
 
 // Of the last pictures of the first -o that is one. Returns whether there is any.
@@ -167,7 +156,7 @@ bool WedgeReport::write_sheet() const
                                                                   duration_text(result.seconds))
                                                     : "failed");
     }
-    if (drawn) write_bytes(folder_ / "wedge.png", encode_png(contact_sheet(tiles)));
+    if (drawn) write_whole(folder_ / "wedge.png", encode_png(contact_sheet(tiles)));
     return drawn;
 }
 

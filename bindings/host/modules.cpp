@@ -30,6 +30,8 @@ std::optional<std::string> read_module(const std::filesystem::path& path)
     }
 }
 
+}  // namespace
+
 std::vector<std::filesystem::path> rapid_path()
 {
     std::vector<std::filesystem::path> folders;
@@ -42,8 +44,6 @@ std::vector<std::filesystem::path> rapid_path()
     }
     return folders;
 }
-
-}  // namespace
 
 std::filesystem::path lua_folder()
 {

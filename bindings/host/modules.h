@@ -19,6 +19,9 @@ std::optional<std::string> read_lua_file(const std::filesystem::path& path);
 // `graphs/sparks.lua` stays as the user typed it; a module beside it is shown the same way.
 std::string shown(const std::filesystem::path& path);
 
+// The folders of RAPID_PATH, in order.
+std::vector<std::filesystem::path> rapid_path();
+
 class Modules {
 public:
     // on_read: told of each place where a file is looked for; may be empty.

@@ -1,29 +1,15 @@
 #include "bindings/host/own_nodes.h"
 
-#include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <lua.hpp>
 #include <set>
 
 #include "bindings/host/lua_text.h"
+#include "bindings/host/modules.h"
 #include "bindings/host/script_host.h"
 
 namespace rapid {
 namespace {
-
-std::vector<std::filesystem::path> folders()
-{
-    std::vector<std::filesystem::path> all = {"."};
-    const char* variable = std::getenv("RAPID_PATH");
-    const std::string list = variable ? variable : "";
-    for (std::size_t begin = 0; begin < list.size();) {
-        const std::size_t end = std::min(list.find(':', begin), list.size());
-        if (end > begin) all.emplace_back(list.substr(begin, end - begin));
-        begin = end + 1;
-    }
-    return all;
-}
 
 // Whether a file defines a node: scenes and modules lie beside them.
 bool defines_node(const std::filesystem::path& file)
@@ -36,8 +22,10 @@ bool defines_node(const std::filesystem::path& file)
 
 std::set<std::string> own_nodes()
 {
+    std::vector<std::filesystem::path> folders = rapid_path();
+    folders.insert(folders.begin(), ".");
     std::set<std::string> names;
-    for (const std::filesystem::path& folder : folders()) {
+    for (const std::filesystem::path& folder : folders) {
         std::error_code unreadable;
         for (const auto& entry : std::filesystem::directory_iterator(folder, unreadable))
             if (defines_node(entry.path())) names.insert(entry.path().stem().string());

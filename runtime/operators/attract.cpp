@@ -3,6 +3,8 @@
 //   a = strength d / (|d|² + core²)^((falloff + 1) / 2),   d = center - P        0 at d = 0
 //
 // A falloff of 2 is the inverse-square law, 0 a constant acceleration; a negative strength repels.
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "runtime/graph/node.h"
@@ -27,6 +29,26 @@ struct Attract {
             .param(&Attract::strength, "strength", 1.0, any_number(), "m/s² at 1 m", "acceleration; negative: away")
             .param(&Attract::falloff, "falloff", 2.0, any_number(), "", "power of the distance by which it falls")
             .param(&Attract::core, "core", 0.0, at_least(0), "m", "within about this distance it grows no more");
+    }
+
+    std::shared_ptr<const Force> dynamic(const Evaluation& now) const
+    {
+        if (shape && falloff > 0 && core == 0 && (!strength.attribute.empty() || strength.constant > 0))
+            now.warnings.push_back(fmt::format("{}:{}: node \"{}\": {}", now.location.file, now.location.line, now.node,
+                                               advice(now.frame.dt)));
+        return dynamic_of<detail::ForceOf<Attract>>(now, group, *this);
+    }
+
+    // All that it draws goes through the surface, where only a core bounds it. Within that it is a spring of
+    // omega² = strength / core^(falloff + 1); a quarter of a radian a step is resolved.
+    std::string advice(double dt) const
+    {
+        const std::string text =
+            "without core its pull has no bound at the surface of shape, which no number of sub-steps resolves; give "
+            "core, the distance within which it grows no more";
+        if (!strength.attribute.empty()) return text;
+        const double least = std::pow(16 * strength.constant * dt * dt, 1 / (falloff + 1));
+        return text + fmt::format(": from {:.2g} m on 1 sub-step resolves it", least);
     }
 
     void contribute(const Chunk& chunk, Forces& forces) const

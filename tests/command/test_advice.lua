@@ -101,4 +101,32 @@ return rapid.create { points = one } :points("fails", function() error "later" e
     assert.equal(0, result.status)
     assert.equal("", result.stderr)
   end)
+
+  -- Points about a torus, drawn to its surface: at first, and the worst error after two seconds.
+  local function drawn(core)
+    return rapid("run scene.lua -f 1-48", head .. ([[
+return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, spacing = 0.5 } }
+  :attract { shape = rapid.mesh.torus { radius = 0.6, tube = 0.22 }%s } :solve { substeps = 2 }]]):format(core))
+  end
+
+  it("names core where a surface draws without bound, of a size that is resolved", function()
+    local bare = drawn("")
+    local core = tonumber(bare.stderr:match "give core,[^\n]* from (%S+) m on 1 sub%-step resolves it")
+    assert.near((16 / 24 ^ 2) ^ (1 / 3), core, 0.006, bare.stderr)
+    assert.truthy(bare.stderr:find('scene.lua:4: node "attract1": without core its pull has no bound', 1, true))
+    local with = drawn(", core = " .. core)
+    assert.falsy(with.stderr:find("core", 1, true), with.stderr)
+    assert.falsy(with.stdout:find("stiff", 1, true), with.stdout)
+    local function median(result) return tonumber(result.stdout:match "half of the points below (%S+) m") end
+    assert.truthy(median(bare) > 1, bare.stdout)
+    -- 1.5 (what is told by what is) (omega dt)²/24 of 12 radians, about 2 m: a quarter of a radian in a sub-step.
+    assert.truthy(median(with) < 0.1, with.stdout)
+  end)
+
+  it("says that sub-steps are no remedy where they make nothing better", function()
+    local lines = advice("run scene.lua -f 1-2", [[
+local rapid = require "rapid"
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0.01, 0, 0}} } } :attract {} :solve {}]])
+    assert.truthy(lines[1]:find "; they are no remedy near a place where a force has no bound: attract has core", lines[1])
+  end)
 end)

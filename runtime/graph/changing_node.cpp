@@ -7,6 +7,7 @@
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/solver/changing.h"
+#include "runtime/solver/constraints/placed_constraint.h"
 
 namespace rapid {
 namespace {
@@ -33,15 +34,15 @@ bool is_followed(const Node& node, const Param& param)
 
 }  // namespace
 
-// Of forces all parameters are followed. Others place things, as the targets of pins, and are Solve's to interpolate:
-// of these nodes numbers alone. Actions are the script's.
+// Of forces all parameters are followed, of constraints and colliders numbers, and the places of constraints. Actions
+// are the script's.
 ChangingNode::Between ChangingNode::between_calls(const Node& node, const Param& param)
 {
     const auto has = [&](Stage stage) {
         return std::count(node.type->stages.begin(), node.type->stages.end(), stage) > 0;
     };
     if (node.type->kind != NodeKind::Dynamic || param.type == "integer") return Between::Unfollowed;
-    if (has(Stage::Forces)) return Between::Interpolated;
+    if (has(Stage::Forces) || (has(Stage::Constraints) && param.type == place_type)) return Between::Interpolated;
     const bool is_number = param.type == "number" && (has(Stage::Collision) || has(Stage::Constraints));
     return is_number ? Between::Held : Between::Unfollowed;
 }

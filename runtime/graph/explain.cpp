@@ -97,8 +97,7 @@ std::string between_calls(const PlannedNode& planned, const Param& param)
         case ChangingNode::Between::Unfollowed:
             break;
     }
-    return param.type.find("vec3") == 0 ? "straight from value to value; not in the estimated error"
-                                        : "its value at the end holds throughout; not in the estimated error";
+    return "its value at the end holds throughout; not in the estimated error";
 }
 
 void explain_functions(const Plan& plan, const PlannedNode& planned, Explanation& result)

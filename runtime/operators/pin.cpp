@@ -9,6 +9,8 @@
 #include "runtime/points/members.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/mesh_surface.h"
+#include "runtime/solver/constraints/energy_bound.h"
+#include "runtime/solver/constraints/placed_constraint.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/twin.h"
@@ -19,7 +21,7 @@ namespace rapid {
 namespace {
 
 struct PinTarget {
-    static constexpr std::string_view param_type = "vec3, attribute or moving shape";
+    static constexpr std::string_view param_type = place_type;
 
     std::optional<PerPoint<Vec3f>> place;
     MotionPtr motion;
@@ -126,10 +128,29 @@ struct PinBody {
     }
 };
 
+// A place that is a function of time, through a step: c0 + x (c1 + x (c2 + x c3)), x its part from 0 to 1.
+class PlaceCurve {
+public:
+    // Through places at the parts 0, 1/3, 2/3 and 1.
+    explicit PlaceCurve(const std::array<Vec3d, 4>& at)
+        : c0_(at[0]),
+          c1_(-5.5 * at[0] + 9 * at[1] - 4.5 * at[2] + at[3]),
+          c2_(9 * at[0] - 22.5 * at[1] + 18 * at[2] - 4.5 * at[3]),
+          c3_(-4.5 * at[0] + 13.5 * at[1] - 13.5 * at[2] + 4.5 * at[3])
+    {
+    }
+
+    Vec3d at(double x) const { return c0_ + x * (c1_ + x * (c2_ + x * c3_)); }
+    Vec3d slope(double x) const { return c1_ + x * (2 * c2_ + 3 * x * c3_); }
+
+private:
+    Vec3d c0_, c1_, c2_, c3_;
+};
+
 class PinCoupling : public Coupling {
 public:
-    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, bool rigid, double h)
-        : pins_(std::move(pins)), body_(std::move(body)), rigid_(rigid), h_(h)
+    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, std::optional<PlaceCurve> curve, bool rigid, double h)
+        : pins_(std::move(pins)), body_(std::move(body)), curve_(std::move(curve)), rigid_(rigid), h_(h)
     {
     }
 
@@ -151,7 +172,11 @@ public:
     {
         pins_->springs.add_stored_energy(step, at, factor, energy);
     }
-    void link(EnergyIslands& islands) const override { pins_->springs.link(islands); }
+    void link(EnergyIslands& islands) const override
+    {
+        pins_->springs.link(islands);
+        for (const std::uint32_t i : driven_) islands.drive(i);
+    }
     void move_kinematic(Substep& step) override
     {
         pins_->springs.move_kinematic(step);  // with the targets of before
@@ -160,7 +185,7 @@ public:
         if (!rigid_) return;
         for (const auto& [i, pin] : held_) {
             step.points[i] = {pin->now, 0};
-            step.v[i] = body_ ? body_.velocity(*pin, since) : Vec3d((pin->to - pin->from) / h_);
+            step.v[i] = velocity(*pin, since);
         }
     }
     void advance(Substep& step) override { pins_->springs.advance(step); }
@@ -172,27 +197,57 @@ public:
 private:
     void aim(double since)
     {
-        for (const auto& [i, pin] : held_)
-            pin->now = body_ ? body_.place(*pin, since) : Vec3d(pin->from + since / h_ * (pin->to - pin->from));
+        driven_.clear();
+        for (const auto& [i, pin] : held_) {
+            const Vec3d target = place(*pin, since);
+            if (!rigid_ && target != pin->now) driven_.push_back(static_cast<std::uint32_t>(i));
+            pin->now = target;
+        }
+    }
+    Vec3d place(const Pin& pin, double since) const
+    {
+        if (body_) return body_.place(pin, since);
+        return curve_ ? curve_->at(since / h_) : Vec3d(pin.from + since / h_ * (pin.to - pin.from));
+    }
+    Vec3d velocity(const Pin& pin, double since) const
+    {
+        if (body_) return body_.velocity(pin, since);
+        return (curve_ ? curve_->slope(since / h_) : Vec3d(pin.to - pin.from)) / h_;
     }
 
     std::shared_ptr<Pins> pins_;
     PinBody body_;
+    std::optional<PlaceCurve> curve_;
     bool rigid_;
     double h_;  // s, the frame's length
     std::vector<std::pair<std::size_t, Pin*>> held_;
     std::vector<std::uint32_t> awake_;
+    std::vector<std::uint32_t> driven_;  // by springs whose ends have moved in the sub-step
 };
 
-class PinConstraint : public RememberingConstraint<PinConstraint, Pins> {
+class PinConstraint : public RememberingConstraint<PinConstraint, Pins>, public Placed {
 public:
-    std::optional<PerPoint<Vec3f>> place;
+    std::optional<PerPoint<Vec3f>> place;  // at the end of the step
+    std::optional<PlaceCurve> curve;       // where that is a function of time
     PinBody body;
     double compliance = 0;
 
+    std::shared_ptr<const Constraint> through(const AtParts& at) const override
+    {
+        std::array<Vec3d, parts.size()> places;
+        for (std::size_t k = 0; k < at.size(); ++k) {
+            const auto* pin = dynamic_cast<const PinConstraint*>(at[k].get());
+            if (!pin || !pin->place || !pin->place->attribute.empty()) return nullptr;
+            places[k] = pin->place->constant.cast<double>();
+        }
+        auto result = std::make_shared<PinConstraint>(*this);
+        result->curve.emplace(places);
+        return result;
+    }
+
     std::shared_ptr<Coupling> begin(const PointSet& points, double h) const override
     {
-        auto coupling = std::make_shared<PinCoupling>(memory, body, compliance == 0, h);
+        auto coupling = std::make_shared<PinCoupling>(memory, body, curve, compliance == 0, h);
         const Strided<std::uint8_t> members = members_of(points, group);
         const Strided<Vec3f> P = points.P().read();
         const Strided<std::int64_t> id = points.id().read();
@@ -205,17 +260,17 @@ public:
             Pin& pin = memory->by_id[id[i]];
             const Vec3d to = target[i].cast<double>();
             if (!pin.taken) {
-                pin.from = pin.to = pin.now = to;
+                pin.from = pin.to = pin.now = curve ? curve->at(0) : to;
                 if (body) pin.on = body.attach(to);
                 for (int axis = 0; compliance > 0 && axis < 3; ++axis)
                     memory->springs.add({id[i]}, {&pin, axis}, compliance);
                 pin.taken = true;
             } else if (place) {
                 pin.from = pin.to;
-                pin.to = to;
             }
+            if (place) pin.to = to;
             coupling->hold_at(i, pin);
-            if (moves || pin.from != pin.to) coupling->keep_awake(static_cast<std::uint32_t>(i));
+            if (moves || curve || pin.from != pin.to) coupling->keep_awake(static_cast<std::uint32_t>(i));
         }
         memory->springs.follow(points, group);
         std::sort(held.begin(), held.end());

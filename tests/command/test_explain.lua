@@ -134,7 +134,7 @@ return rapid.create { subframes = 2, points = rapid.points.grid { size = {1, 1, 
       { name = "collide1.transform", called = "as its path needs",
         between = "called between frames, until pieces of the path are within 1e-5 of its length" },
       { name = "pin1.target", called = "2 times a frame",
-        between = "straight from value to value; not in the estimated error" },
+        between = "numbers are interpolated to the time of each sub-step; " .. error_has },
       { name = "attribute1.heat", called = "once a frame", between = "its value holds for the frame" },
     }, plan_of("changes.lua").raw.functions)
     assert.truthy(explain("changes.lua").stdout:find("functions of the frame\n  gravity1.g ", 1, true))

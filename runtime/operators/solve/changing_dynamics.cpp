@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "runtime/solver/changing.h"
+#include "runtime/solver/constraints/placed_constraint.h"
 #include "runtime/solver/timed_force.h"
 
 namespace rapid {
@@ -96,6 +97,17 @@ private:
     bool finer_, has_births_;
 };
 
+// A constraint with places that are functions of time; null where it has none.
+std::shared_ptr<const Constraint> through_step(const ChangingConstraint& changing, bool finer)
+{
+    const std::shared_ptr<const Constraint> end = changing.at(1, finer);
+    const auto* placed = dynamic_cast<const Placed*>(end.get());
+    if (!placed) return nullptr;
+    Placed::AtParts at;
+    for (std::size_t k = 0; k < at.size(); ++k) at[k] = changing.at(Placed::parts[k], finer);
+    return placed->through(at);
+}
+
 Dynamics with(const Dynamics& dynamics, const Times& times, bool finer)
 {
     Dynamics result;
@@ -107,8 +119,10 @@ Dynamics with(const Dynamics& dynamics, const Times& times, bool finer)
             if (const auto* changing = dynamic_cast<const ChangingInteraction*>(dynamic.get()))
                 return times.add(*changing, result);
         } else if constexpr (std::is_same_v<D, Constraint>) {
-            if (const auto* changing = dynamic_cast<const ChangingConstraint*>(dynamic.get()); changing && finer)
-                return result.add(changing->at(0.5, true));
+            if (const auto* changing = dynamic_cast<const ChangingConstraint*>(dynamic.get())) {
+                if (auto placed = through_step(*changing, finer)) return result.add(std::move(placed));
+                if (finer) return result.add(changing->at(0.5, true));
+            }
         }
         result.add(dynamic);
     });

@@ -1,5 +1,6 @@
 // The dynamics of a step in which some change: with forces at the middles of its sub-steps, and interactions at their
-// ends. Of constraints and colliders the run has those of the end of the step, shadows those of its middle.
+// ends, and constraints with places that are functions of time. Of other constraints and of colliders the run has those
+// of the end of the step, shadows those of its middle.
 #pragma once
 
 #include <memory>

@@ -384,6 +384,7 @@ function rapid.mesh.box(options) end
 ---@class rapid.options.mesh_from
 ---@field points any[]  {{x, y, z}, ...} [list, m, required]
 ---@field faces any[]  {{1, 2, 3}, ...}: places in `points`, from 1 [list, required]
+---@field values? table  { Cd = {{r, g, b}, ...}, heat = {...} }: of each of `points`, for what is born on the mesh [table]
 
 ---A mesh from a list of places and a list of faces.
 ---@param options? rapid.options.mesh_from

@@ -68,6 +68,16 @@ describe("rapid.mesh", function()
     end)
   end)
 
+  it(".from has values at its vertices, which births between them interpolate", function()
+    local points = born("rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, " ..
+      "values = { heat = {5, 7, 2}, Cd = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}} } }")
+    for i = 1, #points do
+      local p = points[i]
+      assert.near(5 + 2 * p.P.x - 3 * p.P.z, p.heat, 2e-6)
+      assert.near({p.P.x, p.P.z, 0}, p.Cd, 1e-6)
+    end
+  end)
+
   it(".read reads a file beside the graph", function()
     scene.folder:write("roof.obj", "v 0 1 0\nv 2 1 0\nv 2 1 2\nv 0 1 2\nf 1 4 3 2\n")
     local points = born "rapid.mesh.read 'roof.obj'"
@@ -243,6 +253,10 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.mesh.from {}"] = "rapid.mesh.from: points is missing: {{x, y, z}, ...}",
       ["rapid.mesh.from { points = {{0, 0, 0}}, faces = {{1, 2, 3}} }"] = "rapid.mesh.from: face 1 has the corner " ..
         "2; corners are whole, from 1 to 1",
+      ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { h = {1} } }"] =
+        "values: h has 1 values; it must be a list of 3 values, one for each of `points`",
+      ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { id = {} } }"] =
+        "values: id is no attribute of vertices",
       ["rapid.mesh.read()"] = "rapid.mesh.read: the path is missing",
       ["rapid.mesh.read 'none.obj'"] = 'rapid.mesh.read: there is no mesh file "none.obj"',
       ["rapid.mesh.read(5)"] = "path = 5 has the wrong type; it must be a string",

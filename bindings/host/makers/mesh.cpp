@@ -110,9 +110,37 @@ struct TorusMesh {
 };
 RAPID_MAKER(TorusMesh);
 
+// Values at vertices by name: numbers, or vec3 where the first is one.
+std::map<std::string, Mesh::VertexValues> vertex_values(const std::map<std::string, Value>& lists, std::size_t vertices)
+{
+    std::map<std::string, Mesh::VertexValues> values;
+    for (const auto& [name, list] : lists) {
+        if (name == "P" || name == "v" || name == "id")
+            throw Error(
+                fmt::format("values: {} is no attribute of vertices that births could have; take another name", name));
+        const Table* table = list.table();
+        if (!table || table->list.size() != vertices)
+            throw Error(fmt::format("values: {} has {}; it must be a list of {} values, one for each of `points`", name,
+                                    table ? fmt::format("{} values", table->list.size()) : describe(list), vertices));
+        Param param;
+        param.name = name;
+        const auto read = [&]<class T>(std::vector<T> column) {
+            param.type = std::is_same_v<T, float> ? "list of numbers" : "list of {x, y, z}";
+            read_value(param, list, column);
+            values[name] = std::move(column);
+        };
+        if (vertices > 0 && table->list.front().get<double>())
+            read(std::vector<float>());
+        else
+            read(std::vector<Vec3f>());
+    }
+    return values;
+}
+
 struct MeshFrom {
     std::vector<Vec3f> points;
     std::vector<std::vector<double>> faces;
+    std::map<std::string, Value> values;
 
     static Maker declare()
     {
@@ -120,7 +148,9 @@ struct MeshFrom {
             .param(&MeshFrom::points, "points", Value(), any_number(), "m", "{{x, y, z}, ...}")
             .required()
             .param(&MeshFrom::faces, "faces", Value(), any_number(), "", "{{1, 2, 3}, ...}: places in `points`, from 1")
-            .required();
+            .required()
+            .param(&MeshFrom::values, "values", Value(), any_number(), "",
+                   "{ Cd = {{r, g, b}, ...}, heat = {...} }: of each of `points`, for what is born on the mesh");
     }
     ObjectPtr make(MakeContext&) const
     {
@@ -134,7 +164,9 @@ struct MeshFrom {
                 face.push_back(static_cast<std::int32_t>(corner) - 1);
             }
         }
-        return make_mesh(points, indices);
+        auto mesh = std::make_shared<Mesh>(*make_mesh(points, indices));
+        mesh->values = vertex_values(values, points.size());
+        return mesh;
     }
 };
 RAPID_MAKER(MeshFrom);

@@ -3,7 +3,7 @@
 # What the command needs, to be built and to run (lua-busted for `rapid test`). libopenvdb-dev's headers include
 # Boost's, though it does not depend on them.
 build_packages=(
-    ccache cmake g++ ninja-build
+    ccache cmake g++ graphviz ninja-build
     libassimp-dev libboost-dev libcereal-dev libcli11-dev libeigen3-dev libfmt-dev libluajit-5.1-dev libminizip-dev
     libopenvdb-dev libpng-dev libpugixml-dev librandom123-dev libseccomp-dev libstb-dev libtbb-dev libxxhash-dev
     libzstd-dev nlohmann-json3-dev zlib1g-dev

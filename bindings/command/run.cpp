@@ -35,6 +35,9 @@ public:
             ->type_name("FRAMES");
         files_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
+        app.add_option("--profile", profile_,
+                       "writes what each node, frame and file took as a trace, which Chrome and Perfetto open")
+            ->type_name("FILE");
         events_.declare(app);
         app.add_flag("--durable", durable_, "a frame has its name when it is on the disk, and outlasts a power cut");
         app.add_flag("--keep-all", keep_all_,
@@ -63,7 +66,7 @@ public:
         if (durable_) make_files_durable();
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
         Threads threads(common.threads);
-        RunReport report({graph_.file(), threads.count(), stats_, quiet_, common.verbose}, files_);
+        RunReport report({graph_.file(), threads.count(), stats_, profile_, quiet_, common.verbose}, files_);
         const SignalThread signals([&](int signal) { report.abandon(128 + signal, "interrupted"); });
 
         return threads.run([&] {
@@ -89,7 +92,7 @@ private:
     SandboxAccess access() const
     {
         SandboxAccess access{{folder_of(graph_.file())}, files_.folders()};
-        for (const std::string& file : {stats_, events_.path()}) {
+        for (const std::string& file : {stats_, profile_, events_.path()}) {
             if (file.empty()) continue;
             access.writable.push_back(folder_of(file));
             std::filesystem::create_directories(access.writable.back());
@@ -150,7 +153,7 @@ private:
     GraphOptions graph_;
     FrameFiles files_;
     std::optional<FrameSelection> frames_;
-    std::string stats_;
+    std::string stats_, profile_;
     EventFile events_;
     UntrustedOptions untrusted_;
     bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false;

@@ -15,6 +15,7 @@ RunReport::RunReport(Options options, FrameFiles& files) : options_(std::move(op
     run_.graph = options_.graph;
     run_.threads = options_.threads;
     if (!options_.stats_file.empty()) statistics_.emplace(options_.stats_file, run_);
+    if (!options_.profile_file.empty()) profile_.emplace(options_.profile_file);
 }
 
 double RunReport::now() const { return stopwatch_.seconds(); }
@@ -31,6 +32,7 @@ void RunReport::frame(const FrameResult& result)
     const FrameStatistics frame = statistics_of(result);
     totals_.add(frame);
     if (statistics_) statistics_->add(frame);
+    if (profile_) profile_->add(result);
     add_writing();
     keep_worst(run_.stiff, result.figures.stiff);
     progress_->frame(frame, now());
@@ -105,6 +107,7 @@ void RunReport::add_writing()
     for (const FrameWriter::Written& file : files_.take_written()) {
         totals_.add_writing(file.seconds);
         if (statistics_) statistics_->add_writing(file.frame, file.seconds);
+        if (profile_) profile_->add(file);
     }
     if (statistics_) statistics_->write_before(unwritten);
 }
@@ -114,7 +117,14 @@ void RunReport::write_statistics()
     run_.seconds = now();
     run_.peak_bytes = peak_memory();
     add_writing();
+    std::optional<Error> failed;
+    try {
+        if (profile_) profile_->finish();
+    } catch (const Error& error) {
+        failed = error;
+    }
     if (statistics_) statistics_->finish(run_);
+    if (failed) throw Error(*failed);
 }
 
 void RunReport::tell_untold()

@@ -8,6 +8,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
+#include "bindings/command/profile_file.h"
 #include "bindings/command/statistics_file.h"
 #include "runtime/report/frame_warnings.h"
 #include "runtime/report/progress.h"
@@ -22,7 +23,8 @@ public:
     struct Options {
         std::string graph;
         int threads = 1;
-        std::string stats_file;  // empty: none
+        std::string stats_file;    // empty: none
+        std::string profile_file;  // likewise
         bool quiet = false, verbose = false;
     };
     // The run's time begins here. files: those that the run writes.
@@ -39,7 +41,7 @@ public:
 
     // The statistics file and the summary. Error: the file can't be written.
     void finish();
-    // An error that ends the run: reports it, and writes the statistics of the frames so far.
+    // An error that ends the run: reports it, and writes the statistics and the profile of the frames so far.
     int fail(const Error& error);
     // From another thread, at any moment: says why, writes the statistics, removes unfinished files, and ends the
     // process.
@@ -47,6 +49,7 @@ public:
 
 private:
     void add_writing();
+    // Statistics and profile. Error: a file can't be written.
     void write_statistics();
     void tell_untold();
     double now() const;
@@ -59,6 +62,7 @@ private:
     RunStatistics run_;
     RunTotals totals_;
     std::optional<StatisticsFile> statistics_;
+    std::optional<ProfileFile> profile_;
     std::optional<Progress> progress_;
     std::set<std::string> warned_;  // of no frame: as many as the scene makes
     FrameWarnings frame_warnings_;

@@ -10,7 +10,6 @@
 #include "runtime/graph/changing_node.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/undeclared_columns.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 
@@ -52,9 +51,10 @@ void Evaluator::leave_out_errors()
 
 FrameResult Evaluator::advance()
 {
-    const Stopwatch stopwatch;
+    frame_clock_ = Stopwatch();
     FrameResult result;
     result.frame = next_;
+    result.began = std::chrono::steady_clock::now();
 
     std::vector<Flow> results;
     std::vector<std::size_t> readers;
@@ -71,7 +71,7 @@ FrameResult Evaluator::advance()
         result.time[name] = simulation.clock().at(static_cast<double>(next_)).time;
     }
     ++next_;
-    result.total_seconds = stopwatch.seconds();
+    result.total_seconds = frame_clock_.seconds();
     return result;
 }
 
@@ -98,8 +98,8 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     for (std::size_t first = 0, last = 0; first < plan_.nodes.size(); first = last + 1) {
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
-        // The result hook and checked declarations take one node after the other.
-        if (!result_ && !checks_declarations_) last = plan_.last_together(first);
+        // The hooks and checked declarations take one node after the other.
+        if (!result_ && !input_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);
         remove_condemned(results, frame.figures);
     }
@@ -221,7 +221,9 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
     const Context context(*this, planned, left, frame);
     const Evaluation& evaluation = *context.evaluation;
     return at_node(node.name, node.location, [&] {
-        const Stopwatch stopwatch;
+        if (input_) input_(node, evaluation.frame, inputs);
+        const double begin = frame_clock_.seconds();
+        const double scripts_before = frame.figures.script_seconds;
         std::optional<UndeclaredColumns> undeclared;
         const NodeKind kind = node.type->kind;
         if (checks_declarations_ && (kind == NodeKind::Points || kind == NodeKind::Solve))
@@ -241,11 +243,28 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
             undeclared->restore(result.points);
             if (kind == NodeKind::Solve) undeclared->restore(simulations_[planned.simulation]->state);
         }
-        if (kind == NodeKind::Solve) frame.figures.solve_seconds += stopwatch.seconds();
+        add_work(first, last, begin, scripts_before, result.points, frame);
         if (planned.once) kept_[first] = result;
         if (result_) result_(node, next_, result.points);
         return result;
     });
+}
+
+void Evaluator::add_work(std::size_t first, std::size_t last, double begin, double scripts_before,
+                         const PointSet& result, FrameResult& frame) const
+{
+    NodeWork& work = frame.work.emplace_back();
+    for (std::size_t i = first; i <= last; ++i) work.nodes.push_back(plan_.nodes[i].node->name);
+    work.begin = begin;
+    work.seconds = frame_clock_.seconds() - begin;
+    if (plan_.nodes[first].node->type->kind == NodeKind::Solve) {
+        work.stage = NodeWork::Stage::Solve;
+        frame.figures.solve_seconds += work.seconds;
+    } else if (frame.figures.script_seconds > scripts_before) {
+        work.stage = NodeWork::Stage::Script;
+    }
+    work.points = result.size();
+    work.bytes = result.bytes();
 }
 
 std::vector<Uses> Evaluator::declared_for(std::size_t node) const

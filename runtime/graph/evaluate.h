@@ -6,17 +6,30 @@
 // and those after it once, at the end of the frame.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "runtime/graph/plan.h"
 #include "runtime/graph/snapshot.h"
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 
 class ChangingNode;
+
+// What one pass of a frame took: of a node, or of neighbours that went over the points together.
+struct NodeWork {
+    enum class Stage { Graph, Script, Solve };
+    std::vector<std::string> nodes;  // names, in the order of the chain
+    Stage stage = Stage::Graph;      // Script: kernels
+    double begin = 0, seconds = 0;   // s, wall time since advance() began, and how long
+    std::uint64_t points = 0;        // of the result
+    std::uint64_t bytes = 0;         // of its columns; those that it shares with others count in each
+};
 
 struct FrameResult {
     std::int64_t frame = 0;
@@ -25,6 +38,8 @@ struct FrameResult {
     std::map<std::string, double> time;
     std::map<std::string, std::vector<StepRecord>> steps;  // of each Create with a Solve, if the plan keeps them
     FrameFigures figures;
+    std::vector<NodeWork> work;  // in order; of a node once for each sub-frame
+    std::chrono::steady_clock::time_point began = {};
     double total_seconds = 0;  // wall time, without writing
     std::vector<std::string> warnings;
 };
@@ -39,6 +54,9 @@ public:
     // Receives the result of each node.
     using ResultHook = std::function<void(const Node& node, std::int64_t frame, const PointSet& points)>;
 
+    // Receives the flow that enters each node (no input: none), once its functions of the frame have been called.
+    using InputHook = std::function<void(const Node& node, const Frame& frame, std::span<const Flow> inputs)>;
+
     explicit Evaluator(const Plan& plan, WriteHook write = {}, ResultHook result = {});
     ~Evaluator();
 
@@ -49,6 +67,9 @@ public:
     // From now on no errors are estimated, which takes up to twice the time of Solve: for runs that nobody asks for
     // them. With a tolerance they are all the same.
     void leave_out_errors();
+
+    // From now on `input` is told what enters each node. Nodes are then evaluated one by one.
+    void watch_inputs(InputHook input) { input_ = std::move(input); }
 
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
@@ -79,6 +100,8 @@ private:
     // Evaluates the nodes from first to last: several if they are fused (Plan::last_together). Returns the last result.
     Flow evaluate(std::size_t first, std::size_t last, int left, std::vector<Flow>& results,
                   std::vector<std::size_t>& readers, FrameResult& frame);
+    void add_work(std::size_t first, std::size_t last, double begin, double scripts_before, const PointSet& result,
+                  FrameResult& frame) const;
     // What a node may use: for a Solve, also what the dynamics upstream of it do.
     std::vector<Uses> declared_for(std::size_t node) const;
     void edit_together(std::size_t first, std::size_t last, int left, PointSet& points, FrameResult& frame);
@@ -89,6 +112,8 @@ private:
     const Plan& plan_;
     WriteHook write_;
     ResultHook result_;
+    InputHook input_;
+    Stopwatch frame_clock_;  // since advance() began
     std::int64_t next_;
     int subframes_ = 1;  // of all simulations
     bool checks_declarations_ = false;

@@ -169,7 +169,7 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     std::error_code ignored;
     const std::uintmax_t bytes = std::filesystem::file_size(path, ignored);
     const std::lock_guard lock(mutex_);
-    written_.push_back({job.frame.number, path, spent, bytes});
+    written_.push_back({job.frame.number, path, spent, bytes, std::chrono::steady_clock::now()});
     if (--due_[job.frame.number] == 0) due_.erase(job.frame.number);
 }
 

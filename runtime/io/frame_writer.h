@@ -5,6 +5,7 @@
 // written before an error stay. A queued frame shares its columns with later ones, and costs only those that change.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -29,6 +30,7 @@ public:
         std::string path;
         double seconds;
         std::uint64_t bytes;
+        std::chrono::steady_clock::time_point end = {};
     };
 
     // waiting: the most frames in the queue, besides the one that is being written. Error: an unknown extension.

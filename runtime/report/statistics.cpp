@@ -74,6 +74,14 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.bands = result.figures.bands;
     frame.seconds.script = result.figures.script_seconds;
     frame.seconds.solve = result.figures.solve_seconds;
+    for (const NodeWork& work : result.work) {
+        const auto same = std::find_if(frame.nodes.begin(), frame.nodes.end(),
+                                       [&](const FrameStatistics::Node& node) { return node.nodes == work.nodes; });
+        if (same == frame.nodes.end())
+            frame.nodes.push_back({work.nodes, work.seconds, work.points, work.bytes});
+        else
+            *same = {work.nodes, same->seconds + work.seconds, work.points, work.bytes};
+    }
     // The stages are timed separately: rounding of the clock must not make the remainder negative.
     frame.seconds.graph = std::max(0.0, result.total_seconds - frame.seconds.script - frame.seconds.solve);
     return frame;
@@ -150,6 +158,11 @@ ordered_json to_json(const FrameStatistics& frame)
     json["contact_limit"] = frame.contact_limit;
     json["trapped"] = frame.trapped;
     json["beyond_tolerance"] = frame.beyond_tolerance;
+    ordered_json nodes = ordered_json::array();
+    for (const FrameStatistics::Node& node : frame.nodes)
+        nodes.push_back(
+            {{"nodes", node.nodes}, {"seconds", node.seconds}, {"points", node.points}, {"bytes", node.bytes}});
+    json["nodes"] = std::move(nodes);
     return json;
 }
 

@@ -53,6 +53,13 @@ struct FrameStatistics {
     std::uint64_t asleep = 0;             // sleeping points at the frame's end
     std::optional<Residual::Search> contact_search;
     StageSeconds seconds;
+    // What each pass took, in order; sub-frames added up. The points and bytes of the last.
+    struct Node {
+        std::vector<std::string> nodes;  // names: one, or neighbours that went over the points together
+        double seconds;                  // of the wall, s
+        std::uint64_t points, bytes;     // of the result
+    };
+    std::vector<Node> nodes;
 };
 
 // Without the time of writing, which comes later.

@@ -56,7 +56,7 @@ const std::map<std::string, std::set<std::string>> below = {
       "runtime/operators/emit", "runtime/operators/solve"}},
     {"runtime/picture", {"runtime", "runtime/points", "runtime/shapes/mesh"}},
     {"runtime/io", {"runtime", "runtime/files", "runtime/points", "runtime/picture"}},
-    {"runtime/report", {"runtime", "runtime/graph"}},
+    {"runtime/report", {"runtime", "runtime/points", "runtime/graph"}},
 };
 
 struct Include {

@@ -28,6 +28,10 @@ FrameResult frame_result()
     result.figures.script_seconds = 0.125;
     result.figures.solve_seconds = 0.5;
     result.total_seconds = 1;
+    // Of a frame of two sub-frames.
+    result.work = {{{"emit1"}, NodeWork::Stage::Graph, 0, 0.25, 2, 64},
+                   {{"tint", "fade"}, NodeWork::Stage::Script, 0.25, 0.125, 2, 64},
+                   {{"emit1"}, NodeWork::Stage::Graph, 0.5, 0.125, 3, 96}};
     return result;
 }
 
@@ -117,7 +121,9 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
         "collisions": 12,
         "contact_energy": { "added": 0.5, "lost": 3.0 },
         "bands": [ { "node": "collide1", "width": 0.125, "voxels": 5000, "seconds": 0.5 } ],
-        "contact_limit": 3, "trapped": 2, "beyond_tolerance": 0 })"));
+        "contact_limit": 3, "trapped": 2, "beyond_tolerance": 0,
+        "nodes": [ { "nodes": ["emit1"], "seconds": 0.375, "points": 3, "bytes": 96 },
+                   { "nodes": ["tint", "fade"], "seconds": 0.125, "points": 2, "bytes": 64 } ] })"));
 }
 
 TEST_CASE("estimated errors are told by their median, 95 % and largest, in the file and in the summary", "[report]")

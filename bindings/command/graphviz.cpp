@@ -1,0 +1,88 @@
+#include "bindings/command/graphviz.h"
+
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+
+#include "runtime/error.h"
+#include "runtime/files/file_error.h"
+
+namespace rapid {
+namespace {
+
+// A file in memory: dot may read and write as it likes, without a pipe that fills.
+Descriptor memory_file()
+{
+    Descriptor file(memfd_create("dot", MFD_CLOEXEC));
+    if (!file) throw Error(fmt::format("no memory for dot: {}", std::strerror(errno)));
+    return file;
+}
+
+void write_all(const Descriptor& file, const std::string& text)
+{
+    for (std::size_t written = 0; written < text.size();) {
+        const ssize_t count =
+            pwrite(file.number(), text.data() + written, text.size() - written, static_cast<off_t>(written));
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) throw Error(fmt::format("no memory for dot: {}", std::strerror(errno)));
+        written += static_cast<std::size_t>(count);
+    }
+}
+
+std::string read_all(const Descriptor& file)
+{
+    std::string text;
+    char part[65536];
+    while (true) {
+        const ssize_t count = pread(file.number(), part, sizeof part, static_cast<off_t>(text.size()));
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) return text;
+        text.append(part, static_cast<std::size_t>(count));
+    }
+}
+
+}  // namespace
+
+std::string lay_out(const std::string& graph, const std::string& format)
+{
+    const Descriptor input = memory_file(), output = memory_file(), messages = memory_file();
+    write_all(input, graph);
+
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    posix_spawn_file_actions_adddup2(&actions, input.number(), STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, output.number(), STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, messages.number(), STDERR_FILENO);
+    // Signals as a program expects them: those of this thread may be blocked.
+    sigset_t none, all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setsigdefault(&attributes, &all);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    std::string name = "dot", option = "-T" + format;
+    char* const arguments[] = {name.data(), option.data(), nullptr};
+    pid_t child = -1;
+    const int failed = posix_spawnp(&child, "dot", &actions, &attributes, arguments, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    if (failed == ENOENT)
+        throw Error("graphs are laid out by dot, which is not here; install it (apt install graphviz), or write .dot");
+    if (failed) throw Error(fmt::format("dot can't be started: {}", std::strerror(failed)));
+
+    int status = 0;
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw Error(fmt::format("dot failed: {}", read_all(messages)));
+    return read_all(output);
+}
+
+}  // namespace rapid

@@ -48,11 +48,29 @@ void add_events(const StepRecord& record, std::int32_t chain, std::vector<Event>
 }
 
 template <class T, class F>
-void append(PointSet& points, std::span<const Event> events, const char* name, const F& value)
+void set(PointSet& points, std::span<const Event> events, const char* name, const F& value)
 {
     points.add({name, Column<T>::zero()});
-    const std::span<T> to = points.column<T>(name).write().last(events.size());
+    const std::span<T> to = points.column<T>(name).write();
     for (std::size_t i = 0; i < events.size(); ++i) to[i] = value(events[i]);
+}
+
+PointSet points_of(std::span<const Event> events, std::int64_t frame)
+{
+    PointSet points;
+    points.append(events.size());
+    set<Vec3f>(points, events, "P", [](const Event& e) { return e.P; });
+    set<Vec3f>(points, events, "v", [](const Event& e) { return e.v; });
+    set<Vec3f>(points, events, "N", [](const Event& e) { return e.N; });
+    set<std::int64_t>(points, events, "id", [](const Event& e) { return e.id; });
+    set<std::int32_t>(points, events, "event", [](const Event& e) { return static_cast<std::int32_t>(e.kind); });
+    set<std::int32_t>(points, events, "frame", [&](const Event&) { return static_cast<std::int32_t>(frame); });
+    set<std::int32_t>(points, events, "chain", [](const Event& e) { return e.chain; });
+    set<std::int32_t>(points, events, "hitpath", [](const Event& e) { return e.collider; });
+    set<float>(points, events, "time", [](const Event& e) { return static_cast<float>(e.time); });
+    set<float>(points, events, "speed", [](const Event& e) { return e.speed; });
+    set<float>(points, events, "impulse", [](const Event& e) { return e.impulse; });
+    return points;
 }
 
 }  // namespace
@@ -65,9 +83,15 @@ void EventFile::declare(CLI::App& app)
         ->type_name("FILE");
 }
 
-void EventFile::check() const
+void EventFile::begin()
 {
     if (path_.empty()) return;
+    check();
+    file_.emplace(path_, points_of({}, 0));
+}
+
+void EventFile::check() const
+{
     std::string known;
     for (const Format& format : formats())
         if (format.read) known += (known.empty() ? "" : ", ") + format.extension;
@@ -79,6 +103,7 @@ void EventFile::check() const
 
 void EventFile::add(const FrameResult& result)
 {
+    if (!file_) return;
     std::vector<Event> events;
     std::int32_t chain = 0;
     for (const auto& [name, records] : result.steps) {
@@ -87,25 +112,14 @@ void EventFile::add(const FrameResult& result)
     }
     const auto key = [](const Event& e) { return std::tuple(e.time, e.chain, e.kind, e.id, e.collider); };
     std::sort(events.begin(), events.end(), [&](const Event& a, const Event& b) { return key(a) < key(b); });
-    if (path_.empty() || events.empty()) return;
-    events_.append(events.size());
-    append<Vec3f>(events_, events, "P", [](const Event& e) { return e.P; });
-    append<Vec3f>(events_, events, "v", [](const Event& e) { return e.v; });
-    append<Vec3f>(events_, events, "N", [](const Event& e) { return e.N; });
-    append<std::int64_t>(events_, events, "id", [](const Event& e) { return e.id; });
-    append<std::int32_t>(events_, events, "event", [](const Event& e) { return static_cast<std::int32_t>(e.kind); });
-    append<std::int32_t>(events_, events, "frame",
-                         [&](const Event&) { return static_cast<std::int32_t>(result.frame); });
-    append<std::int32_t>(events_, events, "chain", [](const Event& e) { return e.chain; });
-    append<std::int32_t>(events_, events, "hitpath", [](const Event& e) { return e.collider; });
-    append<float>(events_, events, "time", [](const Event& e) { return static_cast<float>(e.time); });
-    append<float>(events_, events, "speed", [](const Event& e) { return e.speed; });
-    append<float>(events_, events, "impulse", [](const Event& e) { return e.impulse; });
+    if (!events.empty()) file_->append(points_of(events, result.frame));
 }
 
-void EventFile::finish() const
+void EventFile::finish()
 {
-    if (!path_.empty()) write_points(path_, events_);
+    if (!file_) return;
+    file_->finish();
+    file_.reset();
 }
 
 }  // namespace rapid

@@ -1,10 +1,12 @@
 // The events of a run, as points in a file: --events.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "bindings/command/command.h"
 #include "runtime/graph/evaluate.h"
+#include "runtime/io/point_file.h"
 
 namespace rapid {
 
@@ -14,17 +16,19 @@ public:
 
     // Empty where nobody asks for it.
     const std::string& path() const { return path_; }
-    // Error: no format that can be one file of points.
-    void check() const;
+    // Before the first frame. Error: no format that can be one file of points; a file that can't be written.
+    void begin();
 
     // The events of a frame, in the order of their times.
     void add(const FrameResult& result);
-    // Writes the file.
-    void finish() const;
+    // Names the file, which there is not before.
+    void finish();
 
 private:
+    void check() const;
+
     std::string path_;
-    PointSet events_;
+    std::optional<PointFile> file_;
 };
 
 }  // namespace rapid

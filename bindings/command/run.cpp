@@ -76,13 +76,13 @@ public:
             for (const std::string& warning : session->take_warnings()) report.warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = keep_all_;
-            events_.check();
             options.keep_steps = !events_.path().empty();
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) report.warning(warning);
 
             const FrameSelection frames = range_of(plan);
             files_.resolve(plan, !frames.single());
+            events_.begin();
             report.begin(plan.first_frame(), frames.last);
             return compute(*session, plan, frames, report);
         });

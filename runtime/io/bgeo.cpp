@@ -18,6 +18,7 @@
 #include "runtime/files/input_file.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
+#include "runtime/io/point_file.h"
 #include "runtime/io/records.h"
 
 namespace rapid {
@@ -104,40 +105,98 @@ std::string group_section(const PointSet& points)
     return section.text();
 }
 
-void write_bgeo(OutputFile& file, const PointSet& points, const FrameInfo&)
+constexpr std::size_t count_offset = 9;  // in the file, of the number of points
+constexpr std::string_view end_section("\x00\xff", 2);
+
+void check_count(std::size_t points)
 {
-    if (points.size() > 0x7fffffff)
-        throw Error(fmt::format("{} points are more than .bgeo can count; write .vdb", points.size()));
+    if (points > 0x7fffffff) throw Error(fmt::format("{} points are more than .bgeo can count; write .vdb", points));
+}
 
-    std::vector<std::string> names = further_attributes(points);
-    names.insert(names.begin(), {"v", "id"});
-
-    check_column_names(names, std::string_view("\0", 1));
-    check_column_names(points.group_names(), std::string_view("\0", 1));
-    const std::string groups = group_section(points);
-
+// What comes before the records.
+std::string header_section(const PointSet& points, const std::vector<std::string>& names)
+{
     BigEndianText header;
     header.bytes("BgeoV");
     for (const std::size_t count : {std::size_t{5}, points.size(), std::size_t{0}, points.groups().size(),
                                     std::size_t{0}, names.size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
         header.int32(count);
-
-    RecordWriter records(ByteOrder::Big);
-    records.add("P", *points.find("P"));
-    records.add_constant(1.0f);
     for (const std::string& name : names) {
         const AnyColumn& column = *points.find(name);
-        records.add(name, column);
         header.string(name);
         header.int16(component_count(type_of(column)));
         header.int32(houdini_type(name, type_of(column)));
         for (const std::uint32_t word : default_words(column)) header.int32(word);
     }
+    return header.text();
+}
 
-    file.append(header.text().data(), header.text().size());
+// The names of the attributes, besides the position.
+std::vector<std::string> attribute_names(const PointSet& points)
+{
+    std::vector<std::string> names = further_attributes(points);
+    names.insert(names.begin(), {"v", "id"});
+    check_column_names(names, std::string_view("\0", 1));
+    return names;
+}
+
+RecordWriter records_of(const PointSet& points, const std::vector<std::string>& names)
+{
+    RecordWriter records(ByteOrder::Big);
+    records.add("P", *points.find("P"));
+    records.add_constant(1.0f);
+    for (const std::string& name : names) records.add(name, *points.find(name));
+    return records;
+}
+
+void write_bgeo(OutputFile& file, const PointSet& points, const FrameInfo&)
+{
+    check_count(points.size());
+    const std::vector<std::string> names = attribute_names(points);
+    check_column_names(points.group_names(), std::string_view("\0", 1));
+    const std::string end = group_section(points) + std::string(end_section);
+    const RecordWriter records = records_of(points, names);
+    const std::string header = header_section(points, names);
+
+    file.append(header.data(), header.size());
     records.write(file, file.appended(), points.size());
-    const std::string end = groups + std::string("\x00\xff", 2);
     file.write_at(file.appended() + records.record_bytes() * points.size(), end.data(), end.size());
+}
+
+class BgeoStream : public PointStream {
+public:
+    BgeoStream(OutputFile& file, const PointSet& like) : file_(file), names_(attribute_names(like))
+    {
+        const std::string header = header_section(like, names_);
+        file_.append(header.data(), header.size());
+        end_ = file_.appended();
+    }
+    void append(const PointSet& points) override
+    {
+        check_count(count_ + points.size());
+        const RecordWriter records = records_of(points, names_);
+        records.write(file_, end_, points.size());
+        end_ += records.record_bytes() * points.size();
+        count_ += points.size();
+    }
+    void finish() override
+    {
+        file_.write_at(end_, end_section.data(), end_section.size());
+        BigEndianText count;
+        count.int32(count_);
+        file_.write_at(count_offset, count.text().data(), count.text().size());
+    }
+
+private:
+    OutputFile& file_;
+    const std::vector<std::string> names_;
+    std::uint64_t end_ = 0;
+    std::size_t count_ = 0;
+};
+
+std::unique_ptr<PointStream> stream_bgeo(OutputFile& file, const PointSet& like)
+{
+    return std::make_unique<BgeoStream>(file, like);
 }
 
 class BigEndianReader {
@@ -262,6 +321,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
 
 RAPID_FORMAT(Format{".bgeo", "classic Houdini geometry, read by Houdini and Partio; id as int32", write_bgeo,
                     read_bgeo});
+RAPID_POINT_STREAM(".bgeo", stream_bgeo);
 
 }  // namespace
 }  // namespace rapid

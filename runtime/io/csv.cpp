@@ -16,6 +16,8 @@
 #include "runtime/io/format.h"
 #include "runtime/io/id_order.h"
 #include "runtime/io/ordered_chunks.h"
+#include "runtime/io/point_file.h"
+#include "runtime/memory_budget.h"
 #include "runtime/parallel.h"
 
 namespace rapid {
@@ -102,14 +104,37 @@ std::string csv_lines(const CsvTable& table, const std::vector<std::size_t>& ord
     return text;
 }
 
+void append_lines(OutputFile& file, const CsvTable& table, const std::vector<std::size_t>& order, std::size_t points)
+{
+    append_chunks(file, points,
+                  [&](std::size_t begin, std::size_t end) { return csv_lines(table, order, begin, end); });
+}
+
 void write_csv(OutputFile& file, const PointSet& points, const FrameInfo&)
 {
     const CsvTable table = csv_table(points);
     const std::vector<std::size_t> order = id_order(points.id());
     file.append(table.header.data(), table.header.size());
+    append_lines(file, table, order, points.size());
+}
 
-    append_chunks(file, points.size(),
-                  [&](std::size_t begin, std::size_t end) { return csv_lines(table, order, begin, end); });
+class CsvStream : public PointStream {
+public:
+    CsvStream(OutputFile& file, const PointSet& like) : file_(file)
+    {
+        const CsvTable table = csv_table(like);
+        file.append(table.header.data(), table.header.size());
+    }
+    void append(const PointSet& points) override { append_lines(file_, csv_table(points), {}, points.size()); }
+    void finish() override {}
+
+private:
+    OutputFile& file_;
+};
+
+std::unique_ptr<PointStream> stream_csv(OutputFile& file, const PointSet& like)
+{
+    return std::make_unique<CsvStream>(file, like);
 }
 
 // The start of each line, without the header and trailing empty lines.
@@ -263,6 +288,7 @@ PointSet read_csv(const std::filesystem::path& path)
 }
 
 RAPID_FORMAT(Format{".csv", "a table of text, a point a line in order of id", write_csv, read_csv});
+RAPID_POINT_STREAM(".csv", stream_csv);
 
 }  // namespace
 }  // namespace rapid

@@ -66,6 +66,38 @@ return rapid.create { fps = 24 }
     end
   end)
 
+  it("keeps no events: they are on their way to the disk", function()
+    local text = [[
+return rapid.create { fps = 24 }
+  :emit { source = rapid.mesh.sphere { center = {0, 2, 0} }, rate = 1e5, life = {0.01, 0.02} } :solve {}]]
+    for _, extension in ipairs { "csv", "bgeo" } do
+      local peak, rows = {}, {}
+      for i, frames in ipairs { 20, 200 } do
+        local result = scene.command("run", text, ("-f 1-%d --threads 2 --events e.%s"):format(frames, extension))
+        assert.equal("", result.stderr)
+        peak[i] = tonumber(result.stdout:match "memory   ([%d.]+) MiB at the peak")
+        rows[i] = #scene.folder:read("e." .. extension)
+      end
+      -- 1,600,000 events, of 68 bytes in .bgeo
+      assert.truthy(rows[2] > 1e8 and rows[2] > 9 * rows[1], rows[2])
+      assert.truthy(peak[2] - peak[1] < 10, ("%g MiB after 20 frames, %g after 200"):format(peak[1], peak[2]))
+    end
+  end)
+
+  it("are a whole file, or none where the run fails", function()
+    local text = [[
+return rapid.create { fps = 24 } :emit { source = rapid.mesh.sphere {}, rate = 500 }
+  :detail("fail", function(points, frame) if frame.number == 5 then error "late" end end) :solve {}]]
+    scene.folder:write("e.csv", "old")
+    assert.equal(1, scene.command("run", text, "-f 1-8 --quiet --events e.csv").status)
+    assert.equal("old", scene.folder:read "e.csv")
+    assert.equal(0, scene.command("run", text, "-f 1-4 --quiet --events e.csv").status)
+    assert.match("^id,Px,Py,Pz,", scene.folder:read "e.csv")
+    local full = scene.command("run", text, "-f 1-4 --quiet --events /dev/full/e.csv")
+    assert.equal(2, full.status)
+    assert.match("/dev/full/e%.csv: ", full.stderr)
+  end)
+
   it("refuses a file that holds no points", function()
     local result = scene.command("run", "return rapid.create {} :solve {}", "-f 1-2 --events events.json")
     assert.equal(2, result.status)

@@ -146,6 +146,16 @@ function LevelSet:intersect(other) end
 function LevelSet:subtract(other) end
 
 ---@class rapid.Fog  a volume of a density
+local Fog = {}
+---The density, trilinear between voxels.
+---@param P rapid.Vec3
+---@return number
+function Fog:sample(P) end
+---Writes a .vdb file, in a run.
+---@param path string  relative to the current folder
+---@param options? { grid?: string }
+---@return rapid.Fog
+function Fog:write(path, options) end
 
 ---@class rapid.Grid  of vectors
 local Grid = {}
@@ -153,6 +163,11 @@ local Grid = {}
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Grid:sample(P) end
+---Writes a .vdb file, in a run.
+---@param path string  relative to the current folder
+---@param options? { grid?: string }
+---@return rapid.Grid
+function Grid:write(path, options) end
 
 ---@class rapid
 local rapid = {}

@@ -31,6 +31,9 @@ typedef double (*rapid_shape_distance)(const void* shape, double x, double y, do
 // Of a grid of vectors' own pointer; value: shape [3].
 typedef void (*rapid_vector_grid_sample)(const void* grid, double x, double y, double z, double* value);
 
+// Of a fog's own pointer.
+typedef double (*rapid_fog_sample)(const void* fog, double x, double y, double z);
+
 // runtime/noise.h; curl: shape [3].
 typedef double (*rapid_noise)(double x, double y, double z, double time, double octaves, double seed);
 typedef void (*rapid_curl_noise)(double x, double y, double z, double time, double octaves, double seed, double* curl);

@@ -142,6 +142,16 @@ function LevelSet:intersect(other) end
 function LevelSet:subtract(other) end
 
 ---@class rapid.Fog  a volume of a density
+local Fog = {}
+---The density, trilinear between voxels.
+---@param P rapid.Vec3
+---@return number
+function Fog:sample(P) end
+---Writes a .vdb file, in a run.
+---@param path string  relative to the current folder
+---@param options? { grid?: string }
+---@return rapid.Fog
+function Fog:write(path, options) end
 
 ---@class rapid.Grid  of vectors
 local Grid = {}
@@ -149,6 +159,11 @@ local Grid = {}
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Grid:sample(P) end
+---Writes a .vdb file, in a run.
+---@param path string  relative to the current folder
+---@param options? { grid?: string }
+---@return rapid.Grid
+function Grid:write(path, options) end
 
 ---@class rapid
 local rapid = {}
@@ -260,11 +275,25 @@ function rapid.math.rotation_between(from, to) end
 ---@return rapid.Camera
 function rapid.camera(options) end
 
+---@class rapid.options.fog_from_points
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
+
+---The density of points: their weights by volume.
+---@param points rapid.Points  what is spread over the voxels [points, required]
+---@param options? rapid.options.fog_from_points
+---@return rapid.Fog
+function rapid.fog.from_points(points, options) end
+
 ---@class rapid.options.fog_read
 ---@field grid? string  its name; the only fog of floats, when not given [string]
+---@field before? "hold"|"repeat"|"mirror"|"nothing"  what holds before the first file of a sequence [string, one of hold, repeat, mirror, nothing, default "hold"]
+---@field after? "hold"|"repeat"|"mirror"|"nothing"  what holds after the last [string, one of hold, repeat, mirror, nothing, default "hold"]
+---@field offset? integer  by which a sequence begins later [integer, frames, default 0]
 
 ---Reads a fog, in which points are born by density, from a .vdb file.
----@param path string  relative to the graph file [string, required]
+---@param path string  relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some [string, required]
 ---@param options? rapid.options.fog_read
 ---@return rapid.Fog
 function rapid.fog.read(path, options) end
@@ -280,14 +309,35 @@ function rapid.fog.read(path, options) end
 ---@return rapid.Grid
 function rapid.grid.from(options) end
 
+---@class rapid.options.grid_from_points
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
+---@field attribute? string  a vec3 [string, default "v"]
+
+---The mean of a vec3 of points, by their weights.
+---@param points rapid.Points  what is spread over the voxels [points, required]
+---@param options? rapid.options.grid_from_points
+---@return rapid.Grid
+function rapid.grid.from_points(points, options) end
+
 ---@class rapid.options.grid_read
 ---@field grid? string  its name; the only grid of vectors, when not given [string]
+---@field before? "hold"|"repeat"|"mirror"|"nothing"  what holds before the first file of a sequence [string, one of hold, repeat, mirror, nothing, default "hold"]
+---@field after? "hold"|"repeat"|"mirror"|"nothing"  what holds after the last [string, one of hold, repeat, mirror, nothing, default "hold"]
+---@field offset? integer  by which a sequence begins later [integer, frames, default 0]
 
 ---Reads a grid of vectors from a .vdb file.
----@param path string  relative to the graph file [string, required]
+---@param path string  relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some [string, required]
 ---@param options? rapid.options.grid_read
 ---@return rapid.Grid
 function rapid.grid.read(path, options) end
+
+---Writes fogs and grids of vectors to a .vdb file, in a run.
+---@param path string  relative to the current folder [string, required]
+---@param grids table  { density = fog, v = grid }: their names in the file [table, required]
+---@return rapid.Grid
+function rapid.grid.write(path, grids) end
 
 ---@class rapid.options.levelset_box
 ---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
@@ -791,7 +841,7 @@ function Node:fade_by_age(params) end
 
 ---@class rapid.params.field
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field grid rapid.Grid|fun(frame: rapid.Frame): rapid.Grid  of vectors, by rapid.grid [vector grid, required]
+---@field grid rapid.Grid|fun(frame: rapid.Frame): rapid.Grid  of vectors, by rapid.grid; also a sequence [vector grid, required]
 ---@field mode? "force"|"velocity"|fun(frame: rapid.Frame): "force"|"velocity"  what the vectors are: forces (N), or velocities (m/s) that points are drawn to [string, one of force, velocity, default "force"]
 ---@field strength? number|rapid.Attribute|fun(frame: rapid.Frame): number  the vectors are multiplied by it [number, default 1, takes rapid.attr]
 ---@field drag? number|rapid.Attribute|fun(frame: rapid.Frame): number  with velocities, the rate at which points come to them; 1 when not given [number, 1/s, at least 0, takes rapid.attr]

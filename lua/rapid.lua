@@ -109,8 +109,13 @@ local function make(native, load_node, numeric, shapes, studies)
   rapid.grid = {
     read = maker("grid.read", "path"),
     from = grid_from,
+    from_points = maker("grid.from_points", "points"),
+    write = function(path, grids)
+      if path == nil then error("rapid.grid.write: the path is missing", 2) end
+      return native.make("grid.write", { path = path, grids = options_of("rapid.grid.write", grids) })
+    end,
   }
-  rapid.fog = { read = maker("fog.read", "path") }
+  rapid.fog = { read = maker("fog.read", "path"), from_points = maker("fog.from_points", "points") }
   rapid.shape = {}
   for _, name in ipairs(native.maker_names "shape") do rapid.shape[name] = maker("shape." .. name) end
   rapid.points = {
@@ -236,6 +241,16 @@ local function make(native, load_node, numeric, shapes, studies)
       return native.make("levelset." .. name, options)
     end
   end
+  -- A grid is written under the name of the option `grid`.
+  local function write_by(usual)
+    return function(object, path, options)
+      if path == nil then error("grid:write: the path is missing", 2) end
+      local name = options_of("grid:write", options).grid or usual
+      if type(name) ~= "string" then error(("grid:write: grid = %s is no name"):format(describe.value(name)), 2) end
+      native.make("grid.write", { path = path, grids = { [name] = object } })
+      return object
+    end
+  end
   local value_methods = {
     ["level set"] = {
       distance = shapes.queries.distance,
@@ -253,7 +268,8 @@ local function make(native, load_node, numeric, shapes, studies)
         return object
       end,
     },
-    ["vector grid"] = { sample = shapes.sample },
+    ["vector grid"] = { sample = shapes.sample, write = write_by "v" },
+    fog = { sample = shapes.sample_fog, write = write_by "density" },
     motion = {},
   }
   for _, kind in ipairs { "shape", "plane", "sphere", "box" } do
@@ -270,7 +286,10 @@ local function make(native, load_node, numeric, shapes, studies)
     local object, name = ...
     local query = shapes.queries[name] -- first, as traces of kernels can follow it
     if query and shapes.pointer_of(object) then return query end
-    if name == "sample" and shapes.grid_of(object) then return shapes.sample end
+    if name == "sample" then
+      if shapes.grid_of(object) then return shapes.sample end
+      if shapes.fog_of(object) then return shapes.sample_fog end
+    end
     local kind = native.kind(object)
     if kind == "node" then
       if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
@@ -296,7 +315,7 @@ local function make(native, load_node, numeric, shapes, studies)
       __metatable = false,
     })
   end
-  for _, name in ipairs { "math", "mesh", "levelset", "grid", "shape", "points" } do
+  for _, name in ipairs { "math", "mesh", "levelset", "grid", "fog", "shape", "points" } do
     closed(rapid[name], "rapid." .. name)
   end
   return closed(rapid, "rapid")

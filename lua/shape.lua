@@ -2,7 +2,7 @@
 --
 --   shape:distance(P)    m, negative inside; beyond a level set's band a bound of the right sign
 --   shape:gradient(P)    a vec3 out of the shape, of length 1 where the distance is exact; zero where there is none
---   grid:sample(P)       a vec3, between the voxels' values
+--   grid:sample(P)       a vec3, between the voxels' values; of a fog a number, the density
 --
 -- An object's pointer is asked of the host once, and then found in a table, which compiled traces can do. The functions
 -- are vararg for the reason that vec3.lua gives.
@@ -11,11 +11,12 @@ local vector = require "vec3"
 
 local vec3, istype = vector.type, ffi.istype
 
--- native.shape(object): light userdata, a shape; nil for any other object; native.vector_grid likewise.
--- native.shape_distance, native.vector_grid_sample: the functions to ask.
+-- native.shape(object): light userdata, a shape; nil for any other object; native.vector_grid, native.fog likewise.
+-- native.shape_distance, native.vector_grid_sample, native.fog_sample: the functions to ask.
 local function make(native)
   local ask = ffi.cast("rapid_shape_distance", native.shape_distance)
   local ask_grid = ffi.cast("rapid_vector_grid_sample", native.vector_grid_sample)
+  local ask_fog = ffi.cast("rapid_fog_sample", native.fog_sample)
   local gradient, value = ffi.new "double[3]", ffi.new "double[3]"
 
   -- The pointer of an object that `find` knows; false for any other.
@@ -34,6 +35,7 @@ local function make(native)
   end
 
   local pointer_of, grid_of = pointers_by(native.shape), pointers_by(native.vector_grid)
+  local fog_of = pointers_by(native.fog)
 
   local function place_shown(P)
     return (type(P) == "number" or P == nil) and tostring(P) or "a " .. type(P)
@@ -73,7 +75,19 @@ local function make(native)
     return (vec3(value[0], value[1], value[2]))
   end
 
-  return { pointer_of = pointer_of, queries = queries, grid_of = grid_of, sample = sample }
+  local function sample_fog(...)
+    local fog, P = ...
+    local pointer = type(fog) == "userdata" and fog_of(fog)
+    if not pointer then error("fog:sample(P) is asked of a fog: with a colon, not a dot", 0) end
+    if not istype(vec3, P) then error(("fog:sample(P) takes a vec3, not %s"):format(place_shown(P)), 0) end
+    local density = ask_fog(pointer, P.x, P.y, P.z)
+    return density
+  end
+
+  return {
+    pointer_of = pointer_of, queries = queries, grid_of = grid_of, sample = sample,
+    fog_of = fog_of, sample_fog = sample_fog,
+  }
 end
 
 return { make = make }

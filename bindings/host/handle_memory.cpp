@@ -4,6 +4,7 @@
 #include <lua.hpp>
 
 #include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/mesh/mesh.h"
@@ -32,13 +33,14 @@ std::size_t weight_of(const Object& object)
 {
     // A level set is two grids of floats, OpenVDB's and the one for queries, whose blocks are about half full.
     constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
-    constexpr std::size_t bytes_a_vector_grid = std::size_t{4} << 20;  // which does not tell its size
+    constexpr std::size_t bytes_a_grid = std::size_t{4} << 20;  // of vectors, or a fog, which do not tell their size
     if (const auto* level_set = dynamic_cast<const LevelSet*>(&object))
         return static_cast<std::size_t>(level_set->active_voxels()) * bytes_a_voxel;
     if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
         return mesh->positions.size() * sizeof(Vec3f) + mesh->triangles.size() * sizeof(Mesh::Triangle);
     if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
-    return dynamic_cast<const VectorGrid*>(&object) ? bytes_a_vector_grid : 0;
+    const bool is_grid = dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object);
+    return is_grid ? bytes_a_grid : 0;
 }
 
 }  // namespace

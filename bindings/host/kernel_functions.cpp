@@ -7,6 +7,7 @@
 #include "bindings/host/kernel_moment.h"
 #include "runtime/noise.h"
 #include "runtime/random.h"
+#include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 
 namespace rapid {
@@ -59,13 +60,25 @@ double shape_distance(const void* shape, double x, double y, double z, double* g
 }
 
 // So it does the grid.
+template <class G>
+typename G::Value sample(const void* grid, const Vec3d& P)
+{
+    const auto* known = static_cast<const G*>(grid);
+    typename G::Value found;
+    const std::optional<double> now = known->varies() ? KernelMoment::time() : std::nullopt;
+    if (now)
+        known->sample_at({&P, 1}, {&*now, 1}, {&found, 1});
+    else
+        known->sample({&P, 1}, {&found, 1});
+    return found;
+}
+
 void vector_grid_sample(const void* grid, double x, double y, double z, double* value)
 {
-    const Vec3d P(x, y, z);
-    Vec3d found;
-    static_cast<const VectorGrid*>(grid)->sample({&P, 1}, {&found, 1});
-    Eigen::Map<Vec3d>(value, 3) = found;
+    Eigen::Map<Vec3d>(value, 3) = sample<VectorGrid>(grid, {x, y, z});
 }
+
+double fog_sample(const void* fog, double x, double y, double z) { return sample<DensityGrid>(fog, {x, y, z}); }
 
 }  // namespace
 
@@ -80,6 +93,7 @@ void set_kernel_functions(lua_State* L)
     set("curl_noise", &curl_noise_at);
     set("shape_distance", &shape_distance);
     set("vector_grid_sample", &vector_grid_sample);
+    set("fog_sample", &fog_sample);
 }
 
 }  // namespace rapid

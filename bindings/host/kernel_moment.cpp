@@ -14,10 +14,16 @@ KernelMoment::KernelMoment(const double* times, const std::int32_t* at) : times_
 
 KernelMoment::~KernelMoment() { current = outer_; }
 
+std::optional<double> KernelMoment::time()
+{
+    if (!current || !current->times_ || *current->at_ < 0) return std::nullopt;
+    return current->times_[*current->at_];
+}
+
 double KernelMoment::since_begin(const StepShape& shape)
 {
-    if (!current || !current->times_ || *current->at_ < 0) return shape.duration();
-    return current->times_[*current->at_] - shape.begin();
+    const std::optional<double> now = time();
+    return now ? *now - shape.begin() : shape.duration();
 }
 
 }  // namespace rapid

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "runtime/graph/step_shape.h"
 
@@ -16,6 +17,8 @@ public:
     KernelMoment(const KernelMoment&) = delete;
     KernelMoment& operator=(const KernelMoment&) = delete;
 
+    // The present, in seconds since the start; nothing: the end of the step.
+    static std::optional<double> time();
     // The present, in seconds since the step of the shape began.
     static double since_begin(const StepShape& shape);
 

@@ -63,6 +63,10 @@ public:
         return *this;
     }
     MakerDeclaration& required() { return maker_.params.back().required = true, *this; }
+    MakerDeclaration& choices(std::vector<std::string> names)
+    {
+        return maker_.params.back().choices = std::move(names), *this;
+    }
     // Given by Rapid's own Lua files, not by users.
     MakerDeclaration& internal() { return maker_.params.back().internal = true, *this; }
 

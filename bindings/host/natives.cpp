@@ -17,6 +17,7 @@
 #include "bindings/host/script_type.h"
 #include "runtime/points/point_names.h"
 #include "runtime/printable.h"
+#include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/shape.h"
 
@@ -54,7 +55,8 @@ int kind_of(State& state)
     return 1;
 }
 
-// native.shape(object), native.vector_grid(object): its pointer, valid while the object is; nil for any other object.
+// native.shape(object), .vector_grid(object), .fog(object): its pointer, valid while the object is; nil for any other
+// object.
 template <class T>
 int pointer_to(State& state)
 {
@@ -164,6 +166,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"run", run_body},
                                       {"shape", native<pointer_to<Shape>>},
                                       {"vector_grid", native<pointer_to<VectorGrid>>},
+                                      {"fog", native<pointer_to<DensityGrid>>},
                                       {"outside_kernels", native<outside_kernels>},
                                       {"trace_aborted", native<trace_aborted>},
                                       {"read_module", native<read_source<false>>},

@@ -9,6 +9,8 @@
 #include "bindings/host/script_operator.h"
 #include "runtime/graph/step_shape.h"
 #include "runtime/points/point_names.h"
+#include "runtime/shapes/level_set/density_grid.h"
+#include "runtime/shapes/level_set/vector_grid.h"
 
 namespace rapid {
 namespace {
@@ -74,6 +76,8 @@ const std::map<std::string, DeclaredType>& declared_types()
         {"bool", {"boolean", keep_as<bool>}},
         {"float", {"number", keep_as<double>, true}},
         {"floats", {"list of numbers", keep_list<double>, true}},
+        {"fog", {DensityGrid::param_type, keep_as<DensityGridPtr>}},
+        {"grid", {VectorGrid::param_type, keep_as<VectorGridPtr>}},
         {"group", {group_param_type, keep_name<Access::Joins>, false, true}},
         {"int", {"integer", keep_as<int>, true}},
         {"ramp", {Ramp::param_type, keep_ramp, true}},

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "runtime/graph/step_grid.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/motion/deforming.h"
@@ -71,7 +72,9 @@ std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const Frame
 Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame)
 {
     const ObjectPtr* object = value.get<ObjectPtr>();
-    if (!object || !takes_step_shape(param)) return value;
+    if (!object) return value;
+    if (const ObjectPtr grid = step_grid(*object, clock, frame)) return grid;
+    if (!takes_step_shape(param)) return value;
     const auto shape = step_shape(*object, clock, frame);
     return shape ? Value(ObjectPtr(shape)) : value;
 }
@@ -79,7 +82,8 @@ Value in_step(const Param& param, const Value& value, const FrameClock& clock, c
 bool differs_by_step(const Param& param, const Value& value)
 {
     const ObjectPtr* object = value.get<ObjectPtr>();
-    return object && *object && takes_step_shape(param) && is_moving_shape(**object);
+    if (!object || !*object) return false;
+    return is_grid_sequence(**object) || (takes_step_shape(param) && is_moving_shape(**object));
 }
 
 void AnyShape::distance(const Chunk& chunk, std::span<double> phi, std::span<Vec3d> gradient) const

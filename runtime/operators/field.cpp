@@ -3,7 +3,8 @@
 //   mode "force"       F = strength value                N; accelerates a point by its mass
 //   mode "velocity"    a = -drag (v - strength value)    exact at any step: no drag is too stiff
 //
-// The value is sampled at the middle of the step: of second order in the variation of the field along the path.
+// The value is sampled at the middle of the sub-step, in place and time: of second order in the variation of the field
+// along the path.
 #include "runtime/graph/node.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 
@@ -21,7 +22,7 @@ struct Field {
     {
         return node<Field>("field", "Moves points by a grid of vectors: a force, or the velocity of a flow.")
             .takes("mass")
-            .param(&Field::grid, "grid", Value(), any_number(), "", "of vectors, by rapid.grid")
+            .param(&Field::grid, "grid", Value(), any_number(), "", "of vectors, by rapid.grid; also a sequence")
             .required()
             .param(&Field::mode, "mode", "force", any_number(), "",
                    "what the vectors are: forces (N), or velocities (m/s) that points are drawn to")
@@ -40,7 +41,7 @@ struct Field {
     void contribute(const Chunk& chunk, Forces& forces) const
     {
         std::vector<Vec3d> values(chunk.size());
-        grid->sample(chunk.P, values);
+        grid->sample_at(chunk.P, chunk.time, values);
         const Strided<float> size = chunk.read(strength);
         if (mode == "velocity") {
             const Strided<float> rate = drag ? chunk.read(*drag) : Strided<float>{&usual_drag, 0};

@@ -1,24 +1,33 @@
 // rapid.fog: volumes of a density.
 #include "bindings/host/maker.h"
-#include "runtime/shapes/level_set/density_grid.h"
+#include "bindings/host/makers/grid_files.h"
+#include "bindings/host/makers/points_of_grid.h"
 
 namespace rapid {
 namespace {
 
-struct ReadFog {
-    std::string path, grid;
-
+struct ReadFog : GridFiles {
     static Maker declare()
     {
-        return maker<ReadFog>("fog.read", "Reads a fog, in which points are born by density, from a .vdb file.")
-            .param(&ReadFog::path, "path", Value(), any_number(), "", "relative to the graph file")
-            .required()
-            .param(&ReadFog::grid, "grid", Value(), any_number(), "",
-                   "its name; the only fog of floats, when not given");
+        auto declaration =
+            maker<ReadFog>("fog.read", "Reads a fog, in which points are born by density, from a .vdb file.");
+        GridFiles::declare(declaration, "its name; the only fog of floats, when not given");
+        return declaration;
     }
-    ObjectPtr make(MakeContext& context) const { return read_density_grid(context.resolve(path), grid); }
+    ObjectPtr make(MakeContext& context) const { return make_with<DensityGrid>(context, read_density_grid); }
 };
 RAPID_MAKER(ReadFog);
+
+struct FogFromPoints : PointsOfGrid {
+    static Maker declare()
+    {
+        auto declaration = maker<FogFromPoints>("fog.from_points", "The density of points: their weights by volume.");
+        PointsOfGrid::declare(declaration);
+        return declaration;
+    }
+    ObjectPtr make(MakeContext&) const { return density_of_points(spread()); }
+};
+RAPID_MAKER(FogFromPoints);
 
 }  // namespace
 }  // namespace rapid

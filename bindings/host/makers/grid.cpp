@@ -2,25 +2,83 @@
 #include <fmt/format.h>
 
 #include "bindings/host/maker.h"
-#include "runtime/shapes/level_set/vector_grid.h"
+#include "bindings/host/makers/grid_files.h"
+#include "bindings/host/makers/points_of_grid.h"
+#include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {
 namespace {
 
-struct ReadGrid {
-    std::string path, grid;
+struct ReadGrid : GridFiles {
+    static Maker declare()
+    {
+        auto declaration = maker<ReadGrid>("grid.read", "Reads a grid of vectors from a .vdb file.");
+        GridFiles::declare(declaration, "its name; the only grid of vectors, when not given");
+        return declaration;
+    }
+    ObjectPtr make(MakeContext& context) const { return make_with<VectorGrid>(context, read_vector_grid); }
+};
+RAPID_MAKER(ReadGrid);
+
+struct GridFromPoints : PointsOfGrid {
+    std::string attribute;
 
     static Maker declare()
     {
-        return maker<ReadGrid>("grid.read", "Reads a grid of vectors from a .vdb file.")
-            .param(&ReadGrid::path, "path", Value(), any_number(), "", "relative to the graph file")
-            .required()
-            .param(&ReadGrid::grid, "grid", Value(), any_number(), "",
-                   "its name; the only grid of vectors, when not given");
+        auto declaration = maker<GridFromPoints>("grid.from_points", "The mean of a vec3 of points, by their weights.");
+        PointsOfGrid::declare(declaration);
+        declaration.param(&GridFromPoints::attribute, "attribute", std::string("v"), any_number(), "", "a vec3");
+        return declaration;
     }
-    ObjectPtr make(MakeContext& context) const { return read_vector_grid(context.resolve(path), grid); }
+    ObjectPtr make(MakeContext&) const
+    {
+        const PointSet& set = points->points;
+        const Column<Vec3f>* column = set.find<Vec3f>(attribute);
+        if (!column) {
+            std::vector<std::string> vectors;
+            for (const auto& [name, any] : set.columns())
+                if (type_of(any) == AttributeType::Vec3) vectors.push_back(name);
+            throw Error(fmt::format("attribute = \"{}\": the points have no vec3 of that name{}", attribute,
+                                    did_you_mean(attribute, vectors)));
+        }
+        std::vector<Vec3f> vectors(set.size());
+        for (std::size_t i = 0; i < vectors.size(); ++i) vectors[i] = (*column)[i];
+        SpreadPoints those = spread();
+        those.vectors = vectors;
+        return vectors_of_points(those);
+    }
 };
-RAPID_MAKER(ReadGrid);
+RAPID_MAKER(GridFromPoints);
+
+struct WriteGrids {
+    std::string path;
+    std::map<std::string, Value> grids;
+
+    static Maker declare()
+    {
+        return maker<WriteGrids>("grid.write", "Writes fogs and grids of vectors to a .vdb file, in a run.")
+            .param(&WriteGrids::path, "path", Value(), any_number(), "", "relative to the current folder")
+            .required()
+            .param(&WriteGrids::grids, "grids", Value(), any_number(), "",
+                   "{ density = fog, v = grid }: their names in the file")
+            .required();
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        std::map<std::string, ObjectPtr> objects;
+        for (const auto& [name, value] : grids) {
+            const ObjectPtr* object = value.get<ObjectPtr>();
+            if (!object || !(std::dynamic_pointer_cast<const VectorGrid>(*object) ||
+                             std::dynamic_pointer_cast<const DensityGrid>(*object)))
+                throw Error(fmt::format("{} = {}; it must be a fog or a grid of vectors", name, describe(value)));
+            objects[name] = *object;
+        }
+        if (objects.empty()) throw Error("there is no grid to write; give { NAME = grid }");
+        if (context.may_write) write_grids(path, objects);
+        return objects.begin()->second;
+    }
+};
+RAPID_MAKER(WriteGrids);
 
 // The parameter `at`: the values of the function at each node, which lua/rapid.lua has asked for.
 struct PlaceFunction {

@@ -11,6 +11,7 @@
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/open_grids.h"
 #include "runtime/shapes/scatter/alias_table.h"
 
 namespace rapid {
@@ -57,6 +58,8 @@ private:
     AliasTable chances_;
 };
 
+}  // namespace
+
 ScatterPtr scatter_in_fog(const FloatGrid& grid)
 {
     std::vector<Cell> cells;
@@ -82,14 +85,16 @@ ScatterPtr scatter_in_fog(const FloatGrid& grid)
     return std::make_shared<ScatterInFog>(grid.constTransformPtr(), std::move(cells), AliasTable(weights, sum));
 }
 
-class OpenDensityGrid final : public DensityGrid {
-public:
-    explicit OpenDensityGrid(const FloatGrid& grid) : scatter_(scatter_in_fog(grid)) {}
-    const ScatterPtr& scatter() const override { return scatter_; }
+double OpenDensityGrid::total() const
+{
+    double sum = 0;
+    for (auto value = grid_->tree().cbeginValueOn(); value; ++value)
+        sum += double(*value) * static_cast<double>(value.getVoxelCount());
+    const openvdb::Vec3d size = grid_->voxelSize();
+    return sum * size.x() * size.y() * size.z();
+}
 
-private:
-    ScatterPtr scatter_;
-};
+namespace {
 
 bool is_fog(const openvdb::GridBase& grid)
 {
@@ -137,7 +142,7 @@ DensityGridPtr read(const std::filesystem::path& path, const std::string& name)
     initialize_openvdb();
     const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(reader, path, name);
     try {
-        return std::make_shared<OpenDensityGrid>(*grid);
+        return std::make_shared<OpenDensityGrid>(grid);
     } catch (const Error& error) {
         throw Error(fmt::format("cannot use \"{}\": {}", path.string(), error.message()));
     }

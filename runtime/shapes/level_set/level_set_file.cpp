@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "runtime/error.h"
-#include "runtime/files/output_stream.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/vdb_archive.h"
 
 namespace rapid {
 namespace {
@@ -82,35 +82,13 @@ LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
     return level_set;
 }
 
-// As openvdb::io::File writes, to a stream.
-class Archive : public openvdb::io::Archive {
-public:
-    void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const
-    {
-        openvdb::io::Archive::write(stream, grids, /*seekable=*/true);
-    }
-};
-
 const bool defined = read_level_set.define(read);
 
 }  // namespace
 
 void GridLevelSet::write(const std::filesystem::path& path, const std::string& name) const
 {
-    if (name.empty()) throw Error(fmt::format("cannot write \"{}\": the grid needs a name", path.string()));
-    // The tree is shared, and only the name differs.
-    openvdb::MetaMap metadata(*grid_);
-    metadata.removeMeta(openvdb::GridBase::META_GRID_NAME);
-    metadata.insertMeta(openvdb::GridBase::META_GRID_NAME, openvdb::StringMetadata(name));
-    try {
-        OutputFile file(path);
-        OutputStream stream(file);
-        Archive().write_to(stream, {grid_->copyGridReplacingMetadata(metadata)});
-        stream.flush();
-        file.finish();
-    } catch (const std::exception& e) {
-        throw Error(fmt::format("cannot write \"{}\": {}", path.string(), e.what()));
-    }
+    write_archive(path, {named_grid(*grid_, name)});
 }
 
 }  // namespace rapid

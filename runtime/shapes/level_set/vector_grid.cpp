@@ -2,49 +2,17 @@
 
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
-#include <openvdb/tools/Interpolation.h>
 
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/open_grids.h"
 
 namespace rapid {
 namespace {
 
 using openvdb::Vec3SGrid;
-
-class OpenVectorGrid final : public VectorGrid {
-public:
-    explicit OpenVectorGrid(Vec3SGrid::ConstPtr grid) : grid_(std::move(grid)) {}
-
-    void sample(std::span<const Vec3d> P, std::span<Vec3d> values) const override
-    {
-        if (grid_->getGridClass() == openvdb::GRID_STAGGERED)
-            sample_by<openvdb::tools::StaggeredBoxSampler>(P, values);
-        else
-            sample_by<openvdb::tools::BoxSampler>(P, values);
-    }
-
-private:
-    template <class Sampler>
-    void sample_by(std::span<const Vec3d> P, std::span<Vec3d> values) const
-    {
-        // Not registered with the tree, which would lock it for each batch.
-        openvdb::tree::ValueAccessor<const openvdb::Vec3STree, /*IsSafe=*/false> accessor(grid_->tree());
-        for (std::size_t i = 0; i < P.size(); ++i) {
-            const openvdb::Vec3d at = grid_->transform().worldToIndex({P[i].x(), P[i].y(), P[i].z()});
-            // Voxels have 32-bit coordinates; there are none farther out.
-            constexpr double farthest = 1 << 30;
-            openvdb::Vec3s value = grid_->background();
-            if (std::abs(at.x()) < farthest && std::abs(at.y()) < farthest && std::abs(at.z()) < farthest)
-                value = Sampler::sample(accessor, at);
-            values[i] = Vec3d(value.x(), value.y(), value.z());
-        }
-    }
-
-    Vec3SGrid::ConstPtr grid_;
-};
 
 openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
 {

@@ -18,11 +18,19 @@ namespace rapid {
 
 class VectorGrid : public Object {
 public:
+    using Value = Vec3d;
     static constexpr std::string_view param_type = "vector grid";
     std::string_view kind() const override { return "vector grid"; }
 
-    // P, values: shape [n], m and the grid's own unit. From any number of threads.
+    // P, values: shape [n], m and the grid's own unit. From any number of threads. Of a grid that changes with time, at
+    // the end of the step that it is for.
     virtual void sample(std::span<const Vec3d> P, std::span<Vec3d> values) const = 0;
+    // The same, each at its own time, s since the start of the simulation.
+    virtual void sample_at(std::span<const Vec3d> P, std::span<const double> time, std::span<Vec3d> values) const
+    {
+        static_cast<void>(time);
+        sample(P, values);
+    }
 };
 
 using VectorGridPtr = std::shared_ptr<const VectorGrid>;

@@ -1,0 +1,52 @@
+// Points that a grid is made of, as makers are given them.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "bindings/host/maker.h"
+#include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set/grid_of_points.h"
+
+namespace rapid {
+
+// The parameters of what is made of points; T derives from it.
+struct PointsOfGrid {
+    std::shared_ptr<const PointsObject> points;
+    double voxel;
+    std::optional<PerPoint<float>> radius;
+    PerPoint<float> weight;
+
+    template <class T>
+    static void declare(MakerDeclaration<T>& declaration)
+    {
+        declaration
+            .param(static_cast<std::shared_ptr<const PointsObject> T::*>(&T::points), "points", Value(), any_number(),
+                   "", "what is spread over the voxels")
+            .required();
+        declaration.param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, above(0), "m", "edge of a voxel")
+            .param(static_cast<std::optional<PerPoint<float>> T::*>(&T::radius), "radius", Value(), above(0), "m",
+                   "over which a point is spread, of at least a voxel; 1.5 voxels when not given")
+            .param(static_cast<PerPoint<float> T::*>(&T::weight), "weight", 1.0, at_least(0), "",
+                   "what a point counts: the sum of density times volume is that of the weights");
+    }
+
+    // Refers to this; the columns that it holds are kept until it is destroyed.
+    SpreadPoints spread() const
+    {
+        const PointSet& set = points->points;
+        const std::size_t n = set.size();
+        const Strided<Vec3f> P = set.P().read();
+        places_.clear();
+        for (std::size_t i = 0; i < n; ++i) places_.push_back(P[i]);
+        usual_ = static_cast<float>(1.5 * voxel);
+        const Strided<float> r = radius ? radius->read(set) : Strided<float>{&usual_, 0}, w = weight.read(set);
+        return {places_, std::span(r.data, r.stride ? n : 1), std::span(w.data, w.stride ? n : 1), {}, voxel};
+    }
+
+private:
+    mutable std::vector<Vec3f> places_;
+    mutable float usual_ = 0;
+};
+
+}  // namespace rapid

@@ -1,0 +1,24 @@
+// Grids to .vdb files that get their names only when they are complete.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <filesystem>
+#include <string>
+
+namespace rapid {
+
+// A grid under another name; the tree is shared. Error: an empty name.
+template <class Grid>
+openvdb::GridBase::ConstPtr named_grid(const Grid& grid, const std::string& name)
+{
+    openvdb::MetaMap metadata(grid);
+    metadata.removeMeta(openvdb::GridBase::META_GRID_NAME);
+    metadata.insertMeta(openvdb::GridBase::META_GRID_NAME, openvdb::StringMetadata(name));
+    return grid.copyGridReplacingMetadata(metadata);
+}
+
+// Error: the file, and what is wrong; a grid without a name.
+void write_archive(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids);
+
+}  // namespace rapid

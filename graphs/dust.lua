@@ -24,11 +24,11 @@ local dust = rapid.create { fps = 24, seed = 6 }
   :turbulence { amplitude = 3, size = 0.3, speed = 0.5 }
   :collide    { shape = rapid.shape.plane {}, bounce = 0, friction = 1 }
   :points     ("spread", function(p)
-      p.pscale = 0.015 + 0.06 * math.sqrt(p.nage)
-      p.Alpha = 0.1 * (1 - p.nage)
+      p.pscale = 0.008 + 0.09 * math.sqrt(p.nage)
+      p.Alpha = 0.06 * (1 - p.nage) ^ 1.5
     end)
   :solve      {}
 
 return dust:merge(pieces)
   :picture { shutter = 0.5, emitters = false,
-             camera = rapid.camera { position = {1.6, 1.4, 5.4}, target = {0, 0.75, 0} } }
+             camera = rapid.camera { position = {1.6, 1.4, 5.8}, target = {0, 0.75, 0} } }

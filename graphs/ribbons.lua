@@ -27,4 +27,4 @@ return rapid.create { fps = 24, seed = 1, points = rapid.points.from { P = start
       p.Cd = vec3(0.9, 0.25, 0.1):lerp(vec3(0.1, 0.35, 1), part)
     end)
   :solve     {}
-  :picture   { blend = "add", camera = rapid.camera { position = {0, 1.5, 4.6}, target = {0, 1.2, 0} } }
+  :picture   { blend = "add", camera = rapid.camera { position = {0, 1.4, 3.9}, target = {0, 1.2, 0} } }

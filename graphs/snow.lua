@@ -1,0 +1,44 @@
+-- snow: it settles on a fir until the fir is shaken, and comes down in a cloud.
+--
+-- Shows:  response = "stick" with an adhesion on a body that moves; meshes made in the scene.
+-- Proves: flakes stay where they have come to lie, until the fir's motion takes more than their adhesion
+--         (tests/graphs/test_snow.lua).
+-- Run:    rapid run graphs/snow.lua -f 1-132 -o /tmp/snow.mp4
+local rapid = require "rapid"
+
+local rate = rapid.param("rate", 12000, "flakes per second, for 1.6 s")
+local adhesion = rapid.param("adhesion", 14, "m/s² that take a flake off")
+
+-- A cone whose edge is cut into branches.
+local function tier(radius, low, high)
+  local points, faces = {{0, high, 0}, {0, low + 0.08, 0}}, {}
+  for k = 0, 63 do
+    local angle = 2 * math.pi * k / 64
+    local r = radius * (0.86 + 0.14 * math.cos(9 * angle + 7 * low))
+    points[k + 3] = {r * math.cos(angle), low, r * math.sin(angle)}
+    faces[2 * k + 1] = {1, (k + 1) % 64 + 3, k + 3}
+    faces[2 * k + 2] = {2, k + 3, (k + 1) % 64 + 3}
+  end
+  return rapid.levelset.from_mesh(rapid.mesh.from { points = points, faces = faces }, { voxel = 0.025 })
+end
+local fir = rapid.levelset.box { size = {0.14, 0.5, 0.14}, center = {0, 0.22, 0}, voxel = 0.025 }
+for k = 0, 4 do fir = fir:union(tier(0.85 - 0.15 * k, 0.35 + 0.36 * k, 0.95 + 0.37 * k)) end
+
+-- Still for 3.4 s; then it is shaken for a second.
+local function shaken(frame)
+  local t = frame.time - 3.4
+  if t <= 0 or t >= 1 then return rapid.translate(0, 0, 0) end
+  return rapid.rotate({0.3, 0, 1}, 5 * math.sin(math.pi * t) * math.sin(2 * math.pi * 5 * t))
+end
+
+return rapid.create { fps = 24, seed = 12 }
+  :emit       { source = rapid.mesh.grid { size = {2, 2}, center = {-0.15, 2.9, 0} },
+                rate = function(frame) return frame.time < 1.6 and rate or rate / 30 end, velocity = {0, -1.2, 0},
+                spread = 20, attributes = { pscale = {0.006, 0.013}, Cd = {0.95, 0.97, 1} } }
+  :gravity    {}
+  :wind       { velocity = {0.15, 0, 0}, drag = 7 }
+  :turbulence { amplitude = 3, size = 0.5, speed = 0.4 }
+  :collide    { shape = fir, transform = shaken, response = "stick", adhesion = adhesion }
+  :collide    { shape = rapid.shape.plane {}, response = "stick" }
+  :solve      { substeps = 3 }
+  :picture    { emitters = false, camera = rapid.camera { position = {1, 1.7, 4.6}, target = {0, 1.1, 0} } }

@@ -1,0 +1,70 @@
+-- graphs/ash.lua: what its head promises.
+describe("graphs/ash.lua", function()
+  local scene = require "testing.scene"
+  local command = require "testing.command"
+  local folder = command.shell("pwd").stdout:gsub("%s", "") .. "/graphs/smoke"
+
+  -- A chain of frames 49 to 113, with the sequence and two of its files.
+  local function run(chain, frame)
+    return scene.run(([[
+local folder = %q
+local function file(maker, number, grid)
+  return maker(("%%s/smoke.%%04d.vdb"):format(folder, number), { grid = grid })
+end
+local fog = rapid.fog.read(folder .. "/smoke.####.vdb", { grid = "density" })
+local flow = rapid.grid.read(folder .. "/smoke.####.vdb", { grid = "v" })
+local before, after = file(rapid.fog.read, 49, "density"), file(rapid.fog.read, 65, "density")
+local v_before, v_after = file(rapid.grid.read, 49, "v"), file(rapid.grid.read, 65, "v")
+return rapid.create { fps = 24, seed = 3, start = 49 } %s]]):format(folder, chain), { frames = {frame, frame} })[frame]
+  end
+
+  it("bears flakes where there is smoke at the moment, in one file or the other", function()
+    -- In frame 53, a quarter of the way, by 3/4 of the first file's density and 1/4 of the second's: the parts of the
+    -- flakes are those of the totals, and where files have no smoke in common the flakes of one are not the other's.
+    local function drawn(source, number)
+      return run(([[
+  :emit { source = %s, impulse = { [53] = %d }, age = 0, attributes = { a = 0, b = 0 } }
+  :points("read", function(p) p.a, p.b = before:sample(p.P), after:sample(p.P) end) :solve {}]]):format(source, number),
+        53)
+    end
+    local function part(points, of_first)
+      local sum = 0
+      for i = 1, #points do
+        local p = points[i]
+        local first, second = 0.75 * p.a, 0.25 * p.b
+        assert.is_true(first + second > 0)
+        sum = sum + (of_first and first or second) / (first + second)
+      end
+      return sum / #points
+    end
+    local between = drawn("fog", 40000)
+    assert.equal(40000, #between)
+    -- Both files are of as many points, all of weight 1, within a tenth: of the mixture 3/4 are the first file's.
+    assert.near(0.75, part(between, true), 0.03)
+    assert.near(0.25, part(between, false), 0.03)
+  end)
+
+  it("goes as the smoke goes, at each moment between two files", function()
+    -- With such a drag a flake has the velocity of the flow, that of frame 55 three eighths of the way from file to
+    -- file; but for half a sub-step, 1.3 ms, in which it goes some 3 mm and the flow changes by some 0.01 m/s.
+    local points = run([[
+  :emit { source = fog, impulse = { [54] = 2000 }, age = 0 }
+  :attribute { a = {0, 0, 0}, b = {0, 0, 0} }
+  :field { grid = flow, mode = "velocity", drag = 2e4 }
+  :solve { substeps = 16 }
+  :points("read", function(p) p.a, p.b = v_before:sample(p.P), v_after:sample(p.P) end)]], 55)
+    local off, apart = 0, 0
+    for i = 1, #points do
+      local p = points[i]
+      off = off + (p.a:lerp(p.b, 0.375) - p.v):length() / #points
+      apart = apart + (p.b - p.a):length() / #points
+    end
+    assert.is_true(apart > 0.3, apart)
+    assert.is_true(off < 0.02, off)
+  end)
+
+  it("is carried up by it, though flakes fall", function()
+    local points = rapid.run("graphs/ash.lua", { frames = {1, 40}, set = { rate = 1000 } })[40]
+    assert.is_true(#points > 1000 and points:mean("v").y > 0.5)
+  end)
+end)

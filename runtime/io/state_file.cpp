@@ -1,9 +1,9 @@
 #include "runtime/io/state_file.h"
 
+#include <blosc.h>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -21,37 +21,73 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::string_view magic = "\x89RAPID\r\n";
-constexpr int format = 1;
-constexpr int level = 1;                                                                                 // of zstd
+constexpr int format = 2;
 constexpr std::array<std::string_view, 6> types = {"float", "vec3", "int32", "int64", "quat", "uint8"};  // KeptColumn's
 constexpr std::string_view type_of_bytes = "bytes";
 
-using Block = std::vector<char>;
+// Compressed and read on all threads. Blosc sorts the bytes of numbers by their place, which makes ids a hundredth and
+// takes a tenth off positions; LZ4 on its first level reads and writes gigabytes a second.
+constexpr std::size_t piece_bytes = std::size_t{1} << 20;
+constexpr int level = 1;
+constexpr const char* codec = "lz4";
+constexpr std::uint64_t most_expansion = 1024;  // more than any codec's
 
-Block compressed(const void* data, std::size_t bytes)
+struct Piece {
+    std::unique_ptr<char[]> data;
+    std::size_t size = 0;
+};
+
+Piece compressed(const char* data, std::size_t bytes, std::size_t scalar)
 {
-    Block block(ZSTD_compressBound(bytes));
-    const std::size_t size = ZSTD_compress(block.data(), block.size(), data, bytes, level);
-    if (ZSTD_isError(size)) throw Error(ZSTD_getErrorName(size));
-    block.resize(size);
-    return block;
+    const std::size_t most = bytes + BLOSC_MAX_OVERHEAD;
+    Piece piece{std::make_unique_for_overwrite<char[]>(most)};
+    const int size = blosc_compress_ctx(level, BLOSC_SHUFFLE, scalar, bytes, data, piece.data.get(), most, codec, 0, 1);
+    if (size <= 0) throw Error("can't be compressed");
+    piece.size = static_cast<std::size_t>(size);
+    return piece;
 }
 
 [[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
 
-void decompress(std::span<const unsigned char> block, void* data, std::size_t bytes)
+void decompress(std::span<const unsigned char> piece, char* data, std::size_t bytes)
 {
-    const std::size_t size = ZSTD_decompress(data, bytes, block.data(), block.size());
-    if (ZSTD_isError(size) || size != bytes) damaged("a block does not fit its header");
+    std::size_t known = 0;
+    if (blosc_cbuffer_validate(piece.data(), piece.size(), &known) != 0 || known != bytes ||
+        blosc_decompress_ctx(piece.data(), data, bytes, 1) != static_cast<int>(bytes))
+        damaged("a block does not fit its header");
 }
 
-// A block's size, before memory is taken for it.
-std::size_t values_of(std::span<const unsigned char> block, std::uint64_t values, std::size_t bytes_a_value)
+// What is in a block before it is compressed.
+struct Raw {
+    const char* data;
+    std::size_t bytes, scalar;  // scalar: bytes of a number
+
+    std::size_t pieces() const { return (bytes + piece_bytes - 1) / piece_bytes; }
+};
+
+template <class T>
+constexpr std::size_t scalar_bytes = sizeof(T) % sizeof(float) == 0 && !std::is_integral_v<T> ? sizeof(float)
+                                                                                              : sizeof(T);
+
+KeptColumn empty_column(std::size_t type)
 {
-    const unsigned long long bytes = ZSTD_getFrameContentSize(block.data(), block.size());
-    if (values > (std::uint64_t{1} << 48) || bytes != values * bytes_a_value)
-        damaged("a block does not fit its header");
-    return static_cast<std::size_t>(values);
+    const KeptColumn of_type[] = {Column<float>(),        Column<Vec3f>(), Column<std::int32_t>(),
+                                  Column<std::int64_t>(), Column<Quatf>(), Column<std::uint8_t>()};
+    return of_type[type];
+}
+
+Raw raw_of(const KeptColumn& column)
+{
+    return std::visit(
+        []<class T>(const Column<T>& values) -> Raw {
+            return {reinterpret_cast<const char*>(values.read().data), values.bytes(), scalar_bytes<T>};
+        },
+        column);
+}
+
+std::size_t values_of(const KeptColumn& column)
+{
+    return std::visit([](const auto& values) { return values.size(); }, column);
 }
 
 std::uint64_t number_at(const unsigned char* at)
@@ -65,21 +101,25 @@ std::uint64_t number_at(const unsigned char* at)
 
 void write_state(OutputFile& file, ordered_json header, const SavedState& state)
 {
-    std::vector<Block> blocks(1 + state.columns.size());
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t k) {
-        if (k == 0)
-            blocks[k] = compressed(state.bytes.data(), state.bytes.size());
-        else
-            std::visit([&](const auto& column) { blocks[k] = compressed(column.read().data, column.bytes()); },
-                       state.columns[k - 1]);
+    std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
+    for (const KeptColumn& column : state.columns) blocks.push_back(raw_of(column));
+    std::vector<std::pair<const Raw*, std::size_t>> places;  // block and offset of each piece
+    for (const Raw& raw : blocks)
+        for (std::size_t k = 0; k < raw.pieces(); ++k) places.emplace_back(&raw, k * piece_bytes);
+    std::vector<Piece> pieces(places.size());
+    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t k) {
+        const auto& [raw, at] = places[k];
+        pieces[k] = compressed(raw->data + at, std::min(piece_bytes, raw->bytes - at), raw->scalar);
     });
     header["format"] = format;
     ordered_json& list = header["blocks"] = ordered_json::array();
-    list.push_back({{"type", type_of_bytes}, {"values", state.bytes.size()}, {"bytes", blocks[0].size()}});
-    for (std::size_t k = 0; k < state.columns.size(); ++k)
-        list.push_back({{"type", types[state.columns[k].index()]},
-                        {"values", std::visit([](const auto& column) { return column.size(); }, state.columns[k])},
-                        {"bytes", blocks[k + 1].size()}});
+    for (std::size_t b = 0, next = 0; b < blocks.size(); ++b) {
+        ordered_json sizes = ordered_json::array();
+        for (std::size_t k = 0; k < blocks[b].pieces(); ++k) sizes.push_back(pieces[next++].size);
+        list.push_back({{"type", b == 0 ? type_of_bytes : types[state.columns[b - 1].index()]},
+                        {"values", b == 0 ? state.bytes.size() : values_of(state.columns[b - 1])},
+                        {"pieces", std::move(sizes)}});
+    }
 
     const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> sum(XXH3_createState(), XXH3_freeState);
     if (!sum) throw std::bad_alloc();
@@ -93,7 +133,7 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
     append(magic.data(), magic.size());
     append(&length, sizeof length);
     append(text.data(), text.size());
-    for (const Block& block : blocks) append(block.data(), block.size());
+    for (const Piece& piece : pieces) append(piece.data.get(), piece.size);
     const std::uint64_t digest = XXH3_64bits_digest(sum.get());
     file.append(&digest, sizeof digest);
 }
@@ -128,46 +168,55 @@ StateFile::StateFile(const std::filesystem::path& path) : file_(path)
 
 SavedState StateFile::state() const
 {
+    SavedState state;
+    std::size_t at = blocks_at_;
+    const std::size_t end = file_.bytes().size() - sizeof(std::uint64_t);
     struct Place {
-        std::string type;
-        std::uint64_t values;
-        std::span<const unsigned char> block;
+        std::span<const unsigned char> piece;
+        char* to;
+        std::size_t bytes;
     };
     std::vector<Place> places;
-    try {
-        std::size_t at = blocks_at_;
-        const std::size_t end = file_.bytes().size() - sizeof(std::uint64_t);
-        for (const ordered_json& block : header_.at("blocks")) {
-            const std::uint64_t size = block.at("bytes").get<std::uint64_t>();
+    // No more memory is taken than a file of this size can fill.
+    std::uint64_t left = (end - at) * most_expansion;
+    const auto add = [&](const ordered_json& block, std::size_t bytes_a_value, const auto& allocate) {
+        const std::uint64_t values = block.at("values").get<std::uint64_t>();
+        if (values > left / bytes_a_value) damaged("a block does not fit its header");
+        const std::size_t bytes = static_cast<std::size_t>(values) * bytes_a_value;
+        left -= bytes;
+        char* const to = allocate(static_cast<std::size_t>(values));
+        std::size_t done = 0;
+        for (const ordered_json& piece : block.at("pieces")) {
+            const std::uint64_t size = piece.get<std::uint64_t>();
             if (size > end - at) damaged("it is shorter than its header says");
-            places.push_back({block.at("type"), block.at("values"), file_.bytes().subspan(at, size)});
+            const std::size_t filled = std::min(piece_bytes, bytes - done);
+            places.push_back({file_.bytes().subspan(at, static_cast<std::size_t>(size)), to + done, filled});
             at += static_cast<std::size_t>(size);
+            done += filled;
+        }
+        if (done != bytes) damaged("a block does not fit its header");
+    };
+    try {
+        const ordered_json& blocks = header_.at("blocks");
+        if (blocks.empty() || blocks[0].at("type") != type_of_bytes) damaged("its header can't be read");
+        add(blocks[0], 1, [&](std::size_t size) { return state.bytes.resize(size), state.bytes.data(); });
+        state.columns.reserve(blocks.size() - 1);
+        for (std::size_t k = 1; k < blocks.size(); ++k) {
+            const auto found = std::find(types.begin(), types.end(), blocks[k].at("type").get<std::string>());
+            if (found == types.end()) damaged("its header can't be read");
+            std::visit(
+                [&]<class T>(Column<T>& column) {
+                    add(blocks[k], sizeof(T), [&](std::size_t size) {
+                        return reinterpret_cast<char*>(column.append_for_writing(size).data());
+                    });
+                },
+                state.columns.emplace_back(empty_column(static_cast<std::size_t>(found - types.begin()))));
         }
     } catch (const nlohmann::json::exception&) {
         damaged("its header can't be read");
     }
-    if (places.empty() || places[0].type != type_of_bytes) damaged("its header can't be read");
-
-    SavedState state;
-    state.columns.assign(places.size() - 1, Column<float>());
-    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t k) {
-        const auto& [type, values, block] = places[k];
-        if (k == 0) {
-            state.bytes.resize(values_of(block, values, 1));
-            return decompress(block, state.bytes.data(), state.bytes.size());
-        }
-        const auto fill = [&, &values = values, &block = block]<class T>(const Column<T>&) {
-            Column<T> column;
-            const std::span<T> to = column.append_for_writing(values_of(block, values, sizeof(T)));
-            decompress(block, to.data(), to.size_bytes());
-            state.columns[k - 1] = std::move(column);
-        };
-        const KeptColumn of_type[] = {Column<float>(),        Column<Vec3f>(), Column<std::int32_t>(),
-                                      Column<std::int64_t>(), Column<Quatf>(), Column<std::uint8_t>()};
-        const auto found = std::find(types.begin(), types.end(), type);
-        if (found == types.end()) damaged("its header can't be read");
-        std::visit(fill, of_type[found - types.begin()]);
-    });
+    tbb::parallel_for(std::size_t{0}, places.size(),
+                      [&](std::size_t k) { decompress(places[k].piece, places[k].to, places[k].bytes); });
     return state;
 }
 

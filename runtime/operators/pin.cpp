@@ -241,7 +241,8 @@ public:
             places[k] = pin->place->constant.cast<double>();
         }
         auto result = std::make_shared<PinConstraint>(*this);
-        result->curve.emplace(places);
+        const auto moves = [&](const Vec3d& to) { return to != places[0]; };
+        if (std::any_of(places.begin(), places.end(), moves)) result->curve.emplace(places);
         return result;
     }
 

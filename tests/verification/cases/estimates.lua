@@ -205,6 +205,16 @@ return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P =
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {0, 0, 0}) } }
   :spring { stiffness = 60, damping = 1, target = function(f) return {2 * math.sin(6 * math.pi * f.time), 0, 0} end }
   :solve { substeps = 64 }]] },
+  { "pin, distance", "rope on a hook whose place is a function of the frame, 8 sub-steps", 1, 18, [[
+local P = {}
+for i = 0, 10 do P[i + 1] = {i / 10, 0, 0} end
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = P } } :gravity {}
+  :group { name = "hook", where = function(p) return p.id == 0 end } :distance { pairs = chain(10) }
+  :pin { group = "hook", target = function(f) return {0.2 * math.sin(6 * f.time), 0, 0} end } :solve { substeps = 8 }]] },
+  { "pin", "points on compliant pins whose place is a function of the frame, 4 sub-steps", 1, 24, [[
+return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 1, 4, 0.2, {0, 0, 0}) } }
+  :pin { compliance = 0.02, target = function(f) return {math.sin(5 * f.time), 0, f.time} end }
+  :solve { substeps = 4 }]] },
   { "vortex, drag", "a vortex that comes and goes, with drag that does", 1, 24, [[
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {1, 0, 0}) } }
   :vortex { strength = function(f) return 6 * math.sin(5 * f.time) end }

@@ -2,23 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
-#include <sstream>
-
 #include "runtime/deferred.h"
+#include "runtime/path_list.h"
 
 namespace rapid {
 namespace {
-
-// The parts of a list such as "/a:/b".
-std::vector<std::string> parts_of_path(const char* list)
-{
-    std::vector<std::string> parts;
-    std::stringstream text(list ? list : "");
-    for (std::string part; std::getline(text, part, ':');)
-        if (!part.empty()) parts.push_back(part);
-    return parts;
-}
 
 // Plugins, as main() finds them, and folders of modules.
 void add_own_paths(SandboxAccess& access, const CommonOptions& common)
@@ -26,7 +14,7 @@ void add_own_paths(SandboxAccess& access, const CommonOptions& common)
     access.readable.insert(access.readable.end(), common.plugins.begin(), common.plugins.end());
     std::error_code none;
     for (const char* variable : {"RAPID_PLUGIN_PATH", "RAPID_PATH"})
-        for (const std::string& path : parts_of_path(std::getenv(variable)))
+        for (const std::string& path : path_list_of(variable))
             if (std::filesystem::exists(path, none)) access.readable.emplace_back(path);
 }
 

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdlib>
 #include <fstream>
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
+#include "runtime/path_list.h"
 
 namespace rapid {
 namespace {
@@ -34,15 +34,8 @@ std::optional<std::string> read_module(const std::filesystem::path& path)
 
 std::vector<std::filesystem::path> rapid_path()
 {
-    std::vector<std::filesystem::path> folders;
-    const char* variable = std::getenv("RAPID_PATH");
-    const std::string list = variable ? variable : "";
-    for (std::size_t begin = 0; begin < list.size();) {
-        const std::size_t end = std::min(list.find(':', begin), list.size());
-        if (end > begin) folders.emplace_back(list.substr(begin, end - begin));
-        begin = end + 1;
-    }
-    return folders;
+    const std::vector<std::string> parts = path_list_of("RAPID_PATH");
+    return {parts.begin(), parts.end()};
 }
 
 std::filesystem::path lua_folder()

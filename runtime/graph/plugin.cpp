@@ -10,6 +10,7 @@
 
 #include "runtime/files/input_file.h"
 #include "runtime/graph/registry.h"
+#include "runtime/path_list.h"
 
 namespace rapid {
 namespace {
@@ -62,11 +63,7 @@ void load_plugin(const std::string& file)
 
 void load_plugins(const std::string& path)
 {
-    for (std::size_t begin = 0; begin <= path.size();) {
-        const std::size_t end = std::min(path.find(':', begin), path.size());
-        const std::string part = path.substr(begin, end - begin);
-        begin = end + 1;
-        if (part.empty()) continue;
+    for (const std::string& part : parts_of_path_list(path)) {
         if (std::error_code none; !fs::is_directory(part, none)) {
             load_plugin(part);
             continue;

@@ -8,6 +8,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/graph_options.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
 #include "runtime/graph/explain.h"
 
@@ -173,7 +174,7 @@ ordered_json json_of_surplus(const Explanation& surplus)
             {"stages", json_of(surplus.stages)}};
 }
 
-class Explain : public Command {
+class Explain : public Command, public Confined {
 public:
     std::string name() const override { return "explain"; }
     std::string doc() const override { return "tells what a graph's plan keeps and leaves out, and why"; }
@@ -185,6 +186,14 @@ public:
         app.add_option("--against", against_, "tells what one of two graphs needs and the other does not")
             ->type_name("GRAPH");
         app.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(app, "graph");
+    }
+
+    void confine(const CommonOptions& common) override
+    {
+        SandboxAccess access{{folder_of(graph_.file())}, {}};
+        if (!against_.empty()) access.readable.push_back(folder_of(against_));
+        untrusted_.confine([&] { return access; }, common);
     }
 
     int run(const CommonOptions& common) override
@@ -236,6 +245,7 @@ private:
     GraphOptions graph_;
     FrameFiles files_;
     std::string against_;
+    UntrustedOptions untrusted_;
     bool json_ = false;
 };
 RAPID_COMMAND(Explain);

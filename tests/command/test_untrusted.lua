@@ -212,6 +212,23 @@ describe("--untrusted of other commands", function()
     assert.equal(0, check("--untrusted --allow-read outside --races").status)
   end)
 
+  it("keeps graphs that are explained in their folders", function()
+    local folder = new_folder(read)
+    command.shell("mkdir other", { cwd = folder.path })
+    folder:write("other/scene.lua", graph(plain))
+    local function explain(arguments)
+      return command.rapid("explain inside/scene.lua " .. arguments, { cwd = folder.path })
+    end
+    assert.equal(0, explain("").status)
+    local refused = explain "--untrusted"
+    assert.equal(2, refused.status)
+    assert.match("inside/scene.lua:3: rapid.mesh.read: .*outside/mesh.obj", refused.stderr)
+    assert.equal(explain("").stdout, explain("--untrusted --allow-read outside").stdout)
+    local against = explain "--against other/scene.lua"
+    assert.equal(0, against.status)
+    assert.equal(against.stdout, explain("--against other/scene.lua --untrusted --allow-read outside").stdout)
+  end)
+
   it("keeps a graph that is studied in its folder, and writes the study", function()
     local folder = new_folder(plain:gsub("gravity {}", "gravity {} :attract { strength = 1 }"))
     local function study(arguments)

@@ -33,7 +33,7 @@ Watchdog::~Watchdog()
     thread_.join();
 }
 
-// The watchdog is not woken: it never sleeps for longer than a section may take.
+// The watchdog is not woken: it never sleeps for as long as a section may take.
 Watchdog::Section::Section(Watchdog& watchdog, std::string what) : watchdog_(watchdog)
 {
     const std::lock_guard lock(watchdog.mutex_);
@@ -50,13 +50,18 @@ Watchdog::Section::~Section()
     watchdog_.running_.pop_back();  // sections end in the reverse order; whose name is taken off does not matter
 }
 
+// The thread looks about often: when it comes much later than it meant to, the process was stopped (SIGSTOP, a machine
+// that slept), and no script ran meanwhile.
 void Watchdog::watch()
 {
+    const auto step = std::min<std::chrono::steady_clock::duration>(std::chrono::seconds(1), duration_of(limit_ / 4));
     std::unique_lock lock(mutex_);
     while (!stop_) {
         const auto now = std::chrono::steady_clock::now();
         if (running_.empty() || now < deadline_) {
-            wake_.wait_until(lock, running_.empty() ? now + duration_of(limit_) : deadline_);
+            const auto then = running_.empty() ? now + step : std::min(deadline_, now + step);
+            wake_.wait_until(lock, then);
+            if (const auto late = std::chrono::steady_clock::now() - then; late > step) deadline_ += late;
             continue;
         }
         const std::string message =

@@ -126,6 +126,33 @@ return rapid.create { points = points } :points("spins", function(p) while true 
   end)
 end)
 
+-- Stopped for longer than a script may take, in the midst of one.
+describe("a run that is stopped (SIGSTOP)", function()
+  it("goes on, and its scripts have all their time", function()
+    local folder = new_folder([[
+local rapid = require "rapid"
+local function spin(points, frame)
+  local sum = 0
+  for i = 1, frame.number == 2 and 3e8 or 0 do sum = sum + i end
+end
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :detail("spin", spin) :solve {}]])
+    local result = command.shell([[
+"$RAPID" run scene.lua -f 1-2 -o a.####.csv --script-timeout 6 --quiet &
+run=$!
+for i in $(seq 1000); do [ -e a.0001.csv ] && break; sleep 0.01; done
+kill -STOP $run
+sleep 7
+grep '^State' /proc/$run/status
+kill -CONT $run
+wait $run
+]], { cwd = folder.path })
+    assert.match("stopped", result.stdout)
+    assert.equal("", result.stderr)
+    assert.equal(0, result.status)
+    assert.truthy(folder:read "a.0002.csv")
+  end)
+end)
+
 describe("a frame that can't be written", function()
   local growing = [[
 local rapid = require "rapid"

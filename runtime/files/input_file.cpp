@@ -9,6 +9,7 @@
 #include <cerrno>
 
 #include "runtime/files/file_error.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -47,6 +48,8 @@ void read_block(int descriptor, unsigned char* to, std::size_t begin, std::size_
 InputFile::InputFile(const std::filesystem::path& path)
 {
     const OpenFile file = open_regular(path);
+    if (const auto bytes = static_cast<double>(file.bytes); !fits_in_memory(bytes))  // a file of holes may be any size
+        throw beyond_memory("the file, which is read whole,", bytes, "read a smaller one");
     bytes_ = std::make_unique_for_overwrite<unsigned char[]>(file.bytes);
     size_ = file.bytes;
     constexpr std::size_t block = std::size_t{4} << 20;  // large enough for a thread's trouble, small enough to share

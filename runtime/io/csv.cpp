@@ -178,6 +178,11 @@ Error csv_error(std::size_t line, const std::string& what) { return Error(fmt::f
 std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
                                      const std::vector<std::string>& names)
 {
+    constexpr double bytes_a_number = sizeof(double) + sizeof(std::int64_t);  // as which it is kept until all are read
+    const double bytes = bytes_a_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
+    if (!fits_in_memory(bytes))
+        throw beyond_memory(fmt::format("{} lines of {} numbers", starts.size(), names.size()), bytes,
+                            "split the file, or write .bgeo in its place");
     std::vector<CsvColumn> columns(names.size());
     for (CsvColumn& column : columns) {
         column.numbers.resize(starts.size());

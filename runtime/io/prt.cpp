@@ -21,6 +21,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/records.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -268,6 +269,9 @@ PointSet read_prt(const std::filesystem::path& path)
     if (n > held)
         throw Error(fmt::format("the file ends early: its header promises {} points, it holds at most {}", n, held));
     const std::size_t bytes = n * channels.stride;
+    // The records, and as much again for the points that are made of them.
+    if (const double both = 2.0 * static_cast<double>(bytes); !fits_in_memory(both))
+        throw beyond_memory(fmt::format("{} points, decompressed,", n), both, "write fewer points to the file");
     const std::unique_ptr<unsigned char[]> records(new unsigned char[bytes]);
     uLongf found = bytes;
     const int result = n == 0 ? Z_OK : ::uncompress(records.get(), &found, reader.rest().data(), reader.rest().size());

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "runtime/error.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -175,6 +176,8 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
     }
     if (wanted / most_expansion > packed) throw ends_early();
     const std::vector<unsigned char> data = bytes_at(packed, length);
+    if (const auto all = static_cast<double>(wanted); !fits_in_memory(all))
+        throw beyond_memory("an array, decompressed,", all, "write fewer points to the file");
     std::vector<unsigned char> result(wanted);
     std::size_t from = 0, to = 0;
     for (std::size_t b = 0; b < blocks; ++b) {

@@ -10,6 +10,8 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/memory_budget.h"
+
 namespace rapid {
 namespace {
 
@@ -186,6 +188,8 @@ ZipReader::~ZipReader() = default;
 std::vector<unsigned char> ZipReader::read(const Member& member)
 {
     const auto wrong = [&] { return Error(fmt::format("\"{}\" is damaged", member.name)); };
+    if (const auto bytes = static_cast<double>(member.bytes); !fits_in_memory(bytes))
+        throw beyond_memory(fmt::format("\"{}\", decompressed,", member.name), bytes, "write fewer points to the file");
     const unz64_file_pos place = {member.position, member.number};
     if (::unzGoToFilePos64(archive_->zip, &place) != UNZ_OK || ::unzOpenCurrentFile(archive_->zip) != UNZ_OK)
         throw wrong();

@@ -1,4 +1,5 @@
 -- --memory: what would need more is refused before it is begun, with numbers and the parameter that would mend it.
+local command = require "testing.command"
 local scene = require "testing.scene"
 
 local grid = "rapid.points.grid { size = {40, 40, 40}, spacing = 1 }"
@@ -53,6 +54,30 @@ describe("--memory", function()
       assert.equal("", result.stderr)
       assert.equal(0, result.status)
     end
+  end)
+end)
+
+-- A file says how much it holds; one of holes, or one that is compressed, is small on the disk.
+describe("a file that is larger than the memory that a run may take", function()
+  local function read(file)
+    return scene.command("run", "return rapid.create { points = rapid.points.read '" .. file .. "' } :solve {}",
+      "-f 1 --quiet --memory 64M")
+  end
+
+  it("is refused before it is read", function()
+    command.shell("truncate -s 300G hole.ply hole.obj; truncate -s 60M small.ply", { cwd = scene.folder.path })
+    local result = read "hole.ply"
+    assert.equal(2, result.status)
+    assert.match("^scene%.lua:1: rapid%.points%.read: hole%.ply: the file, which is read whole, would take about " ..
+      "300%.0 GiB, and %d+ MiB are free of 64 MiB; read a smaller one, or set %-%-memory\n$", result.stderr)
+    assert.match("small%.ply: not a PLY", read "small.ply".stderr)
+  end)
+
+  it("is refused before what is compressed, or text, is unpacked", function()
+    local points = "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1 / 106 } }"
+    assert.equal(0, scene.command("run", points, "-f 1 --quiet -o big.prt -o big.csv").status)
+    assert.match("big%.prt: %d+ points, decompressed, would take about 7%d MiB", read "big.prt".stderr)
+    assert.match("big%.csv: %d+ lines of 7 numbers would take about 127 MiB", read "big.csv".stderr)
   end)
 end)
 

@@ -6,6 +6,7 @@
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
+#include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/mesh/mesh.h"
 
@@ -28,19 +29,24 @@ Counts& counts_of(lua_State* L)
     return counts;
 }
 
+// Of OpenVDB's tree, the nodes above the leaves: each of the two upper kinds has a pointer for every child that it may
+// have, 32^3 and 16^3 of them, and what lies about the origin is in eight of each.
+constexpr std::size_t bytes_of_upper_nodes = 8 * (32 * 32 * 32 + 16 * 16 * 16) * sizeof(void*);
+
 // Bytes of an object's arrays, roughly.
 std::size_t weight_of(const Object& object)
 {
     // A level set is two grids of floats, OpenVDB's and the one for queries, whose blocks are about half full.
     constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
-    constexpr std::size_t bytes_a_grid = std::size_t{4} << 20;  // of vectors, or a fog, which do not tell their size
+    constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // of grids that do not tell their size
+    if (dynamic_cast<const PlacedLevelSet*>(&object)) return 0;    // its level set is another's, which weighs
     if (const auto* level_set = dynamic_cast<const LevelSet*>(&object))
-        return static_cast<std::size_t>(level_set->active_voxels()) * bytes_a_voxel;
+        return bytes_of_upper_nodes + static_cast<std::size_t>(level_set->active_voxels()) * bytes_a_voxel;
     if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
         return mesh->positions.size() * sizeof(Vec3f) + mesh->triangles.size() * sizeof(Mesh::Triangle);
     if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
-    const bool is_grid = dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object);
-    return is_grid ? bytes_a_grid : 0;
+    const bool grid = dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object);
+    return grid ? bytes_of_upper_nodes + bytes_of_leaves : 0;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 //
 //   RAPID_MUTANTS=10000 build/test/bin/test_mutants       as many of each reader (1,000)
 //   RAPID_MUTANT_SECONDS=3600 build/test/bin/test_mutants as long for each reader, at most (40)
+//   RAPID_MUTANT_READER=.vdb build/test/bin/test_mutants  only readers with this in their names
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <sys/mman.h>
@@ -18,6 +19,8 @@
 
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
+#include "runtime/io/state_file.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/vector_grid.h"
@@ -56,9 +59,27 @@ void use_density_grid(const Path& path)
     read_density_grid(path, "")->scatter()->place(RandomKey(1, "a"), 0, births);
 }
 
+void use_state(const Path& path)
+{
+    PointSet points;
+    try {
+        restore(points, StateFile(path).state());
+    } catch (Error& error) {
+        throw error.at({path.string(), 0});  // as who asks for a snapshot does
+    }
+    describe(points);
+}
+
 // Writes a whole file of the format.
 void write_points_of(const Path& path) { write_points(path, random_points({.size = 40, .wide = false})); }
 void write_level_set(const Path& path) { level_set_sphere(1, Vec3d::Zero(), {0.2, 3})->write(path, "surface"); }
+
+void write_state(const Path& path)
+{
+    OutputFile file(path);
+    rapid::write_state(file, {{"rapid", "0.1.0"}, {"frame", 12}}, state_of(random_points({.size = 40, .wide = false})));
+    file.finish();
+}
 
 void write_vector_grid(const Path& path)
 {
@@ -162,6 +183,7 @@ const std::vector<Reader>& readers()
         {"level set .vdb", "a.vdb", "", write_level_set, use_level_set},
         {"vector grid .vdb", "a.vdb", "", write_vector_grid, use_vector_grid},
         {"fog .vdb", "a.vdb", "", write_density_grid, use_density_grid},
+        {"state", "state", "", write_state, use_state},
     };
     return all;
 }
@@ -228,6 +250,8 @@ TEST_CASE("a damaged file is read, or is an error that names it: no signal, no h
           "[mutants][long]")
 {
     const Reader& reader = GENERATE(from_range(readers()));
+    const char* const which = std::getenv("RAPID_MUTANT_READER");
+    if (which && reader.name.find(which) == std::string::npos) return;
     const TemporaryFolder folder;
     if (reader.write) reader.write(folder / ("whole-" + reader.file));
     const std::string whole = reader.write ? file_text(folder / ("whole-" + reader.file)) : reader.whole;

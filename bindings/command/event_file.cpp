@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "runtime/io/format.h"
+#include "runtime/io/frame_pattern.h"
 #include "runtime/operators/emit/parent_paths.h"
 
 namespace rapid {
@@ -81,6 +82,11 @@ void EventFile::declare(CLI::App& app)
                    "writes births, contacts and deaths with their places and times as points (any format that can be "
                    "read: .csv, .bgeo, .npz, ...)")
         ->type_name("FILE");
+}
+
+void EventFile::take_part(const std::string& part)
+{
+    if (!path_.empty()) path_ = with_part(path_, part);
 }
 
 void EventFile::begin()

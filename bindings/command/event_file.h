@@ -16,6 +16,8 @@ public:
 
     // Empty where nobody asks for it.
     const std::string& path() const { return path_; }
+    // The events of a part of the points, "03of16".
+    void take_part(const std::string& part);
     // Before the first frame. Error: no format that can be one file of points; a file that can't be written.
     void begin();
 

@@ -49,6 +49,11 @@ ordered_json json_of(const Explanation::ExplainedStage& stage)
     return {{"name", stage.name}, {"kept", stage.kept}, {"why", stage.why}};
 }
 
+ordered_json json_of(const Explanation::ExplainedCoupling& coupling)
+{
+    return {{"name", coupling.name}, {"what", coupling.what}};
+}
+
 template <class T>
 ordered_json json_of(const std::vector<T>& all)
 {
@@ -64,6 +69,7 @@ ordered_json json_of(const Explanation& plan)
             {"functions", json_of(plan.functions)},
             {"stages", json_of(plan.stages)},
             {"passes", plan.passes},
+            {"parts", {{"possible", plan.couplings.empty()}, {"because", json_of(plan.couplings)}}},
             {"bytes_per_point", plan.bytes_per_point()}};
 }
 
@@ -135,7 +141,10 @@ std::string text_of(const Explanation& plan)
     text += functions.text(" functions of the frame");
     text += " passes over the points\n";
     for (const std::vector<std::string>& pass : plan.passes) text += fmt::format("  {}\n", fmt::join(pass, ", "));
-    return text + text_of(plan, false);
+    if (plan.couplings.empty()) return text + " parts: yes (run --part, --sample)\n" + text_of(plan, false);
+    Rows couplings;
+    for (const auto& coupling : plan.couplings) couplings.add(coupling.name, "", coupling.what);
+    return text + couplings.text(" parts: no, because") + text_of(plan, false);
 }
 
 // The part that `one` keeps and `other` does not. Nodes are compared by type, as names differ from scene to scene.

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "bindings/command/part_options.h"
+
 namespace rapid {
 namespace {
 
@@ -102,6 +104,63 @@ std::vector<std::filesystem::path> FrameFiles::folders() const
     return folders;
 }
 
+void FrameFiles::take_part(std::shared_ptr<const PartRecord> record)
+{
+    part_ = std::move(record);
+    for (Target& target : targets_) target.to.pattern = name_in_part(target.to.pattern);
+}
+
+std::string FrameFiles::name_in_part(const std::string& pattern) const
+{
+    return part_ ? with_part(pattern, name_of(part_->part)) : pattern;
+}
+
+void FrameFiles::check_part(const std::string& pattern) const
+{
+    if (!part_ && has_part(pattern))
+        throw Error("{part} stands for a part of the points; give --part, or leave it out");
+}
+
+std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
+{
+    std::vector<std::pair<std::string, std::string>> merges;
+    for (const Target& target : targets_) {
+        const std::string& pattern = target.to.pattern;
+        if (has_part(pattern))
+            throw Error(fmt::format("-o {}: names the whole, where --parts is given; leave {{part}} out", target.text));
+        if (const Format& format = format_of(pattern); !format.read || format.film)
+            throw Error(
+                fmt::format("-o {}: a {} file of parts can't be put together; write points, or leave --parts "
+                            "out",
+                            target.text, format.extension));
+        for (const std::string& output : target.outputs) {
+            const std::string whole = FramePattern(pattern).of_output(output);
+            merges.emplace_back(whole, with_part(whole, "{part}"));
+        }
+    }
+    return merges;
+}
+
+// A file that was complete is none while it is written again.
+void FrameFiles::note_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info)
+{
+    const std::filesystem::path file = part_record_file(pattern, output);
+    const auto start = static_cast<std::int64_t>(info.number - std::llround(info.time * info.fps));
+    if (!of_part_.emplace(file, Sequence{info.fps, start}).second) return;
+    std::error_code none;
+    std::filesystem::remove(file, none);
+}
+
+void FrameFiles::write_part_records() const
+{
+    for (const auto& [file, sequence] : of_part_) {
+        PartRecord record = *part_;
+        record.fps = sequence.fps;
+        record.start = sequence.start;
+        record.write(file);
+    }
+}
+
 PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
 {
     PlanOptions options;
@@ -148,6 +207,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
             if (attribute.kept && !attribute.group && !of_scene.count(attribute.name)) unasked_.insert(attribute.name);
     std::set<std::string> patterns;
     const auto check = [&](const std::string& pattern) {
+        check_part(pattern);
         const Format& format = format_of(pattern);
         if (format.film)
             check_film(format, pattern);
@@ -160,7 +220,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
         const auto file = planned.node->arguments.find("file");
         if (planned.node->type->name != "write" || file == planned.node->arguments.end()) continue;
         try {
-            if (const std::string* pattern = file->second.get<std::string>()) check(*pattern);
+            if (const std::string* pattern = file->second.get<std::string>()) check(name_in_part(*pattern));
         } catch (const Error& error) {
             throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()))
                 .in_node(planned.node->name)
@@ -220,6 +280,7 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     const std::string key = key_of(to);
     if (named_.insert(key + '\n' + output).second)
         first_names_.push_back(FramePattern(to.pattern).expand(info.number, output));
+    if (part_) note_sequence(to.pattern, output, info);
     FrameWriter* writer = nullptr;
     {
         const std::lock_guard lock(mutex_);
@@ -244,7 +305,7 @@ void FrameFiles::write(const FrameResult& result)
 
 void FrameFiles::write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)
 {
-    const OutputTarget to{pattern, std::nullopt};
+    const OutputTarget to{name_in_part(pattern), std::nullopt};
     PointSet written = points;
     remove_unasked(written);
     submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main");
@@ -260,6 +321,7 @@ void FrameFiles::finish(bool complete)
             if (!first) first = std::current_exception();
         }
     if (first) std::rethrow_exception(first);
+    if (complete && part_) write_part_records();
 }
 
 std::vector<FrameWriter::Written> FrameFiles::take_written()

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bindings/command/command.h"
+#include "bindings/command/part_record.h"
 #include "bindings/command/picture_scene.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"
@@ -26,11 +27,19 @@ public:
     // output to output, the one above. Error: one can't be made.
     std::vector<std::filesystem::path> folders() const;
 
+    // The files are those of a part. Before folders() and all below. record: what is known of it before the run; its
+    // identity may grow until finish().
+    void take_part(std::shared_ptr<const PartRecord> record);
+
     // Options of the plan, which must keep all attributes that -o names.
     PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
 
     // Whether -o asks for films, which a program of its own writes.
     bool makes_films() const;
+
+    // What `rapid merge` makes of the parts of a run: its -o, and the pattern of the parts. After resolve(). Error: a
+    // picture, which can't be put together; a name with {part}.
+    std::vector<std::pair<std::string, std::string>> merges() const;
 
     // The -o as the user gave them.
     std::vector<std::string> names() const;
@@ -44,7 +53,8 @@ public:
     // Queues the file of a `:write` node.
     void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
 
-    // Waits until all files are written; complete: with all frames, else there are no films. Error: one could not be.
+    // Waits until all files are written; complete: with all frames, else there are no films and no records of a part.
+    // Error: one could not be.
     void finish(bool complete = true);
 
     // The first name of each pattern and output, once it is known; then no more.
@@ -62,6 +72,10 @@ private:
         std::vector<std::string> outputs;  // whose points it takes
     };
     void resolve(Target& target, const Plan& plan) const;
+    std::string name_in_part(const std::string& pattern) const;
+    void check_part(const std::string& pattern) const;
+    void note_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info);
+    void write_part_records() const;
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
     void remove_unasked(PointSet& points) const;
@@ -71,6 +85,13 @@ private:
     std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
     std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
     std::unique_ptr<SceneOfPlan> scene_;
+
+    std::shared_ptr<const PartRecord> part_;  // null where all points are simulated
+    struct Sequence {
+        double fps;
+        std::int64_t start;
+    };
+    std::map<std::filesystem::path, Sequence> of_part_;  // by the file of the record
 
     std::set<std::string> named_;
     std::vector<std::string> first_names_;

@@ -8,13 +8,17 @@
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
+#include "bindings/command/part_options.h"
+#include "bindings/command/part_record.h"
 #include "bindings/command/run_report.h"
 #include "bindings/command/signals.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/watch.h"
 #include "bindings/host/threads.h"
 #include "runtime/files/output_file.h"
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/evaluate.h"
+#include "runtime/io/frame_pattern.h"
 
 namespace rapid {
 namespace {
@@ -34,6 +38,7 @@ public:
                            default_frames))
             ->type_name("FRAMES");
         files_.declare(app);
+        part_.declare(app);
         app.add_option("--stats", stats_, "writes points and seconds of each frame as JSON")->type_name("FILE");
         app.add_option("--profile", profile_,
                        "writes what each node, frame and file took as a trace, which Chrome and Perfetto open")
@@ -55,6 +60,7 @@ public:
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (untrusted_.asked() && files_.makes_films())
             throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
+        begin_part();
         untrusted_.confine([&] { return access(); }, common);
     }
     // --watch runs the graph in processes of its own.
@@ -71,16 +77,17 @@ public:
 
         return threads.run([&] {
             const std::unique_ptr<Session> session = graph_.load(
-                true, [&](const std::string& message) { report.abandon(status_failed, message); },
-                tell_ ? Watch::tell : nullptr);
+                true, [&](const std::string& message) { report.abandon(status_failed, message); }, on_read());
             for (const std::string& warning : session->take_warnings()) report.warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = keep_all_;
             options.keep_steps = !events_.path().empty();
             const Plan plan(session->graph(), options);
             for (const std::string& warning : plan.warnings) report.warning(warning);
+            if (!part_.subset().is_all()) take_subset(plan, part_.subset());
 
             const FrameSelection frames = range_of(plan);
+            if (record_) record_->frames = frames;
             files_.resolve(plan, !frames.single());
             events_.begin();
             report.begin(plan.first_frame(), frames.last);
@@ -89,6 +96,32 @@ public:
     }
 
 private:
+    // Files of a part have names of their own.
+    void begin_part()
+    {
+        if (!part_.part()) return;
+        const std::string name = name_of(*part_.part());
+        record_ = std::make_shared<PartRecord>();
+        record_->part = *part_.part();
+        record_->sample = part_.sample();
+        std::map<std::string, std::string>& identity = record_->identity;
+        identity = graph_.session().set;
+        if (graph_.seed()) identity["--seed"] = fmt::format("{}", *graph_.seed());
+        files_.take_part(record_);
+        events_.take_part(name);
+        for (std::string* file : {&stats_, &profile_})
+            if (!file->empty()) *file = with_part(*file, name);
+    }
+
+    std::function<void(const std::filesystem::path& file)> on_read()
+    {
+        if (!record_) return tell_ ? Watch::tell : nullptr;
+        return [this](const std::filesystem::path& file) {
+            read_.add(file);
+            if (tell_) Watch::tell(file);
+        };
+    }
+
     SandboxAccess access() const
     {
         SandboxAccess access{{folder_of(graph_.file())}, files_.folders()};
@@ -126,6 +159,7 @@ private:
                 report.frame(result);
                 events_.add(result);
             }
+            if (record_) read_.put_into(record_->identity, folder_of(graph_.file()));
             files_.finish();
             events_.finish();
             report.finish();
@@ -153,6 +187,9 @@ private:
     GraphOptions graph_;
     FrameFiles files_;
     std::optional<FrameSelection> frames_;
+    PartOptions part_;
+    std::shared_ptr<PartRecord> record_;  // null where all points are simulated
+    ReadFiles read_;                      // of a part
     std::string stats_, profile_;
     EventFile events_;
     UntrustedOptions untrusted_;

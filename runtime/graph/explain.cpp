@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "runtime/graph/changing_node.h"
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/point_function.h"
 
 namespace rapid {
@@ -180,6 +181,8 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
         std::vector<std::string>& names = result.passes.emplace_back();
         for (const std::size_t i : pass) names.push_back(plan.nodes[i].node->name);
     }
+    for (const PointCoupling& coupling : couplings_of(plan))
+        result.couplings.push_back({coupling.node->name, coupling.what});
     return result;
 }
 

@@ -37,6 +37,11 @@ struct Explanation {
         std::string why;
     };
 
+    struct ExplainedCoupling {
+        std::string name;  // of the node
+        std::string what;  // "acts between neighbours"
+    };
+
     // In order of creation, kept ones first.
     std::vector<ExplainedNode> nodes;
     // Kept ones first, by simulation and in order of name.
@@ -44,6 +49,8 @@ struct Explanation {
     std::vector<ExplainedFunction> functions;  // parameters of kept nodes, in the order of these
     std::vector<ExplainedStage> stages;
     std::vector<std::vector<std::string>> passes;  // names of nodes
+    // Why no subset of the points can be simulated alone; none where one can.
+    std::vector<ExplainedCoupling> couplings;
 
     // The sum over all simulations.
     std::size_t bytes_per_point() const;

@@ -233,7 +233,25 @@ private:
 struct Dictionary {
     std::vector<RecordAttribute> attributes;
     std::size_t stride;
+    std::vector<std::vector<std::uint32_t>> defaults = {};  // of the attributes, as words
 };
+
+void set_default(PointSet& points, const std::string& name, const std::vector<std::uint32_t>& words)
+{
+    AnyColumn* column = points.find(name);
+    if (!column) return;  // numbers that became several columns
+    std::visit(
+        [&]<class T>(Column<T>& c) {
+            if constexpr (std::is_same_v<T, std::int64_t>) {
+                if (words.size() == 1) c.set_fallback(static_cast<std::int32_t>(words[0]));
+            } else if (words.size() * 4 == sizeof(T)) {
+                T value;
+                std::memcpy(static_cast<void*>(&value), words.data(), sizeof value);
+                c.set_fallback(value);
+            }
+        },
+        *column);
+}
 
 // before: bytes of a record before its first attribute.
 Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::size_t before)
@@ -245,7 +263,8 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
         const std::uint32_t type = reader.integer(4);
         std::size_t& stride = dictionary.stride;
         if (type == FloatType || type == IntType || type == VectorType) {
-            reader.take(4 * size);
+            std::vector<std::uint32_t>& words = dictionary.defaults.emplace_back();
+            for (std::size_t c = 0; c < size; ++c) words.push_back(reader.integer(4));
             RecordAttribute& attribute = dictionary.attributes.emplace_back();
             attribute.name = name;
             attribute.type = type == IntType ? ScalarType::Int32 : ScalarType::Float;
@@ -311,6 +330,8 @@ PointSet read_bgeo(const std::filesystem::path& path)
                                 reader.rest().size() / dictionary.stride));
     PointSet points =
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
+    for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first, has none
+        set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
     if (primitives > 0) return points;
     reader.enter("attributes of the whole");
     if (of_the_whole > 0) reader.take(read_dictionary(reader, of_the_whole, 0).stride);

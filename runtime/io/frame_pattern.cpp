@@ -69,12 +69,25 @@ FramePattern::FramePattern(std::string text) : text_(std::move(text)), before_(t
 
 namespace {
 
+std::string with_value(std::string text, std::string_view variable, std::string_view value)
+{
+    for (std::size_t at = 0; (at = text.find(variable, at)) != std::string::npos; at += value.size())
+        text.replace(at, variable.size(), value);
+    return text;
+}
+
 std::string with_output(std::string text, std::string_view output)
 {
-    constexpr std::string_view variable = "{output}";
-    for (std::size_t at = 0; (at = text.find(variable, at)) != std::string::npos; at += output.size())
-        text.replace(at, variable.size(), output);
-    return text;
+    return with_value(std::move(text), "{output}", output);
+}
+
+constexpr std::string_view part_variable = "{part}";
+
+// Where the dot, dash or low line is that text ends with; its end where it ends with none.
+std::size_t separator_before(std::string_view text)
+{
+    const bool separated = !text.empty() && std::string_view("._-").find(text.back()) != std::string_view::npos;
+    return text.size() - separated;
 }
 
 }  // namespace
@@ -86,6 +99,14 @@ std::string FramePattern::expand(int frame, std::string_view output) const
     const std::string number =
         fmt::format("{}{:0{}}", frame < 0 ? "-" : "", std::abs(static_cast<long long>(frame)), *digits_);
     return with_output(before_, output) + number + with_output(after_, output);
+}
+
+std::string FramePattern::of_output(std::string_view output) const { return with_output(text_, output); }
+
+std::string FramePattern::without_frame(std::string_view output) const
+{
+    if (!digits_) return with_output(text_, output);
+    return with_output(before_.substr(0, separator_before(before_)), output) + with_output(after_, output);
 }
 
 std::map<int, fs::path> FramePattern::existing(std::string_view output) const
@@ -112,6 +133,20 @@ std::map<int, fs::path> FramePattern::existing(std::string_view output) const
         if (fs::path(expand(frame, output)).filename() == name) found.emplace(frame, folder / name);
     }
     return found;
+}
+
+bool has_part(std::string_view pattern) { return pattern.find(part_variable) != std::string_view::npos; }
+
+std::string with_part(const std::string& pattern, std::string_view part)
+{
+    if (has_part(pattern)) return with_value(pattern, part_variable, part);
+    const std::size_t slash = pattern.find_last_of('/'), name = slash == std::string::npos ? 0 : slash + 1;
+    std::size_t place = pattern.size();
+    for (std::size_t at = name; at < pattern.size() && place == pattern.size(); ++at)
+        if (frame_number_at(pattern, at)) place = separator_before(std::string_view(pattern).substr(0, at));
+    if (place == pattern.size())
+        if (const std::size_t dot = pattern.find_last_of('.'); dot != std::string::npos && dot > name) place = dot;
+    return fmt::format("{}_part{}{}", pattern.substr(0, place), part, pattern.substr(place));
 }
 
 OutputTarget parse_output_target(const std::string& text)

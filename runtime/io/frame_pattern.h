@@ -1,5 +1,5 @@
 // Patterns of file names for a sequence of frames: `####` (a digit each; a single # means four), $F4 or $F, %04d or %d;
-// and {output}, the name of a graph's output.
+// {output}, the name of a graph's output; and {part}, that of a part of the points.
 #pragma once
 
 #include <filesystem>
@@ -24,6 +24,10 @@ public:
     bool has_output() const { return text_.find("{output}") != std::string::npos; }
 
     std::string expand(int frame, std::string_view output = "main") const;
+    // The pattern of one output.
+    std::string of_output(std::string_view output) const;
+    // Of all frames: without the number, and the dot, dash or low line before it.
+    std::string without_frame(std::string_view output = "main") const;
 
     // The existing files, by frame. A number may have more digits than the pattern (10000 for ####).
     std::map<int, std::filesystem::path> existing(std::string_view output = "main") const;
@@ -33,6 +37,11 @@ private:
     std::string before_, after_;  // of the frame number
     std::optional<int> digits_;   // least width of the number
 };
+
+// The pattern of a part, "03of16": in place of {part}; where that is not there, as _part03of16 before the frame's
+// number, or before the extension.
+std::string with_part(const std::string& pattern, std::string_view part);
+bool has_part(std::string_view pattern);
 
 // The target of `-o FILE:ATTR,ATTR`.
 struct OutputTarget {

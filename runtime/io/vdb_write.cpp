@@ -112,10 +112,14 @@ PointDataGrid::Ptr make_point_grid(const PointSet& points)
                     column);
         for (const auto& [name, members] : points.groups()) {
             auto handle = leaf.groupWriteHandle(name);
-            if (members.is_uniform())
-                handle.collapse(members[0] != 0);
+            const Strided<std::uint8_t> values = members.read();
+            const bool uniform = std::all_of(order.begin(), order.end(), [&](vdb::Index32 i) {
+                return (values[i] != 0) == (values[order[0]] != 0);
+            });
+            if (uniform)
+                handle.collapse(values[order[0]] != 0);
             else
-                for (vdb::Index k = 0; k < order.size(); ++k) handle.set(k, members[order[k]] != 0);
+                for (vdb::Index k = 0; k < order.size(); ++k) handle.set(k, values[order[k]] != 0);
         }
     });
     return grid;

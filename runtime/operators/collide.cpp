@@ -5,6 +5,7 @@
 // at the time of impact on the point's path, where its distance from the shape is its radius.
 #include <fmt/format.h>
 
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
 #include "runtime/shapes/motion/deforming.h"
@@ -115,6 +116,27 @@ struct Collide {
                             response));
     }
 
+    // A level set is widened to the largest radius, and points come to other bits in a wider band.
+    std::string couples(const Plan& plan, const PlannedNode& node) const
+    {
+        const auto is_function = [&](const char* name) {
+            const auto given = node.node->arguments.find(name);
+            return given != node.node->arguments.end() && given->second.function();
+        };
+        const bool has_band =
+            shape.deforming || std::dynamic_pointer_cast<const LevelSet>(shape.rest) || is_function("shape");
+        if (!has_band) return {};
+        if (method != "continuous" || is_function("method"))
+            return fmt::format("with method = \"{}\" its level set reaches as deep as the fastest of all points goes",
+                               method);
+        if (radius && radius->attribute.empty()) return {};
+        const std::string attribute = radius ? radius->attribute : "pscale";
+        const PlannedAttribute* planned = plan.simulations[node.simulation].find(attribute);
+        if (!radius && (!planned || !planned->kept)) return {};
+        if (value_of_all(plan, node.simulation, attribute)) return {};
+        return fmt::format("its level set is as wide as the largest radius ({}) of all points", attribute);
+    }
+
     void uses(Uses& uses) const
     {
         if (!record.speed) return;
@@ -147,6 +169,7 @@ struct Collide {
     }
 };
 RAPID_NODE(Collide);
+RAPID_COUPLING("collide", Collide);
 
 }  // namespace
 }  // namespace rapid

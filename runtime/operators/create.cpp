@@ -4,8 +4,10 @@
 // simulation; ids that they had before are dropped). At every later frame they are the points as Solve left them,
 // passed on without a copy. Every planned column and group exists from the first frame on, so that all frames have the
 // same.
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
 
 #include <fmt/format.h>
@@ -60,6 +62,16 @@ struct Create {
                                         type_name(type_of(column)), type_name(type_of(known->fallback))));
     }
 
+    void take(const Subset& subset) { subset_ = subset; }
+
+    std::optional<std::vector<float>> values(const std::string& attribute, float fallback) const
+    {
+        if (!points || points->points.empty()) return std::vector<float>();
+        const auto* own = points->points.find<float>(attribute);
+        if (!own) return std::vector{fallback};
+        return own->is_uniform() ? std::optional(std::vector{(*own)[0]}) : std::nullopt;
+    }
+
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
     {
         Flow flow = std::move(inputs[0]);
@@ -76,6 +88,15 @@ private:
         return std::visit([](const auto& c) -> AttributeValue { return c.fallback(); }, column);
     }
 
+    void keep_subset(PointSet& set) const
+    {
+        std::vector<std::uint8_t> kept(set.size());
+        for_each_chunk(set.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) kept[i] = subset_.has(static_cast<std::int64_t>(i));
+        });
+        set.keep(kept);
+    }
+
     PointSet initial(Simulation& simulation, const Evaluation& now) const
     {
         PointSet set = points ? points->points : PointSet();
@@ -89,11 +110,15 @@ private:
             std::iota(ids.begin(), ids.end(), std::int64_t{0});
         }
         simulation.next_id = static_cast<std::int64_t>(set.size());
+        if (!subset_.is_all()) keep_subset(set);
         simulation.adopted.clear();
         return set;
     }
+
+    Subset subset_;
 };
 RAPID_NODE(Create);
+RAPID_COUPLING("create", Create);
 
 }  // namespace
 }  // namespace rapid

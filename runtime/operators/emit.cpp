@@ -12,15 +12,15 @@
 // those of the same simulation move later in the frame, and bear along their path of the frame before.
 //
 // A birth's random numbers depend on the seed, on the name of this node and on the birth's number in this emitter, or
-// among the births of its parent.
+// among the births of its parent. Births that a subset of the points leaves out (points/subset.h) have their number and
+// their id, and nothing else is computed of them.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <numeric>
 
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
@@ -30,10 +30,12 @@
 #include "runtime/operators/emit/birth_values.h"
 #include "runtime/operators/emit/birth_velocity.h"
 #include "runtime/operators/emit/births.h"
+#include "runtime/operators/emit/chosen_births.h"
 #include "runtime/operators/emit/draws.h"
 #include "runtime/operators/emit/emit_source.h"
 #include "runtime/operators/emit/inheritance.h"
 #include "runtime/operators/emit/interval.h"
+#include "runtime/operators/emit/newborn_columns.h"
 #include "runtime/operators/emit/parent_emitter.h"
 #include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
@@ -49,30 +51,6 @@ constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness i
 
 // Of a point with the attributes that most have, in the state and in what is made of it within a frame.
 constexpr double bytes_a_birth = 2 * 64;
-
-// The newborn points' part of the columns in which each has a value of its own, shape [n]; the others are empty.
-struct NewbornColumns {
-    std::span<Vec3f> P, v;
-    std::span<std::int64_t> id;
-    std::span<float> dt, age, birthtime, life;
-    // Copy inherited attributes to the newborn from number `first` on.
-    std::vector<std::function<void(std::size_t first, std::span<const Birthplace> places)>> inherit;
-    // Draw those that differ from birth to birth; number: of the first, in this emitter.
-    std::vector<DrawValues> draw;
-};
-
-// The values of all points, one each; expanded in parallel, because they are many more than the newborn.
-std::span<float> expanded(Column<float>& column)
-{
-    if (!column.is_uniform()) return column.write();
-    const float shared = column[0];
-    const std::span<float> values = column.overwrite();
-    for_each_chunk(values.size(), [&](std::size_t begin, std::size_t end) {
-        std::fill(values.begin() + static_cast<std::ptrdiff_t>(begin),
-                  values.begin() + static_cast<std::ptrdiff_t>(end), shared);
-    });
-    return values;
-}
 
 struct Emit {
     EmitSource source;
@@ -194,6 +172,25 @@ struct Emit {
         const bool whole_frames = !age && birth == "begin" && !uses.functions.count("birth");
         if (source.is_node || !whole_frames) uses.writes.push_back("dt");
         if (!joins.empty()) uses.makes_groups.push_back(joins);
+    }
+
+    std::string couples(const Plan&, const PlannedNode&) const
+    {
+        return source.is_node ? "its births are numbered over all points of its source" : "";
+    }
+
+    void take(const Subset& subset) { subset_ = subset; }
+
+    std::optional<std::vector<float>> values(const std::string& attribute, float fallback) const
+    {
+        if (const auto given = attributes.of.find(attribute); given != attributes.of.end()) {
+            const auto* number = std::get_if<float>(&given->second.first());
+            return number && given->second.is_common() ? std::optional(std::vector{*number}) : std::nullopt;
+        }
+        if (source.is_node) return std::nullopt;
+        const auto* own = source_.values().find<float>(attribute);
+        if (!own) return std::vector{fallback};
+        return own->is_uniform() && own->size() > 0 ? std::optional(std::vector{(*own)[0]}) : std::nullopt;
     }
 
     void check() const
@@ -344,7 +341,7 @@ private:
     bool joins_group(const Evaluation& now) const { return !joins.empty() && now.keeps_group(joins); }
 
     void move_source(const Simulation& simulation, const Evaluation& now);
-    void emit(Flow& flow, const Births& births, const Evaluation& now);
+    void emit(Flow& flow, Births births, const Evaluation& now);
 
     // Error: no memory for so many newborn, with a copy of those that are there.
     void require_room(const PointSet& points, std::size_t n) const
@@ -362,9 +359,10 @@ private:
                 const Evaluation& now) const;
     NewbornColumns newborn_columns(PointSet& points, std::size_t n, const BirthAges& ages,
                                    const BirthVelocity& velocity, const Evaluation& now) const;
-    void fill(const NewbornColumns& newborn, const Births& births, std::size_t first, std::span<Birthplace> places,
+    void fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first, std::span<Birthplace> places,
               const BirthAges& ages, const BirthVelocity& velocity, const Evaluation& now) const;
 
+    Subset subset_;
     BirthClock clock_;
     bool at_beginning_ = false;  // of an interval: see BirthSource::Move
     bool warned_unmatched_ = false;
@@ -372,6 +370,7 @@ private:
     ParentEmitter parents_;       // where it is a node
 };
 RAPID_NODE(Emit);
+RAPID_COUPLING("emit", Emit);
 
 void Emit::move_source(const Simulation& simulation, const Evaluation& now)
 {
@@ -397,14 +396,17 @@ void Emit::move_source(const Simulation& simulation, const Evaluation& now)
                         now.location.file, now.location.line, now.node, describe(*move.jump, frame), frame));
 }
 
-void Emit::emit(Flow& flow, const Births& births, const Evaluation& now)
+void Emit::emit(Flow& flow, Births births, const Evaluation& now)
 {
     PointSet& points = flow.points;
     const BirthAges ages(age, birth, source_, now.at_start ? 0 : now.frame.dt);
     make_columns(points, ages, now);
-    const std::size_t n = source_.empty()          ? 0
-                          : flow.simulation->trial ? std::min(births.count, trial_births)
-                                                   : births.count;
+    if (source_.empty()) births.count = 0;
+    if (flow.simulation->trial) births.count = std::min(births.count, trial_births);
+    const std::int64_t first_id = flow.simulation->next_id;
+    flow.simulation->next_id += static_cast<std::int64_t>(births.count);
+    const Chosen chosen = choose(births, subset_, first_id);
+    const std::size_t n = chosen.size();
     if (n == 0) return;
     require_room(points, n);
 
@@ -414,11 +416,11 @@ void Emit::emit(Flow& flow, const Births& births, const Evaluation& now)
     for_each_chunk(n, [&](std::size_t chunk_begin, std::size_t chunk_end) {
         std::array<Birthplace, batch_size> places;
         for (std::size_t begin = chunk_begin; begin < chunk_end; begin += batch_size)
-            fill(newborn, births, begin, std::span(places).first(std::min(batch_size, chunk_end - begin)), ages,
+            fill(newborn, chosen, begin, std::span(places).first(std::min(batch_size, chunk_end - begin)), ages,
                  velocities, now);
     });
-    std::iota(newborn.id.begin(), newborn.id.end(), flow.simulation->next_id);
-    flow.simulation->next_id += static_cast<std::int64_t>(n);
+    const Items in_frame = chosen.in_frame(0);
+    for (std::size_t i = 0; i < n; ++i) newborn.id[i] = first_id + static_cast<std::int64_t>(in_frame[i]);
     now.figures.born += n;
 }
 
@@ -495,24 +497,24 @@ NewbornColumns Emit::newborn_columns(PointSet& points, std::size_t n, const Birt
     return newborn;
 }
 
-// The births of a batch, number `first` of this frame and the following, column by column.
-void Emit::fill(const NewbornColumns& newborn, const Births& births, std::size_t first, std::span<Birthplace> places,
+// The births of a batch, the first-th of those chosen and the following, column by column.
+void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first, std::span<Birthplace> places,
                 const BirthAges& ages, const BirthVelocity& velocities, const Evaluation& now) const
 {
     const std::size_t size = places.size();
+    const Items numbers = chosen.numbers(first);
     std::array<Draws, batch_size> draw_buffer;
     std::array<double, batch_size> age_buffer;
     const std::span<Draws> draws = std::span(draw_buffer).first(size);
     const std::span<double> L = std::span(age_buffer).first(size);
 
     const bool own_age = !ages.common();
-    if (own_age || velocities.is_random() || !newborn.life.empty())
-        uniform4(now.random, births.first + first, draw_use, draws);
-    source_.place(now.random, births.first + first, /*in_order=*/!rate, places);
+    if (own_age || velocities.is_random() || !newborn.life.empty()) uniform4(now.random, numbers, draw_use, draws);
+    source_.place(now.random, numbers, /*in_order=*/!rate, places);
     for (const auto& inherit_attribute : newborn.inherit) inherit_attribute(first, places);
-    for (const auto& draw_attribute : newborn.draw) draw_attribute(first, size, births.first + first);
+    for (const auto& draw_attribute : newborn.draw) draw_attribute(first, size, numbers);
 
-    if (own_age || source_.moves()) ages.find(births, first, places, draws, L);
+    if (own_age || source_.moves()) ages.find(chosen.births, chosen.in_frame(first), places, draws, L);
     if (own_age) {
         for (std::size_t i = 0; i < size; ++i) {
             const double gamma = std::min(L[i], ages.frame_length());
@@ -535,7 +537,7 @@ void Emit::fill(const NewbornColumns& newborn, const Births& births, std::size_t
             newborn.life[first + i] = static_cast<float>(life->at(draws[i][life_draw]));
     if (newborn.v.empty()) return;
     std::array<Draws, batch_size> speed_draws;
-    if (!speed.is_single()) uniform4(now.random, births.first + first, speed_use, std::span(speed_draws).first(size));
+    if (!speed.is_single()) uniform4(now.random, numbers, speed_use, std::span(speed_draws).first(size));
     velocities.find(places, draws, speed_draws, source_motion, newborn.v.subspan(first, size));
 }
 

@@ -1,6 +1,7 @@
 // interact: separation, cohesion, alignment and drag between neighbours (equations: solver/interaction.h).
 #include <optional>
 
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/solver/interaction.h"
 
@@ -42,6 +43,8 @@ struct Interact {
                    "neighbours that each heeds, the nearest of those that it sees; 0: all");
     }
 
+    std::string couples(const Plan&, const PlannedNode&) const { return "acts between neighbours"; }
+
     std::shared_ptr<const Interaction> dynamic(const Evaluation& now) const
     {
         auto interaction = dynamic_of<Interaction>(now, group);
@@ -59,6 +62,7 @@ struct Interact {
     }
 };
 RAPID_NODE(Interact);
+RAPID_COUPLING("interact", Interact);
 
 }  // namespace
 }  // namespace rapid

@@ -10,13 +10,16 @@
 //
 // The result has the columns and groups of all inputs. A point whose own chain lacks a column gets the column's value
 // for points without one.
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
+#include "runtime/graph/point_edit.h"
 #include "runtime/graph/stateful.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
+#include <set>
 
 namespace rapid {
 namespace {
@@ -56,6 +59,52 @@ void append_points(PointSet& into, PointSet from, const Evaluation& now)
     for (const auto& [name, members] : from.groups()) copy_values(into.group(name), members);
 }
 
+// The nodes before one, itself included, by their place in the plan.
+std::set<std::size_t> upstream_of(const Plan& plan, std::size_t node)
+{
+    std::set<std::size_t> found;
+    std::vector<std::size_t> open = {node};
+    while (!open.empty()) {
+        const std::size_t at = open.back();
+        open.pop_back();
+        if (!found.insert(at).second) continue;
+        open.insert(open.end(), plan.nodes[at].inputs.begin(), plan.nodes[at].inputs.end());
+    }
+    return found;
+}
+
+bool removes_points(const PlannedNode& node)
+{
+    const PointEdit* edit = node.op->as_point_edit();
+    return node.node->type->kind == NodeKind::Solve || (edit && edit->removes_points());
+}
+
+bool bears_points(const PlannedNode& node)
+{
+    const auto& stages = node.node->type->stages;
+    return std::find(stages.begin(), stages.end(), Stage::Emission) != stages.end();
+}
+
+// Whether points of one simulation are in the order of their ids behind a merge. The points of the first input come
+// first, then those of the second that it does not have, and so on: newborn points, in the order in which their
+// emitters are evaluated, and those that an input before has removed.
+bool keeps_order(const Plan& plan, const PlannedNode& merge)
+{
+    std::set<std::size_t> before;  // the inputs so far
+    std::size_t last_emitter = 0;
+    for (const std::size_t input : merge.inputs) {
+        const std::set<std::size_t> here = upstream_of(plan, input);
+        for (const std::size_t node : here)
+            if (bears_points(plan.nodes[node]) && !before.count(node) && node < last_emitter) return false;
+        for (const std::size_t node : before)
+            if (!here.count(node) && removes_points(plan.nodes[node])) return false;
+        before.insert(here.begin(), here.end());
+        for (const std::size_t node : before)
+            if (bears_points(plan.nodes[node])) last_emitter = std::max(last_emitter, node);
+    }
+    return true;
+}
+
 // The ids of the points in the result.
 class IdSet {
 public:
@@ -79,6 +128,14 @@ struct Merge {
             .kind(NodeKind::Merge)
             .reads("id")
             .writes("id");
+    }
+
+    std::string couples(const Plan& plan, const PlannedNode& node) const
+    {
+        if (node.carries.size() > 1) return "numbers the points of several simulations in the order in which they come";
+        return keeps_order(plan, node)
+                   ? ""
+                   : "joins its inputs in another order than that of the ids, which parts could not be put together in";
     }
 
     Flow start(std::span<Flow> inputs, const Evaluation& now)
@@ -172,6 +229,7 @@ private:
     std::vector<Run> adopted_;  // in this run, for snapshots
 };
 RAPID_NODE(Merge);
+RAPID_COUPLING("merge", Merge);
 
 }  // namespace
 }  // namespace rapid

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "runtime/graph/coupling.h"
+
 namespace rapid {
 namespace {
 
@@ -83,5 +85,6 @@ NodeType PictureNode::declare()
 }
 
 RAPID_NODE(PictureNode);
+RAPID_COUPLING("picture", PictureNode);
 
 }  // namespace rapid

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/operators/solve/aging.h"
@@ -59,6 +60,25 @@ struct Solve {
                    "the most, with a tolerance")
             .writes("P")
             .writes("v");
+    }
+
+    // Which steps it takes depends on whether all points have one value of these: the frame in one, where they do.
+    std::string couples(const Plan& plan, const PlannedNode& node) const
+    {
+        const PlannedSimulation& simulation = plan.simulations[node.simulation];
+        const auto has_group = [&](std::size_t writer) {
+            const auto& arguments = plan.nodes[writer].node->arguments;
+            const auto given = arguments.find("group");
+            return given != arguments.end() && !given->second.is_nil();
+        };
+        for (const char* name : {"airresist", "targetv", "force"}) {
+            const PlannedAttribute* attribute = simulation.find(name);
+            if (!attribute || !attribute->kept) continue;
+            const std::vector<std::size_t>& writers = attribute->written_by;
+            if (attribute->made_by.size() > 1 || std::any_of(writers.begin(), writers.end(), has_group))
+                return fmt::format("takes other steps where all points have the same {}", name);
+        }
+        return {};
     }
 
     // The initial state, before any dynamics: of the nodes upstream only Create has run.
@@ -366,6 +386,7 @@ private:
     SleepRecords sleep_records_;  // of the previous frame
 };
 RAPID_NODE(Solve);
+RAPID_COUPLING("solve", Solve);
 
 }  // namespace
 }  // namespace rapid

@@ -1,5 +1,6 @@
 // trail: keeps the last places of each point.
 #include "runtime/points/trail.h"
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/parallel.h"
 
@@ -38,6 +39,7 @@ struct Trail {
     }
 };
 RAPID_NODE(Trail);
+RAPID_COUPLING("trail", Trail);
 
 }  // namespace
 }  // namespace rapid

@@ -1,6 +1,7 @@
 // write: writes the points to a file for each frame, and passes them on unchanged.
 //
 // It also writes the first frame, wherever it is in the chain, so that a sequence of files begins with the frames.
+#include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/points/members.h"
 
@@ -70,6 +71,7 @@ private:
     }
 };
 RAPID_NODE(Write);
+RAPID_COUPLING("write", Write);
 
 }  // namespace
 }  // namespace rapid

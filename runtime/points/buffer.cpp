@@ -11,6 +11,8 @@
 #include <new>
 #include <utility>
 
+#include "runtime/points/column_files.h"
+
 namespace rapid {
 namespace {
 
@@ -79,6 +81,7 @@ SparePages& spare_pages()
 
 SparePages::Block new_pages(std::size_t bytes)
 {
+    if (void* in_file = map_in_file(bytes)) return {in_file, bytes};
     SparePages::Block block = spare_pages().take(bytes);
     if (block.begin) return block;
     block = {mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes};
@@ -117,9 +120,12 @@ void Buffer::reserve(std::size_t bytes)
     if (mapped_) {
         const std::size_t offset = static_cast<char*>(data_) - static_cast<char*>(block_);
         const std::size_t grown = whole_pages(wanted + offset);
-        void* moved = mremap(block_, block_bytes_, grown, MREMAP_MAYMOVE);
-        if (moved == MAP_FAILED) throw std::bad_alloc();
-        madvise(moved, grown, MADV_HUGEPAGE);
+        void* moved = block_;
+        if (!resize_in_file(moved, block_bytes_, grown)) {
+            moved = mremap(block_, block_bytes_, grown, MREMAP_MAYMOVE);
+            if (moved == MAP_FAILED) throw std::bad_alloc();
+            madvise(moved, grown, MADV_HUGEPAGE);
+        }
         block_ = moved;
         block_bytes_ = grown;
         data_ = static_cast<char*>(moved) + offset;
@@ -149,6 +155,7 @@ void Buffer::reserve(std::size_t bytes)
 
 void Buffer::release()
 {
+    if (mapped_ && unmap_in_file(block_, block_bytes_)) return;
     if (mapped_)
         spare_pages().give({block_, block_bytes_});
     else

@@ -74,3 +74,24 @@ TEST_CASE("selected attributes are P, v, id and the named ones, groups too", "[i
     CHECK(error_of([&] { select_attributes(points, {"agee"}); }) ==
           "there is no attribute or group \"agee\" to write; did you mean \"age\"?");
 }
+
+TEST_CASE("a part has its name in place of {part}, or before the frame's number", "[io][pattern]")
+{
+    const auto part = [](const char* pattern) { return with_part(pattern, "03of16"); };
+    CHECK(part("out/a.####.vdb") == "out/a_part03of16.####.vdb");
+    CHECK(part("out.d/a_$F4.vdb") == "out.d/a_part03of16_$F4.vdb");
+    CHECK(part("a-%04d.vdb") == "a_part03of16-%04d.vdb");
+    CHECK(part("####.vdb") == "_part03of16####.vdb");
+    CHECK(part("out.d/a.json") == "out.d/a_part03of16.json");
+    CHECK(part("out.d/a") == "out.d/a_part03of16");
+    CHECK(part("{part}/a.####.vdb") == "03of16/a.####.vdb");
+    CHECK(part("{part}/{output}.{part}.####.vdb") == "03of16/{output}.03of16.####.vdb");
+}
+
+TEST_CASE("a sequence has a name of its own, without the number and what parts it off", "[io][pattern]")
+{
+    CHECK(FramePattern("out/a.####.vdb").without_frame() == "out/a.vdb");
+    CHECK(FramePattern("out/{output}_$F.vdb").without_frame("left") == "out/left.vdb");
+    CHECK(FramePattern("a.vdb").without_frame() == "a.vdb");
+    CHECK(FramePattern("out/{output}.####.vdb").of_output("left") == "out/left.####.vdb");
+}

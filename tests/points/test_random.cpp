@@ -1,5 +1,6 @@
 #include "runtime/random.h"
 
+#include "runtime/items.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -91,6 +92,21 @@ TEST_CASE("numbers drawn side by side are those drawn one by one, to the bit", "
     std::vector<std::array<double, 4>> together(41);
     uniform4(key, first, use, together);
     for (std::size_t i = 0; i < together.size(); ++i) CHECK(together[i] == uniform4(key, first + i, use));
+}
+
+TEST_CASE("numbers of some items are those of each, however many there are", "[random]")
+{
+    const RandomKey key(7, "emit1");
+    std::vector<std::uint32_t> offsets;
+    for (std::uint32_t i = 0; offsets.size() < 100; i += 1 + i % 7) offsets.push_back(i);
+    const std::uint64_t first = 0xFFFFFFF0;  // across the low half of the counter
+    for (const std::size_t n : {0, 1, 15, 16, 17, 100}) {
+        std::vector<std::array<double, 4>> numbers(n);
+        uniform4(key, Items(first, offsets.data()), 3, numbers);
+        for (std::size_t i = 0; i < n; ++i) CHECK(numbers[i] == uniform4(key, first + offsets[i], 3));
+    }
+    CHECK(Items(first, offsets.data()).from(5)[2] == first + offsets[7]);
+    CHECK(Items(4).from(5)[2] == 11);
 }
 
 }  // namespace rapid

@@ -51,7 +51,7 @@ BirthAges::BirthAges(const std::optional<BirthAge>& age, const std::string& birt
 {
 }
 
-void BirthAges::find(const Births& births, std::size_t first, std::span<const Birthplace> places,
+void BirthAges::find(const Births& births, const Items& places_in_frame, std::span<const Birthplace> places,
                      std::span<const Draws> draws, std::span<double> L) const
 {
     const AnyColumn* own = age_ && !age_->attribute.empty() ? source_.values().find(age_->attribute) : nullptr;
@@ -63,7 +63,7 @@ void BirthAges::find(const Births& births, std::size_t first, std::span<const Bi
         else if (age_)
             L[i] = age_->interval.at(draws[i][age_draw]);
         else
-            L[i] = even_ ? births.even_age(first + i) : h_ * draws[i][age_draw];
+            L[i] = even_ ? births.even_age(places_in_frame[i]) : h_ * draws[i][age_draw];
     }
 }
 

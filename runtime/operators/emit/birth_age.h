@@ -41,10 +41,10 @@ public:
     // The age of all newborn, s; nothing where they differ.
     const std::optional<double>& common() const { return common_; }
 
-    // The ages L of the births from number `first` of this frame on, s; spans have shape [n]. The draws are read where
-    // ages are random.
-    void find(const Births& births, std::size_t first, std::span<const Birthplace> places, std::span<const Draws> draws,
-              std::span<double> L) const;
+    // The ages L of some births, s; places_in_frame: their numbers among the births of this frame; spans have shape
+    // [n]. The draws are read where ages are random.
+    void find(const Births& births, const Items& places_in_frame, std::span<const Birthplace> places,
+              std::span<const Draws> draws, std::span<double> L) const;
 
 private:
     const std::optional<BirthAge>& age_;

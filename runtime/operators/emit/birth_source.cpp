@@ -261,19 +261,26 @@ std::vector<std::string> BirthSource::inherited() const
     return names;
 }
 
-void BirthSource::place(RandomKey key, std::uint64_t first, bool in_order, std::span<Birthplace> out) const
+void BirthSource::place(RandomKey key, const Items& births, bool in_order, std::span<Birthplace> out) const
 {
-    if (scatter_) return scatter_->place(key, first, out);
+    if (scatter_) {
+        // In runs of consecutive births.
+        for (std::size_t begin = 0, end = 1; begin < out.size(); begin = end++) {
+            while (end < out.size() && births[end] == births[begin] + (end - begin)) ++end;
+            scatter_->place(key, births[begin], out.subspan(begin, end - begin));
+        }
+        return;
+    }
 
     const std::uint64_t n = values_.size();
     const Strided<Vec3f> P = values_.P().read(), N = normals_.read();
     for (std::size_t i = 0; i < out.size(); ++i) {
-        std::uint64_t point = (first + i) % n;
+        std::uint64_t point = births[i] % n;
         if (!chances_.empty()) {
-            const auto u = uniform4(key, first + i, pick_use);
+            const auto u = uniform4(key, births[i], pick_use);
             point = static_cast<std::uint64_t>(chances_.draw(u[0], u[1]));
         } else if (!in_order) {
-            const auto u = uniform4(key, first + i, pick_use);
+            const auto u = uniform4(key, births[i], pick_use);
             point = std::min(n - 1, static_cast<std::uint64_t>((u[0] + u[1] * 0x1p-32) * static_cast<double>(n)));
         }
         out[i] = {P[point], has_normals_ ? direction(N[point]) : Vec3f(Vec3f::Zero()),

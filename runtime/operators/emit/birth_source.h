@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/graph/points_object.h"
+#include "runtime/items.h"
 #include "runtime/object.h"
 #include "runtime/points/point_set.h"
 #include "runtime/shapes/mesh/mesh.h"
@@ -57,9 +58,9 @@ public:
     // The attributes that newborn points inherit: all but those that every point has of its own (P, v, id, age, ...).
     std::vector<std::string> inherited() const;
 
-    // Places birth number first + i at out[i]; N has the length 1, or 0 where there is no normal. Source points are
+    // Places birth number births[i] at out[i]; N has the length 1, or 0 where there is no normal. Source points are
     // taken in order, cyclically, or at random; by a density at random. Draws from the uses 0 to 15 and 17 of the key.
-    void place(RandomKey key, std::uint64_t first, bool in_order, std::span<Birthplace> out) const;
+    void place(RandomKey key, const Items& births, bool in_order, std::span<Birthplace> out) const;
 
     // A column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
     template <class T>

@@ -99,11 +99,11 @@ DrawValues draw_values(const BirthValue& value, AnyColumn& column, std::size_t n
     return std::visit(
         [&]<class T>(Column<T>& own) -> DrawValues {
             return [&value, key, use = use_of(name), to = own.write().last(n)](std::size_t first, std::size_t count,
-                                                                               std::uint64_t number) {
+                                                                               const Items& births) {
                 std::array<std::array<double, 4>, 64> u;
                 for (std::size_t i = 0; i < count; i += u.size()) {
                     const std::size_t part = std::min(u.size(), count - i);
-                    uniform4(key, number + i, use, std::span(u).first(part));
+                    uniform4(key, births.from(i), use, std::span(u).first(part));
                     for (std::size_t j = 0; j < part; ++j) to[first + i + j] = value.at<T>(u[j][0]);
                 }
             };

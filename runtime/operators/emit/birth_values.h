@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "runtime/graph/param.h"
-#include "runtime/random.h"
+#include "runtime/items.h"
 
 namespace rapid {
 
@@ -40,9 +40,9 @@ struct BirthValues {
 
 void read_value(const Param& param, const Value& value, BirthValues& field);
 
-// Gives `count` births, from `first` among the last n points of a column, values by their random numbers; number: that
-// of the first birth.
-using DrawValues = std::function<void(std::size_t first, std::size_t count, std::uint64_t number)>;
+// Gives `count` births, from `first` among the last n points of a column, values by their random numbers; births: their
+// numbers.
+using DrawValues = std::function<void(std::size_t first, std::size_t count, const Items& births)>;
 // For the attribute of this name, whose newborn differ. The value outlives the result.
 DrawValues draw_values(const BirthValue& value, AnyColumn& column, std::size_t n, RandomKey key, std::string_view name);
 

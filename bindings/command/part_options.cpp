@@ -1,0 +1,58 @@
+#include "bindings/command/part_options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+namespace rapid {
+namespace {
+
+std::optional<int> whole(std::string_view text)
+{
+    int number = 0;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (parsed.ec != std::errc() || parsed.ptr != text.data() + text.size()) return {};
+    return number;
+}
+
+Part read_part(const std::string& text)
+{
+    const std::size_t slash = text.find('/');
+    const std::optional<int> number = whole(text.substr(0, slash));
+    const std::optional<int> count = slash == std::string::npos ? std::nullopt : whole(text.substr(slash + 1));
+    if (!number || !count || *count < 1 || *count > most_parts || *number < 1 || *number > *count)
+        throw Error(
+            fmt::format("--part = \"{}\"; it must be K/N, with K from 1 to N, and N at most {}", text, most_parts));
+    return {*number, *count};
+}
+
+double read_sample(const std::string& text)
+{
+    const double fraction = read_positive("--sample", text);
+    if (fraction > 1)
+        throw Error(fmt::format("--sample = \"{}\"; it must be a part of all points, above 0 and at most 1", text));
+    return fraction;
+}
+
+}  // namespace
+
+void PartOptions::declare(CLI::App& app)
+{
+    app.add_option_function<std::string>(
+           "--part", [this](const std::string& text) { part_ = read_part(text); },
+           "simulates one of N subsets of the points, which `rapid merge` puts together; file names get _part03of16 "
+           "before the frame's number, or in place of {part}")
+        ->type_name("K/N");
+    app.add_option_function<std::string>(
+           "--sample", [this](const std::string& text) { sample_ = read_sample(text); },
+           "simulates this part of the points, 0.01 for a hundredth: a preview with the same ids and paths")
+        ->type_name("FRACTION");
+}
+
+std::string name_of(const Part& part)
+{
+    const std::string count = fmt::format("{}", part.count);
+    return fmt::format("{:0{}}of{}", part.number, count.size(), count);
+}
+
+}  // namespace rapid

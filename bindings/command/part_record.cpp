@@ -1,0 +1,111 @@
+#include "bindings/command/part_record.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "bindings/command/whole_file.h"
+#include "runtime/files/input_file.h"
+#include "runtime/io/frame_pattern.h"
+
+namespace rapid {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int format_version = 1;
+
+}  // namespace
+
+PartRecord PartRecord::read(const std::filesystem::path& file)
+{
+    PartRecord record;
+    try {
+        const ordered_json json = ordered_json::parse(InputFile(file).text());
+        if (json.at("rapid_part") != format_version)
+            throw Error(
+                fmt::format("is a record of version {}; it must be {}", json.at("rapid_part").dump(), format_version));
+        record.part = {json.at("part").get<int>(), json.at("parts").get<int>()};
+        if (record.part.number < 1 || record.part.number > record.part.count) throw Error("is no record of a part");
+        if (!json.at("sample").is_null()) record.sample = json.at("sample").get<double>();
+        record.frames.first = json.at("frames").at("first");
+        record.frames.last = json.at("frames").at("last");
+        record.frames.step = json.at("frames").at("step");
+        if (record.frames.step < 1 || record.frames.last < record.frames.first) throw Error("has no frames");
+        record.fps = json.at("fps");
+        record.start = json.at("start");
+        record.identity = json.at("identity").get<std::map<std::string, std::string>>();
+        return record;
+    } catch (Error& error) {
+        throw error.at({file.string(), 0});
+    } catch (const nlohmann::json::exception& error) {
+        throw Error(fmt::format("is no record of a part: {}", error.what())).at({file.string(), 0});
+    }
+}
+
+void PartRecord::write(const std::filesystem::path& file) const
+{
+    const ordered_json json = {{"rapid_part", format_version},
+                               {"part", part.number},
+                               {"parts", part.count},
+                               {"sample", sample ? ordered_json(*sample) : ordered_json()},
+                               {"frames", {{"first", frames.first}, {"last", frames.last}, {"step", frames.step}}},
+                               {"fps", fps},
+                               {"start", start},
+                               {"identity", identity}};
+    write_whole(file, json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+}
+
+std::string difference(const PartRecord& there, const PartRecord& here)
+{
+    std::vector<std::string> found;
+    const auto compare = [&](const std::string& name, const std::string& a, const std::string& b) {
+        if (a != b) found.push_back(fmt::format("{} is {} there and {} here", name, a, b));
+    };
+    const auto of = [](const PartRecord& record, const std::string& name) {
+        const auto known = record.identity.find(name);
+        return known == record.identity.end() ? std::string("not given") : known->second;
+    };
+    const auto frames = [](const FrameSelection& f) { return fmt::format("{}-{}x{}", f.first, f.last, f.step); };
+    const auto sample = [](const PartRecord& record) {
+        return record.sample ? fmt::format("{}", *record.sample) : "all";
+    };
+    compare("the number of parts", fmt::format("{}", there.part.count), fmt::format("{}", here.part.count));
+    compare("the sample", sample(there), sample(here));
+    compare("-f", frames(there.frames), frames(here.frames));
+    compare("fps", fmt::format("{}", there.fps), fmt::format("{}", here.fps));
+    compare("the first frame", fmt::format("{}", there.start), fmt::format("{}", here.start));
+    std::map<std::string, std::string> names = there.identity;
+    names.insert(here.identity.begin(), here.identity.end());
+    for (const auto& [name, value] : names) compare(name, of(there, name), of(here, name));
+    return fmt::format("{}", fmt::join(found, "; "));
+}
+
+std::filesystem::path part_record_file(const std::string& pattern, std::string_view output)
+{
+    return FramePattern(pattern).without_frame(output) + ".json";
+}
+
+void ReadFiles::add(const std::filesystem::path& file)
+{
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(file, none)) return;
+    const std::lock_guard lock(mutex_);
+    std::string& hash = hashes_[file.lexically_normal().string()];
+    if (!hash.empty()) return;
+    const InputFile content(file);
+    const XXH128_hash_t bits = XXH3_128bits(content.bytes().data(), content.bytes().size());
+    hash = fmt::format("{:016x}{:016x}", bits.high64, bits.low64);
+}
+
+void ReadFiles::put_into(std::map<std::string, std::string>& identity, const std::filesystem::path& folder) const
+{
+    const std::lock_guard lock(mutex_);
+    for (const auto& [file, hash] : hashes_)
+        identity["file " + std::filesystem::proximate(file, folder).string()] = hash;
+    identity["the version of rapid"] = RAPID_VERSION;
+}
+
+}  // namespace rapid

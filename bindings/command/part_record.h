@@ -1,0 +1,53 @@
+// What a part of a run is: a small JSON file beside its frames, by which `rapid merge` knows that parts belong
+// together.
+//
+//   sparks_part03of16.####.vdb has sparks_part03of16.vdb.json
+//
+// It is written when the part is complete, and removed when it begins again: a part without one is not complete.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "bindings/command/frame_selection.h"
+#include "runtime/points/subset.h"
+
+namespace rapid {
+
+struct PartRecord {
+    Part part;
+    std::optional<double> sample;
+    FrameSelection frames;
+    double fps = 24;         // of the output's simulation
+    std::int64_t start = 1;  // likewise: its first frame
+    // What decides the bits of a run, by names that a user knows: "rate", "--seed", "file fog.vdb" (a hash).
+    std::map<std::string, std::string> identity;
+
+    // Error: the file can't be read, or is no such record.
+    static PartRecord read(const std::filesystem::path& file);
+    void write(const std::filesystem::path& file) const;
+};
+
+// "rate is 2000 there and 3000 here" for each that differs; empty where nothing does.
+std::string difference(const PartRecord& there, const PartRecord& here);
+
+// The record of a sequence, or of a file: by its pattern with the part's name.
+std::filesystem::path part_record_file(const std::string& pattern, std::string_view output = "main");
+
+// The files that a run reads, and hashes of their contents. From any thread.
+class ReadFiles {
+public:
+    void add(const std::filesystem::path& file);
+    // By their paths from the folder; and the version of Rapid.
+    void put_into(std::map<std::string, std::string>& identity, const std::filesystem::path& folder) const;
+
+private:
+    mutable std::mutex mutex_;
+    std::map<std::string, std::string> hashes_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,121 @@
+#include "runtime/graph/coupling.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runtime/graph/point_edit.h"
+#include "runtime/graph/point_function.h"
+
+namespace rapid {
+namespace {
+
+// The type of a parameter that takes a function of all points at once (Kernel::set_function_type).
+constexpr std::string_view whole_set_function_type = "function of the points";
+
+constexpr const char* of_place = "may read p.index, the place of a point among all";
+
+std::vector<CouplingRule>& rules()
+{
+    static std::vector<CouplingRule> all;
+    return all;
+}
+
+const CouplingRule* rule_of(const std::string& type)
+{
+    const auto found =
+        std::find_if(rules().begin(), rules().end(), [&](const CouplingRule& rule) { return rule.type == type; });
+    return found == rules().end() ? nullptr : &*found;
+}
+
+bool has_stage(const NodeType& type, Stage stage)
+{
+    return std::find(type.stages.begin(), type.stages.end(), stage) != type.stages.end();
+}
+
+// A parameter for a function of all points at once.
+bool takes_whole_set(const NodeType& type)
+{
+    return std::any_of(type.params.begin(), type.params.end(),
+                       [](const Param& param) { return param.type == whole_set_function_type; });
+}
+
+bool asks_places(const PlannedNode& planned)
+{
+    if (const PointEdit* edit = planned.op->as_point_edit(); edit && edit->asks_places()) return true;
+    return std::any_of(planned.node->arguments.begin(), planned.node->arguments.end(), [](const auto& argument) {
+        const auto function = argument.second.template object<PointFunction>();
+        return function && function->asks_places();
+    });
+}
+
+std::string what_couples(const Plan& plan, const PlannedNode& planned)
+{
+    const NodeType& type = *planned.node->type;
+    if (takes_whole_set(type)) return "its function is given all points";
+    if (asks_places(planned)) return of_place;
+    if (has_stage(type, Stage::Constraints)) return "its constraints are solved for all points together";
+    const CouplingRule* rule = rule_of(type.name);
+    if (has_stage(type, Stage::Emission) && !(rule && rule->take)) return "brings points, and leaves none out";
+    if (rule) return rule->couples(plan, planned);
+    const bool alone = planned.op->as_point_edit() || type.kind == NodeKind::Dynamic || type.kind == NodeKind::Source;
+    return alone ? "" : "may look at all points, as nothing says that it does not (RAPID_COUPLING)";
+}
+
+}  // namespace
+
+CouplingRegistration::CouplingRegistration(CouplingRule rule) { rules().push_back(rule); }
+
+std::vector<PointCoupling> couplings_of(const Plan& plan)
+{
+    std::vector<PointCoupling> found;
+    for (const PlannedNode& planned : plan.nodes)
+        if (std::string what = what_couples(plan, planned); !what.empty())
+            found.push_back({planned.node, std::move(what)});
+    return found;
+}
+
+void take_subset(const Plan& plan, const Subset& subset)
+{
+    const std::vector<PointCoupling> found = couplings_of(plan);
+    if (found.empty()) {
+        for (const PlannedNode& planned : plan.nodes)
+            if (const CouplingRule* rule = rule_of(planned.node->type->name); rule && rule->take)
+                rule->take(planned, subset);
+        return;
+    }
+    const auto& [node, what] = found.front();
+    throw Error(
+        fmt::format("{}: points of this scene can't be simulated in parts, nor a sample of them; run all", what))
+        .in_node(node->name)
+        .at(node->location);
+}
+
+std::optional<float> value_of_all(const Plan& plan, std::size_t simulation, const std::string& attribute)
+{
+    const PlannedAttribute* planned = plan.simulations[simulation].find(attribute);
+    const AttributeSpec* known = known_attribute(attribute);
+    if (!planned || !planned->written_by.empty()) return std::nullopt;
+    float fallback = known ? std::get<float>(known->fallback) : 0;
+    for (const AttributeSpec& spec : plan.columns_of(simulation))
+        if (spec.name == attribute) fallback = std::get<float>(spec.fallback);
+
+    std::optional<float> value;
+    for (const PlannedNode& node : plan.nodes) {
+        if (node.simulation != simulation) continue;
+        for (const auto& [name, argument] : node.node->arguments)
+            if (name == attribute && argument.function()) return std::nullopt;  // a default that changes
+        const CouplingRule* rule = rule_of(node.node->type->name);
+        if (!rule || !rule->values) continue;
+        const std::optional<std::vector<float>> values = rule->values(node, attribute, fallback);
+        if (!values) return std::nullopt;
+        for (const float here : *values)
+            if (value.value_or(here) != here)
+                return std::nullopt;
+            else
+                value = here;
+    }
+    return value ? value : fallback;
+}
+
+}  // namespace rapid

@@ -1,0 +1,270 @@
+#include "runtime/io/merge_parts.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+#include "runtime/parallel.h"
+#include "runtime/points/subset.h"
+
+namespace rapid {
+namespace {
+
+// Points that are merged together; their list stays in the second-level cache.
+constexpr std::size_t bucket_points = 32768;
+
+// Where a point of the result is now.
+struct Source {
+    std::uint32_t part;
+    std::uint32_t place;
+};
+
+void check_ids(const PointSet& points, std::size_t part, std::size_t count, const std::string& name)
+{
+    const Strided<std::int64_t> ids = points.id().read();
+    for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (i > 0 && ids[i] <= ids[i - 1])
+                throw Error(fmt::format("point {} comes after point {}; points of a part are in order of id", ids[i],
+                                        ids[i - 1]))
+                    .at({name, 0});
+            if (const std::uint64_t own = Subset::part_of(ids[i], count); own != part)
+                throw Error(
+                    fmt::format("point {} is not of part {} of {}, but of part {}", ids[i], part + 1, count, own + 1))
+                    .at({name, 0});
+        }
+    });
+}
+
+// The type of a column in all parts that have points. Error: there is none.
+AttributeType common_type(const std::string& name, const std::vector<PointSet>& parts,
+                          const std::vector<std::string>& names)
+{
+    std::optional<AttributeType> type;
+    std::size_t of = 0;
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+        if (parts[k].empty()) continue;
+        const AttributeType here = type_of(*parts[k].find(name));
+        if (!type || here == *type) {
+            if (!type) type = here, of = k;
+            continue;
+        }
+        const auto is_whole = [](AttributeType t) { return t == AttributeType::Int32 || t == AttributeType::Int64; };
+        const auto either = [&](AttributeType t) { return here == t || *type == t; };
+        if (is_whole(here) && is_whole(*type))
+            type = AttributeType::Int64;
+        else if (either(AttributeType::Float) && (is_whole(here) || is_whole(*type)))
+            type = AttributeType::Float;
+        else
+            throw Error(
+                fmt::format("the attribute {} is {}, and {} in {}", name, type_name(here), type_name(*type), names[of]))
+                .at({names[k], 0});
+    }
+    return type.value_or(type_of(*parts.front().find(name)));
+}
+
+void check_columns(const std::vector<PointSet>& parts, const std::vector<std::string>& names)
+{
+    for (std::size_t k = 1; k < parts.size(); ++k)
+        if (parts[k].column_names() != parts[0].column_names() || parts[k].group_names() != parts[0].group_names())
+            throw Error(fmt::format("it has the attributes and groups {} {}, and {} has {} {}",
+                                    fmt::join(parts[k].column_names(), " "), fmt::join(parts[k].group_names(), " "),
+                                    names[0], fmt::join(parts[0].column_names(), " "),
+                                    fmt::join(parts[0].group_names(), " ")))
+                .at({names[k], 0});
+}
+
+// The ids between two, wherever they are: [begin[k], end[k]) of part k, at `first` in the result.
+struct Bucket {
+    std::vector<std::size_t> begin, end;
+    std::size_t first = 0, size = 0;
+};
+
+// The first place from `begin` on with an id that is not below another.
+std::size_t first_from(const Strided<std::int64_t>& ids, std::size_t begin, std::size_t end, std::int64_t id)
+{
+    while (begin < end) {
+        const std::size_t middle = begin + (end - begin) / 2;
+        if (ids[middle] < id)
+            begin = middle + 1;
+        else
+            end = middle;
+    }
+    return begin;
+}
+
+std::vector<Bucket> buckets_of(const std::vector<PointSet>& parts)
+{
+    const auto largest = std::max_element(parts.begin(), parts.end(),
+                                          [](const PointSet& a, const PointSet& b) { return a.size() < b.size(); });
+    const std::size_t of_largest = std::max<std::size_t>(1, bucket_points / parts.size());
+    std::vector<Bucket> buckets;
+    std::vector<std::size_t> at(parts.size(), 0);
+    std::size_t first = 0;
+    for (std::size_t place = 0; place < std::max<std::size_t>(1, largest->size()); place += of_largest) {
+        const std::size_t next = place + of_largest;
+        Bucket bucket{at, {}, first, 0};
+        for (std::size_t k = 0; k < parts.size(); ++k) {
+            const Strided<std::int64_t> ids = parts[k].id().read();
+            if (next >= largest->size())
+                at[k] = parts[k].size();
+            else
+                at[k] = first_from(ids, at[k], parts[k].size(), largest->id()[next]);
+            bucket.size += at[k] - bucket.begin[k];
+        }
+        bucket.end = at;
+        first += bucket.size;
+        buckets.push_back(std::move(bucket));
+    }
+    return buckets;
+}
+
+// In order of id.
+void find_sources(const std::vector<PointSet>& parts, const Bucket& bucket,
+                  std::vector<std::pair<std::int64_t, Source>>& sources)
+{
+    sources.clear();
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+        const Strided<std::int64_t> ids = parts[k].id().read();
+        for (std::size_t i = bucket.begin[k]; i < bucket.end[k]; ++i)
+            sources.push_back({ids[i], {static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(i)}});
+    }
+    if (sources.empty()) return;
+    const auto [least, most] = std::minmax_element(sources.begin(), sources.end(),
+                                                   [](const auto& a, const auto& b) { return a.first < b.first; });
+    const auto range = static_cast<std::uint64_t>(most->first - least->first) + 1;
+    if (range > 8 * sources.size()) {
+        std::sort(sources.begin(), sources.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+        return;
+    }
+    // Ids are dense, mostly: each has its own place.
+    constexpr std::uint32_t none = UINT32_MAX;
+    thread_local std::vector<std::uint32_t> by_id;
+    thread_local std::vector<std::pair<std::int64_t, Source>> sorted;
+    by_id.assign(range, none);
+    const std::int64_t first = least->first;
+    for (std::size_t i = 0; i < sources.size(); ++i)
+        by_id[static_cast<std::size_t>(sources[i].first - first)] = static_cast<std::uint32_t>(i);
+    sorted.clear();
+    for (const std::uint32_t i : by_id)
+        if (i != none) sorted.push_back(sources[i]);
+    sources.swap(sorted);
+}
+
+// Gathers a bucket's values of one column.
+using Gather = std::function<void(const Bucket& bucket, const std::vector<std::pair<std::int64_t, Source>>& sources)>;
+
+template <class T, class From>
+T converted(const From& value)
+{
+    if constexpr (std::is_convertible_v<From, T>)
+        return static_cast<T>(value);
+    else
+        return Column<T>::zero();  // of a part without points
+}
+
+template <class T, class Get>
+Gather gather_into(std::span<T> values, const std::vector<PointSet>& parts, const Get& columns_of)
+{
+    // A column of the same type in all parts, which is the rule, or one that is converted.
+    std::vector<Strided<T>> from;
+    for (const PointSet& part : parts)
+        if (const Column<T>* column = columns_of(part)) from.push_back(column->read());
+    RAPID_ASSERT(from.size() == parts.size());
+    return [values, from](const Bucket& bucket, const std::vector<std::pair<std::int64_t, Source>>& sources) {
+        T* to = values.data() + bucket.first;
+        for (const auto& [id, source] : sources) *to++ = from[source.part][source.place];
+    };
+}
+
+template <class T>
+AnyColumn column_of(const AnyColumn& column)
+{
+    return std::visit(
+        []<class From>(const Column<From>& c) -> AnyColumn {
+            Column<T> result(0, converted<T>(c.fallback()));
+            if (c.size() == 0) return result;
+            const std::span<T> values = result.append_for_writing(c.size());
+            for (std::size_t i = 0; i < values.size(); ++i) values[i] = converted<T>(c[i]);
+            return result;
+        },
+        column);
+}
+
+// The parts, with one type for each column.
+std::vector<PointSet> of_one_type(const std::vector<PointSet>& parts, const std::vector<std::string>& names)
+{
+    std::vector<PointSet> result = parts;
+    for (const std::string& name : parts.front().column_names()) {
+        const AttributeType type = common_type(name, parts, names);
+        for (PointSet& part : result) {
+            const AnyColumn& column = *part.find(name);
+            if (type_of(column) == type) continue;
+            switch (type) {
+                case AttributeType::Float:
+                    part.set(name, column_of<float>(column));
+                    break;
+                case AttributeType::Vec3:
+                    part.set(name, column_of<Vec3f>(column));
+                    break;
+                case AttributeType::Int32:
+                    part.set(name, column_of<std::int32_t>(column));
+                    break;
+                case AttributeType::Int64:
+                    part.set(name, column_of<std::int64_t>(column));
+                    break;
+                case AttributeType::Quat:
+                    part.set(name, column_of<Quatf>(column));
+                    break;
+            }
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
+PointSet merge_parts(const std::vector<PointSet>& given, const std::vector<std::string>& names)
+{
+    RAPID_ASSERT(!given.empty() && given.size() == names.size());
+    for (std::size_t k = 0; k < given.size(); ++k) check_ids(given[k], k, given.size(), names[k]);
+    check_columns(given, names);
+    const std::vector<PointSet> parts = of_one_type(given, names);
+    const std::vector<Bucket> buckets = buckets_of(parts);
+    const std::size_t size = buckets.back().first + buckets.back().size;
+
+    PointSet result;
+    result.append(size);
+    std::vector<Gather> gathers;
+    for (const auto& [name, column] : parts.front().columns())
+        std::visit(
+            [&, &key = name]<class T>(const Column<T>& c) {
+                Column<T> merged(0, c.fallback());
+                if (size > 0)
+                    gathers.push_back(gather_into(merged.append_for_writing(size), parts,
+                                                  [&](const PointSet& part) { return part.find<T>(key); }));
+                result.set(key, std::move(merged));
+            },
+            column);
+    for (const auto& [name, members] : parts.front().groups()) {
+        Column<std::uint8_t> merged(0, 0);
+        if (size > 0)
+            gathers.push_back(gather_into(merged.append_for_writing(size), parts,
+                                          [&, &key = name](const PointSet& part) { return part.find_group(key); }));
+        result.group(name) = std::move(merged);
+    }
+    tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
+        thread_local std::vector<std::pair<std::int64_t, Source>> sources;
+        find_sources(parts, buckets[b], sources);
+        for (const Gather& gather : gathers) gather(buckets[b], sources);
+    });
+    return result;
+}
+
+}  // namespace rapid

@@ -1,0 +1,34 @@
+// The items that random numbers are drawn for: consecutive ones, or some of a range.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "runtime/random.h"
+
+namespace rapid {
+
+class Items {
+public:
+    // first, first + 1, ...
+    Items(std::uint64_t first) : first_(first) {}
+    // first + offsets[0], first + offsets[1], ...; the offsets outlive it.
+    Items(std::uint64_t first, const std::uint32_t* offsets) : first_(first), offsets_(offsets) {}
+
+    std::uint64_t operator[](std::size_t i) const { return first_ + (offsets_ ? offsets_[i] : i); }
+    bool are_consecutive() const { return !offsets_; }
+    std::uint64_t first() const { return first_; }
+    // Without the first n.
+    Items from(std::size_t n) const { return offsets_ ? Items(first_, offsets_ + n) : Items(first_ + n); }
+
+private:
+    std::uint64_t first_;
+    const std::uint32_t* offsets_ = nullptr;
+};
+
+// out[i] is uniform4(key, items[i], use) to the bit.
+void uniform4(RandomKey key, const Items& items, std::uint64_t use, std::span<std::array<double, 4>> out);
+
+}  // namespace rapid

@@ -1,0 +1,160 @@
+#include "runtime/points/column_files.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <condition_variable>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Block {
+    std::size_t bytes;
+    int descriptor;
+};
+
+std::atomic<bool> in_use{false};
+std::mutex blocks_mutex;
+std::map<void*, Block> blocks;
+std::filesystem::path blocks_folder;
+
+Error failed(const char* what, int code)
+{
+    return Error(fmt::format("no file for columns in \"{}\": {}: {}", blocks_folder.string(), what, strerror(code)));
+}
+
+int open_unnamed(const std::filesystem::path& folder)
+{
+    const int unnamed = open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (unnamed >= 0) return unnamed;
+    std::string name = (folder / ".rapid-columns-XXXXXX").string();
+    const int named = mkostemp(name.data(), O_CLOEXEC);
+    if (named < 0) throw failed("open", errno);
+    unlink(name.c_str());
+    return named;
+}
+
+// Reserved, as a write to a page that finds the disk full ends the process.
+void reserve(int descriptor, std::size_t bytes)
+{
+    if (const int code = posix_fallocate(descriptor, 0, static_cast<off_t>(bytes)); code != 0)
+        throw failed("reserve", code);
+}
+
+// Bytes of files that this process has in memory.
+std::size_t resident_of_files()
+{
+    std::FILE* file = std::fopen("/proc/self/statm", "re");
+    if (!file) return 0;
+    unsigned long all = 0, resident = 0, shared = 0;
+    const int read = std::fscanf(file, "%lu %lu %lu", &all, &resident, &shared);
+    std::fclose(file);
+    return read == 3 ? shared * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) : 0;
+}
+
+}  // namespace
+
+// Takes pages away from this process, which the system keeps or writes out as it likes.
+struct ColumnFiles::Trimmer {
+    explicit Trimmer(std::size_t most) : limit(resident_of_files() + most), thread([this] { run(); }) {}
+    ~Trimmer()
+    {
+        {
+            const std::lock_guard lock(mutex);
+            ends = true;
+        }
+        changed.notify_one();
+        thread.join();
+    }
+
+    void run()
+    {
+        std::unique_lock lock(mutex);
+        while (!changed.wait_for(lock, 2ms, [this] { return ends; })) {
+            if (resident_of_files() <= limit) continue;
+            const std::lock_guard of_blocks(blocks_mutex);
+            for (const auto& [begin, block] : blocks) madvise(begin, block.bytes, MADV_DONTNEED);
+        }
+    }
+
+    const std::size_t limit;
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool ends = false;
+    std::thread thread;  // the last member
+};
+
+ColumnFiles::ColumnFiles(const std::filesystem::path& folder, std::size_t resident)
+{
+    RAPID_ASSERT(!in_use);
+    blocks_folder = folder.empty() ? "." : folder;
+    trimmer_ = std::make_unique<Trimmer>(resident);
+    in_use = true;
+}
+
+ColumnFiles::~ColumnFiles()
+{
+    RAPID_ASSERT(blocks.empty());
+    in_use = false;
+}
+
+void* map_in_file(std::size_t bytes)
+{
+    if (!in_use) return nullptr;
+    const int descriptor = open_unnamed(blocks_folder);
+    try {
+        reserve(descriptor, bytes);
+        void* block = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
+        if (block == MAP_FAILED) throw failed("map", errno);
+        const std::lock_guard lock(blocks_mutex);
+        blocks.emplace(block, Block{bytes, descriptor});
+        return block;
+    } catch (...) {
+        close(descriptor);
+        throw;
+    }
+}
+
+bool resize_in_file(void*& block, std::size_t old_bytes, std::size_t bytes)
+{
+    if (!in_use) return false;
+    const std::lock_guard lock(blocks_mutex);
+    const auto found = blocks.find(block);
+    if (found == blocks.end()) return false;
+    reserve(found->second.descriptor, bytes);
+    void* moved = mremap(block, old_bytes, bytes, MREMAP_MAYMOVE);
+    if (moved == MAP_FAILED) throw failed("map", errno);
+    const Block grown{bytes, found->second.descriptor};
+    blocks.erase(found);
+    blocks.emplace(moved, grown);
+    block = moved;
+    return true;
+}
+
+bool unmap_in_file(void* block, std::size_t bytes)
+{
+    if (!in_use) return false;
+    const std::lock_guard lock(blocks_mutex);
+    const auto found = blocks.find(block);
+    if (found == blocks.end()) return false;
+    munmap(block, bytes);
+    close(found->second.descriptor);
+    blocks.erase(found);
+    return true;
+}
+
+}  // namespace rapid

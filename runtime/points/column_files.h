@@ -1,0 +1,35 @@
+// Columns that are larger than memory: while one of these lives, the blocks of large columns (buffer.h) are unnamed
+// files, mapped. The system may write their pages out, and what of them is in memory is kept below a limit; values stay
+// as they are.
+//
+// For one process that does one thing, as `rapid merge` does: the setting is that of the process.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+
+namespace rapid {
+
+class ColumnFiles {
+public:
+    // folder: of the files, on a disk with room for the columns. resident: bytes that may be in memory.
+    ColumnFiles(const std::filesystem::path& folder, std::size_t resident);
+    // The columns that were made while it lived must be gone.
+    ~ColumnFiles();
+    ColumnFiles(const ColumnFiles&) = delete;
+    ColumnFiles& operator=(const ColumnFiles&) = delete;
+
+private:
+    struct Trimmer;
+    std::unique_ptr<Trimmer> trimmer_;
+};
+
+// For Buffer: whole pages in a file; null where no ColumnFiles lives. Error: no room.
+void* map_in_file(std::size_t bytes);
+// Whether a block is one of those; then it is of the new size, and may be elsewhere: in `block`. Error: no room.
+bool resize_in_file(void*& block, std::size_t old_bytes, std::size_t bytes);
+// Whether a block is one of those; then it is gone.
+bool unmap_in_file(void* block, std::size_t bytes);
+
+}  // namespace rapid

@@ -1,0 +1,66 @@
+// Some of the points, chosen by their ids: a part of a run, or a sample of it.
+//
+// Whether a point is in a subset depends on its id alone. Part k of n has the ids with floor(n h(id) / 2^64) = k, h a
+// hash of 64 bits: the parts are disjoint, and together they are all points. A sample of the fraction f has those with
+// h'(id) < 2^64 f, h' another hash: a larger sample holds a smaller one, and parts of a sample are as large as parts of
+// the whole.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+namespace rapid {
+
+// Part number of `count`, from 1.
+struct Part {
+    int number = 1, count = 1;
+
+    bool operator==(const Part&) const = default;
+};
+
+class Subset {
+public:
+    Subset() = default;
+    // sample: above 0, at most 1.
+    Subset(std::optional<Part> part, std::optional<double> sample)
+        : is_all_((!part || part->count == 1) && (!sample || *sample == 1))
+    {
+        if (part)
+            number_ = static_cast<std::uint64_t>(part->number - 1), count_ = static_cast<std::uint64_t>(part->count);
+        if (sample && *sample < 1) limit_ = static_cast<std::uint64_t>(std::ldexp(*sample, 64)), samples_ = true;
+    }
+
+    bool is_all() const { return is_all_; }
+
+    bool has(std::int64_t id) const
+    {
+        const auto bits = static_cast<std::uint64_t>(id);
+        if (samples_ && hash(bits ^ 0x2545f4914f6cdd1dull) >= limit_) return false;
+        return count_ == 1 || part_of(id, count_) == number_;
+    }
+
+    // The part, from 0, to which an id belongs.
+    static std::uint64_t part_of(std::int64_t id, std::uint64_t count)
+    {
+        return static_cast<std::uint64_t>(
+            static_cast<unsigned __int128>(hash(static_cast<std::uint64_t>(id))) * count >> 64);
+    }
+
+    bool operator==(const Subset&) const = default;
+
+private:
+    // The finaliser of SplitMix64 (Steele, Lea and Flood 2014), a bijection.
+    static std::uint64_t hash(std::uint64_t bits)
+    {
+        bits += 0x9e3779b97f4a7c15ull;
+        bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9ull;
+        bits = (bits ^ bits >> 27) * 0x94d049bb133111ebull;
+        return bits ^ bits >> 31;
+    }
+
+    bool is_all_ = true, samples_ = false;
+    std::uint64_t number_ = 0, count_ = 1, limit_ = 0;
+};
+
+}  // namespace rapid

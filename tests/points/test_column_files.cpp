@@ -1,0 +1,73 @@
+#include "runtime/points/column_files.h"
+
+#include <algorithm>
+#include <fstream>
+#include <numeric>
+#include <string>
+
+#include "runtime/points/column.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::size_t large = 32 << 20;  // values
+
+// kB
+long resident_memory()
+{
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmRSS:")) return std::stol(line.substr(6));
+    return 0;
+}
+
+TEST_CASE("columns in files have their values, and little of them is in memory", "[column_files]")
+{
+    const test::TemporaryFolder folder;
+    const long before = resident_memory();
+    {
+        const ColumnFiles files(folder.path(), 16 << 20);
+        Column<std::int64_t> column;
+        long most = 0;
+        for (std::size_t part = 0; part < 16; ++part) {  // growing moves them
+            const std::span<std::int64_t> added = column.append_for_writing(large / 16);
+            std::iota(added.begin(), added.end(), static_cast<std::int64_t>(part * large / 16));
+            most = std::max(most, resident_memory());
+        }
+        const Column<std::int64_t> same = column;
+        std::size_t wrong = 0;
+        for (std::size_t i = 0; i < large; ++i) wrong += same[i] != static_cast<std::int64_t>(i);
+        CHECK(wrong == 0);
+        CHECK(column.bytes() == 256 << 20);
+        CHECK(most - before < 128 << 10);
+        CHECK(std::filesystem::is_empty(folder.path()));
+    }
+    CHECK(std::filesystem::is_empty(folder.path()));
+}
+
+TEST_CASE("columns made before and after are in memory as ever", "[column_files]")
+{
+    const test::TemporaryFolder folder;
+    Column<float> before(1 << 20, 1.0f);
+    before.write()[0] = 2;
+    {
+        const ColumnFiles files(folder.path(), 1 << 20);
+        before.append_for_writing(1 << 20)[0] = 3;
+        CHECK(before[1 << 20] == 3);
+    }
+    CHECK(before[0] == 2);
+    CHECK(before[1] == 1);
+}
+
+TEST_CASE("a folder that takes no files is refused", "[column_files]")
+{
+    const ColumnFiles files("/proc/self/nowhere", 1 << 20);
+    Column<float> column;
+    const std::string message = test::error_of([&] { column.append_for_writing(1 << 20); });
+    CHECK(message.find("/proc/self/nowhere") != std::string::npos);
+}
+
+}  // namespace
+}  // namespace rapid

@@ -12,6 +12,6 @@ build_packages=(
 
 # What its tests need besides.
 test_packages=(
-    catch2 clang-14 clang-format-14 ffmpeg libbenchmark-dev libclang-rt-14-dev librapidcheck-dev lua-check python3
-    python3-numpy universal-ctags
+    catch2 clang-14 clang-format-14 ffmpeg libbenchmark-dev libclang-rt-14-dev librapidcheck-dev lua-check munge python3
+    python3-numpy slurm-wlm universal-ctags
 )

@@ -5,6 +5,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/event_file.h"
+#include "bindings/command/farm_options.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
@@ -30,6 +31,7 @@ public:
 
     void declare(CLI::App& app) override
     {
+        app_ = &app;
         graph_.declare(app);
         app.add_option_function<std::string>(
                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
@@ -51,6 +53,11 @@ public:
         app.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
         untrusted_.declare(app, "graph");
         app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
+        farm_.declare(app);
+        app.add_option_function<std::string>(
+               "--parts", [this](const std::string& text) { parts_ = read_whole("--parts", text, 1); },
+               "with --farm: tasks, each of one part of the points, which are then merged [default 1]")
+            ->type_name("N");
         app.add_flag(Watch::tell_option, tell_)->group("");  // internal: a run of --watch
     }
 
@@ -60,6 +67,7 @@ public:
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (untrusted_.asked() && files_.makes_films())
             throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
+        check_farm();
         begin_part();
         untrusted_.confine([&] { return access(); }, common);
     }
@@ -89,6 +97,7 @@ public:
             const FrameSelection frames = range_of(plan);
             if (record_) record_->frames = frames;
             files_.resolve(plan, !frames.single());
+            if (farm_.asked()) return submit(plan);
             events_.begin();
             report.begin(plan.first_frame(), frames.last);
             return compute(*session, plan, frames, report);
@@ -111,6 +120,42 @@ private:
         events_.take_part(name);
         for (std::string* file : {&stats_, &profile_})
             if (!file->empty()) *file = with_part(*file, name);
+    }
+
+    void check_farm() const
+    {
+        farm_.check();
+        if (!farm_.asked() && parts_ > 1) throw Error("--parts is for --farm; give --farm slurm, or --part K/N");
+        if (parts_ > most_parts) throw Error(fmt::format("--parts = {}; it must be at most {}", parts_, most_parts));
+        if (!farm_.asked()) return;
+        if (watch_) throw Error("--watch runs here, and --farm elsewhere; give one of them");
+        if (untrusted_.asked())
+            throw Error("--farm starts programs, which --untrusted forbids; submit `rapid run --untrusted` by sbatch");
+        if (parts_ > 1 && part_.part()) throw Error("--parts and --part are given together; keep one of them");
+    }
+
+    // What would be found wrong before the first frame has been.
+    int submit(const Plan& plan) const
+    {
+        FarmJob job;
+        job.name = "rapid-" + std::filesystem::path(graph_.file()).stem().string();
+        const std::vector<std::filesystem::path> folders = files_.folders();
+        job.outputs = folders.empty() ? "." : folders.front();
+        job.words = farm_.words(*app_, {"--parts"});
+        job.words.emplace_back("--quiet");
+        if (parts_ == 1) {
+            job.tasks.push_back({"run", {}});
+            return farm_.submit(std::move(job));
+        }
+        take_subset(plan, Subset(Part{1, static_cast<int>(parts_)}, std::nullopt));
+        for (int number = 1; number <= parts_; ++number) {
+            const Part part{number, static_cast<int>(parts_)};
+            job.tasks.push_back({"part " + name_of(part), {fmt::format("--part={}/{}", part.number, part.count)}});
+        }
+        for (const auto& [whole, parts] : files_.merges())
+            job.last.push_back({"merge", "--quiet", "--output=" + whole, parts});
+        if (job.last.empty()) throw Error("--parts: nothing is written that could be put together; give -o");
+        return farm_.submit(std::move(job));
     }
 
     std::function<void(const std::filesystem::path& file)> on_read()
@@ -184,6 +229,9 @@ private:
         }
     }
 
+    CLI::App* app_ = nullptr;
+    FarmOptions farm_;
+    std::int64_t parts_ = 1;
     GraphOptions graph_;
     FrameFiles files_;
     std::optional<FrameSelection> frames_;

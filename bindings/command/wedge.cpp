@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "bindings/command/command.h"
+#include "bindings/command/farm_options.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
@@ -72,6 +74,8 @@ public:
                "rows that run at a time, which share the threads [default 1]")
             ->type_name("N");
         app.add_flag("--quiet", quiet_, "no progress and no table");
+        farm_.declare(app);
+        app.add_option(collect_option, collect_)->group("");  // internal: what comes last on a farm
         untrusted_.declare(app, "graph");
     }
 
@@ -83,9 +87,12 @@ public:
     {
         const std::vector<WedgeRow> rows = wedge_rows(settings_, zip_, files_.names());
         const std::vector<fs::path> folders = files_.folders();
+        const fs::path outputs = folders.empty() ? fs::path(".") : folders.front();
+        farm_.check();
+        WedgeReport report(graph_.file(), settings_, rows, outputs, quiet_);
+        if (!collect_.empty()) return collect(rows, report);
         check(rows.front(), common);
-
-        WedgeReport report(graph_.file(), settings_, rows, folders.empty() ? fs::path(".") : folders.front(), quiet_);
+        if (farm_.asked()) return submit(rows, outputs, common);
         const TemporaryFolder statistics;
         const int signal = run_processes(
             rows.size(), static_cast<int>(jobs_),
@@ -96,6 +103,50 @@ public:
     }
 
 private:
+    static constexpr const char* collect_option = "--collect";
+
+    // A task for each row, then the report of all.
+    int submit(const std::vector<WedgeRow>& rows, const fs::path& outputs, const CommonOptions& common) const
+    {
+        FarmJob job;
+        job.name = "rapid-wedge-" + fs::path(graph_.file()).stem().string();
+        job.outputs = outputs;
+        const fs::path folder = fs::absolute(job.scripts()).lexically_normal();
+        for (std::size_t row = 0; row < rows.size(); ++row) {
+            std::vector<std::string> words = words_of(rows[row], statistics_of(folder, row), common);
+            words.erase(words.begin());  // the name of the program
+            std::erase_if(words, [](const std::string& word) { return word.starts_with("--threads="); });
+            job.tasks.push_back({rows[row].label(), {words.begin() + 2, words.end()}});
+            job.words.assign(words.begin(), words.begin() + 2);  // run GRAPH
+        }
+        job.last.push_back(farm_.words(*app_, {"--jobs"}));
+        job.last.back().push_back(fmt::format("{}={}", collect_option, folder.string()));
+        job.last_needs_all = false;
+        return farm_.submit(std::move(job));
+    }
+
+    static fs::path statistics_of(const fs::path& folder, std::size_t row)
+    {
+        return folder / fmt::format("{}.json", row + 1);
+    }
+
+    // The rows have run on a farm.
+    int collect(const std::vector<WedgeRow>& rows, WedgeReport& report) const
+    {
+        for (std::size_t row = 0; row < rows.size(); ++row) {
+            EndedProcess ended{"it did not run to its end", status_failed};
+            std::ifstream file(fs::path(collect_) / fmt::format("{}.status", row + 1));
+            if (int status = 0; file >> status) {
+                ended = {"", status};
+                if (status != status_done)
+                    ended.failure = fmt::format("ended with status {}; see {}", status,
+                                                (fs::path(collect_) / fmt::format("{}.log", row + 1)).string());
+            }
+            report.ended(row, ended, statistics_of(collect_, row));
+        }
+        return report.finish() ? status_done : status_failed;
+    }
+
     // What a misspelt setting is wrong with is found before any row runs. Error: that of `rapid check`.
     void check(const WedgeRow& row, const CommonOptions& common) const
     {
@@ -156,6 +207,8 @@ private:
     std::optional<FrameSelection> frames_;
     std::int64_t jobs_ = 1;
     bool zip_ = false, quiet_ = false;
+    FarmOptions farm_;
+    std::string collect_;  // the folder of their statistics
 };
 RAPID_COMMAND(WedgeCommand);
 

@@ -1,0 +1,145 @@
+#include "bindings/command/farm_job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "bindings/command/whole_file.h"
+#include "runtime/error.h"
+#include "runtime/files/input_file.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr int format_version = 1;
+
+std::string shell_words(const std::vector<std::string>& words)
+{
+    std::vector<std::string> quoted;
+    for (const std::string& word : words) quoted.push_back(shell_word(word));
+    return fmt::format("{}", fmt::join(quoted, " "));
+}
+
+bool limits_memory(const std::vector<std::string>& words)
+{
+    return std::any_of(words.begin(), words.end(),
+                       [](const std::string& word) { return word.starts_with("--memory="); });
+}
+
+// A job that is preempted or whose node is lost begins again. On SIGTERM, which all its processes get, this program
+// ends by itself; the shell waits for it.
+std::string head(const FarmJob& job, const std::string& log)
+{
+    return fmt::format(
+        "#!/bin/bash\n"
+        "#SBATCH --job-name={}\n"
+        "#SBATCH --output={}\n"
+        "#SBATCH --open-mode=append\n"
+        "#SBATCH --requeue\n"
+        "#SBATCH --chdir={}\n",
+        shell_word(job.name), shell_word((job.scripts() / log).string()), shell_word(job.folder.string()));
+}
+
+// Runs commands of this program and notes how they ended. Threads are those that the job was given.
+std::string body(const std::string& status, const std::string& program, const std::vector<std::string>& commands)
+{
+    std::string text = fmt::format("trap : TERM\nstatus={}\nrm -f \"$status\"\nended=0\n", status);
+    for (const std::string& words : commands)
+        text += fmt::format("{} {} ${{SLURM_CPUS_PER_TASK:+--threads=$SLURM_CPUS_PER_TASK}} || ended=$?\n",
+                            shell_word(program), words);
+    return text + "echo $ended >\"$status.new\" && mv \"$status.new\" \"$status\"\nexit $ended\n";
+}
+
+}  // namespace
+
+std::string shell_word(const std::string& text)
+{
+    constexpr std::string_view plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
+    if (!text.empty() && text.find_first_not_of(plain) == std::string::npos) return text;
+    std::string quoted(1, '\'');
+    for (const char c : text) {
+        if (c == '\'')
+            quoted.append("'\\''");
+        else
+            quoted.push_back(c);
+    }
+    quoted.push_back('\'');
+    return quoted;
+}
+
+fs::path FarmJob::status_file(std::size_t task) const
+{
+    return scripts() / (task == 0 ? std::string("last.status") : fmt::format("{}.status", task));
+}
+
+std::string script_of_tasks(const FarmJob& job, const std::string& program)
+{
+    std::string text = head(job, "%a.log") + "case $SLURM_ARRAY_TASK_ID in\n";
+    for (std::size_t k = 0; k < job.tasks.size(); ++k)
+        text += fmt::format("{}) set -- {} ;;  # {}\n", k + 1, shell_words(job.tasks[k].words), job.tasks[k].name);
+    text += "esac\n";
+    const std::string status = shell_word(job.scripts().string() + '/') + "$SLURM_ARRAY_TASK_ID.status";
+    std::string words = shell_words(job.words) + " \"$@\"";
+    // What the job was given of the node's memory, in MiB.
+    if (!limits_memory(job.words) && !limits_memory(job.tasks.front().words))
+        words += " ${SLURM_MEM_PER_NODE:+--memory=${SLURM_MEM_PER_NODE}M}";
+    return text + body(status, program, {words});
+}
+
+std::string script_of_last(const FarmJob& job, const std::string& program)
+{
+    std::vector<std::string> commands;
+    for (const std::vector<std::string>& words : job.last) commands.push_back(shell_words(words));
+    return head(job, "last.log") + body(shell_word(job.status_file(0).string()), program, commands);
+}
+
+SubmittedJob SubmittedJob::read(const fs::path& file)
+{
+    try {
+        const ordered_json json = ordered_json::parse(InputFile(file).text());
+        if (json.at("rapid_farm") != format_version)
+            throw Error(fmt::format("is of version {}; it must be {}", json.at("rapid_farm").dump(), format_version));
+        SubmittedJob submitted;
+        FarmJob& job = submitted.job;
+        job.name = json.at("name");
+        job.words = json.at("command").get<std::vector<std::string>>();
+        job.last = json.at("last").at("commands").get<std::vector<std::vector<std::string>>>();
+        job.last_needs_all = json.at("last").at("needs_all");
+        job.options = json.at("options").get<std::vector<std::string>>();
+        job.folder = json.at("folder").get<std::string>();
+        job.outputs = json.at("outputs").get<std::string>();
+        submitted.last = json.at("last").at("job");
+        for (const ordered_json& task : json.at("tasks")) {
+            job.tasks.push_back({task.at("name"), task.at("command").get<std::vector<std::string>>()});
+            submitted.arrays.push_back(task.at("job"));
+        }
+        if (job.tasks.empty()) throw Error("has no tasks");
+        return submitted;
+    } catch (Error& error) {
+        throw error.at({file.string(), 0});
+    } catch (const nlohmann::json::exception& error) {
+        throw Error(fmt::format("is no FARM.json: {}", error.what())).at({file.string(), 0});
+    }
+}
+
+void SubmittedJob::write() const
+{
+    ordered_json json = {{"rapid_farm", format_version},
+                         {"name", job.name},
+                         {"folder", job.folder.string()},
+                         {"outputs", job.outputs.string()},
+                         {"options", job.options},
+                         {"command", job.words},
+                         {"tasks", ordered_json::array()},
+                         {"last", {{"commands", job.last}, {"needs_all", job.last_needs_all}, {"job", last}}}};
+    for (std::size_t k = 0; k < job.tasks.size(); ++k)
+        json["tasks"].push_back(
+            {{"name", job.tasks[k].name}, {"command", job.tasks[k].words}, {"job", arrays[k]}, {"number", k + 1}});
+    write_whole(job.file(), json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+}
+
+}  // namespace rapid

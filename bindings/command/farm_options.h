@@ -1,0 +1,34 @@
+// --farm: submits to a scheduler what would be run here.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bindings/command/command.h"
+#include "bindings/command/farm_job.h"
+
+namespace rapid {
+
+class FarmOptions {
+public:
+    void declare(CLI::App& app);
+
+    // Error: an option that needs --farm without it.
+    void check() const;
+    bool asked() const { return !farm_.empty(); }
+
+    // The arguments of the command, as they were given: without those above, without --threads, and without `others`.
+    std::vector<std::string> words(const CLI::App& app, const std::vector<std::string>& others) const;
+
+    // Submits the job and tells its ids; with --dry-run prints its scripts. Error: no Slurm; what sbatch says; a job of
+    // the same folder that still runs.
+    int submit(FarmJob job) const;
+
+private:
+    std::string farm_;
+    std::vector<std::string> options_;
+    bool dry_run_ = false;
+};
+
+}  // namespace rapid

@@ -182,6 +182,11 @@ function rapid.param(name, default, doc) end
 ---@return rapid.Attribute
 function rapid.attr(name) end
 
+---A shape, a mesh or points that the program offers which has opened the scene.
+---@param name string
+---@return any
+function rapid.host(name) end
+
 ---@class rapid.NodeParameter
 ---@field [1] "bool"|"float"|"floats"|"group"|"int"|"ramp"|"read"|"shape"|"string"|"vec3"|"vec3s"|"write"
 ---@field default? any

@@ -143,6 +143,11 @@ local function make(native, load_node, numeric, shapes, studies)
     return native.attribute(name)
   end
 
+  -- A shape, a mesh or points that the program offers which has opened the scene.
+  function rapid.host(name)
+    return native.host(name)
+  end
+
   -- A number, a boolean, a string or a vec3 that --set can replace.
   function rapid.param(name, default, doc)
     return native.param(name, default, doc)

@@ -9,13 +9,15 @@
 #include <fstream>
 #include <limits>
 #include <optional>
+#include <utility>
 
 namespace rapid {
 namespace {
 
 constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
 
-std::atomic<std::uint64_t> budget{0};  // 0: not yet known
+std::atomic<std::uint64_t> budget{0};             // 0: not yet known
+thread_local std::uint64_t budget_of_thread = 0;  // 0: that of the process
 
 // The first number of a file; none where there is none, as in "max".
 std::optional<std::uint64_t> number_in(const std::filesystem::path& file)
@@ -81,6 +83,7 @@ std::string gibibytes(double bytes)
 
 std::uint64_t memory_budget()
 {
+    if (budget_of_thread != 0) return budget_of_thread;
     std::uint64_t bytes = budget;
     if (bytes != 0) return bytes;
     const std::uint64_t free = std::min(free_in_machine(), free_in_groups());
@@ -90,6 +93,9 @@ std::uint64_t memory_budget()
 }
 
 void set_memory_budget(std::uint64_t bytes) { budget = bytes; }
+
+MemoryBudget::MemoryBudget(std::uint64_t bytes) : before_(std::exchange(budget_of_thread, bytes)) {}
+MemoryBudget::~MemoryBudget() { budget_of_thread = before_; }
 
 bool fits_in_memory(double bytes)
 {

@@ -13,6 +13,19 @@ namespace rapid {
 std::uint64_t memory_budget();
 void set_memory_budget(std::uint64_t bytes);
 
+// Another budget for what this thread begins, for as long as it lives: where one process runs several scenes. 0: that
+// of the process.
+class MemoryBudget {
+public:
+    explicit MemoryBudget(std::uint64_t bytes);
+    ~MemoryBudget();
+    MemoryBudget(const MemoryBudget&) = delete;
+    MemoryBudget& operator=(const MemoryBudget&) = delete;
+
+private:
+    std::uint64_t before_;
+};
+
 // Whether the process may have so many bytes more. Below 64 MiB that is not asked.
 bool fits_in_memory(double bytes);
 

@@ -12,7 +12,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/part_record.h"
-#include "bindings/command/picture_scene.h"
+#include "bindings/host/picture_scene.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"
 

@@ -7,6 +7,7 @@
 #include "bindings/host/lua_text.h"
 #include "bindings/host/maker.h"
 #include "bindings/host/objects.h"
+#include "bindings/host/offers.h"
 
 namespace rapid {
 namespace {
@@ -33,7 +34,8 @@ int make_object(State& state)
     refuse_in_kernels(state, shown_name(maker, *options), "make it outside, once");
     return construct(state, [&] {
         ScriptHost& host = state.host();
-        MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read};
+        MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read,
+                            host.options().find_file};
         try {
             check_named(*options);
             const auto make = [&] { return maker.make(maker, *options, context); };
@@ -51,6 +53,17 @@ int make_attribute(State& state)
         throw Error("rapid.attr takes the name of an attribute: rapid.attr \"bounce\"");
     push_object(state, std::make_shared<AttributeName>(text_at(state.lua(), 1)));
     return 1;
+}
+
+int take_offer(State& state)
+{
+    refuse_in_kernels(state, "rapid.host", "take it outside, once");
+    if (lua_type(state.lua(), 1) != LUA_TSTRING)
+        throw Error("rapid.host takes the name of what the program offers: rapid.host \"floor\"");
+    return construct(state, [&] {
+        const auto& offers = state.host().options().offers;
+        return (offers ? *offers : Offers()).object(text_at(state.lua(), 1));
+    });
 }
 
 std::shared_ptr<const Table> table_at(State& state, int index)

@@ -13,6 +13,7 @@ namespace rapid {
 // Native functions of lua/rapid.lua.
 int make_object(State& state);     // (maker, options): the object
 int make_attribute(State& state);  // (name)
+int take_offer(State& state);      // (name): an object of the program that embeds Rapid
 
 // The table at `index`, which Rapid's Lua files have made or checked.
 std::shared_ptr<const Table> table_at(State& state, int index);

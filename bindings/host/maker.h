@@ -24,11 +24,14 @@ struct MakeContext {
     std::vector<std::string>& warnings;
     bool may_write;  // false in check, explain and test, which write nothing
     std::function<void(const std::filesystem::path& file)> on_read;  // may be empty
+    std::function<std::string(const std::string& path)> find_file;   // may be empty, and return nothing
 
     // The path of a file that will be read.
     std::filesystem::path resolve(const std::string& path) const
     {
-        const std::filesystem::path file = folder / path;  // an absolute path stays itself
+        std::filesystem::path file = folder / path;  // an absolute path stays itself
+        if (find_file)
+            if (const std::string found = find_file(path); !found.empty()) file = found;
         if (on_read) on_read(file);
         return file;
     }

@@ -1,5 +1,8 @@
 #include "bindings/host/modules.h"
 
+#include <dlfcn.h>
+#include <link.h>
+
 #include <algorithm>
 #include <cctype>
 #include <fstream>
@@ -30,6 +33,17 @@ std::optional<std::string> read_module(const std::filesystem::path& path)
     }
 }
 
+// Of the program or of the library that this code is in, without symbolic links.
+std::filesystem::path own_file()
+{
+    Dl_info here{};
+    link_map* map = nullptr;
+    dladdr1(reinterpret_cast<const void*>(&lua_folder), &here, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP);
+    const bool in_library = map && *map->l_name != '\0';
+    std::error_code missing;
+    return std::filesystem::canonical(in_library ? map->l_name : "/proc/self/exe", missing);
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> rapid_path()
@@ -42,10 +56,13 @@ std::filesystem::path lua_folder()
 {
     static const std::filesystem::path folder = [] {
         std::error_code ignored;
-        const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-        const std::filesystem::path installed = program.parent_path().parent_path() / "share/rapid/lua";
-        return std::filesystem::exists(installed / "host.lua", ignored) ? installed
-                                                                        : std::filesystem::path(RAPID_SOURCE_LUA_DIR);
+        // bin/rapid, or lib/x86_64-linux-gnu/librapid_host.so: share is beside one of the folders above.
+        for (auto above = own_file().parent_path(); above.has_relative_path(); above = above.parent_path()) {
+            const auto installed = above.parent_path() / "share/rapid/lua";
+            if (std::filesystem::exists(installed / "host.lua", ignored)) return installed;
+            if (above.filename() == "bin" || above.filename().string().starts_with("lib")) break;
+        }
+        return std::filesystem::path(RAPID_SOURCE_LUA_DIR);
     }();
     return folder;
 }
@@ -79,13 +96,18 @@ std::optional<Modules::Source> Modules::find(std::string_view name, bool node, s
     }
     std::replace(relative.begin(), relative.end(), '.', '/');
 
-    std::vector<std::filesystem::path> folders = {graph_.parent_path()};
+    const auto& [graph, on_read, further, text_of] = places_;
+    if (text_of)
+        if (std::optional<std::string> text = text_of(std::string(name)))
+            return Source{std::move(*text), std::string(name)};
+    std::vector<std::filesystem::path> folders = {graph.parent_path()};
+    folders.insert(folders.end(), further.begin(), further.end());
     for (const std::filesystem::path& extra : rapid_path()) folders.push_back(extra);
     if (node) folders.push_back(lua_folder() / "nodes");
     for (const std::filesystem::path& where : folders) {
         const std::filesystem::path path = where / (relative + ".lua");
-        if (std::error_code ignored; !graph_.empty() && std::filesystem::equivalent(path, graph_, ignored)) continue;
-        if (on_read_) on_read_(path);
+        if (std::error_code ignored; !graph.empty() && std::filesystem::equivalent(path, graph, ignored)) continue;
+        if (on_read) on_read(path);
         if (std::optional<std::string> text = read_module(path)) return Source{std::move(*text), shown(path)};
         looked_in += (looked_in.empty() ? "" : ", ") + shown(path);
     }

@@ -24,11 +24,13 @@ std::vector<std::filesystem::path> rapid_path();
 
 class Modules {
 public:
-    // on_read: told of each place where a file is looked for; may be empty.
-    Modules(std::filesystem::path graph, std::function<void(const std::filesystem::path& file)> on_read)
-        : graph_(std::move(graph)), on_read_(std::move(on_read))
-    {
-    }
+    struct Places {
+        std::filesystem::path graph;                                     // beside which they are
+        std::function<void(const std::filesystem::path& file)> on_read;  // told of each file looked for; may be empty
+        std::vector<std::filesystem::path> folders = {};                 // before those of RAPID_PATH
+        std::function<std::optional<std::string>(const std::string& name)> text = {};  // asked first; may be empty
+    };
+    explicit Modules(Places places) : places_(std::move(places)) {}
 
     struct Source {
         std::string text, name;  // name: as messages show it
@@ -37,8 +39,7 @@ public:
     std::optional<Source> find(std::string_view name, bool node, std::string& looked_in) const;
 
 private:
-    const std::filesystem::path graph_;
-    const std::function<void(const std::filesystem::path& file)> on_read_;
+    const Places places_;
 };
 
 // The names of Rapid's own nodes written in Lua.

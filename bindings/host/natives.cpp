@@ -31,9 +31,10 @@ int outside_kernels(State& state)
     return 0;
 }
 
-// native.print(text): to standard output, for a terminal.
+// native.print(text): to the program that opened the scene, or to standard output, for a terminal.
 int print_text(State& state)
 {
+    if (const auto& tell = state.host().options().on_print) return tell(text_at(state.lua(), 1)), 0;
     const std::string text = printable(text_at(state.lua(), 1));
     std::fwrite(text.data(), 1, text.size(), stdout);
     return 0;
@@ -153,6 +154,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"maker_names", native<maker_names>},
                                       {"defaults", native<push_defaults>},
                                       {"attribute", native<make_attribute>},
+                                      {"host", native<take_offer>},
                                       {"param", native<declare_parameter>},
                                       {"node", native<make_node>},
                                       {"define", native<define_node_type>},

@@ -11,31 +11,54 @@
 #include "bindings/host/kernel_analysis.h"
 #include "bindings/host/lua_text.h"
 #include "bindings/host/objects.h"
+#include "bindings/host/offers.h"
 #include "bindings/host/values.h"
 #include "runtime/graph/override.h"
 
 namespace rapid {
 
+// What the watchdog calls. An interruptible script is stopped, and the process goes on.
+Watchdog::Late ScriptHost::when_late(const SessionOptions& options)
+{
+    if (options.interruptible)
+        return [this, tell = options.on_timeout](const std::string& message) {
+            if (tell) tell(message);
+            interruption.request(message, Interruption::Late);
+            return Watchdog::GoOn;
+        };
+    return [tell = options.on_timeout](const std::string& message) {
+        if (tell) tell(message);
+        return Watchdog::EndProcess;
+    };
+}
+
 ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options)
-    : watchdog(options.script_timeout, options.on_timeout),
-      modules(file, options.on_read),
+    : watchdog(options.script_timeout, when_late(options)),
+      modules({file, options.on_read, options.paths, options.find_module}),
       file_(file),
       options_(std::move(options)),
       main_thread_(std::this_thread::get_id())
 {
+    if (options_.offers)
+        for (const NodeType& type : options_.offers->node_types) registry.add(type);
     main_ = std::make_unique<State>(*this, true);
     if (!file.empty()) run_graph();
 }
 
-void ScriptHost::run_graph()
+std::string ScriptHost::read_graph() const
 {
     if (options_.on_read) options_.on_read(file_);
     std::error_code ignored;
     if (std::filesystem::is_directory(file_, ignored))
         throw Error("this is a folder; give a graph file").at({file_.string(), 0});
-    const std::optional<std::string> text = read_lua_file(file_);
+    std::optional<std::string> text = read_lua_file(file_);
     if (!text) throw Error(std::strerror(errno)).at({file_.string(), 0});
-    text_ = *text;
+    return std::move(*text);
+}
+
+void ScriptHost::run_graph()
+{
+    text_ = options_.text ? *options_.text : read_graph();
     graph.file = shown(file_);
 
     {
@@ -84,7 +107,10 @@ void ScriptHost::apply_arguments()
             throw Error(fmt::format("--set {}={}: the graph has no parameter \"{}\"{}", name, value, name,
                                     did_you_mean(name, names)))
                 .at({graph.file, 0});
-        arguments.emplace(name, read_argument(value));
+        constexpr std::string_view offered = "host:";  // in a scene of a program: what rapid.host gives
+        arguments.emplace(name, options_.offers && value.starts_with(offered)
+                                    ? Value(options_.offers->object(value.substr(offered.size())))
+                                    : read_argument(value));
     }
     if (arguments.empty()) return;
     try {

@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "bindings/host/interruption.h"
 #include "bindings/host/kernel.h"
 #include "bindings/host/maker_cache.h"
 #include "bindings/host/modules.h"
@@ -29,12 +30,15 @@ public:
     Registry registry;
     std::vector<Session::Parameter> parameters;
     std::vector<std::string> warnings;
+    Interruption interruption;
     Watchdog watchdog;
     const Modules modules;
 
     const SessionOptions& options() const { return options_; }
     std::filesystem::path folder() const { return file_.parent_path(); }
     State& main() { return *main_; }
+    // The thread whose state is the main one.
+    void use_from_this_thread() { main_thread_ = std::this_thread::get_id(); }
     // The calling thread's state; made when it is first asked for. Error: the file behaves otherwise than in the main
     // state.
     State& local();
@@ -55,6 +59,8 @@ public:
     void load_shipped_nodes();
 
 private:
+    Watchdog::Late when_late(const SessionOptions& options);
+    std::string read_graph() const;
     void run_graph();
     void apply_arguments();
     void analyse_kernels();

@@ -18,6 +18,10 @@ const Registry& Session::registry() const { return host_->registry; }
 const std::vector<Session::Parameter>& Session::parameters() const { return host_->parameters; }
 std::vector<std::string> Session::take_warnings() { return std::exchange(host_->warnings, {}); }
 
+void Session::use_from_this_thread() { host_->use_from_this_thread(); }
+void Session::interrupt(const std::string& why) { host_->interruption.request(why, Interruption::Asked); }
+Interruption::Why Session::interrupted() const { return host_->interruption.why(); }
+
 Registry Session::all_node_types()
 {
     ScriptHost host({}, SessionOptions{});

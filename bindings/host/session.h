@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "bindings/host/interruption.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
 #include "runtime/report/study.h"
@@ -30,6 +31,8 @@ struct KernelOrder {
     std::string node;  // if not empty, of this node's kernel alone
 };
 
+struct Offers;  // offers.h
+
 struct SessionOptions {
     std::map<std::string, std::string> set;            // --set NAME=VALUE and NODE.PARAM=VALUE
     double script_timeout = 600;                       // s in scripts, for each frame and for loading
@@ -44,6 +47,18 @@ struct SessionOptions {
     std::function<void(const std::string& message)> on_timeout;
     // If set, told of each file before it is read, and of each place where a module or node was looked for.
     std::function<void(const std::filesystem::path& file)> on_read;
+    // The graph as text, in place of the file's, whose name it has then in messages.
+    std::optional<std::string> text;
+    // Where modules and nodes in Lua are looked for: what find_module gives first, then the graph's folder, then these.
+    std::vector<std::filesystem::path> paths;
+    std::function<std::optional<std::string>(const std::string& name)> find_module;
+    // If set, gives the path of a file that the scene names; empty: as usual.
+    std::function<std::string(const std::string& path)> find_file;
+    std::shared_ptr<const Offers> offers;  // of the program that embeds Rapid; may be null
+    // If set, what scripts print goes there, not to standard output.
+    std::function<void(const std::string& text)> on_print;
+    // A script that overruns, or that interrupt() stops, is an Error; else on_timeout ends the process.
+    bool interruptible = false;
     // If set, told of each trace that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
     std::function<void(const std::string& message)> on_trace_abort;
 };
@@ -66,6 +81,14 @@ public:
     };
     // In the order in which the file declares them.
     const std::vector<Parameter>& parameters() const;
+
+    // From now on this is the thread that uses the session, between two calls of which it may change.
+    void use_from_this_thread();
+
+    // Stops the scripts that run now, in all threads, and all that would run later: Error, with this text. From any
+    // thread; in an interruptible session.
+    void interrupt(const std::string& why);
+    Interruption::Why interrupted() const;
 
     // Of the file's makers, such as that a mesh has holes, since they were last taken: functions of the frame make
     // objects, too.

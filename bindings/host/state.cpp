@@ -53,7 +53,7 @@ void leave_out_current_folder(lua_State* L)
 
 }  // namespace
 
-State::State(ScriptHost& host, bool main) : host_(host), main_(main)
+State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host.interruption)
 {
     L_ = lua_newstate(allocate, this);
     if (!L_) throw std::bad_alloc();
@@ -91,7 +91,10 @@ std::exception_ptr State::set_up()
     return std::make_exception_ptr(status == LUA_ERRMEM ? Error("out of memory") : Error(lua_tostring(L_, -1)));
 }
 
-State::~State() { lua_close(L_); }
+State::~State()
+{
+    if (!is_broken_) lua_close(L_);
+}
 
 State& State::of(lua_State* L)
 {
@@ -159,10 +162,20 @@ void State::call(int arguments, int results)
     lua_pushcfunction(L_, describe_error);
     lua_insert(L_, base);
     const bool limited = std::exchange(limited_, true);
-    const int status = lua_pcall(L_, arguments, results, base);
+    const int status = protected_call(arguments, results, base);
     limited_ = limited;
     lua_remove(L_, base);
     if (status != 0) throw take_error(L_);
+}
+
+// The status of lua_pcall.
+int State::protected_call(int arguments, int results, int handler)
+{
+    Interruption::Call call(slot_, L_);
+    if (sigsetjmp(call.place, 0) == 0) return lua_pcall(L_, arguments, results, handler);
+    call.has_left();
+    is_broken_ = true;
+    host_.interruption.fail();
 }
 
 void State::push_entry(const char* name)

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "bindings/host/interruption.h"
 #include "runtime/error.h"
 
 struct lua_State;
@@ -65,6 +66,7 @@ public:
         ~InCoroutine() { state_.L_ = before_; }
 
     private:
+        const Interruption::InNative in_native_;
         State& state_;
         lua_State* before_;
     };
@@ -98,6 +100,7 @@ public:
 
 private:
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
+    int protected_call(int arguments, int results, int handler);
     // Fills a new state; the error, where there is one.
     std::exception_ptr set_up();
     void open_libraries();
@@ -107,7 +110,9 @@ private:
     bool main_;
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
-    bool limited_ = false;  // to options().script_memory, now
+    bool limited_ = false;    // to options().script_memory, now
+    bool is_broken_ = false;  // compiled code was left by a jump
+    Interruption::Slot slot_;
     lua_State* L_ = nullptr;
     int entries_ = 0;
     std::vector<int> kernel_references_;

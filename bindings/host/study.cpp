@@ -113,7 +113,7 @@ PointSet Session::study_reference(const Frame& frame, const Knobs& knobs) const
         if (!found.table())
             throw Error(fmt::format("it returns {}; it must return {{ P = {{{{x, y, z}}, ...}} }}", describe(found)));
         const Maker& maker = find_maker("points.from");
-        MakeContext context{host_->folder(), host_->warnings, false, {}};
+        MakeContext context{host_->folder(), host_->warnings, false, {}, {}};
         const Table arguments{{}, {}, {{"columns", found}}};
         return std::dynamic_pointer_cast<const PointsObject>(maker.make(maker, arguments, context))->points;
     } catch (const Error& error) {

@@ -18,8 +18,8 @@ std::chrono::steady_clock::duration duration_of(double seconds)
 
 }  // namespace
 
-Watchdog::Watchdog(double limit, std::function<void(const std::string& message)> on_timeout)
-    : limit_(limit), on_timeout_(std::move(on_timeout)), thread_([this] { watch(); })
+Watchdog::Watchdog(double limit, Late on_late)
+    : limit_(limit), on_late_(std::move(on_late)), thread_([this] { watch(); })
 {
 }
 
@@ -67,9 +67,11 @@ void Watchdog::watch()
         const std::string message =
             fmt::format("{}: the script runs for more than {:g} s; --script-timeout sets the limit",
                         fmt::join(running_, ", "), limit_);
-        if (on_timeout_) on_timeout_(message);
-        std::fprintf(stderr, "%s\n", message.c_str());
-        std::_Exit(1);
+        if (on_late_(message) == EndProcess) {
+            std::fprintf(stderr, "%s\n", message.c_str());
+            std::_Exit(1);
+        }
+        deadline_ = now + duration_of(limit_);
     }
 }
 

@@ -1,5 +1,5 @@
-// The watchdog of --script-timeout: it ends the run from a thread of its own when a script overruns, since compiled
-// traces can't be interrupted.
+// The watchdog of --script-timeout: a thread of its own that sees when a script overruns, which may be in compiled
+// code.
 #pragma once
 
 #include <chrono>
@@ -14,9 +14,12 @@ namespace rapid {
 
 class Watchdog {
 public:
-    // limit: s, that a section may take. on_timeout: called from the watchdog's thread; it must not return to the
-    // script. If it returns, or where there is none, the process ends.
-    Watchdog(double limit, std::function<void(const std::string& message)> on_timeout);
+    enum Then { EndProcess, GoOn };
+    using Late = std::function<Then(const std::string& message)>;
+
+    // limit: s, that a section may take. on_late: called from the watchdog's thread, again and again while the section
+    // lasts. Where it says so the process ends, with the message on standard error.
+    Watchdog(double limit, Late on_late);
     ~Watchdog();
 
     // A stretch of script whose time counts. Sections that run together have as much time as if each ran alone.
@@ -33,7 +36,7 @@ private:
     void watch();
 
     const double limit_;
-    const std::function<void(const std::string& message)> on_timeout_;
+    const Late on_late_;
     std::mutex mutex_;
     std::condition_variable wake_;
     std::vector<std::string> running_;

@@ -70,6 +70,8 @@ public:
 
     // From now on `input` is told what enters each node. Nodes are then evaluated one by one.
     void watch_inputs(InputHook input) { input_ = std::move(input); }
+    // From now on asked before each node of a frame; what it throws ends advance().
+    void ask_between_nodes(std::function<void()> ask) { ask_ = std::move(ask); }
 
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
@@ -114,6 +116,7 @@ private:
     ResultHook result_;
     InputHook input_;
     Stopwatch frame_clock_;  // since advance() began
+    std::function<void()> ask_;  // may be empty
     std::int64_t next_;
     int subframes_ = 1;  // of all simulations
     bool checks_declarations_ = false;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <mutex>
 
 namespace rapid {
 namespace {
@@ -13,6 +14,13 @@ std::vector<NodeType (*)()>& declarations()
 {
     static std::vector<NodeType (*)()> all;
     return all;
+}
+
+// One thread may load a plugin while another opens a scene.
+std::mutex& declarations_mutex()
+{
+    static std::mutex mutex;
+    return mutex;
 }
 
 }  // namespace
@@ -31,11 +39,19 @@ std::vector<std::string> NodeType::param_names() const
     return names;
 }
 
-NodeRegistration::NodeRegistration(NodeType (*declare)()) { declarations().push_back(declare); }
+NodeRegistration::NodeRegistration(NodeType (*declare)())
+{
+    const std::lock_guard lock(declarations_mutex());
+    declarations().push_back(declare);
+}
 
 Registry::Registry()
 {
-    for (NodeType (*declare)() : declarations()) add(declare());
+    const auto all = [] {
+        const std::lock_guard lock(declarations_mutex());
+        return declarations();
+    }();
+    for (NodeType (*declare)() : all) add(declare());
 }
 
 const NodeType& Registry::add(NodeType type)

@@ -109,6 +109,32 @@ TEST_CASE("what embeds Lua does not know the command", "[layers]")
     }
 }
 
+TEST_CASE("a program's face knows the scripts below it, and not the command", "[layers]")
+{
+    for (const auto& [folder, above] : std::map<std::string, std::set<std::string>>{
+             {"bindings/host", {"bindings/scene/", "bindings/c/", "include/"}},
+             {"bindings/scene", {"bindings/command/", "bindings/c/"}},
+             {"bindings/c", {"bindings/command/", "bindings/host/", "runtime/"}}}) {
+        const auto includes = includes_below(folder);
+        REQUIRE(includes.size() > 10);
+        for (const Include& include : includes)
+            for (const std::string& other : above) {
+                CAPTURE(include.file, include.included);
+                CHECK(include.included.rfind(other, 0) != 0);
+            }
+    }
+}
+
+TEST_CASE("what programs include is what is installed", "[layers]")
+{
+    const auto includes = includes_below("include/rapid");
+    REQUIRE(includes.size() > 10);
+    for (const Include& include : includes) {
+        CAPTURE(include.file, include.included);
+        CHECK((!include.ours || include.included == "offers.h"));
+    }
+}
+
 TEST_CASE("only shapes, formats and the search for neighbours know OpenVDB", "[layers]")
 {
     for (const Include& include : includes_below("runtime")) {

@@ -1,4 +1,4 @@
-#include "bindings/command/picture_scene.h"
+#include "bindings/host/picture_scene.h"
 
 #include <algorithm>
 #include <array>

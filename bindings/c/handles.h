@@ -1,0 +1,86 @@
+// Handles of the C interface: numbers in the form of pointers, so that one which is closed, of another type or made up
+// is told from one that is open. The tables of those that are open are all that the interface keeps.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace rapid {
+
+// Objects of one type. From any thread.
+//
+// A handle is, from its lowest bit: 1 (no pointer is odd), the type (3 bits), the place in the table (28), the number
+// of objects that have had the place (32), so that a place which is taken again has another handle.
+template <class T, unsigned type>
+class Handles {
+public:
+    // Null: it is of no open object.
+    static std::shared_ptr<T> get(const void* handle)
+    {
+        Table& all = table();
+        const std::lock_guard lock(all.mutex);
+        Entry* entry = all.find(handle);
+        return entry ? entry->object : nullptr;
+    }
+
+    static void* add(std::shared_ptr<T> object)
+    {
+        Table& all = table();
+        const std::lock_guard lock(all.mutex);
+        if (all.free_places.empty()) {
+            all.free_places.reserve(all.entries.size() + 1);  // so that remove() takes no memory
+            all.entries.emplace_back();
+            all.free_places.push_back(static_cast<std::uint32_t>(all.entries.size() - 1));
+        }
+        const std::uint32_t place = all.free_places.back();
+        all.free_places.pop_back();
+        Entry& entry = all.entries[place];
+        entry.object = std::move(object);
+        ++entry.use;
+        const std::uint64_t bits = std::uint64_t{entry.use} << 32 | std::uint64_t{place} << 4 | type << 1 | 1;
+        return reinterpret_cast<void*>(static_cast<std::uintptr_t>(bits));
+    }
+
+    // The object, which is no longer open; null where it was not.
+    static std::shared_ptr<T> remove(const void* handle)
+    {
+        Table& all = table();
+        const std::lock_guard lock(all.mutex);
+        Entry* entry = all.find(handle);
+        if (!entry) return nullptr;
+        all.free_places.push_back(static_cast<std::uint32_t>(entry - all.entries.data()));
+        return std::exchange(entry->object, nullptr);
+    }
+
+private:
+    static_assert(sizeof(void*) == 8);
+
+    struct Entry {
+        std::shared_ptr<T> object;
+        std::uint32_t use = 0;
+    };
+    struct Table {
+        std::mutex mutex;
+        std::vector<Entry> entries;
+        std::vector<std::uint32_t> free_places;
+
+        Entry* find(const void* handle)
+        {
+            const auto bits = static_cast<std::uint64_t>(reinterpret_cast<std::uintptr_t>(handle));
+            const std::size_t place = (bits & 0xffffffff) >> 4;
+            if ((bits & 15) != (type << 1 | 1) || place >= entries.size()) return nullptr;
+            Entry& entry = entries[place];
+            return entry.object && entry.use == bits >> 32 ? &entry : nullptr;
+        }
+    };
+    static Table& table()
+    {
+        static auto* one = new Table;  // never destroyed: programs close what they have open when they end
+        return *one;
+    }
+};
+
+}  // namespace rapid

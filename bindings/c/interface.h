@@ -1,0 +1,135 @@
+// What the functions of rapid.h share.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "bindings/c/handles.h"
+#include "bindings/scene/scene_error.h"
+#include "include/rapid/rapid.h"
+#include "include/rapid/scene.h"
+
+namespace rapid {
+
+// An open scene, with the texts that it has handed out.
+struct OpenScene {
+    Scene scene;
+    std::mutex mutex;  // of the texts
+    std::string node_types, warnings;
+};
+struct OpenFrame {
+    SceneFrame frame;
+    std::mutex mutex;  // of the texts
+    std::string names[4], statistics, picture;
+    std::map<std::string, SceneValue> details;
+};
+struct OpenError {
+    SceneError error;
+    std::string text;
+};
+
+struct OpenOffers {
+    std::mutex mutex;
+    std::vector<std::pair<std::string, HostObject>> objects;
+    std::vector<HostNode> nodes;
+    bool guard = false;
+};
+
+using Scenes = Handles<OpenScene, 1>;
+using Frames = Handles<OpenFrame, 2>;
+using Snapshots = Handles<SceneSnapshot, 3>;
+using Errors = Handles<OpenError, 4>;
+using AllOffers = Handles<OpenOffers, 5>;
+
+// Puts the error into *to, and returns its status.
+int tell(rapid_error** to, SceneError error) noexcept;
+
+// Runs f, the whole of a function.
+template <class F>
+int guarded(rapid_error** error, const F& f) noexcept
+{
+    if (error) *error = nullptr;
+    try {
+        f();
+        return RAPID_OK;
+    } catch (...) {
+        try {
+            return tell(error, caught_error(SceneError::Unexpected));
+        } catch (...) {
+            return RAPID_OUT_OF_MEMORY;  // not even its text can be held
+        }
+    }
+}
+
+// The value, or the error as a Refusal.
+template <class T>
+T take(Result<T> result)
+{
+    if (!result) throw Refusal{result.error()};
+    return std::move(*result);
+}
+
+// The open object of a handle. Refusal: there is none.
+template <class Table>
+auto open(const void* handle, const char* what)
+{
+    auto object = Table::get(handle);
+    if (!object)
+        refuse(handle ? fmt::format("the handle is of no open {}: it was closed, or is of something else", what)
+                      : fmt::format("the {} is NULL", what));
+    return object;
+}
+inline auto open_scene(rapid_scene* handle) { return open<Scenes>(handle, "scene"); }
+inline auto open_offers(rapid_offers* handle) { return open<AllOffers>(handle, "offers"); }
+inline auto open_frame(rapid_frame* handle) { return open<Frames>(handle, "frame"); }
+inline auto open_snapshot(rapid_snapshot* handle) { return open<Snapshots>(handle, "snapshot"); }
+
+template <class T>
+T& not_null(T* pointer, const char* name)
+{
+    if (!pointer) refuse(fmt::format("{} is NULL", name));
+    return *pointer;
+}
+
+// A struct of the caller's, whose size says how much he knows of it; the rest is zero.
+template <class T>
+T known_part(const T* given, const char* name)
+{
+    T known{};
+    const std::size_t size = not_null(given, name).size;
+    if (size < sizeof(std::size_t) || size > (std::size_t{1} << 16))
+        refuse(fmt::format("{0}->size = {1}; it must be sizeof(*{0})", name, size));
+    std::memcpy(static_cast<void*>(&known), given, std::min(size, sizeof known));
+    const char* const bytes = reinterpret_cast<const char*>(given);
+    if (size > sizeof known && std::any_of(bytes + sizeof known, bytes + size, [](char byte) { return byte != 0; }))
+        refuse(
+            fmt::format("{} asks for what this version of Rapid does not know; build the program for it, or install a "
+                        "newer one",
+                        name));
+    return known;
+}
+
+// Gives a struct of the caller as much as he knows of it. least: the size of the struct's first version.
+template <class T>
+void give(T* to, T from, const char* name)
+{
+    const std::size_t size = not_null(to, name).size;
+    if (size < sizeof(std::size_t) || size > (std::size_t{1} << 16))
+        refuse(fmt::format("{0}->size = {1}; it must be sizeof(*{0})", name, size));
+    from.size = size;
+    std::memcpy(static_cast<void*>(to), &from, std::min(size, sizeof(T)));
+    if (size > sizeof(T)) std::memset(reinterpret_cast<char*>(to) + sizeof(T), 0, size - sizeof(T));
+}
+
+// text: lives as long as the handle.
+rapid_value value_in_c(const SceneValue& value);
+SceneValue value_of(const rapid_value& value, const std::string& name);
+
+rapid_frame* new_frame(SceneFrame frame);
+
+}  // namespace rapid

@@ -1,0 +1,312 @@
+// Scenes in C.
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "bindings/c/interface.h"
+
+namespace rapid {
+namespace {
+
+std::vector<std::pair<std::string, SceneValue>> settings_of(const rapid_setting* settings, std::size_t count)
+{
+    std::vector<std::pair<std::string, SceneValue>> result;
+    if (count > 0) not_null(settings, "settings");
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::string name = &not_null(settings[i].name, "a setting's name");
+        result.emplace_back(name, value_of(settings[i].value, name));
+    }
+    return result;
+}
+
+SceneOptions options_of(const rapid_options* given)
+{
+    const rapid_options known = given ? known_part(given, "options") : rapid_options RAPID_OPTIONS;
+    SceneOptions options;
+    options.set = settings_of(known.settings, known.setting_count);
+    if (known.seed) options.seed = *known.seed;
+    if (known.path_count > 0) not_null(known.paths, "options->paths");
+    for (std::size_t i = 0; i < known.path_count; ++i)
+        options.paths.emplace_back(&not_null(known.paths[i], "one of options->paths"));
+    options.threads = known.threads;
+    if (known.script_seconds != 0) options.script_seconds = known.script_seconds;
+    if (known.script_memory != 0) options.script_memory = known.script_memory;
+    options.memory = known.memory;
+    options.estimate_errors = !known.no_errors;
+    options.keep_all = known.keep_all != 0;
+    if (known.offers) {
+        const auto offers = open_offers(known.offers);
+        const std::lock_guard lock(offers->mutex);
+        options.objects = offers->objects;
+        options.nodes = offers->nodes;
+        options.guard_callbacks = offers->guard;
+    }
+    void* const user = known.user;
+    if (known.log)
+        options.log = [log = known.log, user](LogLevel level, const std::string& text) {
+            log(user, static_cast<int>(level), text.c_str());
+        };
+    if (known.progress)
+        options.progress = [progress = known.progress, user](std::int64_t frame, std::int64_t last) {
+            return progress(user, frame, last) != 0;
+        };
+    if (known.find_module)
+        options.find_module = [find = known.find_module, user](const std::string& name) -> std::optional<std::string> {
+            const char* text = find(user, name.c_str());
+            return text ? std::optional<std::string>(text) : std::nullopt;
+        };
+    if (known.find_file)
+        options.find_file = [find = known.find_file, user](const std::string& path) {
+            const char* found = find(user, path.c_str());
+            return std::string(found ? found : "");
+        };
+    return options;
+}
+
+int open_into(rapid_scene** scene, rapid_error** error, const auto& open)
+{
+    return guarded(error, [&] {
+        not_null(scene, "scene") = nullptr;
+        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), {}, {}, {}});
+        *scene = static_cast<rapid_scene*>(Scenes::add(std::move(object)));
+    });
+}
+
+int advance_into(rapid_scene* scene, rapid_frame** frame, rapid_error** error, const auto& advance)
+{
+    return guarded(error, [&] {
+        if (frame) *frame = nullptr;
+        SceneFrame result = take(advance(open_scene(scene)->scene));
+        if (frame) *frame = new_frame(std::move(result));
+    });
+}
+
+std::string joined(const std::vector<std::string>& lines) { return fmt::format("{}", fmt::join(lines, "\n")); }
+
+}  // namespace
+
+rapid_value value_in_c(const SceneValue& value)
+{
+    rapid_value result{RAPID_NUMBER, {0, 0, 0}, nullptr};
+    if (const auto* number = std::get_if<double>(&value)) {
+        result.number[0] = *number;
+    } else if (const auto* boolean = std::get_if<bool>(&value)) {
+        result.type = RAPID_BOOLEAN;
+        result.number[0] = *boolean;
+    } else if (const auto* text = std::get_if<std::string>(&value)) {
+        result.type = RAPID_TEXT;
+        result.text = text->c_str();
+    } else {
+        result.type = RAPID_VEC3;
+        std::copy_n(std::get<std::array<double, 3>>(value).begin(), 3, result.number);
+    }
+    return result;
+}
+
+SceneValue value_of(const rapid_value& value, const std::string& name)
+{
+    switch (value.type) {
+        case RAPID_NUMBER:
+            return value.number[0];
+        case RAPID_BOOLEAN:
+            return value.number[0] != 0;
+        case RAPID_TEXT:
+            return std::string(&not_null(value.text, "the text of a value"));
+        case RAPID_VEC3:
+            return std::array<double, 3>{value.number[0], value.number[1], value.number[2]};
+        default:
+            refuse(fmt::format(
+                "{}: the type of its value is {}; it must be one of RAPID_NUMBER, RAPID_BOOLEAN, RAPID_TEXT, "
+                "RAPID_VEC3",
+                name, value.type));
+    }
+}
+
+}  // namespace rapid
+
+using namespace rapid;
+
+extern "C" {
+
+int rapid_scene_open(const char* file, const rapid_options* options, rapid_scene** scene, rapid_error** error)
+{
+    return open_into(scene, error, [&] { return Scene::open(&not_null(file, "file"), options_of(options)); });
+}
+
+int rapid_scene_open_text(const char* name, const char* text, const rapid_options* options, rapid_scene** scene,
+                          rapid_error** error)
+{
+    return open_into(scene, error, [&] {
+        return Scene::open_text(&not_null(name, "name"), &not_null(text, "text"), options_of(options));
+    });
+}
+
+int rapid_scene_close(rapid_scene* scene, rapid_error** error)
+{
+    return guarded(error, [&] {
+        open_scene(scene);
+        Scenes::remove(scene);
+    });
+}
+
+int rapid_scene_parameter_count(rapid_scene* scene, size_t* count, rapid_error** error)
+{
+    return guarded(error, [&] { not_null(count, "count") = open_scene(scene)->scene.parameters().size(); });
+}
+
+int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_scene(scene);
+        const auto& all = open->scene.parameters();
+        if (place >= all.size()) refuse(fmt::format("place = {}; the scene has {} parameters", place, all.size()));
+        const SceneParameter& found = all[place];
+        give(parameter, {0, found.name.c_str(), found.doc.c_str(), value_in_c(found.value), value_in_c(found.fallback)},
+             "parameter");
+    });
+}
+
+int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t count, rapid_error** error)
+{
+    return guarded(error, [&] { take(open_scene(scene)->scene.set(settings_of(settings, count))); });
+}
+
+int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error)
+{
+    return guarded(error, [&] { not_null(count, "count") = open_scene(scene)->scene.nodes().size(); });
+}
+
+int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_scene(scene);
+        const auto& all = open->scene.nodes();
+        if (place >= all.size()) refuse(fmt::format("place = {}; the scene has {} nodes", place, all.size()));
+        const SceneNode& found = all[place];
+        give(node, {0, found.name.c_str(), found.type.c_str(), found.file.c_str(), found.line}, "node");
+    });
+}
+
+int rapid_scene_node_types(rapid_scene* scene, const char** json, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(json, "json") = nullptr;
+        const auto open = open_scene(scene);
+        auto types = nlohmann::ordered_json::array();
+        for (const SceneNodeType& type : take(open->scene.node_types())) {
+            auto parameters = nlohmann::ordered_json::array();
+            for (const NodeParameter& parameter : type.parameters)
+                parameters.push_back({{"name", parameter.name},
+                                      {"type", parameter.type},
+                                      {"unit", parameter.unit},
+                                      {"doc", parameter.doc},
+                                      {"default", parameter.fallback},
+                                      {"required", parameter.required}});
+            types.push_back({{"name", type.name}, {"doc", type.doc}, {"parameters", std::move(parameters)}});
+        }
+        const std::lock_guard lock(open->mutex);
+        open->node_types = types.dump();
+        *json = open->node_types.c_str();
+    });
+}
+
+int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(text, "text") = nullptr;
+        const auto open = open_scene(scene);
+        const std::lock_guard lock(open->mutex);
+        open->warnings = joined(open->scene.warnings());
+        *text = open->warnings.c_str();
+    });
+}
+
+int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_scene(scene);
+        const auto given = open_offers(offers);
+        const std::lock_guard lock(given->mutex);
+        for (const auto& [name, object] : given->objects) take(open->scene.offer(name, object));
+    });
+}
+
+int rapid_scene_first_frame(rapid_scene* scene, int64_t* frame, rapid_error** error)
+{
+    return guarded(error, [&] { not_null(frame, "frame") = open_scene(scene)->scene.first_frame(); });
+}
+
+int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** error)
+{
+    return guarded(error, [&] { not_null(frame, "frame") = open_scene(scene)->scene.next_frame(); });
+}
+
+int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error)
+{
+    return advance_into(scene, frame, error, [](Scene& open) { return open.advance(); });
+}
+
+int rapid_scene_advance_to(rapid_scene* scene, int64_t number, rapid_frame** frame, rapid_error** error)
+{
+    return advance_into(scene, frame, error, [&](Scene& open) { return open.advance_to(number); });
+}
+
+int rapid_scene_restart(rapid_scene* scene, rapid_error** error)
+{
+    return guarded(error, [&] { take(open_scene(scene)->scene.restart()); });
+}
+
+int rapid_scene_cancel(rapid_scene* scene, rapid_error** error)
+{
+    return guarded(error, [&] { open_scene(scene)->scene.cancel(); });
+}
+
+int rapid_scene_save(rapid_scene* scene, rapid_snapshot** snapshot, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(snapshot, "snapshot") = nullptr;
+        auto saved = std::make_shared<SceneSnapshot>(take(open_scene(scene)->scene.save()));
+        *snapshot = static_cast<rapid_snapshot*>(Snapshots::add(std::move(saved)));
+    });
+}
+
+int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_error** error)
+{
+    return guarded(error, [&] { take(open_scene(scene)->scene.restore(*open_snapshot(snapshot))); });
+}
+
+int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error)
+{
+    return guarded(error, [&] { not_null(frame, "frame") = open_snapshot(snapshot)->frame(); });
+}
+
+int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error** error)
+{
+    return guarded(error, [&] { not_null(bytes, "bytes") = open_snapshot(snapshot)->size(); });
+}
+
+int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error)
+{
+    return guarded(error, [&] {
+        open_snapshot(snapshot);
+        Snapshots::remove(snapshot);
+    });
+}
+
+int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int height, const void** png, size_t* bytes,
+                        rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(png, "png") = nullptr;
+        not_null(bytes, "bytes") = 0;
+        const auto open = open_scene(scene);
+        const auto of = open_frame(frame);
+        std::string picture = take(open->scene.picture(of->frame, {width, height}));
+        const std::lock_guard lock(of->mutex);
+        of->picture = std::move(picture);
+        *png = of->picture.data();
+        *bytes = of->picture.size();
+    });
+}
+
+}  // extern "C"

@@ -1,0 +1,206 @@
+#include "bindings/host/interruption.h"
+
+#include <ucontext.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cinttypes>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <lua.hpp>
+#include <utility>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+// Ignored by default, so that one which comes late harms nobody.
+constexpr int our_signal = SIGURG;
+
+thread_local Interruption::Call* innermost = nullptr;
+
+struct sigaction handler_before = {};
+
+// Where code may be left by a jump: what LuaJIT compiled, and LuaJIT. Read before the first signal that asks for one.
+struct CodeRanges {
+    struct Range {
+        std::uintptr_t begin, end;
+    };
+    std::array<Range, 1024> ranges;
+    std::atomic<std::size_t> size = 0;
+
+    bool contains(std::uintptr_t place) const
+    {
+        const std::size_t count = size.load(std::memory_order_acquire);
+        for (std::size_t i = 0; i < count; ++i)
+            if (ranges[i].begin <= place && place < ranges[i].end) return true;
+        return false;
+    }
+
+    void read()
+    {
+        std::size_t count = 0;
+        std::ifstream maps("/proc/self/maps");
+        for (std::string line; std::getline(maps, line) && count < ranges.size();) {
+            Range range{};
+            char access[5] = {};
+            int name = 0;
+            if (std::sscanf(line.c_str(), "%" SCNxPTR "-%" SCNxPTR " %4s %*s %*s %*s %n", &range.begin, &range.end,
+                            access, &name) != 3 ||
+                access[2] != 'x')
+                continue;
+            const std::string file = line.substr(std::min<std::size_t>(name, line.size()));
+            if (file.empty() || file.find("/libluajit") != std::string::npos) ranges[count++] = range;
+        }
+        size.store(count, std::memory_order_release);
+    }
+};
+
+CodeRanges& code_ranges()
+{
+    static CodeRanges ranges;
+    return ranges;
+}
+std::mutex code_ranges_mutex;  // of those who read them anew
+
+}  // namespace
+
+Interruption::~Interruption()
+{
+    {
+        const std::lock_guard lock(mutex_);
+        stop_ = true;
+    }
+    stopping_.notify_all();
+    if (thread_.joinable()) thread_.join();
+}
+
+void Interruption::request(const std::string& message, Why why)
+{
+    const std::lock_guard lock(mutex_);
+    if (why_ != None || stop_) return;
+    message_ = message;
+    why_ = why;
+    thread_ = std::thread([this] { signal_until_over(); });
+}
+
+void Interruption::check() const
+{
+    if (why_ != None) fail();
+}
+
+void Interruption::fail() const { throw Error(message_); }
+
+Interruption::Slot::Slot(Interruption& owner) : owner_(owner)
+{
+    const std::lock_guard lock(owner_.mutex_);
+    owner_.slots_.insert(this);
+}
+
+Interruption::Slot::~Slot()
+{
+    const std::lock_guard lock(owner_.mutex_);
+    owner_.slots_.erase(this);
+}
+
+// The call is counted before it is asked whether there is an interruption, and the other way round in
+// signal_until_over(): one of them sees the other.
+Interruption::Call::Call(Slot& slot, lua_State* L) : slot_(slot), lua_(L), outer_(innermost)
+{
+    if (slot_.calls_.load() == 0) slot_.thread_ = pthread_self();
+    slot_.calls_.fetch_add(1);
+    innermost = this;
+    if (slot_.owner_.why_ == None) return;
+    end();
+    slot_.owner_.fail();
+}
+
+Interruption::Call::~Call() { end(); }
+
+// The lock: a signal is sent to threads that run, and this one may end.
+void Interruption::Call::end()
+{
+    innermost = outer_;
+    slot_.calls_.fetch_sub(1);
+    if (slot_.owner_.why_ != None) const std::lock_guard lock(slot_.owner_.mutex_);
+}
+
+void Interruption::Call::has_left() const
+{
+    sigset_t ours;
+    sigemptyset(&ours);
+    sigaddset(&ours, our_signal);
+    pthread_sigmask(SIG_UNBLOCK, &ours, nullptr);
+}
+
+Interruption::InNative::InNative() : call_(innermost)
+{
+    if (call_) call_->natives_.fetch_add(1, std::memory_order_relaxed);
+}
+
+Interruption::InNative::~InNative()
+{
+    if (call_) call_->natives_.fetch_sub(1, std::memory_order_relaxed);
+}
+
+void Interruption::install_handler()
+{
+    static const bool installed = [] {
+        struct sigaction action {};
+        action.sa_sigaction = on_signal;
+        action.sa_flags = SA_SIGINFO | SA_RESTART | SA_ONSTACK;
+        sigemptyset(&action.sa_mask);
+        return sigaction(our_signal, &action, &handler_before) == 0;
+    }();
+    static_cast<void>(installed);
+}
+
+void Interruption::on_signal(int signal, siginfo_t* info, void* context)
+{
+    Call* const call = innermost;
+    if (!call || call->slot_.owner_.why_ == None) {
+        if (handler_before.sa_flags & SA_SIGINFO)
+            handler_before.sa_sigaction(signal, info, context);
+        else if (handler_before.sa_handler != SIG_DFL && handler_before.sa_handler != SIG_IGN)
+            handler_before.sa_handler(signal);
+        return;
+    }
+    lua_sethook(call->lua_, stop, LUA_MASKCOUNT, 1);
+    if (!call->slot_.owner_.jumps_ || call->natives_.load(std::memory_order_relaxed) > 0) return;
+    const auto place = static_cast<const ucontext_t*>(context)->uc_mcontext.gregs[REG_RIP];
+    if (code_ranges().contains(static_cast<std::uintptr_t>(place))) siglongjmp(call->place, 1);
+}
+
+// The hook stays: what catches the error is stopped, too.
+void Interruption::stop(lua_State* L, lua_Debug*)
+{
+    if (innermost) luaL_error(L, "%s", innermost->slot_.owner_.message_.c_str());
+}
+
+void Interruption::signal_until_over()
+{
+    constexpr auto pause = std::chrono::milliseconds(5);
+    constexpr int passes_without_jump = 20;
+    install_handler();
+    std::unique_lock lock(mutex_);
+    for (int pass = 0; !stop_ && is_any_running(); ++pass) {
+        if (pass >= passes_without_jump) {
+            const std::lock_guard reading(code_ranges_mutex);
+            code_ranges().read();
+            jumps_ = true;
+        }
+        for (const Slot* slot : slots_)
+            if (slot->calls_ > 0) pthread_kill(slot->thread_, our_signal);
+        stopping_.wait_for(lock, pause);
+    }
+}
+
+bool Interruption::is_any_running() const
+{
+    return std::any_of(slots_.begin(), slots_.end(), [](const Slot* slot) { return slot->calls_ > 0; });
+}
+
+}  // namespace rapid

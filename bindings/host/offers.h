@@ -1,0 +1,33 @@
+// What a program that embeds Rapid offers to a scene: objects that it takes as rapid.host "NAME", and node types.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "runtime/error.h"
+#include "runtime/graph/node_type.h"
+
+namespace rapid {
+
+struct Offers {
+    std::map<std::string, ObjectPtr> objects;  // changes between frames alone, on the scene's thread
+    std::vector<NodeType> node_types;
+
+    // Error: there is none of this name, with those that there are.
+    const ObjectPtr& object(const std::string& name) const
+    {
+        if (const auto found = objects.find(name); found != objects.end()) return found->second;
+        std::vector<std::string> names;
+        for (const auto& entry : objects) names.push_back(entry.first);
+        if (names.empty())
+            throw Error(fmt::format("rapid.host \"{}\": the program that opened the scene offers no objects", name));
+        const std::string nearest = did_you_mean(name, names);
+        throw Error(fmt::format("rapid.host \"{}\": the program offers no such object{}", name,
+                                nearest.empty() ? fmt::format("; it offers {}", fmt::join(names, ", ")) : nearest));
+    }
+};
+
+}  // namespace rapid

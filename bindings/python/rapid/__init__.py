@@ -1,0 +1,358 @@
+"""Rapid in Python: scenes in Lua are opened, advanced, and read as NumPy arrays that share memory with the run.
+
+    import rapid
+
+    scene = rapid.Scene("first.lua", rate=5000)
+    for frame in scene.run(1, 96):
+        print(frame.number, frame["P"][:, 1].mean())
+
+docs/host.md is the guide. Errors are rapid.Error, with file, line and node of the scene.
+"""
+import ctypes
+import json
+import weakref
+from ctypes import byref, c_char_p, c_int64, c_size_t, c_uint64, c_void_p
+
+import numpy
+
+from ._library import (Column, Error, Find, FrameInfo, Log, Node, Options, Parameter, Progress, Value, call, from_value,
+                       get, library, sized, to_settings)
+
+from ._offers import Edit, Force, Held, Mesh, Points, Shape, from_numpy, make_offers
+
+__all__ = ["Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy"]
+__version__ = library.rapid_version().decode()
+
+_types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8]
+
+
+class _Handle:
+    """An open handle of the library, closed when nobody holds it, or by close()."""
+
+    def __init__(self, value, closer):
+        self.value = value
+        self._close = weakref.finalize(self, _Handle._end, closer, value)
+
+    @staticmethod
+    def _end(closer, value):
+        try:
+            call(closer, value)
+        except Error:  # it was closed by hand
+            pass
+
+    def close(self):
+        self._close()
+
+
+class _Released:
+    value = None
+
+
+class Picture:
+    """The bytes of a .png. A notebook shows it."""
+
+    def __init__(self, png):
+        self.png = png
+
+    def _repr_png_(self):
+        return self.png
+
+    def save(self, path):
+        with open(path, "wb") as file:
+            file.write(self.png)
+
+
+class Frame:
+    """A computed frame: frame["P"] is an array that shares memory with the run, and stays as it is while it is held."""
+
+    def __init__(self, handle, scene):
+        self._handle, self._scene = _Handle(handle, "frame_release"), scene
+        self._info = get("frame_get_info", handle, sized(FrameInfo))
+
+    number = property(lambda self: self._info.number)
+    time = property(lambda self: self._info.time, doc="s since the start")
+    fps = property(lambda self: self._info.fps)
+    outputs = property(lambda self: self._names(0))
+    columns = property(lambda self: self._names(1))
+    groups = property(lambda self: self._names(2))
+    warnings = property(lambda self: self._names(3))
+
+    def __len__(self):
+        return self._info.points
+
+    def __contains__(self, name):
+        return name in self.columns
+
+    def __iter__(self):
+        return iter(self.columns)
+
+    def __getitem__(self, name):
+        """The column: shape (points,) of numbers, (points, 3) of vec3, (points, 4) of quaternions. It can't be written:
+        the run shares it."""
+        if name not in self.columns:
+            try:
+                call("frame_column", self._handle.value, name.encode(), byref(sized(Column)))
+            except Error as error:
+                raise KeyError(error.message) from None
+        return self._array("frame_column", name)
+
+    def group(self, name):
+        """Of each point, whether it is in the group."""
+        return self._array("frame_group", name).view(numpy.bool_)
+
+    def detail(self, name):
+        """A value of the whole set: a number, or three."""
+        value = Value()
+        call("frame_detail", self._handle.value, name.encode(), byref(value))
+        return from_value(value)
+
+    def output(self, name):
+        """The same frame's other output."""
+        handle = c_void_p()
+        call("frame_output", self._handle.value, name.encode(), byref(handle))
+        return Frame(handle, self._scene)
+
+    @property
+    def statistics(self):
+        """What `rapid run --stats` writes of a frame."""
+        return json.loads(get("frame_statistics", self._handle.value, c_char_p()).value)
+
+    def write(self, path):
+        """Writes the points to a file of a format that Rapid knows, by the extension."""
+        call("frame_write", self._handle.value, str(path).encode())
+
+    def show(self, width=640, height=360):
+        """A picture, with the shapes of the scene."""
+        data, size = c_void_p(), c_size_t()
+        call("scene_picture", self._scene._handle.value, self._handle.value, width, height, byref(data), byref(size))
+        return Picture(ctypes.string_at(data.value, size.value))
+
+    def release(self):
+        """Gives the memory back before Python does. Arrays that are held keep theirs."""
+        self._handle = _Released
+
+    def _names(self, what):
+        lines = c_char_p()
+        call("frame_names", self._handle.value, what, byref(lines))
+        return lines.value.decode().split("\n") if lines.value else []
+
+    def _array(self, function, name):
+        column = sized(Column)
+        call(function, self._handle.value, name.encode(), byref(column))
+        dtype = numpy.dtype(_types[column.type])
+        shape = (column.count,) if column.components == 1 else (column.count, column.components)
+        if column.count == 0:
+            return numpy.empty(shape, dtype)
+        strides = (column.stride,) if column.components == 1 else (column.stride, dtype.itemsize)
+        array = numpy.asarray(_Memory(self._handle, column.data, shape, strides, dtype))
+        return array
+
+
+class _Memory:
+    """Memory of a frame as NumPy asks for it; arrays hold it, and it holds the frame."""
+
+    def __init__(self, frame, address, shape, strides, dtype):
+        self._frame = frame
+        self.__array_interface__ = {"version": 3, "data": (address, True), "shape": shape, "strides": strides,
+                                    "typestr": dtype.str}
+
+
+class Snapshot:
+    """All that the next frames depend on."""
+
+    def __init__(self, handle):
+        self._handle = _Handle(handle, "snapshot_release")
+
+    @property
+    def frame(self):
+        return get("snapshot_frame", self._handle.value, c_int64()).value
+
+    def __len__(self):
+        """Bytes."""
+        return get("snapshot_bytes", self._handle.value, c_uint64()).value
+
+
+class Scene:
+    """A scene of a file, or with text= of a text, whose messages name it so.
+
+    Parameters of the scene are given by name (rate=5000); those of nodes, and names that are no words of Python, in
+    set={"solve.substeps": 4}. paths: folders where modules are looked for. threads: 0 for all. script_seconds,
+    script_memory, memory: limits. errors=False estimates none. log(text) is told of what scripts print, and of warnings;
+    progress(frame, last) of each frame that advance_to() has done, and ends it where it returns False. module(name) gives
+    the text of a module, or None; find_file(path) the path of a file that the scene names, or None.
+
+    objects={"floor": rapid.Shape(...)}: what the scene takes as rapid.host "floor", and set={"collide2.shape": "host:floor"}
+    for a parameter of a node. nodes: further types of nodes, rapid.Force and rapid.Edit. guard_callbacks=True finds those
+    that write past the ends of their arrays.
+    """
+
+    def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=0, script_memory=0,
+                 memory=0, errors=True, keep_all=False, log=None, progress=None, module=None, find_file=None,
+                 objects=None, nodes=(), guard_callbacks=False, **parameters):
+        self._raised = None  # by a callback: raised where the call ends
+        self._held = {}      # texts that callbacks have returned
+        options = sized(Options)
+        settings = to_settings({**(set or {}), **parameters})
+        options.settings, options.setting_count = settings, len(settings)
+        if seed is not None:
+            options.seed = ctypes.pointer(c_uint64(seed))
+        folders = (c_char_p * len(paths))(*(str(path).encode() for path in paths))
+        options.paths, options.path_count = folders, len(paths)
+        options.threads, options.script_seconds, options.script_memory = threads, script_seconds, script_memory
+        options.memory, options.no_errors, options.keep_all = memory, not errors, keep_all
+        if log:
+            options.log = Log(self._guard(lambda _, level, line: log(line.decode()), None))
+        options.progress = Progress(self._guard(lambda _, frame, last: self._go_on(progress, frame, last), 0))
+        if module:
+            options.find_module = Find(self._guard(lambda _, name: self._hold("module", module(name.decode())), None))
+        if find_file:
+            options.find_file = Find(self._guard(lambda _, path: self._hold("file", find_file(path.decode())), None))
+        self._held_callbacks = Held(self._guard)
+        self._guard_callbacks = guard_callbacks
+        options.offers = make_offers(objects or {}, nodes, guard_callbacks, self._held_callbacks)
+        self._options = options  # the callbacks live as long as the scene
+        handle = c_void_p()
+        try:
+            if text is None:
+                self._call("scene_open", str(file).encode(), byref(options), byref(handle))
+            else:
+                self._call("scene_open_text", str(file).encode(), text.encode(), byref(options), byref(handle))
+        finally:
+            call("offers_release", options.offers)
+        self._handle = _Handle(handle, "scene_close")
+
+    @property
+    def parameters(self):
+        """By name: {"value", "default", "doc"}."""
+        result = {}
+        for place in range(get("scene_parameter_count", self._handle.value, c_size_t()).value):
+            one = sized(Parameter)
+            call("scene_parameter", self._handle.value, place, byref(one))
+            result[one.name.decode()] = {"value": from_value(one.value), "default": from_value(one.fallback),
+                                         "doc": (one.doc or b"").decode()}
+        return result
+
+    @property
+    def nodes(self):
+        """[{"name", "type", "file", "line"}], in the order in which the scene makes them."""
+        result = []
+        for place in range(get("scene_node_count", self._handle.value, c_size_t()).value):
+            one = sized(Node)
+            call("scene_node", self._handle.value, place, byref(one))
+            result.append({"name": one.name.decode(), "type": one.type.decode(), "file": one.file.decode(),
+                           "line": one.line})
+        return result
+
+    @property
+    def node_types(self):
+        """By name: what `rapid nodes` tells."""
+        types = json.loads(get("scene_node_types", self._handle.value, c_char_p()).value)
+        return {one.pop("name"): one for one in types}
+
+    @property
+    def warnings(self):
+        text = get("scene_warnings", self._handle.value, c_char_p()).value
+        return text.decode().split("\n") if text else []
+
+    def set(self, values=None, **parameters):
+        """Gives parameters values, as Scene() does, and goes back to the start."""
+        settings = to_settings({**(values or {}), **parameters})
+        self._call("scene_set", self._handle.value, settings, len(settings))
+
+    def offer(self, name, thing):
+        """Replaces or adds an object: functions of the frame that say rapid.host "NAME" get it from the next frame on, all
+        else when the scene is set()."""
+        offers = make_offers({name: thing}, (), self._guard_callbacks, self._held_callbacks)
+        try:
+            self._call("scene_offer", self._handle.value, offers)
+        finally:
+            call("offers_release", offers)
+
+    @property
+    def first_frame(self):
+        return get("scene_first_frame", self._handle.value, c_int64()).value
+
+    @property
+    def next_frame(self):
+        return get("scene_next_frame", self._handle.value, c_int64()).value
+
+    def advance(self):
+        """Computes the next frame."""
+        handle = c_void_p()
+        self._call("scene_advance", self._handle.value, byref(handle))
+        return Frame(handle, self)
+
+    def advance_to(self, frame):
+        """Computes frames up to this one, and returns it."""
+        handle = c_void_p()
+        self._call("scene_advance_to", self._handle.value, frame, byref(handle))
+        return Frame(handle, self)
+
+    def run(self, first, last):
+        """The frames from first to last, one by one; those before are computed too."""
+        if first > self.next_frame:
+            self.advance_to(first - 1).release()
+        elif first < self.next_frame:
+            self.restart()
+            if first > self.next_frame:
+                self.advance_to(first - 1).release()
+        while self.next_frame <= last:
+            yield self.advance()
+
+    def restart(self):
+        self._call("scene_restart", self._handle.value)
+
+    def save(self):
+        """A Snapshot, after at least one frame."""
+        handle = c_void_p()
+        self._call("scene_save", self._handle.value, byref(handle))
+        return Snapshot(handle)
+
+    def restore(self, snapshot):
+        self._call("scene_restore", self._handle.value, snapshot._handle.value)
+
+    def cancel(self):
+        """Ends the advance that is running in another thread, or else the next one."""
+        call("scene_cancel", self._handle.value)
+
+    def close(self):
+        """Gives its memory back before Python does. Frames and snapshots stay."""
+        self._handle.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def _call(self, name, *arguments):
+        self._raised = None
+        try:
+            call(name, *arguments)
+        except Error as error:
+            if self._raised:
+                raise self._raised from error
+            raise
+        if self._raised:
+            raise self._raised
+
+    def _guard(self, function, otherwise):
+        """A callback whose exception is kept until the call ends: none may pass through C."""
+        scene = weakref.ref(self)
+
+        def guarded(*arguments):
+            try:
+                return function(*arguments)
+            except BaseException as error:  # KeyboardInterrupt, too
+                scene()._raised = error
+                return otherwise
+        return guarded
+
+    def _go_on(self, progress, frame, last):
+        return int(self._raised is None and (progress is None or progress(frame, last) is not False))
+
+    def _hold(self, what, text):
+        if text is None:
+            return None
+        self._held[what] = ctypes.create_string_buffer(str(text).encode())
+        return ctypes.addressof(self._held[what])

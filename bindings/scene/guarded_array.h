@@ -1,0 +1,50 @@
+// The array that a callback of the program writes. With a guard it is longer than the callback knows, and what follows
+// must stay as it is.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+template <class T>
+class GuardedArray {
+public:
+    GuardedArray(std::size_t size, bool guarded, T fill = T())
+        : values_(size + (guarded ? guard : 0), fill), size_(size)
+    {
+        std::fill(values_.begin() + static_cast<std::ptrdiff_t>(size), values_.end(), pattern);
+    }
+
+    T* data() { return values_.data(); }
+    const T& operator[](std::size_t i) const { return values_[i]; }
+
+    // Error: a value that is not finite, or one past the end. who: "the program's shape "floor": the distance".
+    void check(const std::string& who, std::size_t components) const
+    {
+        for (std::size_t i = size_; i < values_.size(); ++i)
+            if (values_[i] != pattern)
+                throw Error(fmt::format("{} was written past the end of its array, at {} of {} points", who,
+                                        i / components, size_ / components));
+        for (std::size_t i = 0; i < size_; ++i)
+            if (!std::isfinite(static_cast<double>(values_[i])))
+                throw Error(fmt::format("{} is {} at place {}; it must be finite", who, static_cast<double>(values_[i]),
+                                        i / components));
+    }
+
+private:
+    static constexpr std::size_t guard = 64;
+    static constexpr T pattern = static_cast<T>(113);
+
+    std::vector<T> values_;
+    std::size_t size_;
+};
+
+}  // namespace rapid

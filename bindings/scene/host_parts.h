@@ -1,0 +1,13 @@
+// The kinds of objects that a program offers. Error: an array that is missing or wrong.
+#pragma once
+
+#include "include/rapid/offers.h"
+#include "runtime/object.h"
+
+namespace rapid {
+
+ObjectPtr make_shape(const std::string& name, const HostShape& shape, bool guarded);
+ObjectPtr make_mesh(const HostMesh& mesh);
+ObjectPtr make_points(const HostPoints& points);
+
+}  // namespace rapid

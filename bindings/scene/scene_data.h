@@ -1,0 +1,31 @@
+// What frames and snapshots hold.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "include/rapid/scene.h"
+#include "runtime/graph/evaluate.h"
+
+namespace rapid {
+
+struct SceneFrame::Data {
+    FrameResult result;
+    std::vector<std::string> warnings;
+    const void* scene = nullptr;  // whose plan it is of; not followed
+
+    // Columns that are uniform, written out. On first request, from any thread.
+    mutable std::mutex mutex;
+    mutable std::map<std::string, AnyColumn> expanded;  // by OUTPUT/NAME
+};
+
+struct SceneSnapshot::Data {
+    Snapshot snapshot;
+    std::vector<std::string> nodes;  // of the graph, by type and name
+};
+
+SceneValue value_of(const DetailValue& detail);
+
+}  // namespace rapid

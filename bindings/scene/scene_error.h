@@ -1,0 +1,36 @@
+// Exceptions as values.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "include/rapid/scene.h"
+#include "runtime/error.h"
+
+namespace rapid {
+
+SceneError wrong_call(std::string message);
+
+// Thrown inside of a call that is refused.
+struct Refusal {
+    SceneError error;
+};
+[[noreturn]] inline void refuse(std::string message) { throw Refusal{wrong_call(std::move(message))}; }
+
+// What is being handled, inside of a catch block. kind: of an Error.
+SceneError caught_error(SceneError::Kind kind);
+
+// Runs a callback of the program: what it throws becomes an Error that names it.
+template <class F, class... Arguments>
+auto call_program(const char* name, const F& f, Arguments&&... arguments)
+{
+    try {
+        return f(std::forward<Arguments>(arguments)...);
+    } catch (const std::exception& error) {
+        throw Error(std::string("the program's ") + name + " threw: " + error.what());
+    } catch (...) {
+        throw Error(std::string("the program's ") + name + " threw what is no std::exception");
+    }
+}
+
+}  // namespace rapid

@@ -1,0 +1,175 @@
+// Frames: columns as views of the memory that the point set has.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "bindings/scene/scene_data.h"
+#include "bindings/scene/scene_error.h"
+#include "runtime/io/format.h"
+#include "runtime/report/statistics.h"
+
+namespace rapid {
+namespace {
+
+template <class T>
+constexpr ColumnType type_in_header()
+{
+    if constexpr (std::is_same_v<T, float>) return ColumnType::Float;
+    if constexpr (std::is_same_v<T, Vec3f>) return ColumnType::Vec3;
+    if constexpr (std::is_same_v<T, std::int32_t>) return ColumnType::Int32;
+    if constexpr (std::is_same_v<T, std::int64_t>) return ColumnType::Int64;
+    if constexpr (std::is_same_v<T, Quatf>) return ColumnType::Quat;
+    if constexpr (std::is_same_v<T, std::uint8_t>) return ColumnType::UInt8;
+}
+
+template <class T>
+SceneColumn view_of(std::string_view name, const Column<T>& column)
+{
+    const Strided<T> values = column.read();
+    SceneColumn view;
+    view.name = name;
+    view.type = type_in_header<T>();
+    view.count = column.size();
+    view.components = std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1;
+    view.stride = values.stride * sizeof(T);
+    view.data = values.data;
+    return view;
+}
+
+SceneError no_such(const char* what, std::string_view name, const std::vector<std::string>& names)
+{
+    return wrong_call(fmt::format("the frame has no {} \"{}\"{}", what, name, did_you_mean(name, names)));
+}
+
+template <class Map>
+std::vector<std::string> keys_of(const Map& map)
+{
+    std::vector<std::string> keys;
+    for (const auto& entry : map) keys.push_back(entry.first);
+    return keys;
+}
+
+}  // namespace
+
+SceneFrame::SceneFrame(std::shared_ptr<const Data> data, std::string output)
+    : data_(std::move(data)), output_(std::move(output))
+{
+}
+
+std::int64_t SceneFrame::number() const { return data_->result.frame; }
+double SceneFrame::time() const { return data_->result.time.at(output_); }
+double SceneFrame::fps() const { return data_->result.fps.at(output_); }
+std::vector<std::string> SceneFrame::outputs() const { return keys_of(data_->result.outputs); }
+std::size_t SceneFrame::size() const { return data_->result.outputs.at(output_).size(); }
+std::vector<std::string> SceneFrame::columns() const { return data_->result.outputs.at(output_).column_names(); }
+std::vector<std::string> SceneFrame::groups() const { return data_->result.outputs.at(output_).group_names(); }
+std::vector<std::string> SceneFrame::warnings() const { return data_->warnings; }
+
+Result<SceneFrame> SceneFrame::output(std::string_view name) const
+{
+    const auto found = data_->result.outputs.find(std::string(name));
+    if (found == data_->result.outputs.end()) return no_such("output", name, outputs());
+    return SceneFrame(data_, found->first);
+}
+
+Result<SceneColumn> SceneFrame::column(std::string_view name) const
+{
+    const PointSet& points = data_->result.outputs.at(output_);
+    const auto found = points.columns().find(name);
+    if (found == points.columns().end()) return no_such("column", name, columns());
+    return std::visit([&](const auto& column) { return view_of(found->first, column); }, found->second);
+}
+
+Result<SceneColumn> SceneFrame::group(std::string_view name) const
+{
+    const PointSet& points = data_->result.outputs.at(output_);
+    const auto found = points.groups().find(name);
+    if (found == points.groups().end()) return no_such("group", name, groups());
+    return view_of(found->first, found->second);
+}
+
+Result<SceneColumn> SceneFrame::expanded(std::string_view name) const
+{
+    Result<SceneColumn> view = column(name);
+    if (!view || view->stride != 0 || view->count == 0) return view;
+    try {
+        const std::lock_guard lock(data_->mutex);
+        const auto [entry, fresh] = data_->expanded.try_emplace(fmt::format("{}/{}", output_, name));
+        if (fresh) try {
+                entry->second = *data_->result.outputs.at(output_).find(name);
+                std::visit([](auto& column) { column.write(); }, entry->second);
+            } catch (...) {
+                data_->expanded.erase(entry);
+                throw;
+            }
+        return std::visit([&](const auto& column) { return view_of(view->name, column); },
+                          std::as_const(entry->second));
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+SceneValue value_of(const DetailValue& detail)
+{
+    if (const auto* number = std::get_if<double>(&detail)) return *number;
+    const Vec3d& vector = std::get<Vec3d>(detail);
+    return std::array<double, 3>{vector[0], vector[1], vector[2]};
+}
+
+std::map<std::string, SceneValue> SceneFrame::details() const
+{
+    std::map<std::string, SceneValue> details;
+    for (const auto& [name, value] : data_->result.outputs.at(output_).details) details[name] = value_of(value);
+    return details;
+}
+
+FrameStatisticsSummary SceneFrame::statistics() const
+{
+    const FrameStatistics all = statistics_of(data_->result);
+    FrameStatisticsSummary summary;
+    summary.points = all.points;
+    summary.born = all.born;
+    summary.died = all.died;
+    summary.collisions = all.collisions;
+    summary.substeps = all.substeps;
+    if (all.error) {
+        summary.has_errors = true;
+        summary.error_p50 = all.error->p50;
+        summary.error_p95 = all.error->p95;
+        summary.error_max = all.error->max;
+    }
+    summary.penetration_max = all.penetration_max;
+    summary.constraint_residual_max = all.constraint_residual_max;
+    summary.seconds = all.seconds.total();
+    summary.script_seconds = all.seconds.script;
+    summary.solve_seconds = all.seconds.solve;
+    return summary;
+}
+
+std::string SceneFrame::statistics_json() const
+{
+    const std::string line = json_line(statistics_of(data_->result), true);
+    const std::size_t begin = line.find('{'), end = line.rfind('}');
+    return line.substr(begin, end - begin + 1);
+}
+
+Result<Done> SceneFrame::write(const std::string& path) const
+{
+    try {
+        FrameInfo info;
+        info.number = static_cast<int>(number());
+        info.time = time();
+        info.fps = fps();
+        write_points(path, data_->result.outputs.at(output_), info);
+        return Done();
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+SceneSnapshot::SceneSnapshot(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+std::int64_t SceneSnapshot::frame() const { return data_->snapshot.frame; }
+std::size_t SceneSnapshot::size() const { return data_->snapshot.size(); }
+
+}  // namespace rapid

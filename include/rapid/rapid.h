@@ -1,0 +1,306 @@
+/* Rapid in C, and by it in any other language: scenes in Lua are opened, advanced, and read without a copy.
+ * docs/host.md is the guide; rapid/scene.h is the same in C++, and says more of each function.
+ *
+ * Every function returns RAPID_OK or what went wrong, and says more in *error where `error` is not NULL: an object of
+ * its own, which the caller frees with rapid_error_free(). Behind RAPID_OK *error is NULL. No exception leaves a
+ * function, and none ends the program.
+ *
+ * Handles (rapid_scene and the other types without a definition) are numbers in the form of pointers: one that is NULL,
+ * closed already, or of another type is an error, RAPID_WRONG_CALL. Texts are UTF-8 and end with a zero; those that are
+ * returned belong to the handle they come from.
+ *
+ * Structs of options begin with their size, which tells a newer library what an older program knows:
+ *
+ *     rapid_options options = RAPID_OPTIONS;
+ *
+ * Threads: a scene is used by one thread at a time, which may be another at each call; a second call meanwhile is
+ * RAPID_BUSY. rapid_scene_cancel() is for any thread at any time, as are all functions of frames and snapshots.
+ * Different scenes run at once on different threads. Callbacks are called on the thread of the call that they are part
+ * of, unless it says otherwise, and may not call the scene.
+ */
+#ifndef RAPID_RAPID_H
+#define RAPID_RAPID_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+#define RAPID_VERSION_MAJOR 0
+#define RAPID_VERSION_MINOR 1
+
+enum {
+    RAPID_OK = 0,
+    RAPID_WRONG_CALL = 1,   /* an argument, or a call at the wrong time; nothing has changed */
+    RAPID_WRONG_SCENE = 2,  /* found before the first frame: Lua, a node's argument, a missing file */
+    RAPID_FAILED_FRAME = 3, /* found while a frame was computed */
+    RAPID_CANCELLED = 4,
+    RAPID_TOO_LONG = 5, /* a script took longer than script_seconds */
+    RAPID_OUT_OF_MEMORY = 6,
+    RAPID_BUSY = 7,      /* the scene is in another call */
+    RAPID_UNEXPECTED = 8 /* of a library or a callback; the text is all that is known */
+};
+
+typedef struct rapid_error rapid_error;
+typedef struct rapid_scene rapid_scene;
+typedef struct rapid_frame rapid_frame;
+typedef struct rapid_snapshot rapid_snapshot;
+typedef struct rapid_offers rapid_offers;
+
+/* "0.1.0", of the library. */
+const char* rapid_version(void);
+
+/* ---- Errors. All take NULL, for which they return "" and 0. */
+
+const char* rapid_error_message(const rapid_error* error); /* what is wrong; what would be right */
+const char* rapid_error_file(const rapid_error* error);    /* "" where there is none */
+int rapid_error_line(const rapid_error* error);            /* from 1; 0 where there is none */
+const char* rapid_error_node(const rapid_error* error);    /* "" where there is none */
+const char* rapid_error_text(const rapid_error* error);    /* FILE:LINE: node "NAME": MESSAGE, of what is known */
+int rapid_error_status(const rapid_error* error);
+void rapid_error_free(rapid_error* error);
+
+/* ---- Values. */
+
+enum { RAPID_NUMBER = 0, RAPID_BOOLEAN = 1, RAPID_TEXT = 2, RAPID_VEC3 = 3 };
+
+typedef struct rapid_value {
+    int type;
+    double number[3]; /* RAPID_NUMBER: [0]; RAPID_BOOLEAN: [0] is 0 or 1; RAPID_VEC3: x y z */
+    const char* text; /* RAPID_TEXT */
+} rapid_value;
+
+enum { RAPID_FLOAT = 0, RAPID_FLOAT_VEC3 = 1, RAPID_INT32 = 2, RAPID_INT64 = 3, RAPID_QUAT = 4, RAPID_UINT8 = 5 };
+
+/* Values of one attribute, or members of a group (RAPID_UINT8, 0 or 1): shape [count][components], packed within a
+ * point; the value of point i is at (const char*)data + i * stride. stride is 0 where all points share one value. */
+typedef struct rapid_column {
+    size_t size; /* sizeof(rapid_column), set by the caller */
+    const char* name;
+    int type;
+    size_t count;
+    size_t components;
+    size_t stride; /* bytes */
+    const void* data;
+} rapid_column;
+
+/* ---- Scenes. */
+
+enum { RAPID_LOG_PRINT = 0, RAPID_LOG_WARNING = 1 };
+
+typedef struct rapid_setting {
+    const char* name; /* of a rapid.param, or NODE.PARAM: "solve.substeps" */
+    rapid_value value;
+} rapid_setting;
+
+typedef struct rapid_options {
+    size_t size;                   /* sizeof(rapid_options) */
+    const rapid_setting* settings; /* as --set gives them */
+    size_t setting_count;
+    const uint64_t* seed;     /* replaces the seed of each create; NULL: theirs */
+    const char* const* paths; /* folders where modules and nodes in Lua are looked for */
+    size_t path_count;
+    int threads;            /* 0: those of the caller's TBB arena; n: n of its own */
+    double script_seconds;  /* that scripts may take for each frame and for opening; 0: 600 */
+    uint64_t script_memory; /* bytes of Lua memory for each thread; 0: 1 GiB */
+    uint64_t memory;        /* bytes that the process may have in all; 0: what is free */
+    int no_errors;          /* 1: no errors are estimated */
+    int keep_all;           /* 1: no attribute is left out */
+    void* user;             /* is handed to the callbacks */
+    /* What scripts print, and what Rapid warns of. */
+    void (*log)(void* user, int level, const char* text);
+    /* Of each frame that rapid_scene_advance_to() has done; 0 ends it with RAPID_CANCELLED. */
+    int (*progress)(void* user, int64_t frame, int64_t last);
+    /* The text of a module or node in Lua of this name, which stays valid until the next call; NULL: it is looked for
+     * in the folders. */
+    const char* (*find_module)(void* user, const char* name);
+    /* The path of a file that the scene names, which stays valid until the next call; NULL: as usual. */
+    const char* (*find_file)(void* user, const char* path);
+    rapid_offers* offers; /* what the program offers the scene; NULL: nothing */
+} rapid_options;
+
+#define RAPID_OPTIONS                                                                                       \
+    {                                                                                                       \
+        sizeof(rapid_options), NULL, 0, NULL, NULL, 0, 0, 0, 0, 0, 0, 0, NULL, NULL, NULL, NULL, NULL, NULL \
+    }
+
+/* Opens the scene of a file, or of a text with a name for messages. options: NULL for the usual ones. *scene is NULL
+ * where it fails. */
+int rapid_scene_open(const char* file, const rapid_options* options, rapid_scene** scene, rapid_error** error);
+int rapid_scene_open_text(const char* name, const char* text, const rapid_options* options, rapid_scene** scene,
+                          rapid_error** error);
+/* Frames and snapshots of the scene stay. A call that is running goes on to its end. */
+int rapid_scene_close(rapid_scene* scene, rapid_error** error);
+
+typedef struct rapid_parameter {
+    size_t size; /* sizeof(rapid_parameter), set by the caller */
+    const char* name;
+    const char* doc;
+    rapid_value value;    /* that the scene was run with */
+    rapid_value fallback; /* its default, of the same type */
+} rapid_parameter;
+
+int rapid_scene_parameter_count(rapid_scene* scene, size_t* count, rapid_error** error);
+/* Its texts stay valid until the scene is set or closed. */
+int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error);
+/* Gives parameters values, runs the scene's file again, and goes to the start. After an error the scene is as it was.
+ */
+int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t count, rapid_error** error);
+
+typedef struct rapid_node {
+    size_t size; /* sizeof(rapid_node), set by the caller */
+    const char* name;
+    const char* type;
+    const char* file; /* where the scene makes it */
+    int line;
+} rapid_node;
+
+int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error);
+int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error);
+/* All types that a scene of this program may use, as JSON: [{"name", "doc", "parameters": [{"name", "type", "unit",
+ * "doc", "default", "required"}]}]. Belongs to the scene, until the next call of this function. */
+int rapid_scene_node_types(rapid_scene* scene, const char** json, rapid_error** error);
+/* Of opening, a line each. Belongs to the scene, until the next call of this function. */
+int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** error);
+
+int rapid_scene_first_frame(rapid_scene* scene, int64_t* frame, rapid_error** error);
+int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** error);
+/* Computes the next frame, or all up to one. *frame is to be released; frame == NULL: nobody reads it. After an error
+ * the scene has no next frame until it is restarted, restored or set. */
+int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error);
+int rapid_scene_advance_to(rapid_scene* scene, int64_t number, rapid_frame** frame, rapid_error** error);
+int rapid_scene_restart(rapid_scene* scene, rapid_error** error);
+/* Ends the advance that is running, or else the next one, with RAPID_CANCELLED. From any thread. */
+int rapid_scene_cancel(rapid_scene* scene, rapid_error** error);
+
+/* All that the next frames depend on, after at least one frame. The frames behind a restore are to the bit those behind
+ * the save. */
+int rapid_scene_save(rapid_scene* scene, rapid_snapshot** snapshot, rapid_error** error);
+int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_error** error);
+int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error);
+int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error** error);
+int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
+
+/* ---- What a program offers to its scenes: meshes, points and shapes, which they take as rapid.host "NAME" (a setting
+ * "host:NAME" gives one to a parameter of a node), and nodes. Arrays are copied.
+ *
+ * Callbacks get arrays of points, never one point, from any thread, several at once, unless it says otherwise. They
+ * return 0; anything else is an error of the frame. What they write must be finite. */
+
+int rapid_offers_new(rapid_offers** offers, rapid_error** error);
+/* 1: callbacks that write past the ends of their arrays are found. Before anything is offered. */
+int rapid_offers_guard(rapid_offers* offers, int guard, rapid_error** error);
+/* positions: shape [count][3], m; triangles: shape [triangle_count][3], counter-clockwise seen from outside. */
+int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* positions, size_t count,
+                      const int32_t* triangles, size_t triangle_count, rapid_error** error);
+/* Of each column name, type, data and stride (0: packed) are read; one is "P". */
+int rapid_offers_points(rapid_offers* offers, const char* name, size_t count, const rapid_column* columns,
+                        size_t column_count, rapid_error** error);
+
+typedef struct rapid_shape {
+    size_t size;               /* sizeof(rapid_shape) */
+    double lower[3], upper[3]; /* bounds, m, which may be infinite: outside of them the distance is above 0 */
+    /* phi, shape [n]: the distance of each place of P, shape [n][3], negative inside. gradient, shape [n][3] or NULL:
+     * that of the distance, out of the shape; zero where there is none. */
+    int (*distance)(void* user, size_t n, const double* P, double* phi, double* gradient);
+    void* user;
+    double slope_bound;      /* the largest slope of the distance; 0: 1, it is exact */
+    double smallest_feature; /* m: a wall thinner than this may be missed; 0: the shape is convex */
+} rapid_shape;
+int rapid_offers_shape(rapid_offers* offers, const char* name, const rapid_shape* shape, rapid_error** error);
+
+typedef struct rapid_call {
+    size_t count;              /* of points */
+    double frame, time, dt;    /* number; s since the start; s, of a frame */
+    const double* parameters;  /* in the order of the declaration; a vector is three numbers */
+    const double* P;           /* of a force: shape [count][3], m, in the middle of a sub-step */
+    const double* v;           /* m/s */
+    double* acceleration;      /* m/s^2, zero at first */
+    const float* const* reads; /* columns, in the order of the declaration, shape [count][1 or 3] */
+    float* const* writes;      /* of an edit, with their values */
+    uint8_t* kill;             /* of an edit: 0 at first; points with 1 are taken away behind it */
+} rapid_call;
+
+typedef struct rapid_node_parameter {
+    const char* name;
+    const char* doc;
+    const char* unit;     /* may be NULL */
+    rapid_value fallback; /* RAPID_NUMBER or RAPID_VEC3 */
+} rapid_node_parameter;
+
+typedef struct rapid_node_column {
+    const char* name;
+    int type; /* RAPID_FLOAT or RAPID_FLOAT_VEC3 */
+} rapid_node_column;
+
+enum { RAPID_FORCE = 0, RAPID_EDIT = 1 };
+
+typedef struct rapid_node_type {
+    size_t size; /* sizeof(rapid_node_type) */
+    const char* name;
+    const char* doc;
+    int kind; /* RAPID_FORCE: for chunks of points, in each sub-step; RAPID_EDIT: once a frame, on the scene's thread */
+    const rapid_node_parameter* parameters;
+    size_t parameter_count;
+    const rapid_node_column* reads;
+    size_t read_count;
+    const rapid_node_column* writes; /* of an edit; P and v by these names */
+    size_t write_count;
+    int (*call)(void* user, const rapid_call* call);
+    void* user;
+} rapid_node_type;
+int rapid_offers_node(rapid_offers* offers, const rapid_node_type* type, rapid_error** error);
+
+/* Replaces or adds the objects of `offers`: functions of the frame that say rapid.host "NAME" get them from the next
+ * frame on, all else when the scene's file is run again (rapid_scene_set()). */
+int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** error);
+int rapid_offers_release(rapid_offers* offers, rapid_error** error);
+
+/* ---- Frames. What they point to stays valid and unchanged until the frame is released, whatever becomes of the scene.
+ */
+
+/* The other outputs of the frame are frames of their own, which share its memory. *frame is to be released. */
+int rapid_frame_output(rapid_frame* of, const char* name, rapid_frame** frame, rapid_error** error);
+/* Names, a line each: what = RAPID_OUTPUTS, RAPID_COLUMNS, RAPID_GROUPS, RAPID_WARNINGS. */
+enum { RAPID_OUTPUTS = 0, RAPID_COLUMNS = 1, RAPID_GROUPS = 2, RAPID_WARNINGS = 3 };
+int rapid_frame_names(rapid_frame* frame, int what, const char** lines, rapid_error** error);
+
+typedef struct rapid_frame_info {
+    size_t size; /* sizeof(rapid_frame_info), set by the caller */
+    int64_t number;
+    double time; /* s since the start */
+    double fps;
+    size_t points;
+    uint64_t born, died, collisions;
+    int substeps;
+    int has_errors;                         /* whether the next three were estimated */
+    double error_p50, error_p95, error_max; /* m, of positions, accumulated since birth */
+    double penetration_max;                 /* m */
+    double constraint_residual_max;         /* m */
+    double seconds, script_seconds, solve_seconds;
+} rapid_frame_info;
+int rapid_frame_get_info(rapid_frame* frame, rapid_frame_info* info, rapid_error** error);
+/* The frame's object in the file of `rapid run --stats`. */
+int rapid_frame_statistics(rapid_frame* frame, const char** json, rapid_error** error);
+
+int rapid_frame_column(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
+int rapid_frame_group(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
+/* As rapid_frame_column(); values that all points share are written out once, so that stride is never 0. */
+int rapid_frame_expanded(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
+/* A value of the whole set (:detail). */
+int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value, rapid_error** error);
+
+/* Writes a file of a format that Rapid knows, by the extension. */
+int rapid_frame_write(rapid_frame* frame, const char* path, rapid_error** error);
+/* A picture with the shapes of its scene, as the bytes of a .png; they belong to the frame until the next picture. */
+int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int height, const void** png, size_t* bytes,
+                        rapid_error** error);
+int rapid_frame_release(rapid_frame* frame, rapid_error** error);
+
+#if defined(__cplusplus)
+}
+#endif
+
+#endif

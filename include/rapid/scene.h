@@ -1,0 +1,315 @@
+// Rapid inside a program: a scene in Lua is opened, given parameters, advanced frame by frame, and its points are read
+// without a copy. `docs/host.md` is the guide; rapid/rapid.h is the same for C and for other languages.
+//
+//   auto scene = rapid::Scene::open("first.lua");
+//   if (!scene) return fail(scene.error().text());
+//   auto frame = scene->advance_to(48);
+//   if (!frame) return fail(frame.error().text());
+//   auto P = frame->column("P");
+//
+// Errors are values: no function of this header throws, but Result::value() on request. Lengths are in metres, times in
+// seconds, angles in degrees, as in scenes.
+//
+// Threads. A Scene is used by one thread at a time, which may be another one at each call; a second call meanwhile,
+// from another thread or from a callback, is an error and changes nothing. cancel() is for any thread at any time.
+// Different scenes run at once on different threads. Frames and snapshots are read, copied and released from any
+// thread.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "offers.h"
+
+namespace rapid {
+
+// What went wrong. The numbers are those of the statuses of rapid.h.
+struct SceneError {
+    enum Kind {
+        WrongCall = 1,    // an argument, or a call at the wrong time; nothing has changed
+        WrongScene = 2,   // found before the first frame: Lua, a node's argument, a missing file
+        FailedFrame = 3,  // found while a frame was computed
+        Cancelled = 4,    // by cancel(), or by the progress callback
+        TooLong = 5,      // a script took longer than SceneOptions::script_seconds
+        OutOfMemory = 6,  // the system's, or a limit's
+        Busy = 7,         // the scene is in another call
+        Unexpected = 8,   // of a library or a callback; the text is all that is known
+    };
+    Kind kind = Unexpected;
+    std::string message;  // what is wrong; what would be right
+    std::string file;     // of the scene or module, as it was named; empty where there is none
+    int line = 0;         // from 1; 0 where there is none
+    std::string node;     // of the scene; empty where there is none
+
+    // FILE:LINE: node "NAME": MESSAGE, of what is known.
+    std::string text() const;
+};
+
+// A T or the error that kept it from being made.
+template <class T>
+class [[nodiscard]] Result {
+public:
+    Result(T value) : held_(std::move(value)) {}
+    Result(SceneError error) : held_(std::move(error)) {}
+
+    explicit operator bool() const { return held_.index() == 0; }
+    // Only where there is a value.
+    T& operator*() { return std::get<0>(held_); }
+    const T& operator*() const { return std::get<0>(held_); }
+    T* operator->() { return &std::get<0>(held_); }
+    const T* operator->() const { return &std::get<0>(held_); }
+    // Only where there is none.
+    const SceneError& error() const { return std::get<1>(held_); }
+
+    // For programs that prefer exceptions: std::runtime_error with the error's text where there is no value.
+    T& value()
+    {
+        if (!*this) throw std::runtime_error(error().text());
+        return **this;
+    }
+
+private:
+    std::variant<T, SceneError> held_;
+};
+
+// The value of what is only done.
+struct Done {};
+
+// A number, a boolean, a text or three numbers.
+using SceneValue = std::variant<double, bool, std::string, std::array<double, 3>>;
+
+// A rapid.param of the scene.
+struct SceneParameter {
+    std::string name, doc;
+    SceneValue value;     // that the scene was run with
+    SceneValue fallback;  // its default, of the same type
+};
+
+// A parameter of a node type.
+struct NodeParameter {
+    std::string name;
+    std::string type;  // as `rapid nodes` shows it: "number", "vec3", "shape"
+    std::string unit;  // "m/s", "deg"; empty: none
+    std::string doc;
+    std::string fallback;  // the default as Lua text; empty: none
+    bool required = false;
+};
+
+// A type of node that scenes may use.
+struct SceneNodeType {
+    std::string name, doc;
+    std::vector<NodeParameter> parameters;
+};
+
+// A node of the scene.
+struct SceneNode {
+    std::string name, type;
+    std::string file;  // where the scene makes it
+    int line = 0;
+};
+
+// The values of one attribute, or the members of a group (UInt8, 0 or 1 a point). The memory belongs to the frame: it
+// stays valid and unchanged until the frame and all its copies are released.
+//
+// Layout: shape [count, components], packed within a point; the points are `stride` bytes apart. stride is 0 where all
+// points share one value, which is held once; SceneFrame::expanded() gives those an array, too.
+struct SceneColumn {
+    std::string_view name;  // belongs to the frame
+    ColumnType type = ColumnType::Float;
+    std::size_t count = 0;       // of points
+    std::size_t components = 1;  // 3 of Vec3 (x y z), 4 of Quat (x y z w)
+    std::size_t stride = 0;      // bytes
+    const void* data = nullptr;  // of float, std::int32_t, std::int64_t or std::uint8_t
+
+    // The values of point i. T: the type of a component, which must agree with `type`.
+    template <class T>
+    const T* at(std::size_t i) const
+    {
+        return reinterpret_cast<const T*>(static_cast<const char*>(data) + i * stride);
+    }
+};
+
+// The figures of a frame, those of `rapid run --stats` that are asked for most; statistics_json() has all of them.
+struct FrameStatisticsSummary {
+    std::uint64_t points = 0;  // of all outputs
+    std::uint64_t born = 0, died = 0, collisions = 0;
+    int substeps = 0;
+    bool has_errors = false;                                    // whether the next three were estimated
+    double error_p50 = 0, error_p95 = 0, error_max = 0;         // m, of positions, accumulated since birth
+    double penetration_max = 0;                                 // m
+    double constraint_residual_max = 0;                         // m
+    double seconds = 0, script_seconds = 0, solve_seconds = 0;  // wall time: in all, and of parts
+};
+
+// A computed frame: columns by name, shared with the scene until the scene writes them (copy-on-write). Copying one
+// copies a pointer. A frame that is released before the next advance() spares the scene a copy of the columns that it
+// changes.
+class SceneFrame {
+public:
+    std::int64_t number() const;
+    double time() const;  // s since the start of the output's simulation
+    double fps() const;
+
+    // The names of the scene's outputs, in order; a scene that returns one node has "main". All functions below speak
+    // of the output that is chosen: at first "main", or the first one where there is no "main".
+    std::vector<std::string> outputs() const;
+    // The same frame with another output chosen. Error: no such output, with the nearest name.
+    Result<SceneFrame> output(std::string_view name) const;
+
+    std::size_t size() const;                  // of points
+    std::vector<std::string> columns() const;  // names, in order
+    std::vector<std::string> groups() const;
+    // Takes some nanoseconds, however many points there are. Error: no such column, with the nearest name.
+    Result<SceneColumn> column(std::string_view name) const;
+    Result<SceneColumn> group(std::string_view name) const;
+    // As column(), where `stride` is never 0: values that all points share are written out once, and kept by the frame.
+    Result<SceneColumn> expanded(std::string_view name) const;
+
+    // Values of the whole set by name (:detail): a number or three.
+    std::map<std::string, SceneValue> details() const;
+
+    FrameStatisticsSummary statistics() const;
+    // The frame's object in the file of `rapid run --stats` (docs/cli.md), as one line of JSON.
+    std::string statistics_json() const;
+    // What nodes warned of in this frame.
+    std::vector<std::string> warnings() const;
+
+    // Writes the points to a file of a format that Rapid knows, by the extension; missing folders are made. The file
+    // has its name when it is complete. Error: an unknown extension, with the known ones; the system's.
+    Result<Done> write(const std::string& path) const;
+
+private:
+    friend class Scene;
+    struct Data;
+    explicit SceneFrame(std::shared_ptr<const Data> data, std::string output);
+    std::shared_ptr<const Data> data_;
+    std::string output_;
+};
+
+// All that the next frames depend on. Copying one copies a pointer; its columns are shared with the scene until either
+// side writes them.
+class SceneSnapshot {
+public:
+    std::int64_t frame() const;  // the last one computed before it was taken
+    std::size_t size() const;    // bytes
+
+private:
+    friend class Scene;
+    struct Data;
+    explicit SceneSnapshot(std::shared_ptr<const Data> data);
+    std::shared_ptr<const Data> data_;
+};
+
+enum class LogLevel { Print = 0, Warning = 1 };  // what scripts print, and what Rapid warns of
+
+struct SceneOptions {
+    // Values of the scene's parameters by name, and of its nodes' by NODE.PARAM ("solve.substeps"), as --set gives
+    // them.
+    std::vector<std::pair<std::string, SceneValue>> set;
+    std::optional<std::uint64_t> seed;  // replaces the seed of each create
+
+    // Folders where modules and nodes in Lua are looked for, after that of the scene and before those of RAPID_PATH.
+    std::vector<std::string> paths;
+    // Asked first for the text of a module or of a node in Lua; nothing: it is looked for in the folders.
+    std::function<std::optional<std::string>(const std::string& name)> find_module;
+    // Asked for the path of each file that the scene reads or writes, as the scene names it; an empty path: as usual,
+    // relative to the scene's folder.
+    std::function<std::string(const std::string& path)> find_file;
+
+    // What the scene takes as rapid.host "NAME"; and by the setting "host:NAME" for a node's parameter, as
+    // {"collide2.shape", "host:floor"}.
+    std::vector<std::pair<std::string, HostObject>> objects;
+    // Types of nodes besides Rapid's own.
+    std::vector<HostNode> nodes;
+    // Finds callbacks that write past the ends of their arrays.
+    bool guard_callbacks = false;
+
+    // Told of what scripts print and of warnings; where it is not set, prints are dropped and warnings are in
+    // Scene::warnings() and SceneFrame::warnings() alone. On the thread of the call.
+    std::function<void(LogLevel level, const std::string& text)> log;
+    // Told by advance_to() of each frame that is done; false ends it with the error Cancelled behind that frame.
+    std::function<bool(std::int64_t frame, std::int64_t last)> progress;
+
+    int threads = 0;                                   // 0: those of the caller's TBB arena; n: n of its own
+    double script_seconds = 600;                       // that scripts may take, for each frame and for opening
+    std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory, for each thread
+    std::uint64_t memory = 0;                          // bytes that the process may have in all; 0: what is free
+    bool estimate_errors = true;                       // false: none in the statistics; frames may take half the time
+    bool keep_all = false;                             // leaves no attribute out, to the same bits
+};
+
+struct PictureSize {
+    int width = 640, height = 360;  // pixels, from 1 to 16384
+};
+
+class Scene {
+public:
+    // Opens the scene of a file, or of a text with a name for messages; modules are looked for beside the file, or in
+    // the folder of the name. Runs the file, plans the run, computes no frame. Errors: WrongScene; TooLong;
+    // OutOfMemory.
+    static Result<Scene> open(const std::string& file, SceneOptions options = {});
+    static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
+
+    Scene(Scene&&) noexcept;
+    Scene& operator=(Scene&&) noexcept;
+    ~Scene();  // not while a call of another thread is running
+
+    // In the order in which the scene declares them.
+    const std::vector<SceneParameter>& parameters() const;
+    const std::vector<SceneNode>& nodes() const;
+    // All types that a scene of this program may use: native ones, Rapid's own in Lua, the scene's, in order of name.
+    Result<std::vector<SceneNodeType>> node_types();
+    // Of opening: meshes with holes, nodes that no output reaches.
+    const std::vector<std::string>& warnings() const;
+
+    // Gives parameters values, as SceneOptions::set, runs the scene's file again, and goes to the start. After an error
+    // the scene is as it was.
+    Result<Done> set(const std::vector<std::pair<std::string, SceneValue>>& values);
+    Result<Done> set(const std::string& name, SceneValue value);
+
+    // Replaces or adds an object. Functions of the frame that say rapid.host "NAME" get it from the next frame on, all
+    // else when the scene's file is run again (set()). Error: WrongCall, with the array that is missing or wrong.
+    Result<Done> offer(const std::string& name, const HostObject& object);
+
+    std::int64_t first_frame() const;
+    std::int64_t next_frame() const;  // that advance() computes
+
+    // Computes the next frame. After an error the scene has no next frame until restart(), restore() or set().
+    Result<SceneFrame> advance();
+    // Computes frames up to this one and returns it. Error: WrongCall where the frame has been computed already.
+    Result<SceneFrame> advance_to(std::int64_t frame);
+
+    // Goes back to the start.
+    Result<Done> restart();
+    // After at least one frame. The frames behind restore() are to the bit those behind save(), in this scene or in
+    // another one of the same file. Error of restore(): a snapshot of another graph.
+    Result<SceneSnapshot> save();
+    Result<Done> restore(const SceneSnapshot& snapshot);
+
+    // Ends the advance that is running, or else the next one, with the error Cancelled: at the next node of the graph,
+    // or at once in a script. From any thread. restart(), restore() and set() forget it.
+    void cancel();
+
+    // The bytes of a .png of a frame of this scene, with its shapes; the camera is fitted to the frame unless the scene
+    // has one.
+    Result<std::string> picture(const SceneFrame& frame, PictureSize size = {});
+
+private:
+    struct Impl;
+    explicit Scene(std::unique_ptr<Impl> impl);
+    static Result<Scene> open_any(const std::string& file, std::optional<std::string> text, SceneOptions options);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace rapid

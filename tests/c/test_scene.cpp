@@ -1,0 +1,258 @@
+// The C interface: what wrong calls get, and that handles know what they are of. What scenes do is in test_scene.cpp.
+#include <atomic>
+#include <cstring>
+#include <thread>
+
+#include "include/rapid/rapid.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Catch::Contains;
+
+const char* const fall = R"(
+local rapid = require "rapid"
+local height = rapid.param("height", 10, "m, of the drop")
+return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.25, center = vec3(0, height, 0) } }
+  :attribute { heat = 2 } :gravity {} :solve {}
+)";
+
+rapid_scene* opened(const char* text = fall)
+{
+    rapid_scene* scene = nullptr;
+    REQUIRE(rapid_scene_open_text("fall.lua", text, nullptr, &scene, nullptr) == RAPID_OK);
+    return scene;
+}
+
+// The status of a call, with the message of its error.
+class Told {
+public:
+    Told() = default;
+    Told(const Told&) = delete;
+    Told& operator=(const Told&) = delete;
+    ~Told() { rapid_error_free(error_); }
+    operator rapid_error**() { return &error_; }
+    std::string message() const { return rapid_error_message(error_); }
+    const rapid_error* get() const { return error_; }
+
+private:
+    rapid_error* error_ = nullptr;
+};
+
+template <class T>
+T sized()
+{
+    T result{};
+    result.size = sizeof(T);
+    return result;
+}
+
+}  // namespace
+
+TEST_CASE("a scene runs in C", "[c]")
+{
+    rapid_scene* scene = opened();
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance_to(scene, 25, &frame, nullptr) == RAPID_OK);
+    auto info = sized<rapid_frame_info>();
+    REQUIRE(rapid_frame_get_info(frame, &info, nullptr) == RAPID_OK);
+    CHECK(info.number == 25);
+    CHECK(info.points == 16);
+    CHECK(info.time == Approx(1));
+    auto P = sized<rapid_column>(), heat = sized<rapid_column>();
+    REQUIRE(rapid_frame_column(frame, "P", &P, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_column(frame, "heat", &heat, nullptr) == RAPID_OK);
+    CHECK(P.type == RAPID_FLOAT_VEC3);
+    CHECK(std::string(P.name) == "P");
+    CHECK(heat.stride == 0);
+    CHECK(*static_cast<const float*>(heat.data) == 2);
+    for (size_t i = 0; i < P.count; ++i)
+        CHECK(reinterpret_cast<const float*>(static_cast<const char*>(P.data) + i * P.stride)[1] ==
+              Approx(10 - 9.81 / 2).epsilon(1e-5));
+    REQUIRE(rapid_frame_expanded(frame, "heat", &heat, nullptr) == RAPID_OK);
+    CHECK(heat.stride == 4);
+    const char* names = nullptr;
+    REQUIRE(rapid_frame_names(frame, RAPID_COLUMNS, &names, nullptr) == RAPID_OK);
+    CHECK(std::string(names) == "P\nheat\nid\nv");
+    REQUIRE(rapid_scene_close(scene, nullptr) == RAPID_OK);
+    CHECK(static_cast<const float*>(P.data)[1] == Approx(10 - 9.81 / 2).epsilon(1e-5));
+    REQUIRE(rapid_frame_release(frame, nullptr) == RAPID_OK);
+}
+
+TEST_CASE("an error in C has message, file, line and node", "[c]")
+{
+    rapid_scene* scene = nullptr;
+    Told told;
+    CHECK(rapid_scene_open_text("wrong.lua",
+                                "local rapid = require 'rapid'\nreturn rapid.create {} :wind { speed = 1 }", nullptr,
+                                &scene, told) == RAPID_WRONG_SCENE);
+    CHECK(scene == nullptr);
+    CHECK(std::string(rapid_error_file(told.get())) == "wrong.lua");
+    CHECK(rapid_error_line(told.get()) == 2);
+    CHECK(rapid_error_status(told.get()) == RAPID_WRONG_SCENE);
+    CHECK_THAT(rapid_error_text(told.get()), Contains("wrong.lua:2: "));
+    CHECK(std::string(rapid_error_message(nullptr)).empty());
+    CHECK(rapid_error_line(nullptr) == 0);
+    rapid_error_free(nullptr);
+}
+
+TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]")
+{
+    rapid_scene* scene = opened();
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
+    auto column = sized<rapid_column>();
+    int64_t number = 0;
+    {
+        Told told;
+        CHECK(rapid_scene_advance(nullptr, nullptr, told) == RAPID_WRONG_CALL);
+        CHECK(told.message() == "the scene is NULL");
+    }
+    {
+        Told told;
+        CHECK(rapid_frame_column(reinterpret_cast<rapid_frame*>(scene), "P", &column, told) == RAPID_WRONG_CALL);
+        CHECK_THAT(told.message(), Contains("no open frame"));
+    }
+    int local = 0;
+    CHECK(rapid_scene_next_frame(reinterpret_cast<rapid_scene*>(&local), &number, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_frame_release(frame, nullptr) == RAPID_OK);
+    CHECK(rapid_frame_release(frame, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_frame_column(frame, "P", &column, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_scene_close(scene, nullptr) == RAPID_OK);
+    CHECK(rapid_scene_close(scene, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_scene_advance(scene, nullptr, nullptr) == RAPID_WRONG_CALL);
+    rapid_scene* next = opened();  // may have the place of the one before
+    CHECK(next != scene);
+    CHECK(rapid_scene_next_frame(scene, &number, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_scene_next_frame(next, &number, nullptr) == RAPID_OK);
+    CHECK(rapid_scene_close(next, nullptr) == RAPID_OK);
+}
+
+TEST_CASE("arguments that are NULL are errors by name", "[c]")
+{
+    rapid_scene* scene = opened();
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
+    const auto refused = [](const char* name, const auto& call) {
+        Told told;
+        CHECK(call(told) == RAPID_WRONG_CALL);
+        CHECK_THAT(told.message(), Contains(std::string(name) + " is NULL"));
+    };
+    rapid_scene* other = nullptr;
+    refused("file", [&](rapid_error** e) { return rapid_scene_open(nullptr, nullptr, &other, e); });
+    refused("text", [&](rapid_error** e) { return rapid_scene_open_text("a", nullptr, nullptr, &other, e); });
+    refused("scene", [&](rapid_error** e) { return rapid_scene_open_text("a", fall, nullptr, nullptr, e); });
+    refused("count", [&](rapid_error** e) { return rapid_scene_parameter_count(scene, nullptr, e); });
+    refused("parameter", [&](rapid_error** e) { return rapid_scene_parameter(scene, 0, nullptr, e); });
+    refused("settings", [&](rapid_error** e) { return rapid_scene_set(scene, nullptr, 1, e); });
+    refused("node", [&](rapid_error** e) { return rapid_scene_node(scene, 0, nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_scene_node_types(scene, nullptr, e); });
+    refused("frame", [&](rapid_error** e) { return rapid_scene_next_frame(scene, nullptr, e); });
+    refused("snapshot", [&](rapid_error** e) { return rapid_scene_save(scene, nullptr, e); });
+    refused("snapshot", [&](rapid_error** e) { return rapid_scene_restore(scene, nullptr, e); });
+    refused("name", [&](rapid_error** e) {
+        auto column = sized<rapid_column>();
+        return rapid_frame_column(frame, nullptr, &column, e);
+    });
+    refused("column", [&](rapid_error** e) { return rapid_frame_column(frame, "P", nullptr, e); });
+    refused("info", [&](rapid_error** e) { return rapid_frame_get_info(frame, nullptr, e); });
+    refused("path", [&](rapid_error** e) { return rapid_frame_write(frame, nullptr, e); });
+    CHECK(rapid_scene_set(scene, nullptr, 0, nullptr) == RAPID_OK);
+    rapid_frame_release(frame, nullptr);
+    rapid_scene_close(scene, nullptr);
+}
+
+TEST_CASE("a struct's size says what the program knows", "[c]")
+{
+    rapid_scene* scene = nullptr;
+    rapid_options options = RAPID_OPTIONS;
+    Told told;
+    options.size = 0;
+    CHECK(rapid_scene_open_text("a.lua", fall, &options, &scene, told) == RAPID_WRONG_CALL);
+    CHECK_THAT(told.message(), Contains("sizeof(*options)"));
+
+    // Of a program that knows no more than the settings.
+    const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
+    options = RAPID_OPTIONS;
+    options.size = offsetof(rapid_options, seed);
+    options.settings = &height;
+    options.setting_count = 1;
+    options.threads = -5;  // beyond
+    REQUIRE(rapid_scene_open_text("a.lua", fall, &options, &scene, nullptr) == RAPID_OK);
+    auto parameter = sized<rapid_parameter>();
+    REQUIRE(rapid_scene_parameter(scene, 0, &parameter, nullptr) == RAPID_OK);
+    CHECK(parameter.value.number[0] == 3);
+    CHECK(parameter.fallback.number[0] == 10);
+    parameter = {};
+    parameter.size = offsetof(rapid_parameter, value);
+    REQUIRE(rapid_scene_parameter(scene, 0, &parameter, nullptr) == RAPID_OK);
+    CHECK(std::string(parameter.doc) == "m, of the drop");
+    CHECK(parameter.value.number[0] == 0);
+    parameter.size = 3;
+    CHECK(rapid_scene_parameter(scene, 0, &parameter, nullptr) == RAPID_WRONG_CALL);
+    rapid_scene_close(scene, nullptr);
+
+    // Of a newer program: what is not asked for is zero.
+    struct Newer {
+        rapid_options known;
+        void* more;
+    } newer{RAPID_OPTIONS, nullptr};
+    newer.known.size = sizeof newer;
+    REQUIRE(rapid_scene_open_text("a.lua", fall, &newer.known, &scene, nullptr) == RAPID_OK);
+    rapid_scene_close(scene, nullptr);
+    newer.more = &newer;
+    CHECK(rapid_scene_open_text("a.lua", fall, &newer.known, &scene, nullptr) == RAPID_WRONG_CALL);
+}
+
+TEST_CASE("callbacks get the program's pointer, and may not call the scene", "[c]")
+{
+    struct Seen {
+        rapid_scene* scene = nullptr;
+        int frames = 0, status = -1;
+    } seen;
+    rapid_options options = RAPID_OPTIONS;
+    options.user = &seen;
+    options.progress = [](void* user, int64_t frame, int64_t) {
+        auto& s = *static_cast<Seen*>(user);
+        ++s.frames;
+        s.status = rapid_scene_advance(s.scene, nullptr, nullptr);
+        return frame < 3 ? 1 : 0;
+    };
+    REQUIRE(rapid_scene_open_text("a.lua", fall, &options, &seen.scene, nullptr) == RAPID_OK);
+    CHECK(rapid_scene_advance_to(seen.scene, 9, nullptr, nullptr) == RAPID_CANCELLED);
+    CHECK(seen.frames == 3);
+    CHECK(seen.status == RAPID_BUSY);
+    // Closed within its own call, it goes on to the end of that.
+    options.progress = [](void* user, int64_t, int64_t) {
+        auto& s = *static_cast<Seen*>(user);
+        s.status = rapid_scene_close(s.scene, nullptr);
+        return 1;
+    };
+    rapid_scene_close(seen.scene, nullptr);
+    REQUIRE(rapid_scene_open_text("a.lua", fall, &options, &seen.scene, nullptr) == RAPID_OK);
+    CHECK(rapid_scene_advance_to(seen.scene, 1, nullptr, nullptr) == RAPID_OK);
+    CHECK(seen.status == RAPID_OK);
+    CHECK(rapid_scene_advance(seen.scene, nullptr, nullptr) == RAPID_WRONG_CALL);
+}
+
+TEST_CASE("handles are opened and closed on several threads", "[c][threads]")
+{
+    std::atomic<int> wrong = 0;
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t)
+        threads.emplace_back([&] {
+            for (int i = 0; i < 3; ++i) {
+                rapid_scene* scene = nullptr;
+                rapid_frame* frame = nullptr;
+                if (rapid_scene_open_text("fall.lua", fall, nullptr, &scene, nullptr) != RAPID_OK) ++wrong;
+                if (rapid_scene_advance_to(scene, 3, &frame, nullptr) != RAPID_OK) ++wrong;
+                if (rapid_scene_close(scene, nullptr) != RAPID_OK) ++wrong;
+                if (rapid_frame_release(frame, nullptr) != RAPID_OK) ++wrong;
+            }
+        });
+    for (std::thread& thread : threads) thread.join();
+    CHECK(wrong == 0);
+}
+
+}  // namespace rapid

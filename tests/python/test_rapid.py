@@ -1,0 +1,314 @@
+"""The Python module: arrays that share memory, errors, callbacks. What scenes do is tested in tests/host/test_scene.cpp.
+
+    RAPID_LIBRARY=build/test/lib/librapid_host.so python3 tests/python/test_rapid.py
+"""
+import gc
+import math
+import os
+import pathlib
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+sys.dont_write_bytecode = True  # in the folder of the sources
+root = pathlib.Path(__file__).resolve().parents[2]
+if "RAPID_INSTALLED" not in os.environ:
+    sys.path.insert(0, str(root / "bindings/python"))
+
+import numpy  # noqa: E402
+
+import rapid  # noqa: E402
+
+FALL = """
+local rapid = require "rapid"
+local height = rapid.param("height", 10, "m, of the drop")
+return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.25, center = vec3(0, height, 0) } }
+  :attribute { heat = 2 }
+  :points("warm", function(p) if p.index % 2 == 0 then p:join "even" end end)
+  :detail("total", function(points) points.detail.count = #points end)
+  :gravity {} :solve {}
+"""
+
+
+def fall(**options):
+    return rapid.Scene("fall.lua", text=FALL, **options)
+
+
+class Frames(unittest.TestCase):
+    def test_a_column_is_an_array_of_the_values(self):
+        frame = fall().advance_to(25)
+        self.assertEqual((frame.number, len(frame), frame.time), (25, 16, 1.0))
+        self.assertEqual((frame["P"].shape, frame["P"].dtype), ((16, 3), numpy.float32))
+        numpy.testing.assert_allclose(frame["P"][:, 1], 10 - 9.81 / 2, rtol=1e-6)
+        self.assertEqual(sorted(frame["id"]), list(range(16)))
+        self.assertEqual(frame["id"].dtype, numpy.int64)
+
+    def test_an_array_shares_memory_and_is_not_written(self):
+        frame = fall().advance_to(3)
+        first, second = frame["P"], frame["P"]
+        self.assertTrue(numpy.shares_memory(first, second))
+        self.assertFalse(first.flags.writeable)
+        with self.assertRaises(ValueError):
+            first[0] = 0
+
+    def test_an_array_outlives_its_frame_and_its_scene_unchanged(self):
+        scene = fall()
+        frame = scene.advance_to(3)
+        P = frame["P"]
+        before = P.copy()
+        frame.release()
+        del frame
+        scene.advance_to(9)
+        scene.close()
+        del scene
+        gc.collect()
+        numpy.testing.assert_array_equal(P, before)
+
+    def test_a_value_that_all_share_is_one_number(self):
+        heat = fall().advance()["heat"]
+        self.assertEqual((heat.shape, heat.strides), ((16,), (0,)))
+        self.assertTrue((heat == 2).all())
+
+    def test_groups_and_details(self):
+        frame = fall().advance_to(2)
+        self.assertEqual(frame.groups, ["even"])
+        self.assertEqual(frame.group("even").sum(), 8)
+        self.assertEqual(frame.group("even").dtype, bool)
+        self.assertEqual(frame.detail("count"), 16)
+
+    def test_a_name_that_is_not_there(self):
+        frame = fall().advance()
+        self.assertIn("P", frame)
+        with self.assertRaisesRegex(KeyError, "did you mean .*heat"):
+            frame["hea"]
+        with self.assertRaisesRegex(rapid.Error, "no group"):
+            frame.group("odd")
+
+    def test_a_frame_that_was_released(self):
+        frame = fall().advance()
+        frame.release()
+        with self.assertRaisesRegex(rapid.Error, "NULL"):
+            frame.columns
+
+    def test_statistics_are_a_dictionary(self):
+        statistics = fall().advance_to(4).statistics
+        self.assertEqual(statistics["points"], 16)
+        self.assertEqual(statistics["frame"], 4)
+
+    def test_a_picture(self):
+        picture = fall().advance().show(64, 36)
+        self.assertTrue(picture.png.startswith(b"\x89PNG"))
+        self.assertEqual(picture._repr_png_(), picture.png)
+
+    def test_points_are_written(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "a.csv"
+            fall().advance().write(path)
+            self.assertEqual(len(path.read_text().splitlines()), 17)
+
+
+def ball(P, gradient, center=(0, 1, 0), radius=0.5):
+    d = P - numpy.array(center)
+    length = numpy.linalg.norm(d, axis=1)
+    if gradient is not None:
+        gradient[:] = d / numpy.maximum(length, 1e-300)[:, None]
+    return length - radius
+
+
+class Offers(unittest.TestCase):
+    def test_points_of_arrays(self):
+        P = numpy.random.default_rng(3).random((100, 3))
+        cloud = rapid.from_numpy(P, heat=numpy.arange(100.0), v=numpy.full((100, 3), 24.0), n=numpy.arange(100))
+        scene = rapid.Scene("cloud.lua", objects={"cloud": cloud},
+                            text="return require('rapid').create { points = rapid.host 'cloud' } :solve {}".replace(
+                                "rapid.host", "require('rapid').host"))
+        first = scene.advance()
+        numpy.testing.assert_array_equal(first["P"], P.astype(numpy.float32))
+        numpy.testing.assert_array_equal(first["heat"], numpy.arange(100.0))
+        self.assertEqual(first["n"].dtype, numpy.int64)
+        numpy.testing.assert_allclose(scene.advance()["P"], P + 1, rtol=1e-6)
+
+    def test_arrays_of_the_wrong_shape(self):
+        for P, columns in (([1, 2, 3], {}), (numpy.zeros((3, 2)), {}), (numpy.zeros((3, 3)), {"heat": numpy.zeros(4)}),
+                           (numpy.zeros((3, 3)), {"heat": numpy.zeros((3, 5))}),
+                           (numpy.zeros((3, 3)), {"heat": numpy.array(["a", "b", "c"])})):
+            with self.assertRaises(TypeError):
+                rapid.from_numpy(P, **columns)
+        with self.assertRaisesRegex(rapid.Error, "nan"):
+            rapid.Scene("a.lua", text="", objects={"a": rapid.from_numpy(numpy.full((2, 3), math.nan))})
+        with self.assertRaises(TypeError):
+            rapid.Scene("a.lua", text="", objects={"a": 3})
+
+    def test_a_shape(self):
+        scene = rapid.Scene("rain.lua", objects={"ball": rapid.Shape(ball, (-0.5, 0.5, -0.5), (0.5, 1.5, 0.5))}, text="""
+            local rapid = require 'rapid'
+            return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.1, center = {0, 2, 0} } }
+              :gravity {} :collide { shape = rapid.host 'ball' } :solve {}""")
+        lowest = min(numpy.linalg.norm(frame["P"] - numpy.array([0, 1, 0]), axis=1).min() for frame in scene.run(1, 24))
+        self.assertGreater(lowest, 0.5 - 1e-5)
+        self.assertLess(lowest, 0.51)
+
+    def test_a_force_and_an_edit(self):
+        def pull(now, strength, center):
+            return strength * (center - now.P)
+
+        def burn(now):
+            now["heat"][:] += now.dt
+            now.kill[:] = now["heat"] > 0.5
+
+        nodes = [rapid.Force("pull", pull, "Pulls.", {"strength": 4.0, "center": (0, 0, 0)}),
+                 rapid.Edit("burn", burn, writes=["heat"])]
+        scene = rapid.Scene("pull.lua", nodes=nodes, text="""local rapid = require 'rapid'
+            return rapid.create { points = rapid.points.from { P = {{1, 0, 0}} } } :burn {} :pull {}
+              :solve { substeps = 100 }""")
+        frame = scene.advance_to(11)
+        self.assertAlmostEqual(frame["P"][0, 0], math.cos(2 * 10 / 24), places=3)
+        self.assertAlmostEqual(frame["heat"][0], 10 / 24, places=5)
+        self.assertEqual(len(scene.advance_to(14)), 0)
+
+    def test_what_a_force_raises_rises(self):
+        def broken(now):
+            raise ZeroDivisionError("in a force")
+        scene = rapid.Scene("a.lua", nodes=[rapid.Force("broken", broken)], text="""local rapid = require 'rapid'
+            return rapid.create { points = rapid.points.grid {} } :broken {} :solve {}""")
+        scene.advance()
+        with self.assertRaisesRegex(ZeroDivisionError, "in a force"):
+            scene.advance()
+
+    def test_a_mesh_is_offered_again(self):
+        def square(y):
+            return rapid.Mesh([[0, y, 0], [1, y, 0], [1, y, 1], [0, y, 1]], [[0, 2, 1], [0, 3, 2]])
+        scene = rapid.Scene("a.lua", objects={"square": square(1)}, text="""local rapid = require 'rapid'
+            return rapid.create {} :emit { source = function() return rapid.host 'square' end, rate = 240 } :solve {}""")
+        scene.advance_to(2)
+        scene.offer("square", square(5))
+        self.assertEqual((scene.advance()["P"][:, 1] > 4).sum(), 10)
+
+
+class Scenes(unittest.TestCase):
+    def test_parameters(self):
+        scene = fall(height=3)
+        self.assertEqual(scene.parameters, {"height": {"value": 3.0, "default": 10.0, "doc": "m, of the drop"}})
+        self.assertAlmostEqual(scene.advance()["P"][0, 1], 3)
+        scene.set(height=5)
+        self.assertAlmostEqual(scene.advance()["P"][0, 1], 5)
+        scene.set({"gravity.g": (0, 0, 2)})
+        self.assertAlmostEqual(scene.advance_to(25)["v"][0, 2], 2, places=5)
+        with self.assertRaisesRegex(rapid.Error, "did you mean .*height"):
+            scene.set(heigt=1)
+        with self.assertRaises(TypeError):
+            scene.set(height=(1, 2))
+        with self.assertRaises(TypeError):
+            scene.set(height=None)
+
+    def test_frames_come_one_by_one(self):
+        scene = fall()
+        self.assertEqual([frame.number for frame in scene.run(3, 6)], [3, 4, 5, 6])
+        self.assertEqual([frame.number for frame in scene.run(1, 2)], [1, 2])
+        heights = [frame["P"][0, 1] for frame in scene.run(1, 5)]
+        for k, height in enumerate(heights):
+            self.assertAlmostEqual(height, 10 - 9.81 / 2 * (k / 24) ** 2, places=5)
+
+    def test_an_error_has_file_line_and_node(self):
+        with self.assertRaises(rapid.Error) as caught:
+            rapid.Scene("wrong.lua", text="local rapid = require 'rapid'\nreturn rapid.create {} :gravity { q = 1 } :solve {}")
+        self.assertEqual((caught.exception.file, caught.exception.line, caught.exception.kind),
+                         ("wrong.lua", 2, "wrong scene"))
+        with self.assertRaisesRegex(rapid.Error, "nowhere.lua"):
+            rapid.Scene("nowhere.lua")
+
+    def test_nodes_and_their_types(self):
+        scene = fall()
+        self.assertEqual([node["type"] for node in scene.nodes],
+                         ["create", "attribute", "points", "detail", "gravity", "solve"])
+        units = {one["name"]: one["unit"] for one in scene.node_types["gravity"]["parameters"]}
+        self.assertEqual(units, {"group": "", "g": "m/s²"})
+
+    def test_snapshots(self):
+        scene = fall()
+        scene.advance_to(3)
+        snapshot = scene.save()
+        self.assertEqual(snapshot.frame, 3)
+        later = scene.advance_to(7)["P"].copy()
+        scene.restore(snapshot)
+        numpy.testing.assert_array_equal(scene.advance_to(7)["P"], later)
+
+    def test_callbacks(self):
+        printed, frames = [], []
+
+        def progress(frame, last):
+            frames.append((frame, last))
+            return frame < 2
+
+        scene = rapid.Scene("a.lua", text="print(require('words').hello) " + FALL, log=printed.append, progress=progress,
+                            module=lambda name: "return { hello = 'from Python' }" if name == "words" else None)
+        self.assertEqual(printed, ["from Python"])
+        with self.assertRaisesRegex(rapid.Error, "cancelled"):
+            scene.advance_to(5)
+        self.assertEqual(frames, [(1, 5), (2, 5)])
+
+    def test_what_a_callback_raises_rises(self):
+        def progress(frame, last):
+            raise ZeroDivisionError("in Python")
+        with self.assertRaisesRegex(ZeroDivisionError, "in Python"):
+            fall(progress=progress).advance_to(5)
+        scene = None
+
+        def call_back(frame, last):
+            scene.advance()
+        scene = fall(progress=call_back)
+        with self.assertRaisesRegex(rapid.Error, "in another call"):
+            scene.advance_to(5)
+
+    def test_limits(self):
+        scene = rapid.Scene("slow.lua", script_seconds=0.2, text="""local rapid = require 'rapid'
+            return rapid.create { points = rapid.points.grid {} }
+              :points("spin", function(p, frame) local i = 0 while frame.number > 1 do i = i + 1 end end) :solve {}""")
+        scene.advance()
+        begun = time.monotonic()
+        with self.assertRaises(rapid.Error) as caught:
+            scene.advance()
+        self.assertEqual(caught.exception.kind, "too long")
+        self.assertLess(time.monotonic() - begun, 20)
+
+    def test_another_thread_cancels(self):
+        scene = rapid.Scene("slow.lua", text="""local rapid = require 'rapid'
+            return rapid.create { points = rapid.points.grid {} }
+              :gravity { g = function(frame) while frame.number > 1 do end return vec3(0, 0, 0) end } :solve {}""")
+        threading.Timer(0.1, scene.cancel).start()
+        with self.assertRaises(rapid.Error) as caught:
+            scene.advance_to(2)
+        self.assertEqual(caught.exception.kind, "cancelled")
+        scene.restart()
+        self.assertEqual(scene.advance().number, 1)
+
+    def test_scenes_on_threads_give_the_same_bits(self):
+        def bits(into, place):
+            scene = rapid.Scene(str(root / "graphs/first.lua"), rate=2000)
+            into[place] = scene.advance_to(12)["P"].tobytes()
+        results = [None] * 3
+        bits(results, 0)
+        threads = [threading.Thread(target=bits, args=(results, place)) for place in (1, 2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(results[0], results[1])
+        self.assertEqual(results[0], results[2])
+        self.assertGreater(len(results[0]), 1000)
+
+    def test_a_scene_is_closed_by_hand_or_by_with(self):
+        with fall() as scene:
+            scene.advance()
+        with self.assertRaisesRegex(rapid.Error, "closed"):
+            scene.advance()
+        scene.close()
+
+
+if __name__ == "__main__":
+    outcome = unittest.main(exit=False, verbosity=0).result
+    failed = len(outcome.failures) + len(outcome.errors)
+    print(f"{outcome.testsRun - failed - len(outcome.skipped)} passed, {failed} failed, {len(outcome.skipped)} skipped")
+    sys.exit(failed > 0)

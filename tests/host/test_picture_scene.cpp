@@ -1,5 +1,5 @@
 // The shapes of pictures: of those that are other ones in each frame, two frames' surfaces are kept.
-#include "bindings/command/picture_scene.h"
+#include "bindings/host/picture_scene.h"
 
 #include <memory>
 

@@ -210,7 +210,8 @@ local P = {}
 for i = 0, 10 do P[i + 1] = {i / 10, 0, 0} end
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = P } } :gravity {}
   :group { name = "hook", where = function(p) return p.id == 0 end } :distance { pairs = chain(10) }
-  :pin { group = "hook", target = function(f) return {0.2 * math.sin(6 * f.time), 0, 0} end } :solve { substeps = 8 }]] },
+  :pin { group = "hook", target = function(f) return {0.2 * math.sin(6 * f.time), 0, 0} end }
+  :solve { substeps = 8 }]] },
   { "pin", "points on compliant pins whose place is a function of the frame, 4 sub-steps", 1, 24, [[
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 1, 4, 0.2, {0, 0, 0}) } }
   :pin { compliance = 0.02, target = function(f) return {math.sin(5 * f.time), 0, f.time} end }

@@ -143,7 +143,7 @@ function At:refuse(message)
 end
 
 function At:refuse_store(what)
-  self:refuse(("the kernel %s; %s"):format(what, self.found.remedy))
+  self:refuse(("%s %s; %s"):format(self.found.subject, what, self.found.remedy))
 end
 
 -- The line of the first mention of a name.
@@ -502,11 +502,23 @@ local remedies = {
     "the whole set in :detail",
   set = "a frame depends on the points that enter it, and nothing else: keep it in a detail value, " ..
     "points.detail.NAME = value",
+  frame = "no snapshot of --cache can hold what a function of the frame remembers: find it from frame.number, or " ..
+    "keep it in points.detail.NAME, in a :detail",
 }
 
 -- Where a kernel may keep what it has kept in a wrong place.
 local function to_remember(of_a_point)
   return of_a_point and remedies.point or remedies.set
+end
+
+-- env: the environment in which the globals of f live; remedy, subject: of messages.
+local function nothing_found(env, remedy, subject, methods)
+  local found = {
+    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
+    inside = {}, env = env, remedy = remedy, subject = subject, methods = {},
+  }
+  for _, name in ipairs(methods) do found.methods[name] = true end
+  return found
 end
 
 -- env: the environment in which the kernel's globals live; of_a_point: the kernel's first parameter is a point;
@@ -515,16 +527,51 @@ local function analyse(kernel, env, of_a_point, point_names)
   if not util.funcinfo(kernel).bytecodes then
     error("the kernel is a function of Lua's own library; it must be one of the scene's, which may call it", 0)
   end
-  local found = {
-    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
-    inside = {}, env = env, remedy = to_remember(of_a_point),
-    methods = {},
-  }
-  for _, name in ipairs(point_names.methods) do found.methods[name] = true end
+  local found = nothing_found(env, to_remember(of_a_point), "the kernel", point_names.methods)
   -- Behind the point and the frame come the parameters of a Lua node, which all points share.
   analyse_function(kernel, found, of_a_point and { [0] = point, [2] = parameters } or { [2] = parameters })
-  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "methods" } do found[own] = nil end
+  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "subject", "methods" } do found[own] = nil end
   return found
+end
+
+-- Where a function of the frame keeps something for its next call: the `stores` of analyse().
+local function remembers(f, env)
+  local found = nothing_found(env, remedies.frame, "a function of the frame", {})
+  analyse_function(f, found)
+  return { stores = found.stores }
+end
+
+-- A constant, as text: equal for equal ones in two states. Tables of constants hold no others.
+local function constant_text(value)
+  if type(value) == "number" then return ("%.17g"):format(value) end
+  if type(value) ~= "table" then return ("%s %d:%s"):format(type(value), #tostring(value), tostring(value)) end
+  local parts = {}
+  for key, element in next, value do parts[#parts + 1] = constant_text(key) .. "=" .. constant_text(element) end
+  table.sort(parts)
+  return "{" .. table.concat(parts, ",") .. "}"
+end
+
+-- All that the body of a file and the functions in it do, before it runs: a list of the lines where they begin and
+-- their instructions and constants, as text, by turns, the body's first. Without the numbers of lines: a comment is no
+-- other program.
+local function code_of(body)
+  local list = {}
+  local function add(f)
+    local info = util.funcinfo(f)
+    local words = { ("%d %d %s"):format(info.params, info.stackslots, tostring(info.isvararg)) }
+    local place = #list + 1
+    list[place], list[place + 1] = info.linedefined, ""
+    for pc = 1, info.bytecodes - 1 do words[#words + 1] = tostring((util.funcbc(f, pc))) end
+    for k = 0, info.nconsts - 1 do words[#words + 1] = constant_text(util.funck(f, k)) end
+    for k = 0, info.upvalues - 1 do words[#words + 1] = util.funcuvname(f, k) end
+    for k = -1, -info.gcconsts, -1 do
+      local value = util.funck(f, k)
+      if type(value) == "proto" then add(value) else words[#words + 1] = constant_text(value) end
+    end
+    list[place + 1] = table.concat(words, " ")
+  end
+  add(body)
+  return list
 end
 
 -- Instructions and constants, as text: equal for the same function in two states. Tables of constants are left out:
@@ -551,5 +598,6 @@ local function tail_call_line(f)
 end
 
 return {
-  analyse = analyse, fingerprint = fingerprint, tail_call_line = tail_call_line, to_remember = to_remember,
+  analyse = analyse, code_of = code_of, fingerprint = fingerprint, remembers = remembers,
+  tail_call_line = tail_call_line, to_remember = to_remember,
 }

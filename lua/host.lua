@@ -21,6 +21,7 @@ local ffi = require "ffi"
 
 -- Runs the body of a file. The place of a tail call that ends it is kept for errors, as it leaves no stack frame.
 local function run(chunk, name, ...)
+  if native.keeps_state then native.add_code(name:gsub("^@", ""), bytecode.code_of(chunk)) end
   return native.run(chunk, (name:gsub("^@", "")), bytecode.tail_call_line(chunk), ...)
 end
 
@@ -92,6 +93,10 @@ end
 
 function entry.analyse(f, of_a_point)
   return bytecode.analyse(f, env, of_a_point, native.point_names)
+end
+
+function entry.remembers(f)
+  return bytecode.remembers(f, env)
 end
 
 entry.fingerprint = bytecode.fingerprint

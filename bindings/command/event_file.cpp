@@ -118,7 +118,19 @@ void EventFile::add(const FrameResult& result)
     }
     const auto key = [](const Event& e) { return std::tuple(e.time, e.chain, e.kind, e.id, e.collider); };
     std::sort(events.begin(), events.end(), [&](const Event& a, const Event& b) { return key(a) < key(b); });
-    if (!events.empty()) file_->append(points_of(events, result.frame));
+    if (events.empty()) return;
+    const PointSet points = points_of(events, result.frame);
+    file_->append(points);
+    if (kept_) append_points(*kept_, points);
+}
+
+void EventFile::keep_all() { kept_ = points_of({}, 0); }
+
+void EventFile::set_events(PointSet events)
+{
+    if (!file_) return;
+    if (events.size() > 0) file_->append(events);
+    kept_ = std::move(events);
 }
 
 void EventFile::finish()

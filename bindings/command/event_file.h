@@ -23,6 +23,12 @@ public:
 
     // The events of a frame, in the order of their times.
     void add(const FrameResult& result);
+    // From now on all events are kept in memory, too.
+    void keep_all();
+    // Of all frames so far, where they are kept.
+    const PointSet& events() const { return *kept_; }
+    // Those of frames that are not computed again: before the first that is.
+    void set_events(PointSet events);
     // Names the file, which there is not before.
     void finish();
 
@@ -31,6 +37,7 @@ private:
 
     std::string path_;
     std::optional<PointFile> file_;
+    std::optional<PointSet> kept_;
 };
 
 }  // namespace rapid

@@ -62,6 +62,8 @@ int frame_number(std::int64_t number)
     return static_cast<int>(number);
 }
 
+std::string absolute(const std::string& path) { return std::filesystem::absolute(path).lexically_normal(); }
+
 std::string key_of(const OutputTarget& to)
 {
     return to.attributes ? fmt::format("{}:{}", to.pattern, fmt::join(*to.attributes, ",")) : to.pattern;
@@ -275,21 +277,67 @@ FrameInfo FrameFiles::info_of(std::int64_t number, double time, double fps, cons
     return info;
 }
 
-void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output)
+std::string FrameFiles::how_of(const OutputTarget& to, const FrameSelection& frames) const
+{
+    std::string how = to.attributes ? fmt::format("of {}", fmt::join(*to.attributes, ",")) : "";
+    const Format& format = format_of(to.pattern);
+    if (!format.film && format.extension != ".png") return how;
+    how += fmt::format("; {}x{}", picture_->width, picture_->height);
+    for (const auto& place : {picture_->position, picture_->target})
+        if (place) how += fmt::format(" {},{},{}", place->x(), place->y(), place->z());
+    if (picture_->fov) how += fmt::format(" {}", *picture_->fov);
+    // The camera of a picture depends on those before it.
+    how += fmt::format("; from {} in steps of {}", frames.first, frames.step);
+    if (format.film) how += fmt::format(" to {}", frames.last);
+    return how;
+}
+
+std::vector<FrameFiles::FrameFile> FrameFiles::files_of(std::int64_t frame, const FrameSelection& frames) const
+{
+    std::vector<FrameFile> files;
+    for (const Target& target : targets_)
+        for (const std::string& output : target.outputs)
+            files.push_back({FramePattern(target.to.pattern).expand(frame_number(frame), output),
+                             how_of(target.to, frames), format_of(target.to.pattern).film});
+    return files;
+}
+
+void FrameFiles::go_on_behind(WholeFiles whole, const FrameSelection& frames)
+{
+    whole_ = std::move(whole);
+    selection_ = frames;
+}
+
+const FrameFiles::WholeFiles::File* FrameFiles::whole_file(std::int64_t frame, const std::string& path,
+                                                           const std::string& how) const
+{
+    const auto of_frame = whole_.frames.find(frame);
+    if (of_frame == whole_.frames.end()) return nullptr;
+    const auto found = of_frame->second.find(absolute(path));
+    return found != of_frame->second.end() && found->second.how == how ? &found->second : nullptr;
+}
+
+void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output,
+                        bool of_node)
 {
     const std::string key = key_of(to);
-    if (named_.insert(key + '\n' + output).second)
-        first_names_.push_back(FramePattern(to.pattern).expand(info.number, output));
+    const FramePattern pattern(to.pattern);
+    const std::string path = pattern.expand(info.number, output), how = how_of(to, selection_);
+    const auto film = whole_.films.empty() ? whole_.films.end() : whole_.films.find(absolute(path));
     if (part_) note_sequence(to.pattern, output, info);
+    if (whole_file(info.number, path, how) || (film != whole_.films.end() && film->second == how)) return;
+    std::shared_ptr<const PictureFit> before;
+    if (const std::int64_t last = info.number - selection_.step; pattern.has_frame() && last >= selection_.first)
+        if (const auto* file = whole_file(last, pattern.expand(frame_number(last), output), how)) before = file->fit;
+    if (named_.insert(key + '\n' + output).second) first_names_.push_back(path);
     FrameWriter* writer = nullptr;
     {
         const std::lock_guard lock(mutex_);
         auto found = writers_.find(key);
-        if (found == writers_.end())
-            found = writers_.emplace(key, std::make_unique<FrameWriter>(std::vector<OutputTarget>{to})).first;
-        writer = found->second.get();
+        if (found == writers_.end()) found = writers_.emplace(key, std::make_unique<Writer>(to, how, of_node)).first;
+        writer = &found->second->frames;
     }
-    writer->submit(std::move(points), std::move(info), output);
+    writer->submit(std::move(points), std::move(info), output, std::move(before));
 }
 
 void FrameFiles::write(const FrameResult& result)
@@ -299,7 +347,7 @@ void FrameFiles::write(const FrameResult& result)
             PointSet points = result.outputs.at(output);
             if (!target.to.attributes) remove_unasked(points);
             submit(target.to, std::move(points),
-                   info_of(result.frame, result.time.at(output), result.fps.at(output), target.to), output);
+                   info_of(result.frame, result.time.at(output), result.fps.at(output), target.to), output, false);
         }
 }
 
@@ -308,7 +356,7 @@ void FrameFiles::write_node(const std::string& pattern, const PointSet& points, 
     const OutputTarget to{name_in_part(pattern), std::nullopt};
     PointSet written = points;
     remove_unasked(written);
-    submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main");
+    submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main", true);
 }
 
 void FrameFiles::finish(bool complete)
@@ -316,7 +364,7 @@ void FrameFiles::finish(bool complete)
     // All writers, even after a failure, so that the frames that the others hold are not lost.
     std::exception_ptr first;
     for (auto& [key, writer] : writers_) try {
-            writer->finish(complete);
+            writer->frames.finish(complete);
         } catch (...) {
             if (!first) first = std::current_exception();
         }
@@ -324,14 +372,13 @@ void FrameFiles::finish(bool complete)
     if (complete && part_) write_part_records();
 }
 
-std::vector<FrameWriter::Written> FrameFiles::take_written()
+std::vector<FrameFiles::Written> FrameFiles::take_written()
 {
     const std::lock_guard lock(mutex_);
-    std::vector<FrameWriter::Written> all;
-    for (const auto& [key, writer] : writers_) {
-        const std::vector<FrameWriter::Written> files = writer->take_written();
-        all.insert(all.end(), files.begin(), files.end());
-    }
+    std::vector<Written> all;
+    for (const auto& [key, writer] : writers_)
+        for (FrameWriter::Written& file : writer->frames.take_written())
+            all.push_back({std::move(file), writer->how, writer->of_node});
     return all;
 }
 
@@ -340,7 +387,7 @@ std::optional<std::int64_t> FrameFiles::first_unwritten() const
     const std::lock_guard lock(mutex_);
     std::optional<std::int64_t> first;
     for (const auto& [key, writer] : writers_)
-        if (const std::optional<int> frame = writer->first_unwritten())
+        if (const std::optional<int> frame = writer->frames.first_unwritten())
             first = std::min(first.value_or(*frame), std::int64_t{*frame});
     return first;
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bindings/command/command.h"
+#include "bindings/command/frame_selection.h"
 #include "bindings/command/part_record.h"
 #include "bindings/host/picture_scene.h"
 #include "runtime/graph/evaluate.h"
@@ -48,6 +49,25 @@ public:
     // or for no output of the graph; two that write the same files.
     void resolve(const Plan& plan, bool several_frames);
 
+    // The files of -o that a frame has, and how they are made besides: two of one path that are made alike are the
+    // same.
+    struct FrameFile {
+        std::string path, how;
+        bool film = false;  // one of all frames
+    };
+    std::vector<FrameFile> files_of(std::int64_t frame, const FrameSelection& frames) const;
+
+    // What an earlier run has left whole: it is not written again. By frame and absolute path; films by absolute path.
+    struct WholeFiles {
+        struct File {
+            std::string how;
+            std::shared_ptr<const PictureFit> fit;  // of a picture
+        };
+        std::map<std::int64_t, std::map<std::string, File>> frames;
+        std::map<std::string, std::string> films;  // and how they are made
+    };
+    void go_on_behind(WholeFiles whole, const FrameSelection& frames);
+
     // Queues the files of a frame. Error: one of an earlier frame that could not be written.
     void write(const FrameResult& result);
     // Queues the file of a `:write` node.
@@ -62,7 +82,11 @@ public:
 
     // The files that are complete since the last call; the first frame of which one is still to come, of those that
     // have been queued. From any thread.
-    std::vector<FrameWriter::Written> take_written();
+    struct Written : FrameWriter::Written {
+        std::string how;
+        bool of_node;  // a `:write`
+    };
+    std::vector<Written> take_written();
     std::optional<std::int64_t> first_unwritten() const;
 
 private:
@@ -79,7 +103,9 @@ private:
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
     void remove_unasked(PointSet& points) const;
-    void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output);
+    std::string how_of(const OutputTarget& to, const FrameSelection& frames) const;
+    const WholeFiles::File* whole_file(std::int64_t frame, const std::string& path, const std::string& how) const;
+    void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output, bool of_node);
 
     std::vector<Target> targets_;
     std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
@@ -97,7 +123,20 @@ private:
     std::vector<std::string> first_names_;
 
     mutable std::mutex mutex_;  // for take_written() and first_unwritten(), while a frame adds a writer
-    std::map<std::string, std::unique_ptr<FrameWriter>> writers_;
+    struct Writer {
+        std::string how;
+        bool of_node;
+        FrameWriter frames;
+
+        Writer(const OutputTarget& to, std::string how_it_is_made, bool is_of_node)
+            : how(std::move(how_it_is_made)), of_node(is_of_node), frames({to})
+        {
+        }
+    };
+    std::map<std::string, std::unique_ptr<Writer>> writers_;
+
+    WholeFiles whole_;
+    FrameSelection selection_{};  // where files are whole, or are to be known as such
 };
 
 }  // namespace rapid

@@ -20,6 +20,9 @@ public:
     const std::optional<std::uint64_t>& seed() const { return seed_; }
     const SessionOptions& session() const { return session_; }
 
+    // The sessions that are loaded from now on keep their state (SessionOptions).
+    void keep_state() { session_.keeps_state = true; }
+
     // Error: the file or a --set is wrong. may_write, on_timeout, on_read: see SessionOptions.
     std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,
                                   std::function<void(const std::filesystem::path& file)> on_read = {}) const;

@@ -8,14 +8,17 @@
 #include "bindings/command/farm_options.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
+#include "bindings/command/graceful_end.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/part_options.h"
 #include "bindings/command/part_record.h"
+#include "bindings/command/run_cache.h"
 #include "bindings/command/run_report.h"
 #include "bindings/command/signals.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/watch.h"
 #include "bindings/host/threads.h"
+#include "runtime/files/content_hash.h"
 #include "runtime/files/output_file.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/evaluate.h"
@@ -46,6 +49,7 @@ public:
                        "writes what each node, frame and file took as a trace, which Chrome and Perfetto open")
             ->type_name("FILE");
         events_.declare(app);
+        cache_.declare(app);
         app.add_flag("--durable", durable_, "a frame has its name when it is on the disk, and outlasts a power cut");
         app.add_flag("--keep-all", keep_all_,
                      "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
@@ -65,6 +69,9 @@ public:
     {
         if (watch_ && untrusted_.asked())
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
+        if (watch_ && cache_.asked())
+            throw Error("--watch runs a graph that changes, of which --cache holds nothing; give one of them");
+        cache_.check();
         if (untrusted_.asked() && files_.makes_films())
             throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
         check_farm();
@@ -81,7 +88,16 @@ public:
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
         Threads threads(common.threads);
         RunReport report({graph_.file(), threads.count(), stats_, profile_, quiet_, common.verbose}, files_);
-        const SignalThread signals([&](int signal) { report.abandon(128 + signal, "interrupted"); });
+        GracefulEnd end(cache_.grace(), [&](int signal) {
+            report.abandon(128 + signal, "interrupted; the frame took longer than the --grace, and is dropped");
+        });
+        const SignalThread signals([&](int signal) {
+            if (!end.ask(signal)) report.abandon(128 + signal, "interrupted");
+        });
+        if (cache_.asked()) {
+            cache_.set_graph(graph_.file());
+            graph_.keep_state();
+        }
 
         return threads.run([&] {
             const std::unique_ptr<Session> session = graph_.load(
@@ -98,9 +114,14 @@ public:
             if (record_) record_->frames = frames;
             files_.resolve(plan, !frames.single());
             if (farm_.asked()) return submit(plan);
+            if (cache_.asked()) events_.keep_all();
             events_.begin();
+            if (cache_.asked()) {
+                cache_.begin(*session, plan, frames, fingerprint_options(common), files_, events_);
+                report.set_cache(&cache_);
+            }
             report.begin(plan.first_frame(), frames.last);
-            return compute(*session, plan, frames, report);
+            return compute(*session, plan, frames, report, end);
         });
     }
 
@@ -160,9 +181,10 @@ private:
 
     std::function<void(const std::filesystem::path& file)> on_read()
     {
-        if (!record_) return tell_ ? Watch::tell : nullptr;
+        if (!record_ && !cache_.asked()) return tell_ ? Watch::tell : nullptr;
         return [this](const std::filesystem::path& file) {
-            read_.add(file);
+            if (record_) read_.add(file);
+            if (cache_.asked()) cache_.was_read(file);
             if (tell_) Watch::tell(file);
         };
     }
@@ -170,6 +192,10 @@ private:
     SandboxAccess access() const
     {
         SandboxAccess access{{folder_of(graph_.file())}, files_.folders()};
+        if (cache_.asked()) {
+            std::filesystem::create_directories(cache_.folder());
+            access.writable.push_back(cache_.folder());
+        }
         for (const std::string& file : {stats_, profile_, events_.path()}) {
             if (file.empty()) continue;
             access.writable.push_back(folder_of(file));
@@ -187,15 +213,32 @@ private:
         return range;
     }
 
-    int compute(Session& session, const Plan& plan, const FrameSelection& frames, RunReport& report)
+    bool estimates_errors() const { return !quiet_ || !stats_.empty(); }
+
+    // What else changes what a run keeps.
+    Fingerprint fingerprint_options(const CommonOptions& common) const
+    {
+        const auto answer = [](bool is) { return is ? "yes" : "no"; };
+        Fingerprint options = {{"the estimate of errors", answer(estimates_errors())},
+                               {"--events", answer(!events_.path().empty())},
+                               {"--keep-all", answer(keep_all_)}};
+        for (const std::string& plugin : common.plugins)
+            options["plugin " + std::filesystem::path(plugin).filename().string()] = hash_text(file_hash(plugin));
+        return options;
+    }
+
+    int compute(Session& session, const Plan& plan, const FrameSelection& frames, RunReport& report, GracefulEnd& end)
     {
         try {
             Evaluator evaluator(
                 plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame, double fps) {
                     if (frames.contains(std::llround(frame.number))) files_.write_node(pattern, points, frame, fps);
                 });
-            if (quiet_ && stats_.empty()) evaluator.leave_out_errors();
-            while (evaluator.next_frame() <= frames.last) {
+            if (!estimates_errors()) evaluator.leave_out_errors();
+            std::int64_t last = frames.last;
+            if (cache_.asked()) last = go_on(evaluator, plan, frames, report);
+            if (cache_.keeps_snapshots()) end.allow();
+            while (evaluator.next_frame() <= last) {
                 const FrameResult result = evaluator.advance();
                 for (const std::string& warning : session.take_warnings()) report.warning(warning, result.frame);
                 for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
@@ -203,9 +246,17 @@ private:
                 for (const std::string& name : files_.take_first_names()) report.line("writing " + name);
                 report.frame(result);
                 events_.add(result);
+                if (!cache_.asked()) continue;
+                cache_.keep(evaluator, events_, end.signal() != 0);
+                if (end.signal() != 0) return interrupted(result.frame, report, end.signal());
+                for (const std::string& warning : cache_.take_warnings()) report.warning(warning, result.frame);
             }
             if (record_) read_.put_into(record_->identity, folder_of(graph_.file()));
+            if (cache_.first_due())  // what an earlier run has computed behind it
+                for (const FrameRecord* record : cache_.records(last + 1, frames.last))
+                    report.known_frame(*record, false);
             files_.finish();
+            finish_cache(true, report);
             events_.finish();
             report.finish();
             return status_done;
@@ -217,6 +268,34 @@ private:
             finish_files(known, report);
             return report.fail(known);
         }
+    }
+
+    // Tells what the cache has, and takes the evaluator there. Returns the last frame to compute.
+    std::int64_t go_on(Evaluator& evaluator, const Plan& plan, const FrameSelection& frames, RunReport& report)
+    {
+        cache_.restore(evaluator, events_);
+        for (const std::string& warning : cache_.take_warnings()) report.warning(warning);
+        const std::int64_t first = plan.first_frame();
+        const std::int64_t known = cache_.first_due() ? evaluator.next_frame() - 1 : frames.last;
+        for (const FrameRecord* record : cache_.records(first, known)) report.known_frame(*record, true);
+        if (known >= first && !quiet_)
+            report.line(fmt::format("frames {}-{} are known from {}", first, known, cache_.folder().string()));
+        return cache_.first_due() ? cache_.last_due() : first - 1;
+    }
+
+    void finish_cache(bool complete, RunReport& report)
+    {
+        if (!cache_.asked()) return;
+        cache_.finish(complete);
+        for (const std::string& warning : cache_.take_warnings()) report.warning(warning);
+    }
+
+    int interrupted(std::int64_t frame, RunReport& report, int signal)
+    {
+        files_.finish(false);
+        finish_cache(false, report);
+        return report.interrupted(signal,
+                                  fmt::format("interrupted after frame {}; the same command goes on behind it", frame));
     }
 
     // Writes the frames before the one that failed, which are complete, or says why not.
@@ -240,6 +319,7 @@ private:
     ReadFiles read_;                      // of a part
     std::string stats_, profile_;
     EventFile events_;
+    RunCache cache_;
     UntrustedOptions untrusted_;
     bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false;
 };

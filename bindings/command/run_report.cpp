@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "runtime/files/output_file.h"
@@ -18,7 +19,7 @@ RunReport::RunReport(Options options, FrameFiles& files) : options_(std::move(op
     if (!options_.profile_file.empty()) profile_.emplace(options_.profile_file);
 }
 
-double RunReport::now() const { return stopwatch_.seconds(); }
+double RunReport::now() const { return earlier_seconds_ + stopwatch_.seconds(); }
 
 void RunReport::begin(std::int64_t first, std::int64_t last)
 {
@@ -33,9 +34,22 @@ void RunReport::frame(const FrameResult& result)
     totals_.add(frame);
     if (statistics_) statistics_->add(frame);
     if (profile_) profile_->add(result);
+    if (cache_) cache_->computed(frame, result.figures.stiff, now(), std::max(earlier_peak_, peak_memory()));
     add_writing();
     keep_worst(run_.stiff, result.figures.stiff);
     progress_->frame(frame, now());
+}
+
+void RunReport::known_frame(const FrameRecord& record, bool is_before)
+{
+    const std::lock_guard lock(mutex_);
+    totals_.add(record.statistics);
+    if (statistics_) statistics_->add(record.statistics);
+    keep_worst(run_.stiff, record.stiff);
+    for (const std::string& text : record.warnings) tell(text, record.statistics.frame);
+    if (!is_before) return;
+    earlier_seconds_ = std::max(earlier_seconds_, record.seconds);
+    earlier_peak_ = std::max(earlier_peak_, record.peak_bytes);
 }
 
 void RunReport::line(const std::string& text)
@@ -55,6 +69,12 @@ void RunReport::warning(const std::string& text)
 void RunReport::warning(const std::string& text, std::int64_t frame)
 {
     const std::lock_guard lock(mutex_);
+    if (cache_) cache_->warned(text);
+    tell(text, frame);
+}
+
+void RunReport::tell(const std::string& text, std::int64_t frame)
+{
     if (warned_.contains(text) || !frame_warnings_.add(text, frame)) return;
     if (progress_) progress_->finish();
     print_warning(fmt::format("frame {}: {}", frame, text));
@@ -70,7 +90,11 @@ void RunReport::finish()
     print(summary(run_, totals_));
 }
 
-int RunReport::fail(const Error& error)
+int RunReport::fail(const Error& error) { return end_early(status_failed, error); }
+
+int RunReport::interrupted(int signal, const std::string& why) { return end_early(128 + signal, Error(why)); }
+
+int RunReport::end_early(int status, const Error& error)
 {
     const std::lock_guard lock(mutex_);
     if (progress_) progress_->finish();
@@ -81,7 +105,7 @@ int RunReport::fail(const Error& error)
     } catch (const Error& second) {
         print_error(second, options_.verbose);
     }
-    return status_failed;
+    return status;
 }
 
 void RunReport::abandon(int status, const std::string& why)
@@ -104,18 +128,20 @@ void RunReport::abandon(int status, const std::string& why)
 void RunReport::add_writing()
 {
     const std::optional<std::int64_t> unwritten = files_.first_unwritten();  // first: files of frames before are taken
-    for (const FrameWriter::Written& file : files_.take_written()) {
+    for (const FrameFiles::Written& file : files_.take_written()) {
         totals_.add_writing(file.seconds);
         if (statistics_) statistics_->add_writing(file.frame, file.seconds);
         if (profile_) profile_->add(file);
+        if (cache_) cache_->written(file);
     }
+    if (cache_) cache_->complete_before(unwritten);
     if (statistics_) statistics_->write_before(unwritten);
 }
 
 void RunReport::write_statistics()
 {
     run_.seconds = now();
-    run_.peak_bytes = peak_memory();
+    run_.peak_bytes = std::max(earlier_peak_, peak_memory());
     add_writing();
     std::optional<Error> failed;
     try {

@@ -9,6 +9,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/profile_file.h"
+#include "bindings/command/run_cache.h"
 #include "bindings/command/statistics_file.h"
 #include "runtime/report/frame_warnings.h"
 #include "runtime/report/progress.h"
@@ -30,7 +31,12 @@ public:
     // The run's time begins here. files: those that the run writes.
     RunReport(Options options, FrameFiles& files);
 
+    // Hears of all frames from now on.
+    void set_cache(RunCache* cache) { cache_ = cache; }
+
     void begin(std::int64_t first, std::int64_t last);
+    // A frame that an earlier run has computed; is_before: before all that this one computes.
+    void known_frame(const FrameRecord& record, bool is_before);
     void frame(const FrameResult& result);
     void line(const std::string& text);
     // Each text once.
@@ -41,6 +47,9 @@ public:
 
     // The statistics file and the summary. Error: the file can't be written.
     void finish();
+    // A signal that ends the run between two frames: says so, and writes the statistics and the profile of the frames so far. Returns
+    // the status of the process.
+    int interrupted(int signal, const std::string& why);
     // An error that ends the run: reports it, and writes the statistics and the profile of the frames so far.
     int fail(const Error& error);
     // From another thread, at any moment: says why, writes the statistics, removes unfinished files, and ends the
@@ -52,11 +61,16 @@ private:
     // Statistics and profile. Error: a file can't be written.
     void write_statistics();
     void tell_untold();
+    void tell(const std::string& text, std::int64_t frame);
+    int end_early(int status, const Error& error);
     double now() const;
 
     const Options options_;
     FrameFiles& files_;
+    RunCache* cache_ = nullptr;
     const Stopwatch stopwatch_;
+    double earlier_seconds_ = 0;  // of the runs that this one goes on behind
+    std::uint64_t earlier_peak_ = 0;
 
     std::timed_mutex mutex_;
     RunStatistics run_;

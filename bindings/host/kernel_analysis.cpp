@@ -75,21 +75,6 @@ void check_assignments(lua_State* L, const Location& location)
     }
 }
 
-// The first place where it writes upvalues, globals or tables that points share.
-void check_stores(lua_State* L)
-{
-    lua_getfield(L, -1, "stores");
-    lua_rawgeti(L, -1, 1);
-    if (lua_istable(L, -1)) {
-        lua_getfield(L, -1, "message");
-        lua_getfield(L, -2, "source");
-        const std::string message = text_at(L, -2), source = text_at(L, -1);
-        lua_pop(L, 2);
-        throw Error(message).at({source.substr(source.starts_with('@') ? 1 : 0), number_of(L, "line")});
-    }
-    lua_pop(L, 2);
-}
-
 void check_groups(lua_State* L, const KernelSource& kernel)
 {
     const int line = number_of(L, "computed_group");
@@ -99,6 +84,26 @@ void check_groups(lua_State* L, const KernelSource& kernel)
 }
 
 }  // namespace
+
+StoreOutside::StoreOutside(lua_State* L)
+{
+    lua_getfield(L, -1, "stores");
+    lua_rawgeti(L, -1, 1);
+    if (lua_istable(L, -1)) {
+        lua_getfield(L, -1, "message");
+        lua_getfield(L, -2, "source");
+        message_ = text_at(L, -2);
+        const std::string source = text_at(L, -1);
+        lua_pop(L, 2);
+        location_ = {source.substr(source.starts_with('@') ? 1 : 0), number_of(L, "line")};
+    }
+    lua_pop(L, 2);
+}
+
+void StoreOutside::refuse() const
+{
+    if (!message_.empty()) throw Error(message_).at(location_);
+}
 
 KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
 {
@@ -114,7 +119,7 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     state.call(2, 1);
     check_calls(L, kernel.location);
     check_assignments(L, kernel.location);
-    check_stores(L);
+    StoreOutside(L).refuse();
     check_groups(L, kernel);
 
     KernelAnalysis found;

@@ -7,9 +7,25 @@
 
 #include "runtime/error.h"
 
+struct lua_State;
+
 namespace rapid {
 
 class State;
+
+// The first place where a function writes upvalues, globals or tables that outlive its call; it reads the result of
+// lua/bytecode.lua at the top of the stack.
+class StoreOutside {
+public:
+    explicit StoreOutside(lua_State* L);
+
+    // Error: there is one.
+    void refuse() const;
+
+private:
+    std::string message_;
+    Location location_;
+};
 
 struct KernelAnalysis {
     std::set<std::string> reads, writes;      // of the point itself

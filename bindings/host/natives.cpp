@@ -15,6 +15,7 @@
 #include "bindings/host/script_error.h"
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
+#include "runtime/files/content_hash.h"
 #include "runtime/points/point_names.h"
 #include "runtime/printable.h"
 #include "runtime/shapes/level_set/density_grid.h"
@@ -72,6 +73,22 @@ int pointer_to(State& state)
 int trace_aborted(State& state)
 {
     state.host().options().on_trace_abort(text_at(state.lua(), 1));
+    return 0;
+}
+
+// native.add_code(file, list): the functions of a file, as lua/bytecode.lua lists them: line and text by turns.
+int add_code(State& state)
+{
+    lua_State* L = state.lua();
+    std::vector<Session::FunctionCode>& functions = state.host().code[text_at(L, 1)];
+    functions.clear();
+    const int size = static_cast<int>(lua_objlen(L, 2));
+    for (int k = 1; k < size; k += 2) {
+        lua_rawgeti(L, 2, k);
+        lua_rawgeti(L, 2, k + 1);
+        functions.push_back({static_cast<int>(lua_tointeger(L, -2)), content_hash(text_at(L, -1))});
+        lua_pop(L, 2);
+    }
     return 0;
 }
 
@@ -171,6 +188,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"fog", native<pointer_to<DensityGrid>>},
                                       {"outside_kernels", native<outside_kernels>},
                                       {"trace_aborted", native<trace_aborted>},
+                                      {"add_code", native<add_code>},
                                       {"read_module", native<read_source<false>>},
                                       {"read_node", native<read_source<true>>}};
     lua_newtable(L);
@@ -180,6 +198,8 @@ void push_natives(State& state, const std::string& chunk_header)
     }
     lua_pushboolean(L, !state.is_main() || state.host().options().quiet);
     lua_setfield(L, -2, "is_quiet");
+    lua_pushboolean(L, state.is_main() && state.host().options().keeps_state);
+    lua_setfield(L, -2, "keeps_state");
     push_detail_natives(state);
     lua_setfield(L, -2, "detail");
     push_text(L, chunk_header);

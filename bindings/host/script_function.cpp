@@ -5,6 +5,7 @@
 #include <lua.hpp>
 #include <utility>
 
+#include "bindings/host/kernel_analysis.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/script_place.h"
 #include "bindings/host/state.h"
@@ -44,6 +45,17 @@ public:
         return result;
     }
 
+    void refuse_memory() const
+    {
+        lua_State* L = state_.lua();
+        state_.push_entry("remembers");
+        lua_rawgeti(L, LUA_REGISTRYINDEX, reference_);
+        state_.call(1, 1);
+        const StoreOutside found(L);
+        lua_pop(L, 1);
+        found.refuse();
+    }
+
 private:
     State& state_;
     Location location_;
@@ -55,7 +67,19 @@ private:
 
 std::shared_ptr<const FrameFunction> script_function(State& state, int index)
 {
-    return std::make_shared<ScriptFunction>(state, index);
+    auto function = std::make_shared<ScriptFunction>(state, index);
+    if (ScriptHost& host = state.host(); host.options().keeps_state && state.is_main()) {
+        if (state.is_loaded())
+            function->refuse_memory();
+        else
+            host.frame_functions.push_back(function);
+    }
+    return function;
+}
+
+void refuse_memory(const FrameFunction& function)
+{
+    if (const auto* script = dynamic_cast<const ScriptFunction*>(&function)) script->refuse_memory();
 }
 
 }  // namespace rapid

@@ -12,4 +12,7 @@ class State;
 // The function at `index` of the main state's stack; kept in its registry while any node holds it.
 std::shared_ptr<const FrameFunction> script_function(State& state, int index);
 
+// Reads the bytecode of such a function. Error: it keeps something for its next call, which no snapshot can hold.
+void refuse_memory(const FrameFunction& function);
+
 }  // namespace rapid

@@ -12,6 +12,7 @@
 #include "bindings/host/lua_text.h"
 #include "bindings/host/objects.h"
 #include "bindings/host/offers.h"
+#include "bindings/host/script_function.h"
 #include "bindings/host/values.h"
 #include "runtime/graph/override.h"
 
@@ -73,6 +74,7 @@ void ScriptHost::run_graph()
 
     const Watchdog::Section section(watchdog, fmt::format("{}: reading the kernels' bytecode", graph.file));
     analyse_kernels();
+    refuse_memory();
     main_->set_loaded();
 }
 
@@ -130,6 +132,21 @@ void ScriptHost::analyse_kernels()
                 for (const auto& [name, argument] : node->arguments)
                     if (const auto* object = argument.get<ObjectPtr>(); object && *object == kernel)
                         error.in_node(node->name).at(node->location);
+            throw;
+        }
+    }
+}
+
+// Error: a function of the frame keeps something from call to call.
+void ScriptHost::refuse_memory() const
+{
+    for (const std::shared_ptr<const FrameFunction>& function : frame_functions) {
+        try {
+            rapid::refuse_memory(*function);
+        } catch (Error& error) {
+            for (const NodePtr& node : graph.nodes)
+                for (const auto& [name, argument] : node->arguments)
+                    if (argument.function() == function.get()) error.in_node(node->name);
             throw;
         }
     }

@@ -31,6 +31,7 @@ public:
     std::vector<Session::Parameter> parameters;
     std::vector<std::string> warnings;
     Interruption interruption;
+    std::map<std::string, std::vector<Session::FunctionCode>> code;
     Watchdog watchdog;
     const Modules modules;
 
@@ -55,6 +56,8 @@ public:
     MakerCache* maker_cache = nullptr;
 
     std::vector<std::shared_ptr<Kernel>> kernels;
+    // With keeps_state, those that were made before the graph had run.
+    std::vector<std::shared_ptr<const FrameFunction>> frame_functions;
 
     void load_shipped_nodes();
 
@@ -64,6 +67,7 @@ private:
     void run_graph();
     void apply_arguments();
     void analyse_kernels();
+    void refuse_memory() const;
     std::unique_ptr<State> make_worker();
     void check_kernels(State& worker) const;
     void run_file(State& state, int results);

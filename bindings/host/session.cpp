@@ -16,6 +16,7 @@ Session::~Session() = default;
 const Graph& Session::graph() const { return host_->graph; }
 const Registry& Session::registry() const { return host_->registry; }
 const std::vector<Session::Parameter>& Session::parameters() const { return host_->parameters; }
+const std::map<std::string, std::vector<Session::FunctionCode>>& Session::code() const { return host_->code; }
 std::vector<std::string> Session::take_warnings() { return std::exchange(host_->warnings, {}); }
 
 void Session::use_from_this_thread() { host_->use_from_this_thread(); }

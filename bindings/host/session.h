@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -39,6 +40,7 @@ struct SessionOptions {
     std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory for each state
     bool may_write = false;                            // whether levelset:write acts; in a run only
     bool quiet = false;                                // print says nothing
+    bool keeps_state = false;                          // what a snapshot can't hold is refused, and code() is there
     KernelOrder kernel_order;
     // Of a study file: the knobs of the scene that becomes its graph. Empty: there is no graph, and only study() is
     // called.
@@ -89,6 +91,13 @@ public:
     // thread; in an interruptible session.
     void interrupt(const std::string& why);
     Interruption::Why interrupted() const;
+    // With keeps_state, by file: a hash of each of its functions, and the line in which it begins; the body's first.
+    // Equal for programs that do the same, whatever their comments and their lines.
+    struct FunctionCode {
+        int line;
+        std::uint64_t hash;
+    };
+    const std::map<std::string, std::vector<FunctionCode>>& code() const;
 
     // Of the file's makers, such as that a mesh has holes, since they were last taken: functions of the frame make
     // objects, too.

@@ -34,13 +34,13 @@ FrameWriter::~FrameWriter()
     thread_.join();
 }
 
-void FrameWriter::submit(PointSet points, FrameInfo frame, std::string output)
+void FrameWriter::submit(PointSet points, FrameInfo frame, std::string output, std::shared_ptr<const PictureFit> before)
 {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return error_ || jobs_.size() < std::max<std::size_t>(1, waiting_); });
     if (error_) std::rethrow_exception(error_);
     due_[frame.number] += targets_.size();
-    jobs_.push_back({std::move(points), std::move(frame), std::move(output)});
+    jobs_.push_back({std::move(points), std::move(frame), std::move(output), std::move(before)});
     changed_.notify_all();
 }
 
@@ -120,8 +120,10 @@ void FrameWriter::write(const Job& job)
 {
     std::shared_ptr<const PictureView> view = job.frame.view;
     for (const Target& target : targets_) {
+        std::shared_ptr<const PictureFit> fit;
         if (target.picture && !view) {
             Pictures& pictures = pictures_[job.output];
+            if (job.before) pictures.fit = *job.before;
             if (job.points.empty() && !pictures.fit.settled()) {
                 pictures.waiting.emplace_back(&target, job);
                 if (pictures.waiting.size() == most_waiting) write_without_points(pictures);
@@ -129,8 +131,9 @@ void FrameWriter::write(const Job& job)
             }
             view = std::make_shared<PictureView>(pictures.fit.next(job.points, job.frame));
             write_waiting(pictures, view);
+            if (!target.film) fit = std::make_shared<PictureFit>(pictures.fit);
         }
-        write_file(target, job, view);
+        write_file(target, job, view, std::move(fit));
     }
 }
 
@@ -142,10 +145,11 @@ void FrameWriter::write_without_points(Pictures& pictures)
 
 void FrameWriter::write_waiting(Pictures& pictures, const std::shared_ptr<const PictureView>& view)
 {
-    for (const auto& [target, job] : std::exchange(pictures.waiting, {})) write_file(*target, job, view);
+    for (const auto& [target, job] : std::exchange(pictures.waiting, {})) write_file(*target, job, view, nullptr);
 }
 
-void FrameWriter::write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view)
+void FrameWriter::write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view,
+                             std::shared_ptr<const PictureFit> fit)
 {
     const Stopwatch stopwatch;
     const std::string path = target.pattern.expand(job.frame.number, job.output);
@@ -169,7 +173,8 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     std::error_code ignored;
     const std::uintmax_t bytes = std::filesystem::file_size(path, ignored);
     const std::lock_guard lock(mutex_);
-    written_.push_back({job.frame.number, path, spent, bytes, std::chrono::steady_clock::now()});
+    written_.push_back(
+        {job.frame.number, path, spent, bytes, std::chrono::steady_clock::now(), target.film, std::move(fit)});
     if (--due_[job.frame.number] == 0) due_.erase(job.frame.number);
 }
 

@@ -31,6 +31,9 @@ public:
         double seconds;
         std::uint64_t bytes;
         std::chrono::steady_clock::time_point end = {};
+        bool film = false;  // a frame of a film, which is complete with its last one
+        // Of a picture: what those of later frames go on from; null where it has waited for points.
+        std::shared_ptr<const PictureFit> fit = nullptr;
     };
 
     // waiting: the most frames in the queue, besides the one that is being written. Error: an unknown extension.
@@ -39,7 +42,9 @@ public:
     ~FrameWriter();
 
     // Queues a frame of one output for all targets. Throws the first error of an earlier frame.
-    void submit(PointSet points, FrameInfo frame, std::string output = "main");
+    // before: what the picture of an earlier frame, of another run, has left, in place of those of this one.
+    void submit(PointSet points, FrameInfo frame, std::string output = "main",
+                std::shared_ptr<const PictureFit> before = nullptr);
     // Waits until all frames are written. Throws the first error. complete: whether they are all that there should be;
     // a film of some of them is dropped.
     void finish(bool complete = true);
@@ -59,6 +64,7 @@ private:
         PointSet points;
         FrameInfo frame;
         std::string output;
+        std::shared_ptr<const PictureFit> before;
     };
     // Pictures of one output. Those before the first points wait for them, because the camera is fitted to points. They
     // hold none, but the shapes of their frame: a hundred wait, and where no points come they show the shapes alone.
@@ -78,7 +84,8 @@ private:
     };
     void run();
     void write(const Job& job);
-    void write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view);
+    void write_file(const Target& target, const Job& job, std::shared_ptr<const PictureView> view,
+                    std::shared_ptr<const PictureFit> fit);
     void add_to_film(const std::string& path, const PointSet& points, const FrameInfo& frame);
     void write_without_points(Pictures& pictures);
     void write_waiting(Pictures& pictures, const std::shared_ptr<const PictureView>& view);

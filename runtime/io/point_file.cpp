@@ -40,6 +40,20 @@ PointStreamRegistration::PointStreamRegistration(const char* extension, BeginStr
     streams()[extension] = begin;
 }
 
+void append_points(PointSet& to, const PointSet& from)
+{
+    const std::size_t before = to.size();
+    to.append(from.size());
+    for (const auto& [name, column] : from.columns())
+        std::visit(
+            [&](const auto& values) {
+                using T = std::decay_t<decltype(values[0])>;
+                const std::span<T> place = to.column<T>(name).write().subspan(before);
+                for (std::size_t i = 0; i < from.size(); ++i) place[i] = values[i];
+            },
+            column);
+}
+
 PointFile::PointFile(const std::filesystem::path& path, const PointSet& like)
     : path_(path),
       format_(format_of(path)),
@@ -64,22 +78,13 @@ void PointFile::finish()
 
 void PointFile::keep(const PointSet& points)
 {
-    const std::size_t before = kept_.size();
     // Columns grow by as much again, and writing takes a part of them.
     const double bytes = static_cast<double>(kept_.bytes() + points.bytes());
     if (!fits_in_memory(bytes))
         throw beyond_memory(
-            fmt::format("{} points, which {} takes all at once,", before + points.size(), format_.extension), bytes,
-            "write .csv or .bgeo, which take them as they come");
-    kept_.append(points.size());
-    for (const auto& [name, column] : points.columns())
-        std::visit(
-            [&](const auto& from) {
-                using T = std::decay_t<decltype(from[0])>;
-                const std::span<T> to = kept_.column<T>(name).write().subspan(before);
-                for (std::size_t i = 0; i < points.size(); ++i) to[i] = from[i];
-            },
-            column);
+            fmt::format("{} points, which {} takes all at once,", kept_.size() + points.size(), format_.extension),
+            bytes, "write .csv or .bgeo, which take them as they come");
+    append_points(kept_, points);
 }
 
 }  // namespace rapid

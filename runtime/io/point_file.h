@@ -29,6 +29,9 @@ struct PointStreamRegistration {
 #define RAPID_POINT_STREAM(extension, begin) \
     static const ::rapid::PointStreamRegistration point_stream_registration(extension, begin)
 
+// Adds points that have the columns of `to`; groups and details stay behind.
+void append_points(PointSet& to, const PointSet& from);
+
 class PointFile {
 public:
     // like: a set of the columns, without points and groups. Error: an unknown extension, or no place to write to.

@@ -24,6 +24,20 @@ public:
     // Whether there have been points. Before that the view shows the shapes alone and may still jump.
     bool settled() const { return most_points_ > 0; }
 
+    // All that the next views depend on.
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        bool is_there = view_.has_value();
+        keep(is_there);
+        if (is_there) {
+            if (!view_) view_.emplace();
+            keep(view_->camera.position, view_->camera.target, view_->camera.fov, view_->full_speed,
+                 view_->least_radius, view_->bounds.min(), view_->bounds.max());
+        }
+        keep(seen_.min(), seen_.max(), goal_.min(), goal_.max(), time_, most_points_);
+    }
+
 private:
     void approach(double part);
 

@@ -1,0 +1,51 @@
+// What `--cache` keeps of each frame besides snapshots: its statistics and warnings, and which files it has written.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bindings/command/fingerprint.h"
+#include "runtime/picture/picture_fit.h"
+#include "runtime/report/statistics.h"
+
+namespace rapid {
+
+// A file that was written, as it was then.
+struct WrittenFile {
+    std::string path, how;  // absolute; how it is made (FrameFiles)
+    bool of_node = false;   // a `:write`
+    std::uint64_t bytes = 0;
+    std::int64_t modified = 0;  // ns
+    std::optional<PictureFit> fit;
+
+    // Takes bytes and modified from the file. False where it is not there.
+    bool look();
+    // Whether it is there and nobody has changed it.
+    bool is_whole() const;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(path, how, of_node, bytes, modified, fit);
+    }
+};
+
+struct FrameRecord {
+    FrameStatistics statistics;
+    std::vector<Stiffness> stiff;
+    std::vector<std::string> warnings;
+    Fingerprint read;              // contents of files, since the frame before
+    double seconds = 0;            // of the run, up to this frame
+    std::uint64_t peak_bytes = 0;  // likewise
+    std::vector<WrittenFile> files;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(statistics, stiff, warnings, read, seconds, peak_bytes, files);
+    }
+};
+
+}  // namespace rapid

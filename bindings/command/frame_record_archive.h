@@ -1,0 +1,107 @@
+// How statistics of frames are written down (frame_record.h): by all their members, so that one that is added does not
+// compile before it is here.
+#pragma once
+
+#include "bindings/command/frame_record.h"
+#include "runtime/points/state_archive.h"
+
+namespace rapid {
+
+template <StateArchive Archive>
+void serialize(Archive& keep, Stiffness::Cure& cure)
+{
+    auto& [error, substeps, error_then] = cure;
+    keep(error, substeps, error_then);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, Stiffness& stiffness)
+{
+    auto& [node, kind, step, substeps, frame, cure, alone] = stiffness;
+    int number = kind;
+    keep(node, number, step, substeps, frame, cure, alone);
+    kind = static_cast<Stiffness::Kind>(number);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, FrameStatistics::Error& error)
+{
+    auto& [p50, p95, max] = error;
+    keep(p50, p95, max);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, FrameStatistics::EnergyDrift& drift)
+{
+    auto& [mean, max] = drift;
+    keep(mean, max);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, ContactEnergy& energy)
+{
+    auto& [added, lost] = energy;
+    keep(added, lost);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, EnergyChanges::Split& split)
+{
+    auto& [friction, shapes] = split;
+    keep(friction, shapes);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, EnergyChanges& changes)
+{
+    auto& [rods, contacts, pins, drag, split] = changes;
+    keep(rods, contacts, pins, drag, split);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, Ledger::Residue& residue)
+{
+    auto& [energy, momentum, angular_momentum] = residue;
+    keep(energy, momentum, angular_momentum);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, Ledger& ledger)
+{
+    auto& [kinetic, potential, elastic, by, by_motion, momentum, angular_momentum, residue] = ledger;
+    keep(kinetic, potential, elastic, by, by_motion, momentum, angular_momentum, residue);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, BandFigures& band)
+{
+    auto& [node, width, voxels, seconds] = band;
+    keep(node, width, voxels, seconds);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, Residual::Search& search)
+{
+    auto& [grids, error, excess, seconds] = search;
+    keep(grids, error, excess, seconds);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, StageSeconds& all)
+{
+    auto& [graph, script, solve, write] = all;
+    keep(graph, script, solve, write);
+}
+
+template <StateArchive Archive>
+void serialize(Archive& keep, FrameStatistics& statistics)
+{
+    auto& [frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
+           left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
+           constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds] = statistics;
+    keep(frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
+         left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
+         constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds);
+}
+
+}  // namespace rapid

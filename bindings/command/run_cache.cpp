@@ -1,0 +1,390 @@
+#include "bindings/command/run_cache.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <utility>
+
+#include "runtime/io/state_file.h"
+#include "runtime/points/state_archive.h"
+#include "runtime/report/memory.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr std::string_view prefix = "snapshot.", suffix = ".rapid";
+
+// What a snapshot's file holds.
+struct KeptRun {
+    Snapshot snapshot;
+    PointSet events;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(snapshot, events);
+    }
+};
+
+fs::path absolute(const std::string& path) { return fs::absolute(path).lexically_normal(); }
+
+std::string list_of(std::vector<std::string> differences)
+{
+    constexpr std::size_t most = 8;
+    if (differences.size() > most) {
+        const std::size_t more = differences.size() - most;
+        differences.resize(most);
+        differences.push_back(fmt::format("{} more", more));
+    }
+    return fmt::format("{}", fmt::join(differences, "; "));
+}
+
+std::string shown_error(const std::string& file, const std::exception& error)
+{
+    return fmt::format("{}: {}", file, error.what());
+}
+
+}  // namespace
+
+void RunCache::declare(CLI::App& app)
+{
+    app.add_option("--cache", folder_,
+                   "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame that "
+                   "is still to be computed; frames that are there already are left as they are")
+        ->type_name("DIR");
+    app.add_option_function<std::string>(
+           "--cache-every", [this](const std::string& text) { every_ = read_whole("--cache-every", text, 0); },
+           "a snapshot after every N-th frame, and the last [default 10]; 0: none")
+        ->type_name("N");
+    app.add_flag("--again", again_, "computes and writes all frames, whatever the cache holds");
+    app.add_option_function<std::string>(
+           "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
+           "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
+        ->type_name("SECONDS");
+    app.add_flag("--cache-replace", replaces_)->group("");  // internal, of wedge: another run's cache is no error
+}
+
+void RunCache::check() const
+{
+    if (!asked() && again_) throw Error("--again says what to do with a --cache; give one, or leave it out");
+}
+
+void RunCache::set_graph(const fs::path& graph)
+{
+    graph_ = graph;
+    read_ = std::make_unique<InputContents>(graph.parent_path());
+}
+
+void RunCache::was_read(const fs::path& file)
+{
+    if (read_) read_->add(file);
+}
+
+// Two runs that wrote into one folder would leave a journal of neither.
+void RunCache::lock()
+{
+    std::error_code error;
+    fs::create_directories(folder_, error);
+    if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
+    lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    if (lock_ && ::flock(lock_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        throw Error(
+            fmt::format("--cache {}: another run has it; wait for its end, or give another folder", folder_.string()));
+}
+
+void RunCache::refuse(const std::vector<std::string>& differences)
+{
+    if (!replaces_)
+        throw Error(fmt::format("--cache {}: it is of another run: {}; give another folder, or --again to begin anew",
+                                folder_.string(), list_of(differences)));
+    again_ = true;
+}
+
+void RunCache::read_journal()
+{
+    const std::string hash = hash_of(fingerprint_);
+    bool is_there = false;
+    known_ = RunJournal::read(folder_ / "journal", hash, is_there);
+    if (!is_there && !snapshots().empty())
+        failures_.push_back((folder_ / "journal").string() + ": it is missing; the cache begins anew");
+    else if (is_there && known_.fingerprint.empty())
+        failures_.push_back((folder_ / "journal").string() + ": it is damaged; the cache begins anew");
+    else if (known_.damaged > 0)
+        failures_.push_back(fmt::format("{}: {} damaged; frames without a record are computed again",
+                                        (folder_ / "journal").string(),
+                                        known_.damaged == 1 ? "an entry is" : "some entries are"));
+    if (!known_.fingerprint.empty() && hash_of(known_.fingerprint) != hash)
+        refuse(differences(known_.fingerprint, fingerprint_));
+    else
+        check_contents();
+}
+
+// Of the files that were read in frames: those of the graph are in the fingerprint.
+void RunCache::check_contents()
+{
+    std::vector<std::string> changed;
+    for (const auto& [frame, record] : known_.frames)
+        for (const auto& [name, hash] : record.read) {
+            contents_[name] = hash;
+            const std::string now = read_->content_of(name);
+            if (now.empty())
+                changed.push_back(fmt::format("{} is not there any more", name.substr(name.find(" of ") + 4)));
+            else if (now != hash)
+                changed.push_back(fmt::format("the {} is another one", name));
+        }
+    if (!changed.empty()) refuse(changed);
+}
+
+void RunCache::begin_anew()
+{
+    known_ = {};
+    contents_.clear();
+    for (const auto& [frame, file] : snapshots()) {
+        std::error_code ignored;
+        fs::remove(file, ignored);
+    }
+}
+
+void RunCache::begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
+                     FrameFiles& files, const EventFile& events)
+{
+    frames_ = frames;
+    first_frame_ = plan.first_frame();
+    lock();
+    Fingerprint all = options;
+    all.merge(read_->take());
+    fingerprint_ = fingerprint_of(session, plan, graph_, all);
+    if (!again_) read_journal();
+    if (again_ || known_.fingerprint.empty()) begin_anew();
+    known_.fingerprint = fingerprint_;
+    find_due(plan, files);
+    if (!events.path().empty()) {  // those up to the last frame are known when it is computed
+        last_due_ = frames_.last;
+        if (!first_due_) first_due_ = last_due_;
+    }
+    try {
+        journal_.begin(folder_ / "journal", known_);
+    } catch (const std::exception& error) {
+        failures_.push_back(shown_error((folder_ / "journal").string(), error) + "; the run goes on, and what it " +
+                            "computes is not kept");
+    }
+    if (every_ > 0) writer_ = std::make_unique<SnapshotWriter>();
+}
+
+void RunCache::find_due(const Plan& plan, FrameFiles& files)
+{
+    FrameFiles::WholeFiles whole;
+    for (const auto& [path, film] : known_.films)
+        if (film.is_whole()) whole.films[path] = film.how;
+    std::set<std::int64_t> torn;  // frames with a file of a node that is not whole
+    for (const auto& [frame, record] : known_.frames) {
+        if (!frames_.contains(frame)) continue;
+        for (const WrittenFile& file : record.files) {
+            const bool is_whole = file.is_whole();
+            if (is_whole)
+                whole.frames[frame][file.path] = {file.how,
+                                                  file.fit ? std::make_shared<PictureFit>(*file.fit) : nullptr};
+            else if (file.of_node)
+                torn.insert(frame);
+        }
+    }
+    leave_waiting_pictures(whole, files);
+
+    const auto is_due = [&](std::int64_t frame) {
+        if (!known_.frames.contains(frame) || torn.contains(frame)) return true;
+        if (!frames_.contains(frame)) return false;
+        for (const FrameFiles::FrameFile& file : files.files_of(frame, frames_)) {
+            const std::string path = absolute(file.path);
+            if (file.film ? !whole.films.contains(path) || whole.films.at(path) != file.how
+                          : !whole.frames[frame].contains(path) || whole.frames[frame].at(path).how != file.how)
+                return true;
+        }
+        return false;
+    };
+    for (std::int64_t frame = plan.first_frame(); frame <= frames_.last; ++frame)
+        if (is_due(frame)) {
+            if (!first_due_) first_due_ = frame;
+            last_due_ = frame;
+        }
+    files.go_on_behind(std::move(whole), frames_);
+}
+
+// Pictures before the first points wait for these, and then have the same camera: all of them are drawn again, or none.
+void RunCache::leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const
+{
+    const std::size_t series = files.files_of(frames_.first, frames_).size();
+    for (std::size_t k = 0; k < series; ++k) {
+        bool is_whole = true;
+        std::vector<std::pair<std::int64_t, std::string>> waited;
+        for (std::int64_t frame = frames_.first; frame <= frames_.last; frame += frames_.step) {
+            const FrameFiles::FrameFile file = files.files_of(frame, frames_)[k];
+            if (file.film || fs::path(file.path).extension() != ".png") break;
+            const std::string path = absolute(file.path);
+            const auto found = whole.frames[frame].find(path);
+            waited.emplace_back(frame, path);
+            is_whole &= found != whole.frames[frame].end();
+            if (found != whole.frames[frame].end() && found->second.fit) break;
+        }
+        if (!is_whole)
+            for (const auto& [frame, path] : waited) whole.frames[frame].erase(path);
+    }
+}
+
+fs::path RunCache::snapshot_file(std::int64_t frame) const
+{
+    return folder_ / fmt::format("{}{:04}{}", prefix, frame, suffix);
+}
+
+std::map<std::int64_t, fs::path> RunCache::snapshots() const
+{
+    std::map<std::int64_t, fs::path> found;
+    std::error_code error;
+    for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
+        const std::string name = entry->path().filename().string();
+        if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() <= prefix.size() + suffix.size())
+            continue;
+        std::int64_t frame = 0;
+        const char* const last = name.data() + name.size() - suffix.size();
+        const auto parsed = std::from_chars(name.data() + prefix.size(), last, frame);
+        if (parsed.ec == std::errc() && parsed.ptr == last && entry->is_regular_file()) found[frame] = entry->path();
+    }
+    return found;
+}
+
+bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluator, EventFile& events)
+{
+    KeptRun kept;
+    try {
+        const StateFile file(path);
+        const Fingerprint known = file.header().at("fingerprint").get<Fingerprint>();
+        Fingerprint of_graph = known;
+        std::erase_if(of_graph, [&](const auto& one) {
+            return InputContents::is_content(one.first) && !fingerprint_.contains(one.first);
+        });
+        if (file.header().at("frame") != frame || hash_of(of_graph) != hash_of(fingerprint_))
+            throw Error(fmt::format("it is of another run: {}", list_of(differences(of_graph, fingerprint_))));
+        rapid::restore(kept, file.state());
+    } catch (const std::exception& error) {
+        failures_.push_back(shown_error(path.string(), error) + "; it is left out");
+        return false;
+    }
+    evaluator.load(kept.snapshot);
+    events.set_events(std::move(kept.events));
+    last_kept_ = frame;
+    return true;
+}
+
+void RunCache::restore(Evaluator& evaluator, EventFile& events)
+{
+    if (!first_due_) return;
+    const std::map<std::int64_t, fs::path> all = snapshots();
+    for (auto one = all.rbegin(); one != all.rend(); ++one)
+        if (one->first < *first_due_ && one->first >= first_frame_ && load(one->first, one->second, evaluator, events))
+            return;
+}
+
+std::vector<const FrameRecord*> RunCache::records(std::int64_t first, std::int64_t last) const
+{
+    std::vector<const FrameRecord*> list;
+    for (auto one = known_.frames.lower_bound(first); one != known_.frames.end() && one->first <= last; ++one)
+        list.push_back(&one->second);
+    return list;
+}
+
+void RunCache::computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff, double seconds,
+                        std::uint64_t peak_bytes)
+{
+    FrameRecord& record = open_[frame.frame];
+    record.statistics = frame;
+    record.stiff = stiff;
+    record.warnings = std::exchange(warnings_, {});
+    record.read = read_->take();
+    record.seconds = seconds;
+    record.peak_bytes = peak_bytes;
+    for (const auto& [name, hash] : record.read) contents_[name] = hash;
+    // Files that are left as they are.
+    if (const auto known = known_.frames.find(frame.frame); known != known_.frames.end())
+        for (const WrittenFile& file : known->second.files)
+            if (file.is_whole()) record.files.push_back(file);
+}
+
+void RunCache::written(const FrameFiles::Written& file)
+{
+    WrittenFile one;
+    one.path = absolute(file.path);
+    one.how = file.how;
+    one.of_node = file.of_node;
+    if (file.film) {
+        films_[one.path] = one;
+    } else if (const auto open = open_.find(file.frame); open != open_.end()) {
+        if (file.fit) one.fit = *file.fit;
+        std::vector<WrittenFile>& files = open->second.files;
+        std::erase_if(files, [&](const WrittenFile& other) { return other.path == one.path; });
+        if (one.look()) files.push_back(std::move(one));
+    }
+    if (const auto open = open_.find(file.frame); open != open_.end())
+        open->second.statistics.seconds.write += file.seconds;
+}
+
+void RunCache::complete_before(std::optional<std::int64_t> frame)
+{
+    while (!open_.empty() && (!frame || open_.begin()->first < *frame)) {
+        add(open_.begin()->second);
+        open_.erase(open_.begin());
+    }
+}
+
+void RunCache::add(const FrameRecord& record)
+{
+    try {
+        journal_.add(record);
+    } catch (const std::exception& error) {
+        failures_.push_back(shown_error((folder_ / "journal").string(), error) +
+                            "; the run goes on, and will compute " + "this frame again");
+    }
+}
+
+void RunCache::keep(const Evaluator& evaluator, const EventFile& events, bool in_any_case)
+{
+    const std::int64_t frame = evaluator.next_frame() - 1;
+    const bool is_due = every_ > 0 && ((frame - first_frame_ + 1) % every_ == 0 || frame == frames_.last);
+    if (!writer_ || !(is_due || in_any_case) || last_kept_ == frame || frame < first_frame_) return;
+    KeptRun kept{evaluator.save(), events.events()};
+    ordered_json header = {{"what", "snapshot of a run"}, {"graph", graph_.string()}, {"frame", frame}};
+    for (const auto& [name, state] : kept.snapshot.simulations) header["simulations"][name] = state.size();
+    for (const auto& [name, state] : kept.snapshot.nodes) header["nodes"][name] = state.size();
+    Fingerprint all = fingerprint_;
+    all.insert(contents_.begin(), contents_.end());
+    header["fingerprint"] = all;
+    writer_->submit(snapshot_file(frame), std::move(header), state_of(kept));
+    last_kept_ = frame;
+}
+
+void RunCache::finish(bool complete)
+{
+    if (writer_) writer_->finish();
+    if (!complete) return;
+    for (auto& [path, film] : films_)
+        if (film.look()) try {
+                journal_.add(film);
+            } catch (const std::exception& error) {
+                failures_.push_back(shown_error((folder_ / "journal").string(), error));
+            }
+}
+
+std::vector<std::string> RunCache::take_warnings()
+{
+    std::vector<std::string> all = std::exchange(failures_, {});
+    if (writer_)
+        for (std::string& failure : writer_->take_failures()) all.push_back(std::move(failure));
+    return all;
+}
+
+}  // namespace rapid

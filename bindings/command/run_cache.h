@@ -1,0 +1,99 @@
+// `--cache DIR`: snapshots of a run and a journal of its frames, from which it goes on where it was.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bindings/command/event_file.h"
+#include "bindings/command/frame_files.h"
+#include "bindings/command/frame_selection.h"
+#include "bindings/command/run_journal.h"
+#include "bindings/command/snapshot_writer.h"
+#include "runtime/graph/evaluate.h"
+
+namespace rapid {
+
+class RunCache {
+public:
+    void declare(CLI::App& app);
+
+    bool asked() const { return !folder_.empty(); }
+    bool keeps_snapshots() const { return asked() && every_ > 0; }
+    const std::filesystem::path& folder() const { return folder_; }
+    double grace() const { return grace_; }
+    // Error: options that say nothing without --cache.
+    void check() const;
+
+    // A file that the graph reads, before it is read.
+    void was_read(const std::filesystem::path& file);
+    void set_graph(const std::filesystem::path& graph);
+
+    // What is asked for, and what the folder has of it. options: of the fingerprint. Error: another run has the folder,
+    // or it is of a run of another fingerprint.
+    void begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
+               FrameFiles& files, const EventFile& events);
+
+    // The frames that are to be computed; nothing: all that was asked for is there.
+    std::optional<std::int64_t> first_due() const { return first_due_; }
+    std::int64_t last_due() const { return last_due_; }
+    // Takes an evaluator as near to the first frame as a snapshot does.
+    void restore(Evaluator& evaluator, EventFile& events);
+    // Of frames that are not computed, in order.
+    std::vector<const FrameRecord*> records(std::int64_t first, std::int64_t last) const;
+
+    // Of the frames that are computed, as RunReport hears of them. complete_before: frames of whose files none is to
+    // come; all, where none is to come of any.
+    void warned(const std::string& text) { warnings_.push_back(text); }
+    void computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff, double seconds,
+                  std::uint64_t peak_bytes);
+    void written(const FrameFiles::Written& file);
+    void complete_before(std::optional<std::int64_t> frame);
+
+    // After a frame: a snapshot, where one is due, or in any case.
+    void keep(const Evaluator& evaluator, const EventFile& events, bool in_any_case);
+    // The frame of the last snapshot that was submitted.
+    std::optional<std::int64_t> last_kept() const { return last_kept_; }
+    // Waits for the snapshots. complete: films are, too.
+    void finish(bool complete);
+    // For the user, since the last call.
+    std::vector<std::string> take_warnings();
+
+private:
+    void lock();
+    void read_journal();
+    void refuse(const std::vector<std::string>& differences);
+    void check_contents();
+    void begin_anew();
+    // What is whole of the frames, and the frames that are not.
+    void find_due(const Plan& plan, FrameFiles& files);
+    void leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const;
+    std::filesystem::path snapshot_file(std::int64_t frame) const;
+    std::map<std::int64_t, std::filesystem::path> snapshots() const;
+    bool load(std::int64_t frame, const std::filesystem::path& file, Evaluator& evaluator, EventFile& events);
+    void add(const FrameRecord& record);
+
+    std::filesystem::path folder_, graph_;
+    std::int64_t every_ = 10;
+    bool again_ = false, replaces_ = false;
+    double grace_ = 20;  // s
+
+    Descriptor lock_;
+    std::unique_ptr<InputContents> read_;
+    Fingerprint fingerprint_, contents_;  // contents_: of the files read in frames
+    RunJournal journal_;
+    RunJournal::Contents known_;
+    FrameSelection frames_{};
+    std::int64_t first_frame_ = 0, last_due_ = 0;
+    std::optional<std::int64_t> first_due_, last_kept_;
+    std::map<std::int64_t, FrameRecord> open_;  // frames whose files are to come
+    std::map<std::string, WrittenFile> films_;  // by path, that are being written
+    std::vector<std::string> warnings_, failures_;
+    std::unique_ptr<SnapshotWriter> writer_;
+};
+
+}  // namespace rapid

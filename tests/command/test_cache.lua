@@ -1,0 +1,411 @@
+-- rapid run --cache: a run that goes on where it was, to the same bytes; and what refuses to.
+local command = require "testing.command"
+local statistics = require "tests.same_statistics"
+
+local rain = [[
+local rapid = require "rapid"
+local rate = rapid.param("rate", 400, "births a second")
+return rapid.create { seed = 3 }
+  :emit { source = rapid.mesh.grid { size = {1, 1}, center = {0, 1, 0} }, rate = rate, velocity = {0, -1, 0},
+          spread = 20 }
+  :points("drift", function(p, frame) p.v = p.v + vec3(0.02 * p:rand(1, frame), 0, 0) end)
+  :gravity {} :drag { quadratic = 0.1 } :turbulence { amplitude = 1 }
+  :collide { shape = rapid.shape.plane {}, bounce = 0.4 }
+  :solve { substeps = 2 }
+]]
+
+local function new_folder(text)
+  local folder = command.folder()
+  folder:write("scene.lua", text or rain)
+  function folder:run(arguments, file)
+    return command.rapid(("run %s %s"):format(file or "scene.lua", arguments), { cwd = self.path })
+  end
+  function folder:done(arguments)
+    local result = self:run(arguments)
+    assert.equal("", result.stderr)
+    assert.equal(0, result.status)
+    return result.stdout
+  end
+  function folder:shell(line)
+    local result = command.shell(line, { cwd = self.path })
+    assert.equal(0, result.status, result.stdout .. result.stderr)
+    return result.stdout
+  end
+  return folder
+end
+
+-- The frames that a run tells it has computed.
+local function computed(said)
+  local list = {}
+  for number in said:gmatch "\nframe (%d+)  " do list[#list + 1] = tonumber(number) end
+  return list
+end
+
+local function range(first, last)
+  local list = {}
+  for k = first, last do list[#list + 1] = k end
+  return list
+end
+
+describe("rapid run --cache", function()
+  it("goes on behind the last snapshot, to the files and statistics of a run that was not interrupted", function()
+    local folder = new_folder()
+    folder:done "-f 1-30 -o whole/a.####.bgeo --stats whole.json --events whole.csv"
+    local arguments = "--cache cache -o a/a.####.bgeo --stats a.json --events a.csv"
+    folder:done("-f 1-14 " .. arguments)
+    local said = folder:done("-f 1-30 --threads 3 " .. arguments)
+    assert.same(range(15, 30), computed(said))
+    assert.truthy(said:find("frames 1-14 are known from cache", 1, true))
+    folder:shell "diff -r whole a && cmp whole.csv a.csv"
+    assert.same(statistics.of(folder:read "whole.json"), statistics.of(folder:read "a.json"))
+    folder:shell "rm a.csv a/a.0003.bgeo"
+    folder:done("-f 1-30 " .. arguments)
+    folder:shell "diff -r whole a && cmp whole.csv a.csv && rm a.csv"
+    assert.same(range(21, 30), computed(folder:done("-f 1-30 " .. arguments))) -- for the events of the last
+    folder:shell "cmp whole.csv a.csv"
+  end)
+
+  it("keeps a snapshot after every tenth frame, and the last", function()
+    local folder = new_folder()
+    folder:done "-f 1-24 --cache cache --quiet"
+    local names = {}
+    for _, name in ipairs(folder:list()) do
+      if name:find "snapshot" then names[#names + 1] = name end
+    end
+    assert.same({ "cache/snapshot.0010.rapid", "cache/snapshot.0020.rapid", "cache/snapshot.0024.rapid" }, names)
+    folder:done "-f 1-6 --cache other --cache-every 4 --quiet"
+    assert.truthy(folder:read "other/snapshot.0004.rapid")
+    assert.truthy(folder:read "other/snapshot.0006.rapid")
+    folder:done "-f 1-6 --cache none --cache-every 0 --quiet"
+    assert.is_nil(folder:read "none/snapshot.0006.rapid")
+  end)
+
+  it("starts near the first frame that is asked for", function()
+    local folder = new_folder()
+    folder:done "-f 1-30 --cache cache --stats whole.json"
+    folder:done "-f 26-28 -o whole.####.bgeo"
+    local said = folder:done "-f 26-28 -o a.####.bgeo --cache cache --stats a.json"
+    assert.same(range(21, 28), computed(said))
+    folder:shell "for f in 26 27 28; do cmp whole.00$f.bgeo a.00$f.bgeo; done"
+    assert.equal(28, #statistics.of(folder:read "a.json").frames)
+  end)
+
+  it("neither computes nor writes again what is there, and does so with --again", function()
+    local folder = new_folder()
+    local arguments = "-f 1-12 -o a/a.####.bgeo -o a/p.####.png --size 64x36 --cache cache --stats a.json"
+    folder:done(arguments)
+    local before, times = folder:read "a.json", folder:shell "stat -c '%n %y' a/*"
+    local said = folder:done(arguments)
+    assert.same({}, computed(said))
+    assert.is_nil(said:find("writing", 1, true))
+    assert.equal(times, folder:shell "stat -c '%n %y' a/*")
+    assert.same(statistics.of(before), statistics.of(folder:read "a.json"))
+    folder:shell "cp -r a whole && rm a/a.0007.bgeo a/p.0012.png"
+    assert.same({ 11, 12 }, (function()
+      local list = computed(folder:done(arguments))
+      return { list[#list - 1], list[#list] }
+    end)())
+    folder:shell "diff -r whole a"
+    assert.same(range(1, 12), computed(folder:done(arguments .. " --again")))
+    folder:shell "diff -r whole a"
+    assert.not_equal(times, folder:shell "stat -c '%n %y' a/*")
+  end)
+
+  it("writes a file again that another has changed", function()
+    local folder = new_folder()
+    local arguments = "-f 1-12 -o a/a.####.bgeo --cache cache"
+    folder:done(arguments)
+    folder:shell "cp -r a whole && printf x >>a/a.0011.bgeo"
+    folder:done(arguments)
+    folder:shell "diff -r whole a"
+  end)
+
+  it("draws pictures and films as a run that was not interrupted", function()
+    -- Its first points are born in the sixth frame.
+    local folder = new_folder((rain:gsub(":emit {", ":emit { impulse = { [6] = 30 }, "):gsub("rate = rate,", "")))
+    local outputs = "--size 64x36 -o DIR/p.####.png -o DIR/n.####.png:P -o DIR/film.gif"
+    folder:done("-f 1-18 " .. outputs:gsub("DIR", "whole"))
+    folder:done("-f 1-18 -o a/p.####.png --size 64x36 --cache cache --cache-every 4")
+    folder:shell "rm a/p.0013.png"
+    folder:done("-f 1-18 -o a/p.####.png --size 64x36 --cache cache --cache-every 4")
+    folder:shell "rm a/p.0003.png"
+    folder:done("-f 1-18 " .. outputs:gsub("DIR", "a") .. " --cache cache --cache-every 4")
+    folder:shell "diff -r whole a"
+    assert.same({}, computed(folder:done("-f 1-18 " .. outputs:gsub("DIR", "a") .. " --cache cache --cache-every 4")))
+  end)
+
+  it("leaves files of :write nodes that are there, and writes those that are not", function()
+    local folder = new_folder(rain:gsub(":gravity {}", ":write { file = \"b/b.####.csv\" } :gravity {}"))
+    folder:done "-f 1-12 --cache cache --cache-every 5"
+    folder:shell "cp -r b whole && rm b/b.0012.csv"
+    assert.same({ 11, 12 }, computed(folder:done "-f 1-12 --cache cache --cache-every 5"))
+    folder:shell "diff -r whole b"
+  end)
+
+  it("refuses another run, and says what differs, by name", function()
+    local folder = new_folder()
+    folder:write("helper.lua", "return { factor = 1 }")
+    folder:write("points.csv", "id,Px,Py,Pz\n0,0,1,0\n")
+    local text = [[
+local rapid = require "rapid"
+local helper = require "helper"
+local rate = rapid.param("rate", 20000, "births a second")
+return rapid.create { seed = 3 }
+  :emit { source = rapid.points.read "points.csv", from = "points", rate = rate }
+  :points("push", function(p) p.v = p.v * helper.factor end)
+  :solve { substeps = 2 }
+]]
+    folder:write("scene.lua", text)
+    folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json"
+    local function refused(arguments)
+      local result = folder:run("-f 1-3 --cache cache -o a.####.bgeo --stats a.json " .. (arguments or ""))
+      assert.equal(2, result.status)
+      assert.equal("", result.stdout)
+      local what, rest = result.stderr:match "^%-%-cache cache: it is of another run: (.*); give (.*)$"
+      assert.equal("another folder, or --again to begin anew\n", rest, result.stderr)
+      return what
+    end
+    assert.equal("emit1.rate was 20000, is 30000; rate was 20000, is 30000", refused "--set rate=30000")
+    assert.equal("solve1.substeps was 2, is 3", refused "--set solve.substeps=3")
+    assert.equal("seed of create1 was 3, is 4", refused "--seed 4")
+    assert.equal("the estimate of errors was yes, is no", (function()
+      local result = folder:run "-f 1-3 --cache cache -o a.####.bgeo --quiet"
+      assert.equal(2, result.status)
+      return result.stderr:match "another run: (.-);"
+    end)())
+    folder:write("scene.lua", (text:gsub("p.v %* helper", "0.5 * p.v * helper")))
+    assert.equal("the function in line 6 of scene.lua is another one", refused())
+    folder:write("scene.lua", (text:gsub(":solve", ":gravity {} :solve")))
+    assert.equal("gravity1 was not there, is gravity behind push; solve1 was solve behind push, " ..
+      "is solve behind gravity1", refused())
+    folder:write("scene.lua", "-- the same with a comment\n\n" .. text)
+    assert.same({}, computed(folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json"))
+    folder:write("helper.lua", "return { factor = 2 }")
+    assert.equal("helper.lua is another one, outside of its functions", refused())
+    folder:write("helper.lua", "return { factor = 1 }")
+    folder:write("points.csv", "id,Px,Py,Pz\n0,0,2,0\n")
+    assert.equal("the content of points.csv is another one", refused())
+    folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json --again"
+    folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json"
+  end)
+
+  it("refuses files that are read in frames and have changed", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create {}
+  :emit { source = function(frame) return rapid.points.read(("points%d.csv"):format(frame.number % 3)) end,
+          from = "points", rate = 10 } :solve {}
+]]
+    for k = 0, 2 do folder:write(("points%d.csv"):format(k), "id,Px,Py,Pz\n0,0,1,0\n") end
+    folder:done "-f 1-6 --cache cache"
+    folder:write("points2.csv", "id,Px,Py,Pz\n0,0,2,0\n")
+    local result = folder:run "-f 1-9 --cache cache"
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find("the content of points2.csv is another one", 1, true), result.stderr)
+    folder:shell "rm points2.csv"
+    result = folder:run "-f 1-9 --cache cache"
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find("points2.csv is not there any more", 1, true), result.stderr)
+  end)
+
+  it("refuses a function of the frame that remembers, before the first frame, with the remedy", function()
+    local function stderr_of(body)
+      local folder = new_folder(([[
+local rapid = require "rapid"
+local count, list = 0, {}
+local function next_rate(frame)
+  %s
+  return 10
+end
+return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :solve {}
+]]):format(body))
+      folder:done "-f 1-2"
+      local result = folder:run "-f 1-2 --cache cache"
+      assert.equal(result.stderr == "" and 0 or 2, result.status)
+      return result.stderr
+    end
+    local remedy = "; no snapshot of --cache can hold what a function of the frame remembers: find it from " ..
+      "frame.number, or keep it in points.detail.NAME, in a :detail\n"
+    assert.equal("scene.lua:4: node \"emit1\": a function of the frame assigns the upvalue \"count\"" .. remedy,
+      stderr_of "count = count + 1")
+    assert.equal("scene.lua:4: node \"emit1\": a function of the frame assigns into a table that all points share" ..
+      remedy, stderr_of "list[#list + 1] = frame.number")
+    assert.equal("scene.lua:4: node \"emit1\": a function of the frame changes a table that all points share by " ..
+      "table.insert" .. remedy, stderr_of "table.insert(list, 1)")
+    assert.equal("", stderr_of "local own, n = {}, 0 own[1] = frame.number for _, x in ipairs(own) do n = n + x end")
+  end)
+
+  -- Runs again after some damage; returns the warnings. Nine frames are there, with snapshots of 3, 6 and 9.
+  local damaged = new_folder()
+  damaged:done "-f 1-12 -o whole/a.####.bgeo"
+  damaged:done "-f 1-9 -o a/a.####.bgeo --cache cache --cache-every 3"
+  damaged:shell "cp -rp a kept_a && mv cache kept"
+  local function warnings_of(damage)
+    damaged:shell("rm -rf cache a && cp -r kept cache && cp -rp kept_a a && " .. damage)
+    local result = damaged:run "-f 1-12 -o a/a.####.bgeo --cache cache --cache-every 3"
+    assert.equal(0, result.status, damage .. ": " .. result.stderr)
+    damaged:shell "diff -r whole a"
+    return result.stderr, computed(result.stdout)[1]
+  end
+
+  it("leaves out damaged and foreign snapshots, with a warning, and goes on behind an earlier one", function()
+    local snapshot = "cache/snapshot.0009.rapid"
+    local function left_out(why)
+      return ("warning: %s: %s; it is left out\n"):format(snapshot, why)
+    end
+    local function check(warning, first, damage)
+      local found, from = warnings_of(damage)
+      assert.equal(warning, found)
+      assert.equal(first, from)
+    end
+    check("", 10, "true")
+    check(left_out "its checksum is wrong; it is no whole snapshot", 7, "truncate -s -1 " .. snapshot)
+    check(left_out "it does not begin as one; it is no whole snapshot", 7, "echo text >" .. snapshot)
+    check(left_out "it is of another run: ", 7, "cp cache/snapshot.0006.rapid " .. snapshot)
+    check(left_out "it is of another run: emit1.rate was 20, is 400; rate was 20, is 400", 7,
+      '"$RAPID" run scene.lua -f 1-9 --set rate=20 --cache other >/dev/null && cp other/snapshot.0009.rapid ' ..
+      snapshot)
+    check("", 10, "echo text >cache/snapshot.abc.rapid")
+    -- Nothing of the journal is used that is not whole.
+    check("warning: cache/journal: it is damaged; the cache begins anew\n", 1, "echo text >cache/journal")
+    check("warning: cache/journal: an entry is damaged; frames without a record are computed again\n", 7,
+      "truncate -s -1 cache/journal")
+    check("warning: cache/journal: it is missing; the cache begins anew\n", 1, "rm cache/journal")
+  end)
+
+  it("comes to the same files whatever is damaged in a cache", function()
+    local lehmer = require "tests.lehmer".new(11)
+    for _ = 1, tonumber(os.getenv "RAPID_DAMAGES" or 30) do
+      local file = "kept/" .. lehmer.pick { "snapshot.0009.rapid", "snapshot.0006.rapid", "journal" }
+      local bytes = damaged:read(file)
+      local at = lehmer.below(#bytes) + 1
+      if lehmer.chance(0.3) then
+        bytes = bytes:sub(1, at - 1)
+      else
+        local flipped = bit.bxor(bytes:byte(at), bit.lshift(1, lehmer.below(8)))
+        bytes = bytes:sub(1, at - 1) .. string.char(flipped) .. bytes:sub(at + 1)
+      end
+      damaged:write("damaged", bytes)
+      local warning = warnings_of("mv damaged " .. file:gsub("kept", "cache"))
+      assert.truthy(warning ~= "" or file:find "0006", "no word about " .. file)
+    end
+  end)
+
+  it("has one run at a time in a folder", function()
+    local folder = new_folder()
+    folder:shell "mkdir cache"
+    local said = folder:shell [[
+exec 9>cache/.lock
+flock -n 9
+"$RAPID" run scene.lua -f 1-2 --cache cache 2>&1 || echo "status $?"
+]]
+    assert.equal("--cache cache: another run has it; wait for its end, or give another folder\nstatus 2\n", said)
+  end)
+
+  it("ends the frame on SIGTERM, keeps it in a snapshot, and goes on from there", function()
+    local folder = new_folder()
+    local said = folder:shell [[
+run() { exec "$RAPID" run scene.lua -f 1-40 --set rate=4000 "$@"; }
+(run -o whole/a.####.bgeo --quiet) || exit 1
+run -o a/a.####.bgeo --cache cache --cache-every 1000 --stats a.json >said 2>&1 &
+one=$!
+until grep -q '^frame 3 ' said; do sleep 0.01; done
+kill -TERM $one
+wait $one
+echo "status $?"
+tail -n 1 said
+ls cache | grep snapshot
+(run -o a/a.####.bgeo --cache cache --stats b.json) >said 2>&1 || cat said
+diff -r whole a
+]]
+    local frame, snapshot = said:match("^status 143\ninterrupted after frame (%d+); the same command goes on " ..
+      "behind it\nsnapshot%.(%d+)%.rapid\n$")
+    assert.truthy(frame, said)
+    assert.equal(tonumber(frame), tonumber(snapshot))
+    assert.equal(tonumber(frame), #statistics.of(folder:read "a.json").frames)
+    assert.equal(40, #statistics.of(folder:read "b.json").frames)
+  end)
+
+  it("drops a frame that takes longer than the grace", function()
+    local folder = new_folder [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = { {0, 0, 0} } } }
+  :detail("slow", function(points, frame)
+    local sum = 0
+    if frame.number == 4 then for k = 1, 1e10 do sum = sum + k % 3 end end
+    points.detail.sum = sum
+  end) :solve {}
+]]
+    local said = folder:shell [[
+"$RAPID" run scene.lua -f 1-8 --cache cache --cache-every 2 --grace 0.2 >said 2>&1 &
+one=$!
+until grep -q '^frame 3 ' said; do sleep 0.01; done
+kill -TERM $one
+wait $one
+echo "status $?"
+tail -n 1 said
+ls cache | grep snapshot
+]]
+    assert.equal("status 143\ninterrupted; the frame took longer than the --grace, and is dropped\n" ..
+      "snapshot.0002.rapid\n", said)
+  end)
+
+  it("goes on where snapshots can't be written, says so, and writes its files", function()
+    local folder = new_folder()
+    folder:done "-f 1-12 -o whole/a.####.bgeo"
+    folder:shell "mkdir -p cache/snapshot.0005.rapid/taken"
+    local result = folder:run "-f 1-12 -o a/a.####.bgeo --cache cache --cache-every 5"
+    assert.equal(0, result.status)
+    assert.equal("warning: frame 6: cache/snapshot.0005.rapid: can't be written: it is not a regular file; " ..
+      "the run goes on without this snapshot\n", (result.stderr:gsub("frame %d+", "frame 6")))
+    folder:shell "diff -r whole a"
+    -- A full disk; a name space of its own may mount one.
+    if command.shell("unshare -rm true").status ~= 0 then return end
+    local said = folder:shell [[
+mkdir full
+unshare -rm sh -c 'mount -t tmpfs -o size=48k none full && exec "$0" "$@"' "$RAPID" run scene.lua -f 1-12 \
+  -o b/a.####.bgeo --cache full/cache --cache-every 1 2>&1 >/dev/null
+echo "status $?"
+diff -r whole b
+]]
+    assert.truthy(said:find("No space left on device; the run goes on without this snapshot", 1, true), said)
+    assert.truthy(said:find "status 0\n$", said)
+  end)
+
+  it("says what goes with it and what does not", function()
+    local folder = new_folder()
+    local function refusal(arguments)
+      local result = folder:run(arguments)
+      assert.equal(2, result.status)
+      return result.stderr
+    end
+    assert.equal("--again says what to do with a --cache; give one, or leave it out\n", refusal "-f 1-2 --again")
+    assert.equal("--watch runs a graph that changes, of which --cache holds nothing; give one of them\n",
+      refusal "-f 1-2 --cache cache --watch")
+    assert.truthy(refusal "-f 1-2 --cache cache --cache-every -1":find("whole number, at least 0", 1, true))
+    assert.truthy(refusal "-f 1-2 --cache cache --grace 0":find("a number above 0", 1, true))
+    assert.equal(0, folder:run("-f 1-3 --cache cache --untrusted").status)
+    assert.equal(0, folder:run("-f 1-5 --cache cache --untrusted").status)
+  end)
+end)
+
+describe("rapid info", function()
+  it("tells what a snapshot is of, and what each node keeps", function()
+    local folder = new_folder()
+    folder:done "-f 1-4 --cache cache"
+    local result = command.rapid("info cache/snapshot.0004.rapid", { cwd = folder.path })
+    assert.equal(0, result.status, result.stderr)
+    assert.truthy(result.stdout:find("of scene.lua after frame 4\n", 1, true), result.stdout)
+    assert.truthy(result.stdout:find "\n  create1  %d+ bytes\n", result.stdout)
+    assert.truthy(result.stdout:find "\n  emit1  %d+ bytes\n", result.stdout)
+    assert.truthy(result.stdout:find("\n  rate  400\n", 1, true), result.stdout)
+    local json = require "dkjson".decode(command.rapid("info cache/snapshot.####.rapid --json",
+      { cwd = folder.path }).stdout)
+    assert.equal(4, json[1].frame)
+    assert.equal("400", json[1].fingerprint.rate)
+    folder:shell "truncate -s -3 cache/snapshot.0004.rapid"
+    result = command.rapid("info cache/snapshot.0004.rapid", { cwd = folder.path })
+    assert.equal(2, result.status)
+    assert.equal("cache/snapshot.0004.rapid: its checksum is wrong; it is no whole snapshot\n", result.stderr)
+  end)
+end)

@@ -7,9 +7,11 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
+#include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
+#include "runtime/graph/evaluate.h"
 #include "runtime/graph/explain.h"
 
 namespace rapid {
@@ -194,6 +196,10 @@ public:
         files_.declare(app);
         app.add_option("--against", against_, "tells what one of two graphs needs and the other does not")
             ->type_name("GRAPH");
+        app.add_option_function<std::string>(
+               "--state", [this](const std::string& text) { state_after_ = read_frames(text).last; },
+               "computes the frames up to this one, and tells what each node then keeps, as a snapshot holds it")
+            ->type_name("FRAME");
         app.add_flag("--json", json_, "as JSON");
         untrusted_.declare(app, "graph");
     }
@@ -215,8 +221,10 @@ public:
             };
             const Explanation here = explained(*graph_.load(false, on_timeout));
             if (against_.empty()) {
-                print(json_ ? json_of(here).dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
-                            : text_of(here));
+                ordered_json json = json_of(here);
+                if (state_after_) json["state"] = state_;
+                print(json_ ? json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
+                            : text_of(here) + text_of_state());
                 return status_done;
             }
             const Explanation there = explained(*graph_.load_other(against_, on_timeout));
@@ -248,13 +256,43 @@ private:
         const Plan plan(session.graph(), options);
         for (const std::string& warning : plan.warnings) print_warning(warning);
         files_.resolve(plan, true);
-        return explain(plan, files_.names());
+        Explanation explanation = explain(plan, files_.names());
+        if (state_after_ && against_.empty()) find_state(plan);
+        return explanation;
+    }
+
+    // Bytes by name: of the points of each Create, and of each node that keeps something.
+    void find_state(const Plan& plan)
+    {
+        Evaluator evaluator(plan, [](auto&&...) {});
+        if (*state_after_ < plan.first_frame())
+            throw Error(
+                fmt::format("--state {}: it is before the scene's first frame, {}", *state_after_, plan.first_frame()));
+        while (evaluator.next_frame() <= *state_after_) evaluator.advance();
+        const Snapshot snapshot = evaluator.save();
+        state_ = {{"frame", snapshot.frame}};
+        for (const auto& [name, state] : snapshot.simulations) state_["simulations"][name] = state.size();
+        for (const auto& [name, state] : snapshot.nodes) state_["nodes"][name] = state.size();
+    }
+
+    std::string text_of_state() const
+    {
+        if (!state_after_) return {};
+        Rows rows;
+        for (const char* of : {"simulations", "nodes"})
+            if (state_.contains(of))
+                for (const auto& [name, size] : state_.at(of).items())
+                    rows.add(name, bytes(size.get<std::size_t>()),
+                             of == std::string_view("nodes") ? "of the node" : "points, ids and what is adopted");
+        return rows.text(fmt::format("\nSTATE after frame {}", *state_after_));
     }
 
     GraphOptions graph_;
     FrameFiles files_;
     std::string against_;
     UntrustedOptions untrusted_;
+    std::optional<std::int64_t> state_after_;  // a frame
+    ordered_json state_;
     bool json_ = false;
 };
 RAPID_COMMAND(Explain);

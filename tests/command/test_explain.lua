@@ -252,3 +252,22 @@ return rapid.create { points = rapid.points.grid {} } :turbulence {} :solve {}]]
     assert.truthy(plan:find("\n  forces +turbulence1\n"), plan)
   end)
 end)
+
+describe("rapid explain --state", function()
+  it("tells what each node keeps after a frame, as a snapshot of that frame does", function()
+    local run = command.rapid("run falls.lua -f 1-7 -o state.####.csv --cache state", { cwd = folder.path })
+    assert.equal(0, run.status, run.stderr)
+    local snapshot = json.decode(command.rapid("info state/snapshot.0007.rapid --json", { cwd = folder.path }).stdout)
+    local state = plan_of("falls.lua -o state.####.csv --state 7").raw.state
+    assert.equal(7, state.frame)
+    assert.same(snapshot.simulations, state.simulations)
+    assert.same(snapshot.nodes, state.nodes)
+    assert.truthy(state.nodes.emit1 > 0 and state.nodes.solve1 > 0)
+    local text = explain("falls.lua -o state.####.csv --state 7").stdout
+    assert.truthy(text:find("\nSTATE after frame 7\n", 1, true))
+    assert.truthy(text:find(("\n  emit1 +%d B +of the node\n"):format(state.nodes.emit1)), text)
+    local wrong = explain "falls.lua --state 0"
+    assert.equal(2, wrong.status)
+    assert.equal("--state 0: it is before the scene's first frame, 1\n", wrong.stderr)
+  end)
+end)

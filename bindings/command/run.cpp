@@ -222,6 +222,8 @@ private:
         Fingerprint options = {{"the estimate of errors", answer(estimates_errors())},
                                {"--events", answer(!events_.path().empty())},
                                {"--keep-all", answer(keep_all_)}};
+        if (part_.part()) options["--part"] = name_of(*part_.part());
+        if (part_.sample()) options["--sample"] = fmt::format("{}", *part_.sample());
         for (const std::string& plugin : common.plugins)
             options["plugin " + std::filesystem::path(plugin).filename().string()] = hash_text(file_hash(plugin));
         return options;

@@ -16,6 +16,7 @@
 #include "bindings/command/untrusted.h"
 #include "bindings/command/wedge_report.h"
 #include "bindings/command/wedge_rows.h"
+#include "runtime/files/content_hash.h"
 #include "runtime/files/file_error.h"
 
 namespace rapid {
@@ -73,6 +74,14 @@ public:
                "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
                "rows that run at a time, which share the threads [default 1]")
             ->type_name("N");
+        app.add_option("--cache", cache_, "rows keep snapshots too, in folders below this one, as of run")
+            ->type_name("DIR");
+        app.add_option_function<std::string>(
+               "--cache-every",
+               [this](const std::string& text) { every_ = fmt::format("{}", read_whole("--cache-every", text, 0)); },
+               "with --cache: as of run")
+            ->type_name("N");
+        app.add_flag("--again", again_, "computes rows that are done, too");
         app.add_flag("--quiet", quiet_, "no progress and no table");
         farm_.declare(app);
         app.add_option(collect_option, collect_)->group("");  // internal: what comes last on a farm
@@ -87,16 +96,18 @@ public:
     {
         const std::vector<WedgeRow> rows = wedge_rows(settings_, zip_, files_.names());
         const std::vector<fs::path> folders = files_.folders();
-        const fs::path outputs = folders.empty() ? fs::path(".") : folders.front();
+        const fs::path folder = folders.empty() ? fs::path(".") : folders.front();
+        if (cache_.empty() && !every_.empty())
+            throw Error("--cache-every says how often a --cache is written; give one");
         farm_.check();
-        WedgeReport report(graph_.file(), settings_, rows, outputs, quiet_);
+        WedgeReport report(graph_.file(), settings_, rows, folder, quiet_);
         if (!collect_.empty()) return collect(rows, report);
         check(rows.front(), common);
-        if (farm_.asked()) return submit(rows, outputs, common);
+        if (farm_.asked()) return submit(rows, folder, common);
         const TemporaryFolder statistics;
         const int signal = run_processes(
             rows.size(), static_cast<int>(jobs_),
-            [&](std::size_t row) { return words_of(rows[row], statistics.file(row), common); },
+            [&](std::size_t row) { return words_of(rows[row], statistics.file(row), folder, common); },
             [&](std::size_t row, const EndedProcess& ended) { report.ended(row, ended, statistics.file(row)); });
         if (signal != 0) return signal;
         return report.finish() ? status_done : status_failed;
@@ -113,7 +124,7 @@ private:
         job.outputs = outputs;
         const fs::path folder = fs::absolute(job.scripts()).lexically_normal();
         for (std::size_t row = 0; row < rows.size(); ++row) {
-            std::vector<std::string> words = words_of(rows[row], statistics_of(folder, row), common);
+            std::vector<std::string> words = words_of(rows[row], statistics_of(folder, row), outputs, common);
             words.erase(words.begin());  // the name of the program
             std::erase_if(words, [](const std::string& word) { return word.starts_with("--threads="); });
             job.tasks.push_back({rows[row].label(), {words.begin() + 2, words.end()}});
@@ -166,7 +177,7 @@ private:
     }
 
     // `rapid run` of the row.
-    std::vector<std::string> words_of(const WedgeRow& row, const fs::path& statistics,
+    std::vector<std::string> words_of(const WedgeRow& row, const fs::path& statistics, const fs::path& folder,
                                       const CommonOptions& common) const
     {
         const int threads = common.threads > 0 ? common.threads : tbb::info::default_concurrency();
@@ -177,6 +188,13 @@ private:
                                           "--stats=" + statistics.string(),
                                           fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
         for (const std::string& frames : app_->get_option("--frames")->results()) words.push_back("--frames=" + frames);
+        // What a row has done is known by its journal: one of the same fingerprint is not run again.
+        const fs::path of_rows = cache_.empty() ? folder / "wedge.cache" : fs::path(cache_);
+        words.push_back("--cache=" + (of_rows / hash_text(content_hash(row.label()))).string());
+        words.push_back("--cache-replace");
+        if (cache_.empty()) words.push_back("--cache-every=0");
+        if (!every_.empty()) words.push_back("--cache-every=" + every_);
+        if (again_) words.push_back("--again");
         add_shared(words, row, common);
         add_outputs(words, row);
         return words;
@@ -206,7 +224,8 @@ private:
     std::vector<SweptSetting> settings_;
     std::optional<FrameSelection> frames_;
     std::int64_t jobs_ = 1;
-    bool zip_ = false, quiet_ = false;
+    std::string cache_, every_;
+    bool zip_ = false, again_ = false, quiet_ = false;
     FarmOptions farm_;
     std::string collect_;  // the folder of their statistics
 };

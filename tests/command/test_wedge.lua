@@ -163,4 +163,44 @@ describe("--set", function()
     assert.equal(2, wrong.status)
     assert.truthy(wrong.stderr:find("substeps", 1, true))
   end)
+
+  it("runs no row again that is done, but with --again, or if its files or its scene are others", function()
+    local function times(of)
+      return command.shell(("stat -c %%y again/%s.*.bgeo"):format(of), { cwd = folder.path }).stdout
+    end
+    local arguments = "--vary rate=240,480 -f 1-6 -o 'again/{rate}.####.bgeo'"
+    assert.equal(0, wedge(arguments).status)
+    local first, low, high = report "again/wedge.json", times(240), times(480)
+    assert.equal(0, wedge(arguments).status)
+    assert.equal(low .. high, times(240) .. times(480))
+    local second = report "again/wedge.json"
+    for k, row in ipairs(second.rows) do
+      assert.truthy(row.seconds >= first.rows[k].seconds) -- those of the run that did it
+      row.seconds, first.rows[k].seconds, row.peak_bytes, first.rows[k].peak_bytes = nil, nil, nil, nil
+    end
+    assert.same(first, second)
+    os.remove(folder:file "again/480.0003.bgeo")
+    assert.equal(0, wedge(arguments).status)
+    assert.equal(low, times(240))
+    assert.not_equal(high, times(480))
+    high = times(480)
+    assert.equal(0, wedge(arguments .. " --again").status)
+    assert.not_equal(low, times(240))
+    low = times(240)
+    assert.equal(0, wedge(arguments .. " --set solve.substeps=3").status)
+    assert.not_equal(low, times(240))
+    assert.not_equal(high, times(480))
+  end)
+
+  it("keeps snapshots of rows with --cache", function()
+    assert.equal(0, wedge("--vary rate=240,480 -f 1-6 --cache rows --cache-every 4").status)
+    local snapshots = 0
+    for _, name in ipairs(folder:list()) do
+      if name:find "^rows/%x+/snapshot%.000[46]%.rapid$" then snapshots = snapshots + 1 end
+    end
+    assert.equal(4, snapshots)
+    local result = wedge "--vary rate=240 -f 1-6 --cache-every 4"
+    assert.equal(2, result.status)
+    assert.equal("--cache-every says how often a --cache is written; give one\n", result.stderr)
+  end)
 end)

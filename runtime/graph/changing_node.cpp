@@ -7,7 +7,7 @@
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/solver/changing.h"
-#include "runtime/solver/constraints/placed_constraint.h"
+#include "runtime/solver/placed_constraint.h"
 
 namespace rapid {
 namespace {

@@ -10,10 +10,10 @@
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/mesh_surface.h"
 #include "runtime/solver/constraints/energy_bound.h"
-#include "runtime/solver/constraints/placed_constraint.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/twin.h"
+#include "runtime/solver/placed_constraint.h"
 
 #include <map>
 

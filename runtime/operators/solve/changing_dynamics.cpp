@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "runtime/solver/changing.h"
-#include "runtime/solver/constraints/placed_constraint.h"
+#include "runtime/solver/placed_constraint.h"
 #include "runtime/solver/timed_force.h"
 
 namespace rapid {

@@ -216,6 +216,10 @@ return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P =
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 1, 4, 0.2, {0, 0, 0}) } }
   :pin { compliance = 0.02, target = function(f) return {math.sin(5 * f.time), 0, f.time} end }
   :solve { substeps = 4 }]] },
+  { "pin, contact", "a grain of ten times the weight on one on a compliant pin, 1 sub-step", 1, 24, [[
+return from { P = {{0, 0, 0}, {0, 0.2, 0}}, mass = {1, 10} } :gravity {} :drag { linear = 5 }
+  :group { name = "held", where = function(p) return p.id == 0 end } :pin { group = "held", compliance = 1e-4 }
+  :contact { radius = 0.1 } :solve { substeps = %d, sleep = math.huge }]] },
   { "vortex, drag", "a vortex that comes and goes, with drag that does", 1, 24, [[
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {1, 0, 0}) } }
   :vortex { strength = function(f) return 6 * math.sin(5 * f.time) end }

@@ -340,7 +340,10 @@ private:
             now.warnings.push_back(fmt::format("node \"{}\": {}", now.node, text));
         };
         if (result.contact_limit > 0)
-            warn("points reached the limit of contacts in a step, and the rest of it was dropped; take more substeps");
+            warn(
+                "points reached the limit of contacts in a step, a hundred impacts, and rest where they are for what "
+                "was "
+                "left of it; take more substeps");
         if (result.residual.loose > 0)
             warn("constraints are off by more than a tenth of their size; take more substeps, or more iterations");
         if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())

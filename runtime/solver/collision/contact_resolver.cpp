@@ -16,6 +16,19 @@ constexpr double tangential = 1e-9;
 // in the valley: what two responses leave of a velocity across it.
 constexpr double valley = 1e-6;
 
+// Impacts of a point in one sub-step, after which it rests where it is for what is left of that: between shapes that
+// close in on it there is no end of them.
+constexpr int max_impacts = 100;
+
+// Counts an impact towards max_contacts, as what it makes of max_impacts; chatter is looked for by the rest.
+bool is_jammed(CollidingPoint& point)
+{
+    constexpr int weight = max_contacts / max_impacts;
+    point.events += weight;
+    point.checked_events += weight;
+    return point.events >= max_contacts;
+}
+
 }  // namespace
 
 void ContactResolver::resolve(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o)
@@ -122,6 +135,13 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
         rest(point, support, contact_response(v, contact.vc, n, 0, friction));
     else
         bounce(point, support, epsilon);
+    if (hits && is_jammed(point)) {
+        audit_.add_limited();
+        block_.v[i] = contact.vc;
+        point.left = 0;
+        point.supports = 1;
+        point.on[0] = support;
+    }
     if (hits) audit_.add(i, o, {P, n, contact.vc, -vn, v, block_.v[i] - v, when});
 }
 

@@ -1,0 +1,47 @@
+-- Points between shapes that close in on them: the limit of impacts in a step.
+local scene = require "testing.scene"
+local json = require "dkjson"
+
+-- A lid comes down onto points on a floor, until there is no room for them.
+local lid = [[
+local lid = rapid.shape.plane { normal = {0, -1, 0}, offset = -1 }
+  :transform { [1] = rapid.translate(0, 0, 0), [12] = rapid.translate(0, -0.95, 0) }
+return rapid.create { fps = 24, points = rapid.points.from {
+    P = {{0, 0.5, 0}, {1, 0.5, 0}, {2, 0.5, 0}, {3, 0.5, 0}}, pscale = {0.05, 0.05, 0.05, 0.05} } }
+  :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.5 } :collide { shape = lid, bounce = 0.5 } :solve {}]]
+
+local function statistics(text, frames)
+  local result = scene.command("run", text, ("-f %s --stats s.json"):format(frames))
+  return json.decode(scene.folder:read "s.json"), result
+end
+
+describe("the limit of impacts", function()
+  it("ends a jam of points at a hundred impacts of each, counts it and tells", function()
+    local stats, result = statistics(lid, "1-24")
+    local impacts, limits = 0, 0
+    for _, frame in ipairs(stats.frames) do
+      assert.is_true(frame.collisions <= 4 * 100, ("frame %d: %d"):format(frame.frame, frame.collisions))
+      impacts, limits = impacts + frame.collisions, limits + frame.contact_limit
+    end
+    assert.is_true(limits >= 4 and impacts < 4 * 24 * 100, ("%d, %d"):format(limits, impacts))
+    assert.matches("points reached the limit of contacts", result.stdout)
+    assert.matches("rest where they are", result.stderr)
+  end)
+
+  it("lets what is jammed rest on the surface that it met last", function()
+    local points = scene.run(lid, { frames = {24, 24} })[24]
+    for i = 1, 4 do assert.near({i - 1, points[1].P.y, 0}, points[i].P, 1e-6) end
+    assert.is_true(points[1].v:length() < 0.1)
+  end)
+
+  it("is not met by a point that bounces on, however fast, up to ninety times a step", function()
+    -- Between walls 0.11 m apart, less a diameter of 0.01 m on each side: a way of 0.1 m.
+    local speed = 90 * 0.1 * 24
+    local points = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{%g, 0, 0}}, pscale = {0.005} } }
+  :collide { shape = rapid.shape.plane { normal = {1, 0, 0}, offset = -0.055 }, bounce = 1 }
+  :collide { shape = rapid.shape.plane { normal = {-1, 0, 0}, offset = -0.055 }, bounce = 1 } :solve {}]])
+      :format(speed), { frames = {3, 3} })[3]
+    assert.near(speed, points[1].v:length(), 1e-3 * speed)
+  end)
+end)

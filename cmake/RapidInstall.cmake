@@ -20,6 +20,7 @@ install(FILES ${PROJECT_BINARY_DIR}/include/runtime/graph/abi.h
 install(DIRECTORY include/rapid DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY bindings/python/rapid DESTINATION lib/python3/dist-packages PATTERN __pycache__ EXCLUDE)
 install(DIRECTORY lua graphs DESTINATION ${CMAKE_INSTALL_DATADIR}/rapid)
+install(DIRECTORY bindings/view/page/ DESTINATION ${CMAKE_INSTALL_DATADIR}/rapid/view)
 
 install(EXPORT rapidTargets NAMESPACE rapid:: DESTINATION ${package_dir})
 install(EXPORT rapidHostTargets NAMESPACE rapid:: DESTINATION ${package_dir})

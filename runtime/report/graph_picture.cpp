@@ -195,7 +195,7 @@ std::string to_dot(const GraphPicture& picture)
         "  rankdir = LR; nodesep = 0.18; ranksep = 0.32; bgcolor = transparent;\n"
         "  node [shape = box, style = \"filled,rounded\", color = \"#8a8f98\", fontname = \"sans-serif\", fontsize = "
         "11, "
-        "height = 0.45, margin = \"0.12,0.05\"];\n"
+        "width = 1.3, height = 0.5, margin = \"0.12,0.05\"];\n"
         "  edge [color = \"#6b7078\", fontname = \"sans-serif\", fontsize = 9, arrowsize = 0.7];\n";
     for (std::size_t i = 0; i < picture.nodes.size(); ++i) {
         const GraphPicture::Node& node = picture.nodes[i];

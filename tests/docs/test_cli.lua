@@ -45,7 +45,9 @@ end
 describe("docs/cli.md", function()
   local of_all = document.section(page, "## Options of every command")
   local of_graphs = document.section(page, "## Options of commands that load a graph")
-  local loads_graphs = { run = true, check = true, explain = true, study = true, wedge = true }
+  local loads_graphs = {
+    run = true, check = true, explain = true, graph = true, trace = true, view = true, study = true, wedge = true,
+  }
 
   it("has a section for every command, in the list of commands too", function()
     assert.is_true(#commands >= 9)

@@ -1,0 +1,123 @@
+// rapid view: a scene, or the files of a sequence, in a web page of this machine.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+
+#include "bindings/command/cache_files.h"
+#include "bindings/command/command.h"
+#include "bindings/command/frame_selection.h"
+#include "bindings/command/graph_options.h"
+#include "bindings/command/signals.h"
+#include "bindings/host/modules.h"
+#include "bindings/host/threads.h"
+#include "bindings/view/requests.h"
+#include "bindings/view/server.h"
+#include "bindings/view/simulation.h"
+#include "runtime/files/output_file.h"
+#include "runtime/memory_budget.h"
+
+namespace rapid {
+namespace {
+
+constexpr int watch_interval = 100;  // ms between two looks at the files that a run has read
+
+// In an installation beside the Lua modules, in a checkout among the sources.
+std::filesystem::path page_folder()
+{
+    const std::filesystem::path root = lua_folder().parent_path();
+    std::error_code none;
+    return std::filesystem::exists(root / "view/index.html", none) ? root / "view" : root / "bindings/view/page";
+}
+
+class View : public Command {
+public:
+    std::string name() const override { return "view"; }
+    std::string doc() const override { return "shows a scene, or files, in the browser while it is computed"; }
+
+    void declare(CLI::App& app) override
+    {
+        graph_.declare(app);
+        app.add_option_function<std::string>(
+               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+               "the frames to compute: 1-240 or 100 [default: 240 from the first]")
+            ->type_name("FRAMES");
+        app.add_option_function<std::string>(
+               "--port",
+               [this](const std::string& text) {
+                   port_ = static_cast<int>(std::min<std::int64_t>(read_whole("--port", text, 0), 65536));
+                   if (port_ > 65535) throw Error(fmt::format("--port = {}; it must be at most 65535", text));
+               },
+               "the port of the page; 0, the default, takes a free one")
+            ->type_name("N");
+        app.add_flag("--no-open", no_open_, "does not open the page in a browser");
+    }
+
+    int run(const CommonOptions& common) override
+    {
+        std::signal(SIGPIPE, SIG_IGN);
+        const SignalThread signals([](int signal) {
+            remove_unfinished_files();
+            _exit(128 + signal);
+        });
+        const Threads threads(common.threads);
+        // The run takes memory, too.
+        ViewOptions options{graph_.file(),
+                            graph_.session(),
+                            graph_.seed(),
+                            {},
+                            {},
+                            threads.count(),
+                            static_cast<std::size_t>(memory_budget() / 2)};
+        options.session.on_timeout = [&](const std::string& message) {
+            print_error(Error(message), common.verbose);
+            remove_unfinished_files();
+            _exit(status_failed);
+        };
+        options.session.quiet = true;
+        if (frames_) options.frames = {frames_->first, frames_->last};
+        if (std::filesystem::path(graph_.file()).extension() != ".lua")
+            options.files = find_cache(graph_.file()).frames;
+
+        std::unique_ptr<ViewRequests> requests;
+        ViewServer server(port_, page_folder(),
+                          [&](const std::string& message, const Answer& answer) { requests->handle(message, answer); });
+        ViewSimulation simulation(std::move(options), [&] {
+            server.post([&] {
+                if (requests) requests->answer_waiting();
+            });
+        });
+        server.post([&] {
+            requests = std::make_unique<ViewRequests>(simulation, graph_.file(),
+                                                      [&](std::function<void()> f) { server.post(std::move(f)); });
+        });
+        server.repeat(watch_interval, [&] { simulation.check_files(); });
+        print(server.address() + '\n');
+        std::fflush(stdout);
+        if (!no_open_) open(server.address());
+        server.run();
+        return status_done;
+    }
+
+private:
+    // Where there is a desktop.
+    static void open(const std::string& address)
+    {
+        if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
+        const pid_t child = fork();
+        if (child != 0) return;
+        execlp("xdg-open", "xdg-open", address.c_str(), nullptr);
+        _exit(status_failed);  // without one the line that was printed has to do
+    }
+
+    GraphOptions graph_;
+    std::optional<FrameSelection> frames_;
+    int port_ = 0;
+    bool no_open_ = false;
+};
+RAPID_COMMAND(View);
+
+}  // namespace
+}  // namespace rapid

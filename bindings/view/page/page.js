@@ -1,0 +1,498 @@
+// The page: what is shown, and what its parts tell each other.
+import { Connection } from "./connection.js";
+import { Picture } from "./picture.js";
+import { Timeline } from "./timeline.js";
+import { Parameters } from "./parameters.js";
+import { Graph } from "./graph.js";
+import { Inspector } from "./point.js";
+import { Figures } from "./figures.js";
+import { Sheet } from "./sheet.js";
+import { ramp } from "./ramp.js";
+import { bindKeys, showKeys } from "./keys.js";
+import { element, by, brief, bytes, colour } from "./dom.js";
+
+history.replaceState(null, "", "/"); // the token is in a cookie by now
+
+const cacheBytes = 300e6, ahead = 4;
+const state = {
+  status: null, frame: NaN, run: 0, follow: true, playing: false, output: "", colour: "", group: "", after: "",
+  style: "discs", trails: 0, point: null, life: null, statistics: [], statisticsRun: 0,
+};
+const cache = new Map(); // messages of frames, by what they show
+let cached = 0;
+
+const connection = new Connection({
+  lost() { note("The server has gone; waiting for it."); },
+  found() { note(""); },
+});
+const ask = (what, given) => connection.ask(what, given);
+
+function note(text) { by("note").textContent = text; }
+
+// ---- the parts ----
+
+const picture = new Picture(by("canvas"));
+const timeline = new Timeline(by("timeline"), { go: (frame) => go(frame), play: () => play(), step: (by_) => go(state.frame + by_) });
+const parameterPart = element("section", { id: "parameters" });
+by("side").append(parameterPart);
+const parameters = new Parameters(parameterPart, { change: (values) => ask("set", { values }).catch(tell), copy });
+const inspector = new Inspector(by("side"), {
+  go: (frame) => go(frame),
+  trace: (id) => trace(id),
+  close(what) {
+    if (what === "point") choosePoint(null);
+    else if (what === "node") graph.toggle(graph.chosen);
+    else inspector.hide(what);
+  },
+});
+
+const tabs = {};
+const nav = element("nav", { role: "tablist" });
+by("dock").append(nav);
+for (const [name, title] of [["graph", "Graph"], ["figures", "Figures"], ["sheet", "Spreadsheet"]]) {
+  const panel = element("div", { role: "tabpanel", "aria-label": title, hidden: true, id: `${name}-panel` });
+  const button = element("button", { role: "tab", id: `${name}-tab`, title: `${title} (${"gfs"["gfs".indexOf(name[0])].toUpperCase()} with Alt)`, onclick: () => openTab(name) }, title);
+  nav.append(button);
+  by("dock").append(panel);
+  tabs[name] = { panel, button };
+}
+nav.append(element("span", { class: "gap" }), element("span", { class: "quiet", id: "dock-note" }));
+const graph = new Graph(tabs.graph.panel, { choose: (node) => chooseNode(node) });
+const figures = new Figures(tabs.figures.panel, { go: (frame) => go(frame) });
+const sheet = new Sheet(tabs.sheet.panel, {
+  rows: (from, count, sort, descending) => ask("sheet", { ...shown(), from, count, sort, descending }),
+  pick: (id) => choosePoint(id),
+});
+
+function openTab(name) {
+  for (const [other, { panel, button }] of Object.entries(tabs)) {
+    panel.hidden = other !== name;
+    button.setAttribute("aria-selected", other === name);
+  }
+  graph.size();
+  figures.draw();
+  if (name === "sheet") sheet.refresh();
+}
+
+// ---- the bar ----
+
+const choices = (list) => list.map(([value, text]) => element("option", { value }, text));
+const bar = {
+  title: element("h1", {}, ""),
+  state: element("span", { id: "state" }, "starting"),
+  output: element("select", { id: "output", title: "the output of the graph", onchange: () => { state.output = bar.output.value; change(); } }),
+  colour: element("select", { id: "colour", title: "colour by an attribute (C)", onchange: () => { state.colour = bar.colour.value; change(); } }),
+  group: element("select", { id: "group", title: "only the points of a group", onchange: () => { state.group = bar.group.value; change(); } }),
+  style: element("select", { id: "style", title: "how points look (D)", onchange: () => { state.style = bar.style.value; change(); } },
+    ...choices([["discs", "spheres"], ["dots", "dots"], ["streaks", "streaks"]])),
+  shapes: element("button", { id: "shapes", title: "colliders and emitters (S)", "aria-pressed": true, onclick: () => toggle("shapes") }, "shapes"),
+  ground: element("button", { id: "ground", title: "grid and axes (G)", "aria-pressed": true, onclick: () => toggle("ground") }, "grid"),
+  trails: element("button", { id: "trails", title: "where points were in the last 12 frames (T)", "aria-pressed": false, onclick: () => { state.trails = state.trails ? 0 : 12; press(bar.trails, state.trails); showTrails(); } }, "trails"),
+};
+by("bar").append(bar.title, bar.state, element("span", { class: "gap" }), bar.output,
+  element("label", { for: "colour" }, "colour"), bar.colour, element("label", { for: "group" }, "group"), bar.group,
+  element("label", { for: "style" }, "as"), bar.style, bar.shapes, bar.ground, bar.trails,
+  element("button", { id: "fit", title: "show everything (F)", onclick: () => picture.fit() }, "fit"),
+  element("button", { id: "camera", title: "copy the camera, for --camera of pictures (K)", onclick: () => copy(`--camera=${picture.cameraText()}`) }, "camera"),
+  element("button", { id: "save", title: "this frame as .png, by the renderer of rapid run (P)", onclick: () => save() }, ".png"),
+  element("button", { id: "theme", title: "dark or light (L)", onclick: () => theme(document.documentElement.dataset.theme === "light" ? "dark" : "light") }, "◐"),
+  element("button", { id: "help", title: "all keys (?)", onclick: () => showKeys() }, "?"));
+
+function press(button, on) { button.setAttribute("aria-pressed", Boolean(on)); }
+
+function toggle(what) {
+  picture[what].visible = !picture[what].visible;
+  press(bar[what], picture[what].visible);
+  picture.draw();
+}
+
+function theme(name) {
+  document.documentElement.dataset.theme = name;
+  try { localStorage.setItem("theme", name); } catch { /* a browser that keeps nothing */ }
+  picture.theme(colour("picture"), colour("line"));
+  timeline.draw();
+  figures.draw();
+}
+
+function copy(text) {
+  navigator.clipboard?.writeText(text).then(() => flash(`copied: ${text}`), () => flash(text));
+  if (!navigator.clipboard) flash(text);
+}
+
+function flash(text) { by("dock-note").textContent = text; }
+function tell(error) { flash(error.message ?? String(error)); }
+
+// ---- frames ----
+
+const shown = () => ({ frame: state.frame, output: state.output || undefined, group: state.group, after: state.after });
+const wishes = (frame) => ({ frame, output: state.output || undefined, colour: state.colour, group: state.group, velocities: state.style === "streaks", after: state.after });
+const isReady = (frame) => state.status.ready.some(([a, b]) => frame >= a && frame <= b);
+const isThere = (frame) => isReady(frame) || state.status.stale.some(([a, b]) => frame >= a && frame <= b);
+const newest = () => (state.status.ready.length ? state.status.ready[state.status.ready.length - 1][1] : NaN);
+const key = (frame) => JSON.stringify([wishes(frame), isReady(frame) ? state.status.run : 0]);
+
+async function fetchFrame(frame) {
+  const name = key(frame);
+  const known = cache.get(name);
+  if (known) { cache.delete(name); cache.set(name, known); return known; }
+  const pending = ask("frame", wishes(frame));
+  cache.set(name, pending);
+  try {
+    const message = await pending;
+    cached += message.bytes;
+    message.key = name;
+    for (const [old, value] of cache) {
+      if (cached <= cacheBytes) break;
+      if (old === name) continue;
+      const done = await Promise.race([value, null]);
+      if (done) { cached -= done.bytes; cache.delete(old); }
+    }
+    return message;
+  } catch (error) {
+    cache.delete(name);
+    throw error;
+  }
+}
+
+let wanted = 0;
+async function show(frame, fresh = false) {
+  const serial = ++wanted;
+  const first = Number.isNaN(state.frame);
+  state.frame = frame;
+  tellTime();
+  if (!isThere(frame)) return;
+  let message;
+  try {
+    message = await fetchFrame(frame);
+  } catch (error) {
+    if (serial === wanted && !/not computed/.test(error.message)) tell(error);
+    return;
+  }
+  if (serial !== wanted) return;
+  picture.style = state.style;
+  picture.shutter = 0.5 / state.status.fps;
+  picture.show(message);
+  state.shownRun = message.run;
+  if (message.shown > 0) state.firstPoints ??= performance.now();
+  document.body.dataset.frame = frame;
+  document.body.dataset.run = message.run;
+  document.body.dataset.shown = message.shown;
+  showLegend(message);
+  note(`${brief(message.total)} points${message.shown < message.total ? `, ${brief(message.shown)} shown${message.every > 1 ? ` (ids that are multiples of ${message.every})` : ""}` : ""}${state.after ? ` after ${state.after}` : ""}`);
+  ask("shapes", { frame, known: picture.knownMeshes() }).then((shapes) => {
+    if (serial !== wanted) return;
+    picture.showShapes(shapes);
+    if (!state.fitted && (message.shown > 0 || shapes.bodies.length)) { state.fitted = message.shown > 0; picture.fit(); }
+  }, () => {});
+  if (first || fresh || !state.playing) refreshDetails();
+  figures.show(state.statistics, state.status.first, state.status.last, frame);
+  tellFrame();
+}
+
+// The frame's own figures.
+function tellFrame() {
+  const figure = figures.of(state.frame);
+  graph.figures(figure);
+  inspector.frame(state.frame, figure, state.status);
+}
+
+// What is told about the frame besides its points.
+function refreshDetails() {
+  if (!tabs.sheet.panel.hidden) sheet.refresh();
+  if (state.point !== null) showPoint();
+  if (state.after) showNode();
+  showTrails();
+}
+
+function change() {
+  if (!Number.isNaN(state.frame)) show(state.frame, true);
+}
+
+function go(frame, keep = false) {
+  if (!Number.isFinite(frame)) return;
+  if (!keep) { state.follow = false; }
+  if (state.playing && !keep) stop();
+  show(Math.min(Math.max(Math.round(frame), state.status.first), state.status.last), true);
+}
+
+// ---- playing ----
+
+let playFrom = 0, playFrame = 0, drawnFrames = 0;
+
+function play() {
+  if (state.playing) return stop();
+  state.playing = true;
+  state.follow = false;
+  if (state.frame >= newest()) state.frame = state.status.first;
+  playFrom = performance.now();
+  playFrame = state.frame;
+  drawnFrames = 0;
+  requestAnimationFrame(advance);
+  tellTime();
+}
+
+function stop() {
+  state.playing = false;
+  tellTime();
+  refreshDetails();
+}
+
+async function advance() {
+  if (!state.playing) return;
+  const end = newest(), now = performance.now();
+  let frame = playFrame + Math.floor(((now - playFrom) / 1000) * state.status.fps);
+  // A browser that is too slow skips frames, a quarter of a second at most.
+  const furthest = state.frame + Math.max(1, Math.round(state.status.fps / 4));
+  if (frame > furthest) {
+    frame = playFrame = furthest;
+    playFrom = now;
+  }
+  if (frame > end) {
+    // At the end from the beginning; while it is computed the newest frame waits for the next.
+    if (state.status.state !== "computing") frame = state.status.first;
+    else frame = end;
+    playFrame = frame;
+    playFrom = now;
+  }
+  if (frame !== state.frame && isThere(frame)) {
+    await show(frame);
+    ++drawnFrames;
+    for (let next = frame + 1; next <= Math.min(frame + ahead, end); ++next) fetchFrame(next).catch(() => {});
+  }
+  requestAnimationFrame(advance);
+}
+
+let rateFrom = 0;
+setInterval(() => {
+  if (state.playing) {
+    const now = performance.now();
+    state.rate = (1000 * drawnFrames) / (now - (rateFrom || now - 1000));
+    rateFrom = now;
+    drawnFrames = 0;
+    tellTime();
+  } else {
+    rateFrom = 0;
+  }
+}, 1000);
+
+function tellTime() {
+  const time = (state.frame - state.status.first) / state.status.fps;
+  timeline.at(state.frame, state.playing, state.playing && rateFrom ? `${state.rate.toFixed(0)} of ${brief(state.status.fps)} fps` : `${time.toFixed(3)} s`);
+}
+
+// ---- points, nodes, regions ----
+
+function choosePoint(id) {
+  state.point = id;
+  state.life = null;
+  sheet.chosen = id;
+  if (!tabs.sheet.panel.hidden) sheet.load();
+  if (id === null) {
+    inspector.hide("point");
+    picture.mark(null);
+    return;
+  }
+  showPoint();
+}
+
+async function showPoint() {
+  const id = state.point;
+  try {
+    const row = await ask("point", { ...shown(), id });
+    const { path } = await ask("path", { id, output: state.output || undefined });
+    if (id !== state.point) return;
+    inspector.point(id, row, state.life);
+    picture.mark(row.values.P, path.map(([, ...place]) => place.slice(0, 3)));
+  } catch (error) {
+    if (id !== state.point) return;
+    inspector.point(id, { values: { id, state: error.message }, groups: [] }, state.life);
+    picture.mark(null);
+  }
+}
+
+picture.onpick = async (row) => {
+  if (row < 0) return choosePoint(null);
+  try {
+    const found = await ask("point", { ...shown(), row });
+    choosePoint(found.values.id);
+  } catch (error) {
+    tell(error);
+  }
+};
+
+async function trace(id) {
+  state.life = "being computed …";
+  showPoint();
+  try {
+    const { lives } = await ask("trace", { id, frame: state.frame, output: state.output || undefined, last: Math.max(newest() || 1, state.frame) });
+    if (id !== state.point) return;
+    state.life = lives[0] ?? "No point of a simulation has this id.";
+  } catch (error) {
+    state.life = error.message;
+  }
+  showPoint();
+}
+
+function chooseNode(name) {
+  state.after = name;
+  if (!name) inspector.hide("node");
+  change();
+}
+
+async function showNode() {
+  const name = state.after, node = graph.node(name);
+  if (!node) return;
+  try {
+    const { arguments: all } = await ask("arguments", { frame: state.frame });
+    if (name === state.after) inspector.node(node, all[name]);
+  } catch {
+    inspector.node(node);
+  }
+}
+
+picture.onregion = async ([x0, y0, x1, y1], done) => {
+  const box = by("view").getBoundingClientRect(), mark = by("rectangle");
+  mark.hidden = done;
+  mark.style.left = `${Math.min(x0, x1) - box.left}px`;
+  mark.style.top = `${Math.min(y0, y1) - box.top}px`;
+  mark.style.width = `${Math.abs(x1 - x0)}px`;
+  mark.style.height = `${Math.abs(y1 - y0)}px`;
+  if (!done) return;
+  const x = (v) => (2 * (v - box.left)) / box.width - 1, y = (v) => 1 - (2 * (v - box.top)) / box.height;
+  const rectangle = [Math.min(x(x0), x(x1)), Math.min(y(y0), y(y1)), Math.max(x(x0), x(x1)), Math.max(y(y0), y(y1))];
+  ask("region", { ...shown(), matrix: picture.matrix().toArray(), rectangle }).then((found) => inspector.region(found), tell);
+};
+
+async function showTrails() {
+  if (!state.trails || state.after) return picture.showTrails(null);
+  try {
+    picture.showTrails(await ask("trails", { ...shown(), frames: state.trails }));
+  } catch {
+    picture.showTrails(null);
+  }
+}
+
+// ---- out ----
+
+async function save() {
+  try {
+    const { data } = await ask("picture", { ...shown(), camera: picture.cameraText().split(",").map(Number), width: 1920, height: 1080 });
+    const link = element("a", { href: URL.createObjectURL(new Blob([data], { type: "image/png" })), download: `${state.status.title.replace(/^.*\//, "").replace(/\.\w+$/, "")}.${String(state.frame).padStart(4, "0")}.png` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    flash(`${link.download}, 1920 × 1080`);
+  } catch (error) {
+    tell(error);
+  }
+}
+
+// ---- what is told about the scene ----
+
+function showLegend(message) {
+  const legend = by("legend");
+  legend.hidden = !message.ranges?.value;
+  if (legend.hidden) return;
+  const bar_ = element("canvas", { width: 128, height: 1 }), context = bar_.getContext("2d");
+  for (let x = 0; x < 128; ++x) { context.fillStyle = `rgb(${ramp(x / 127)})`; context.fillRect(x, 0, 1, 1); }
+  const [low, high] = message.ranges.value;
+  legend.replaceChildren(bar_, element("div", {}, element("span", {}, brief(low)), element("span", {}, message.colour), element("span", {}, brief(high))));
+}
+
+const words = { starting: "starting", computing: "computing", done: "done", full: "memory is full", failed: "error" };
+
+function showChoices(status) {
+  const kept = Object.entries(status.names).filter(([, bytes_]) => bytes_ >= 0).map(([name]) => name);
+  const fill = (select, list, value) => {
+    const text = JSON.stringify(list);
+    if (select.dataset.list !== text) { select.replaceChildren(...choices(list)); select.dataset.list = text; }
+    select.value = value;
+    return select.value === value;
+  };
+  const attributes = kept.filter((name) => !name.startsWith("group:") && name !== "dt").map((name) => [name, name]);
+  const groups = kept.filter((name) => name.startsWith("group:"));
+  if (!fill(bar.colour, [["", kept.includes("Cd") ? "Cd" : "speed"], ["speed", "speed"], ...attributes, ...groups.map((name) => [name, name.replace(":", " ")])], state.colour)) { state.colour = ""; bar.colour.value = ""; }
+  if (!fill(bar.group, [["", "all"], ...groups.map((name) => [name.slice(6), name.slice(6)])], state.group)) { state.group = ""; bar.group.value = ""; }
+  if (!state.output || !status.outputs.includes(state.output)) state.output = status.outputs.includes("main") ? "main" : status.outputs[0] ?? "";
+  fill(bar.output, status.outputs.map((name) => [name, name]), state.output);
+  bar.output.hidden = status.outputs.length < 2;
+  bar.group.hidden = bar.group.previousElementSibling.hidden = groups.length === 0;
+}
+
+function showError(error) {
+  const box = by("error");
+  box.hidden = !error;
+  if (!error) return box.replaceChildren();
+  box.replaceChildren(element("b", {}, error.message),
+    element("div", { class: "where" }, `${error.file ? `${error.file}:${error.line}` : ""}${error.node ? `  node ${error.node}` : ""}`),
+    element("div", { class: "quiet" }, "The last good frames stay. Save the scene, or change a parameter, to run it again."));
+}
+
+async function showFigures(status) {
+  if (status.sequence) return;
+  if (state.statisticsRun !== status.run) { state.statistics = []; state.statisticsRun = status.run; }
+  const after = state.statistics.length ? state.statistics[state.statistics.length - 1].frame : undefined;
+  const answer = await ask("figures", after === undefined ? {} : { after });
+  if (answer.run === state.statisticsRun) {
+    const last = state.statistics.length ? state.statistics[state.statistics.length - 1].frame : -Infinity;
+    state.statistics.push(...answer.figures.filter((f) => f.frame > last));
+  }
+  figures.show(state.statistics, status.first, status.last, state.frame);
+  tellFrame();
+}
+
+async function follow() {
+  let version = 0, graphNumber = 0;
+  for (;;) {
+    let status;
+    try {
+      status = await ask("status", { since: version, graph: graphNumber });
+    } catch {
+      version = graphNumber = 0; // another server, perhaps
+      await new Promise((resolve) => setTimeout(resolve, 500));
+      continue;
+    }
+    version = status.version;
+    const run = state.status?.run;
+    state.status = status;
+    document.title = `${status.title} – rapid view`;
+    bar.title.textContent = status.title;
+    bar.title.title = status.title;
+    bar.state.dataset.state = status.state;
+    bar.state.title = `frames take ${bytes(status.bytes)} of ${bytes(status.most_bytes)}`;
+    bar.state.textContent = status.state === "computing" ? `computing ${newest() || status.first} of ${status.last}` : words[status.state];
+    showChoices(status);
+    showError(status.error);
+    parameters.show(status);
+    inspector.messages(status);
+    timeline.show(status);
+    if (status.graph_number !== graphNumber) {
+      graphNumber = status.graph_number;
+      graph.show(status.graph, status.no_graph);
+      if (state.after && !graph.node(state.after)) chooseNode("");
+    } else if (status.sequence && !graph.picture) {
+      graph.show(null);
+    }
+    // The newest frame while nobody has chosen another; then the one chosen, as soon as this run has it.
+    const end = newest();
+    if (Number.isNaN(state.frame)) { if (!Number.isNaN(end)) await show(status.sequence ? status.first : end, true); }
+    else if (state.follow && !Number.isNaN(end) && end !== state.frame && !status.sequence) await show(end);
+    else if (run !== status.run || (state.shownRun !== status.run && isReady(state.frame))) await show(state.frame, true);
+    showFigures(status).catch(() => {});
+    if (status.state === "done" && state.follow && !status.sequence) refreshDetails();
+    await new Promise((resolve) => setTimeout(resolve, 30));
+  }
+}
+
+bindKeys({
+  play, step: (n) => go(state.frame + n), first: () => go(state.status.first), last: () => go(newest()),
+  fit: () => picture.fit(), look: (turn, tilt) => picture.look(turn, tilt), openTab,
+  press: (id) => by(id).click(), next: (id) => { const s = by(id); s.selectedIndex = (s.selectedIndex + 1) % s.options.length; s.dispatchEvent(new Event("change")); },
+  trace: () => { if (state.point !== null) trace(state.point); },
+  escape: () => { if (state.after) graph.toggle(graph.chosen); choosePoint(null); inspector.hide("region"); },
+});
+let saved = null;
+try { saved = localStorage.getItem("theme"); } catch { /* none */ }
+theme(saved ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+openTab("graph");
+window.rapidView = { state, picture, go, ask, choosePoint }; // for the browser's console, and tests
+follow();

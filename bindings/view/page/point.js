@@ -1,0 +1,105 @@
+// The chosen point, its life; the chosen node; the chosen region.
+import { element, exact, brief, bytes, seconds } from "./dom.js";
+
+export class Inspector {
+  // go(frame); trace(id): asks for a life; close(what).
+  constructor(root, actions) {
+    this.root = root;
+    this.actions = actions;
+    this.parts = Object.fromEntries(["node", "point", "region", "frame-figures", "messages"].map((name) => {
+      const part = element("section", { id: name, hidden: true });
+      root.append(part);
+      return [name, part];
+    }));
+  }
+
+  put(name, title, ...children) {
+    const part = this.parts[name];
+    part.hidden = false;
+    part.replaceChildren(element("h2", {}, title, element("span", { class: "gap" }),
+      ["messages", "frame-figures"].includes(name) ? null : element("button", { title: "close (Esc)", onclick: () => this.actions.close(name) }, "×")), ...children);
+  }
+
+  hide(name) { this.parts[name].hidden = true; this.parts[name].replaceChildren(); }
+
+  point(id, row, life) {
+    if (!row) return this.hide("point");
+    const rows = Object.entries(row.values).map(([name, value]) =>
+      element("tr", { "data-attribute": name }, element("th", {}, name), element("td", { class: "number" }, exact(value))));
+    if (row.groups.length) rows.push(element("tr", {}, element("th", {}, "groups"), element("td", { class: "number" }, row.groups.join(", "))));
+    this.put("point", `Point ${id}`, element("table", { id: "attributes" }, ...rows),
+      element("h2", { class: "life-head" }, "Life", element("span", { class: "gap" }),
+        life ? null : element("button", { id: "trace", title: "computes what happened to the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
+      life ? this.life(life) : element("div", { class: "quiet" }, "Birth, edits by nodes, contacts and death: computed when asked for."));
+  }
+
+  // life: as rapid trace --json has it, or a text.
+  life(life) {
+    if (typeof life === "string") return element("div", { class: "quiet" }, life);
+    const list = element("ul", { class: "life", id: "life" });
+    const add = (frame, text, kind = "") => list.append(element("li", { class: kind },
+      element("button", { class: "small", title: "go to this frame", onclick: () => this.actions.go(frame) }, frame), element("span", {}, text)));
+    if (life.birth) add(life.birth.frame, `${life.birth.why}, ${brief(life.birth.time)} s`, "birth");
+    let asleep = false, edits = "", forces = "";
+    for (const step of life.steps) {
+      const changed = step.edits.map((edit) => `${edit.node}: ${edit.removed ? "not in the output" : Object.keys(edit.changes).join(", ")}`).join("; ");
+      if (changed !== edits && changed) add(step.frame, changed);
+      edits = changed;
+      const pushed = step.forces.map((force) => `${force.node} ${brief(Math.hypot(...force.acceleration))} m/s²`).join(", ");
+      if (pushed !== forces && pushed && forces === "") add(step.frame, pushed, "quiet");
+      forces = pushed;
+      if (step.asleep !== asleep) add(step.frame, step.asleep ? "sleeps" : "is awake again");
+      asleep = step.asleep;
+      for (const contact of step.contacts) add(step.frame, `meets ${contact.node} at ${brief(contact.speed)} m/s, ${brief(contact.time)} s`, "contact");
+    }
+    if (life.death) add(life.death.frame, `${life.death.why}, ${brief(life.death.time)} s`, "death");
+    return list;
+  }
+
+  node(node, given) {
+    if (!node) return this.hide("node");
+    const rows = Object.entries(given ?? node.arguments).map(([name, value]) =>
+      element("tr", {}, element("th", {}, name), element("td", { class: "number" }, value)));
+    for (const what of ["makes", "reads", "writes"])
+      if (node[what].length) rows.push(element("tr", {}, element("th", {}, what), element("td", {}, node[what].join(", "))));
+    this.put("node", `After ${node.name}`, element("div", { class: "quiet" }, `${node.type}, line ${node.line}: the picture shows the points as this node leaves them. Evaluated ${node.evaluated}${node.changes ? `: ${node.changes}` : ""}.`),
+      element("table", {}, ...rows));
+  }
+
+  region(found) {
+    if (!found) return this.hide("region");
+    const rows = Object.entries(found.ranges).map(([name, [low, mean, high]]) =>
+      element("tr", {}, element("th", {}, name), element("td", { class: "number" }, brief(low)), element("td", { class: "number" }, brief(mean)), element("td", { class: "number" }, brief(high))));
+    this.put("region", `Region: ${brief(found.count)} points`, element("table", {},
+      element("tr", {}, element("th", {}), ...["least", "mean", "most"].map((t) => element("td", { class: "number quiet" }, t))), ...rows),
+      ...Object.entries(found.groups).map(([name, count]) => element("div", {}, `${brief(count)} in ${name}`)));
+  }
+
+  frame(number, figure, status) {
+    const rows = [];
+    const add = (name, text, title) => rows.push(element("tr", title ? { title } : {}, element("th", {}, name), element("td", { class: "number" }, text)));
+    if (figure?.seconds) {
+      add("points", `${brief(figure.points)}  (+${brief(figure.born)} −${brief(figure.died)})`, "born, died in this frame");
+      for (const stage of ["solve", "script", "graph"]) if (figure.seconds[stage] > 0) add(stage, seconds(figure.seconds[stage]));
+      if (figure.error) add("error, 95 %", `${brief(figure.error.position_p95)} m`, "estimated, of the positions since birth");
+      if (figure.collisions) add("contacts", brief(figure.collisions));
+      if (figure.penetration_max) add("deepest", `${brief(figure.penetration_max)} m`);
+      if (figure.asleep) add("asleep", brief(figure.asleep));
+      add("sub-steps", brief(figure.substeps));
+    } else if (figure) {
+      add("points", brief(figure.points));
+    }
+    add("frames kept", `${bytes(status.bytes)} of ${bytes(status.most_bytes)}`);
+    const kept = Object.entries(status.names).filter(([, size]) => size >= 0);
+    add("attributes", kept.map(([name]) => name).filter((name) => name !== "dt").join(", "), `at most ${kept.reduce((sum, [, size]) => sum + size, 0)} bytes a point`);
+    this.put("frame-figures", `Frame ${number}`, element("table", {}, ...rows));
+  }
+
+  messages(status) {
+    if (!status.warnings.length) return this.hide("messages");
+    const rows = status.warnings.map(({ frame, text }) => element("li", {},
+      frame > 0 ? element("button", { class: "small", title: "go to this frame", onclick: () => this.actions.go(frame) }, frame) : null, ` ${text}`));
+    if (status.more_warnings) rows.push(element("li", { class: "quiet" }, `and ${status.more_warnings} more`));
+    this.put("messages", "Warnings", element("ul", { class: "list" }, ...rows));
+  }
+}

@@ -1,0 +1,74 @@
+// The timeline: which frames are ready, stale or missing; the frame that is shown; playing.
+import { element, prepare, colour, unit } from "./dom.js";
+
+export class Timeline {
+  // go(frame): the user wants a frame; play(on).
+  constructor(root, { go, play, step }) {
+    this.go = go;
+    this.canvas = element("canvas", { title: "click or drag: go to a frame", "aria-label": "frames" });
+    this.playing = element("button", { id: "play", title: "play, pause (Space)", onclick: () => play() }, "▶");
+    this.field = element("input", { type: "number", id: "frame", title: "the frame shown", onchange: () => go(Number(this.field.value)) });
+    this.text = element("span", { class: "number quiet", id: "rate" });
+    root.append(
+      element("button", { title: "first frame (Home)", onclick: () => go(this.first) }, "|◀"),
+      element("button", { title: "one frame back (←)", onclick: () => step(-1) }, "◂"),
+      this.playing,
+      element("button", { title: "one frame on (→)", onclick: () => step(1) }, "▸"),
+      element("button", { title: "last frame (End)", onclick: () => go(this.last) }, "▶|"),
+      this.field, this.canvas, this.text);
+    this.first = this.last = this.frame = 1;
+    this.ready = [];
+    this.stale = [];
+    this.warned = [];
+    const at = (event) => {
+      const box = this.canvas.getBoundingClientRect();
+      const part = (event.clientX - box.left - 6) / (box.width - 12);
+      go(Math.round(this.first + Math.min(Math.max(part, 0), 1) * (this.last - this.first)));
+    };
+    this.canvas.addEventListener("pointerdown", (event) => { this.canvas.setPointerCapture(event.pointerId); this.held = true; at(event); });
+    this.canvas.addEventListener("pointermove", (event) => { if (this.held) at(event); });
+    this.canvas.addEventListener("pointerup", () => { this.held = false; });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  show(status) {
+    Object.assign(this, { first: status.first, last: status.last, ready: status.ready, stale: status.stale,
+      warned: status.warnings.map((warning) => warning.frame).filter((frame) => frame > 0) });
+    this.field.min = status.first;
+    this.field.max = status.last;
+    this.draw();
+  }
+
+  at(frame, isPlaying, text) {
+    this.frame = frame;
+    if (document.activeElement !== this.field) this.field.value = frame;
+    this.playing.textContent = isPlaying ? "⏸" : "▶";
+    this.playing.setAttribute("aria-pressed", isPlaying);
+    this.text.textContent = text;
+    this.draw();
+  }
+
+  draw() {
+    const { context, width, height } = prepare(this.canvas), span = Math.max(1, this.last - this.first), room = width - 12;
+    const x = (frame) => 6 + ((frame - this.first) / span) * room, half = room / span / 2;
+    const u = unit(), top = height - 9 * u, thick = 6 * u;
+    context.fillStyle = colour("raised");
+    context.fillRect(6 - half, top, room + 2 * half, thick);
+    for (const [list, name] of [[this.stale, "stale"], [this.ready, "good"]]) {
+      context.fillStyle = colour(name);
+      for (const [a, b] of list) context.fillRect(x(a) - half, top, x(b) - x(a) + 2 * half, thick);
+    }
+    context.fillStyle = colour("warn");
+    for (const frame of this.warned) context.fillRect(x(frame) - 1, top - 4, 2, 4);
+    context.fillStyle = colour("quiet");
+    context.font = `${10 * u}px system-ui, sans-serif`;
+    const wish = span / Math.max(1, room / (70 * u)), step = [1, 2, 5, 10, 20, 24, 48, 50, 100, 200, 500, 1000, 2000, 5000].find((s) => s >= wish) ?? 10000;
+    context.textAlign = "center";
+    for (let frame = Math.ceil(this.first / step) * step; frame <= this.last; frame += step) {
+      context.fillRect(x(frame), top - 3, 1, 3);
+      context.fillText(frame, x(frame), top - 6);
+    }
+    context.fillStyle = colour("accent");
+    context.fillRect(x(this.frame) - u, 0, 2 * u, height);
+  }
+}

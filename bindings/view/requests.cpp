@@ -1,0 +1,503 @@
+#include "bindings/view/requests.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "runtime/graph/evaluation.h"
+#include "runtime/picture/frame_picture.h"
+#include "runtime/picture/png_file.h"
+#include "runtime/points/id_index.h"
+
+namespace rapid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t most_rows = 500;  // of the spreadsheet, at a time
+
+Json json_of(const Value& value)
+{
+    if (const bool* flag = value.get<bool>()) return *flag;
+    if (const double* number = value.get<double>()) return *number;
+    if (const std::string* text = value.get<std::string>()) return *text;
+    if (const Vec3d* v = value.get<Vec3d>()) return {v->x(), v->y(), v->z()};
+    return nullptr;
+}
+
+Json json_of(const Error& error)
+{
+    return {{"message", error.message()},
+            {"text", error.what()},
+            {"file", error.location().file},
+            {"line", error.location().line},
+            {"node", error.node()}};
+}
+
+const char* name_of(ViewState state)
+{
+    switch (state) {
+        case ViewState::Starting:
+            return "starting";
+        case ViewState::Computing:
+            return "computing";
+        case ViewState::Done:
+            return "done";
+        case ViewState::Full:
+            return "full";
+        case ViewState::Failed:
+            return "failed";
+    }
+    return "";
+}
+
+// Not finite numbers have no JSON: they are told as texts.
+Json number(double value)
+{
+    if (std::isfinite(value)) return value;
+    return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
+}
+
+Json value_at(const AnyColumn& column, std::size_t i)
+{
+    return std::visit(
+        [&](const auto& values) -> Json {
+            const auto& value = values[i];
+            using T = std::decay_t<decltype(value)>;
+            if constexpr (std::is_same_v<T, Vec3f>)
+                return {number(value.x()), number(value.y()), number(value.z())};
+            else if constexpr (std::is_same_v<T, Quatf>)
+                return {number(value.x()), number(value.y()), number(value.z()), number(value.w())};
+            else if constexpr (std::is_same_v<T, float>)
+                return number(value);
+            else
+                return value;
+        },
+        column);
+}
+
+Json row_of(const PointSet& points, std::size_t i)
+{
+    Json row = Json::object();
+    for (const auto& [name, column] : points.columns())
+        if (name != "dt") row[name] = value_at(column, i);
+    Json groups = Json::array();
+    for (const auto& [name, members] : points.groups())
+        if (members[i]) groups.push_back(name);
+    return {{"values", row}, {"groups", groups}};
+}
+
+FrameWish wish_of(const Json& json)
+{
+    FrameWish wish;
+    wish.colour = json.value("colour", "");
+    wish.group = json.value("group", "");
+    wish.velocities = json.value("velocities", false);
+    wish.most = json.value("most", wish.most);
+    return wish;
+}
+
+}  // namespace
+
+void ViewRequests::Ask::tell(Json json) const
+{
+    json["re"] = re;
+    answer(json.dump(-1, ' ', false, Json::error_handler_t::replace), false);
+}
+
+void ViewRequests::Ask::fail(const std::string& why) const { tell({{"error", why}}); }
+
+ViewRequests::ViewRequests(ViewSimulation& simulation, std::string title,
+                           std::function<void(std::function<void()>)> post)
+    : simulation_(simulation), title_(std::move(title)), post_(std::move(post))
+{
+}
+
+void ViewRequests::handle(const std::string& message, const Answer& answer)
+{
+    const Json json = Json::parse(message, nullptr, false);
+    if (!json.is_object() || !json.contains("re") || !json["re"].is_number_unsigned()) return;
+    const Ask ask{json["re"].get<std::uint32_t>(), answer};
+    try {
+        const std::string what = json.value("do", "");
+        if (what == "status") {
+            const std::uint64_t since = json.value("since", std::uint64_t{0});
+            const std::uint64_t graph = json.value("graph", std::uint64_t{0});
+            if (simulation_.status().version > since) return tell_status(ask, graph);
+            waiting_.push_back({since, graph, ask});
+        } else if (what == "frame") {
+            tell_frame(json, ask);
+        } else if (what == "shapes") {
+            tell_shapes(json, ask);
+        } else if (what == "point") {
+            tell_point(json, ask);
+        } else if (what == "path") {
+            tell_path(json, ask);
+        } else if (what == "trails") {
+            tell_trails(json, ask);
+        } else if (what == "trace") {
+            tell_trace(json, ask);
+        } else if (what == "sheet") {
+            tell_sheet(json, ask);
+        } else if (what == "region") {
+            tell_region(json, ask);
+        } else if (what == "figures") {
+            tell_figures(json, ask);
+        } else if (what == "arguments") {
+            tell_arguments(json, ask);
+        } else if (what == "picture") {
+            tell_picture(json, ask);
+        } else if (what == "set") {
+            set_parameters(json, ask);
+        } else {
+            ask.fail(fmt::format("there is no request \"{}\"", what));
+        }
+    } catch (const std::exception& error) {
+        ask.fail(error.what());
+    }
+}
+
+void ViewRequests::answer_waiting()
+{
+    const std::uint64_t version = simulation_.status().version;
+    std::erase_if(waiting_, [&](const auto& waiting) {
+        if (version <= waiting.since) return false;
+        tell_status(waiting.ask, waiting.graph);
+        return true;
+    });
+}
+
+void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
+{
+    const ViewStatus status = simulation_.status();
+    const FrameStore::Stretches stretches =
+        simulation_.is_sequence() ? FrameStore::Stretches{} : simulation_.store().stretches(status.run);
+    Json parameters = Json::array(), warnings = Json::array();
+    const std::map<std::string, std::string> values = simulation_.values();
+    for (const Session::Parameter& parameter : status.parameters)
+        parameters.push_back({{"name", parameter.name},
+                              {"doc", parameter.doc},
+                              {"value", json_of(parameter.value)},
+                              {"default", json_of(parameter.fallback)},
+                              {"set", values.contains(parameter.name)}});
+    for (const auto& [frame, text] : status.warnings) warnings.push_back({{"frame", frame}, {"text", text}});
+    Json json = {{"version", status.version},
+                 {"title", title_},
+                 {"sequence", simulation_.is_sequence()},
+                 {"run", status.run},
+                 {"state", name_of(status.state)},
+                 {"first", status.first},
+                 {"last", status.last},
+                 {"fps", status.fps},
+                 {"ready", stretches.fresh},
+                 {"stale", stretches.stale},
+                 {"bytes", simulation_.store().bytes()},
+                 {"most_bytes", simulation_.store().most_bytes()},
+                 {"parameters", parameters},
+                 {"values", values},
+                 {"warnings", warnings},
+                 {"more_warnings", status.more_warnings},
+                 {"outputs", status.outputs},
+                 {"names", status.names},
+                 {"no_graph", status.no_graph}};
+    json["graph_number"] = status.graph_number;
+    if (status.graph_number != graph) json["graph"] = Json::parse(status.graph);
+    json["error"] = status.error ? json_of(*status.error) : Json();
+    if (simulation_.is_sequence()) json["ready"] = {{status.first, status.last}};
+    ask.tell(std::move(json));
+}
+
+void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoints& use)
+{
+    const std::int64_t number = json.at("frame").get<std::int64_t>();
+    const std::string node = json.value("after", "");
+    const auto guarded = [ask, use](const PointSet& points) {
+        try {
+            use(points);
+        } catch (const std::exception& error) {
+            ask.fail(error.what());
+        }
+    };
+    if (!node.empty()) {
+        simulation_.inspect(number,
+                            [this, ask, node, guarded](const std::shared_ptr<const ViewSimulation::Results>& all,
+                                                       const std::string& error) {
+                                post_([=] {
+                                    if (!all) return ask.fail(error);
+                                    const auto points = all->find(node);
+                                    if (points == all->end())
+                                        return ask.fail("the node is not evaluated in this frame");
+                                    guarded(points->second);
+                                });
+                            });
+        return;
+    }
+    const ViewFramePtr frame = simulation_.frame(number);
+    if (!frame) return ask.fail("the frame is not computed");
+    const auto output = frame->outputs.find(json.value("output", frame->outputs.begin()->first));
+    if (output == frame->outputs.end()) return ask.fail("the scene has no such output");
+    guarded(output->second);
+}
+
+void ViewRequests::tell_frame(const Json& json, const Ask& ask)
+{
+    const std::int64_t number = json.at("frame").get<std::int64_t>();
+    const std::string after = json.value("after", "");
+    const ViewFramePtr frame = after.empty() ? simulation_.frame(number) : nullptr;
+    const Json head = {{"frame", number}, {"run", frame ? frame->run : simulation_.status().run}, {"after", after}};
+    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+        ask.answer(frame_message(ask.re, points, wish, head.dump()), true);
+    });
+}
+
+std::uint64_t ViewRequests::number_of(const MeshPtr& mesh)
+{
+    const auto known = meshes_.find(mesh.get());
+    if (known != meshes_.end() && !known->second.second.expired()) return known->second.first;
+    std::erase_if(meshes_, [](const auto& entry) { return entry.second.second.expired(); });
+    meshes_[mesh.get()] = {next_mesh_, mesh};
+    return next_mesh_++;
+}
+
+void ViewRequests::tell_shapes(const Json& json, const Ask& ask)
+{
+    const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
+    if (!frame) return ask.fail("the frame is not computed");
+    const PictureScene none;
+    const PictureScene& scene = frame->scene ? *frame->scene : none;
+    std::vector<std::uint64_t> numbers;
+    for (const PictureScene::Body& body : scene.bodies) numbers.push_back(number_of(body.mesh));
+    const auto known = json.value("known", std::vector<std::uint64_t>());
+    ask.answer(shapes_message(ask.re, scene, {known.begin(), known.end()}, numbers), true);
+}
+
+void ViewRequests::tell_point(const Json& json, const Ask& ask)
+{
+    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+        std::size_t i = points.size();
+        if (json.contains("id")) {
+            const std::uint32_t place = IdIndex(points.id())[json["id"].get<std::int64_t>()];
+            if (place != IdIndex::none) i = place;
+        } else {
+            const ShownPoints shown = shown_points(points, wish);
+            const auto k = json.at("row").get<std::size_t>();
+            if (k < shown.count) i = shown[k];
+        }
+        if (i >= points.size()) return ask.fail("the point is not in this frame");
+        ask.tell(row_of(points, i));
+    });
+}
+
+// Where a point is in all frames that are there, for its path; and its speed.
+void ViewRequests::tell_path(const Json& json, const Ask& ask) const
+{
+    const auto id = json.at("id").get<std::int64_t>();
+    Json path = Json::array();
+    for (const ViewFramePtr& frame : simulation_.store().of_run(simulation_.status().run)) {
+        const auto output = frame->outputs.find(json.value("output", frame->outputs.begin()->first));
+        if (output == frame->outputs.end()) continue;
+        const std::uint32_t i = IdIndex(output->second.id())[id];
+        if (i == IdIndex::none) continue;
+        const Vec3f P = output->second.P()[i];
+        path.push_back(
+            {frame->number, number(P.x()), number(P.y()), number(P.z()), number(output->second.v()[i].norm())});
+    }
+    ask.tell({{"path", path}});
+}
+
+// Where points of a frame were in the frames before, as line segments; of many points every so manieth by id.
+void ViewRequests::tell_trails(const Json& json, const Ask& ask)
+{
+    const std::int64_t last = json.at("frame").get<std::int64_t>();
+    const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", 12), 1, 1000);
+    FrameWish wish = wish_of(json);
+    wish.most = 20000;
+    with_points(json, ask, [=, this](const PointSet& now) {
+        const ShownPoints shown = shown_points(now, wish);
+        std::vector<Vec3f> there(shown.count);
+        std::vector<std::uint8_t> was(shown.count, 1);
+        for (std::size_t k = 0; k < shown.count; ++k) there[k] = now.P()[shown[k]];
+        std::vector<float> segments;
+        for (std::int64_t number = last - 1; number >= first; --number) {
+            const ViewFramePtr frame = simulation_.store().find(number);
+            if (!frame) break;
+            const auto output = frame->outputs.find(json.value("output", frame->outputs.begin()->first));
+            if (output == frame->outputs.end()) break;
+            const IdIndex index(output->second.id());
+            const Strided<Vec3f> P = output->second.P().read();
+            for (std::size_t k = 0; k < shown.count; ++k) {
+                const std::uint32_t i = was[k] ? index[now.id()[shown[k]]] : IdIndex::none;
+                was[k] = i != IdIndex::none;
+                if (!was[k]) continue;
+                const auto age = static_cast<float>(last - number) / static_cast<float>(last - first);
+                for (const auto& [end, at] : {std::pair(there[k], age), std::pair(Vec3f(P[i]), age)})
+                    segments.insert(segments.end(), {end.x(), end.y(), end.z(), at});
+                there[k] = P[i];
+            }
+        }
+        ask.answer(trails_message(ask.re, segments, shown.every), true);
+    });
+}
+
+void ViewRequests::tell_trace(const Json& json, const Ask& ask)
+{
+    const auto last = json.at("last").get<std::int64_t>();
+    const std::string output = json.value("output", "main");
+    simulation_.origin(json.at("frame").get<std::int64_t>(), output, json.at("id").get<std::int64_t>(),
+                       [this, ask, last](const ViewSimulation::Origin& point, const std::string& unknown) {
+                           post_([=, this] {
+                               if (!unknown.empty()) return ask.fail(unknown);
+                               simulation_.trace(point, last,
+                                                 [this, ask](const std::string& lives, const std::string& error) {
+                                                     post_([=] {
+                                                         if (!error.empty()) return ask.fail(error);
+                                                         ask.tell({{"lives", Json::parse(lives)}});
+                                                     });
+                                                 });
+                           });
+                       });
+}
+
+void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
+{
+    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+        FrameWish all = wish;
+        all.most = points.size();
+        const ShownPoints shown = shown_points(points, all);
+        std::vector<std::uint32_t> order(shown.count);
+        for (std::size_t k = 0; k < shown.count; ++k) order[k] = static_cast<std::uint32_t>(shown[k]);
+        const std::string sort = json.value("sort", "id");
+        const bool down = json.value("descending", false);
+        if (sort == "id") {
+            const Strided<std::int64_t> id = points.id().read();
+            std::stable_sort(order.begin(), order.end(),
+                             [&](auto a, auto b) { return down ? id[a] > id[b] : id[a] < id[b]; });
+        } else {
+            const std::vector<float> values = numbers_of(points, sort);
+            std::stable_sort(order.begin(), order.end(),
+                             [&](auto a, auto b) { return down ? values[a] > values[b] : values[a] < values[b]; });
+        }
+        const std::size_t from = std::min(json.value("from", std::size_t{0}), order.size());
+        const std::size_t to = std::min(order.size(), from + std::min(json.value("count", most_rows), most_rows));
+        Json names = Json::array(), rows = Json::array();
+        for (const auto& [name, column] : points.columns())
+            if (name != "dt") names.push_back(name);
+        for (std::size_t k = from; k < to; ++k) rows.push_back(row_of(points, order[k]));
+        ask.tell({{"total", order.size()},
+                  {"from", from},
+                  {"names", names},
+                  {"groups", points.group_names()},
+                  {"rows", rows}});
+    });
+}
+
+// The points whose projection is within a rectangle of the screen: how many, and the ranges of their attributes.
+// matrix: from the world to the screen's -1 ... 1, by columns.
+void ViewRequests::tell_region(const Json& json, const Ask& ask)
+{
+    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+        const auto matrix = json.at("matrix").get<std::vector<double>>();
+        const auto rectangle = json.at("rectangle").get<std::vector<double>>();  // least x, y, largest x, y
+        if (matrix.size() != 16 || rectangle.size() != 4) return ask.fail("a matrix has 16 numbers, a rectangle 4");
+        const Eigen::Map<const Eigen::Matrix4d> project(matrix.data());
+        FrameWish all = wish;
+        all.most = points.size();
+        const ShownPoints shown = shown_points(points, all);
+        const Strided<Vec3f> P = points.P().read();
+        std::vector<std::uint32_t> places;
+        for (std::size_t k = 0; k < shown.count; ++k) {
+            const Eigen::Vector4d at = project * P[shown[k]].cast<double>().homogeneous();
+            if (at.w() <= 0) continue;
+            const double x = at.x() / at.w(), y = at.y() / at.w();
+            if (x >= rectangle[0] && x <= rectangle[2] && y >= rectangle[1] && y <= rectangle[3])
+                places.push_back(static_cast<std::uint32_t>(shown[k]));
+        }
+        const PointSet chosen = points.select(places);
+        Json ranges = Json::object(), groups = Json::object();
+        const auto add = [&](const std::string& name) {
+            const std::vector<float> values = numbers_of(chosen, name);
+            float low = std::numeric_limits<float>::infinity(), high = -low;
+            double sum = 0;
+            for (const float value : values) low = std::min(low, value), high = std::max(high, value), sum += value;
+            if (!values.empty())
+                ranges[name] = {number(low), number(sum / static_cast<double>(values.size())), number(high)};
+        };
+        add("speed");
+        for (const std::string& name : chosen.column_names())
+            if (name != "dt" && name != "speed") add(name);
+        for (const auto& [name, members] : chosen.groups()) {
+            std::size_t count = 0;
+            for (std::size_t i = 0; i < chosen.size(); ++i) count += members[i];
+            groups[name] = count;
+        }
+        ask.tell({{"count", chosen.size()}, {"ranges", ranges}, {"groups", groups}});
+    });
+}
+
+void ViewRequests::tell_figures(const Json& json, const Ask& ask) const
+{
+    const std::int64_t after = json.value("after", std::int64_t{INT64_MIN});
+    const std::uint64_t run = simulation_.status().run;
+    Json figures = Json::array();
+    for (const ViewFramePtr& frame : simulation_.store().of_run(run))
+        if (frame->number > after) figures.push_back(Json::parse(frame->statistics));
+    ask.tell({{"run", run}, {"figures", figures}});
+}
+
+void ViewRequests::tell_arguments(const Json& json, const Ask& ask)
+{
+    simulation_.arguments(json.at("frame").get<std::int64_t>(),
+                          [this, ask](const ViewSimulation::Arguments& arguments, const std::string& error) {
+                              post_([=] {
+                                  if (!error.empty()) return ask.fail(error);
+                                  ask.tell({{"arguments", arguments}});
+                              });
+                          });
+}
+
+void ViewRequests::tell_picture(const Json& json, const Ask& ask)
+{
+    const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
+    if (!frame) return ask.fail("the frame is not computed");
+    with_points(json, ask, [=](const PointSet& points) {
+        auto options = std::make_shared<PictureOptions>();
+        options->width = std::clamp(json.value("width", 1280), 16, 16384);
+        options->height = std::clamp(json.value("height", 720), 16, 16384);
+        const auto camera = json.value("camera", std::vector<double>());
+        if (camera.size() == 7) {
+            options->position = Vec3d(camera[0], camera[1], camera[2]);
+            options->target = Vec3d(camera[3], camera[4], camera[5]);
+            options->fov = camera[6] * 3.14159265358979323846 / 180;
+        }
+        FrameInfo info;
+        info.picture = options;
+        info.scene = frame->scene;
+        const std::string png = encode_png(picture_of(points, info));
+        std::string message(8, '\0');
+        const std::uint32_t words[2] = {ask.re, 0};
+        std::memcpy(message.data(), words, sizeof words);
+        ask.answer(message + png, true);
+    });
+}
+
+void ViewRequests::set_parameters(const Json& json, const Ask& ask)
+{
+    std::map<std::string, std::string> values;
+    for (const auto& [name, value] : json.at("values").items()) {
+        if (value.is_array()) {
+            std::vector<std::string> parts;
+            for (const Json& part : value) parts.push_back(part.dump());
+            values[name] = fmt::format("{}", fmt::join(parts, ","));
+        } else {
+            values[name] = value.is_string() ? value.get<std::string>() : value.dump();
+        }
+    }
+    simulation_.set(std::move(values));
+    ask.tell({{"run", simulation_.status().run}});
+}
+
+}  // namespace rapid

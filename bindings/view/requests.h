@@ -1,0 +1,72 @@
+// What a page asks for, and the answers. A request is a JSON object: "re", its number, "do", and what that takes.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings/view/frame_message.h"
+#include "bindings/view/server.h"
+#include "bindings/view/simulation.h"
+
+namespace rapid {
+
+// Used from one thread, that of the server's handler.
+class ViewRequests {
+public:
+    // post: calls a function from that thread.
+    ViewRequests(ViewSimulation& simulation, std::string title, std::function<void(std::function<void()>)> post);
+
+    void handle(const std::string& message, const Answer& answer);
+    // The simulation's status has changed: answers those that wait for it.
+    void answer_waiting();
+
+private:
+    using Json = nlohmann::ordered_json;
+    struct Ask {  // a request with its number and the way back
+        std::uint32_t re;
+        Answer answer;
+
+        void tell(Json json) const;
+        void fail(const std::string& why) const;
+    };
+    // A set of points that requests name: of an output of a frame, or after a node.
+    using WithPoints = std::function<void(const PointSet& points)>;
+    void with_points(const Json& json, const Ask& ask, const WithPoints& use);
+
+    // graph: the number of the picture of the graph that the page has; of another one it is told.
+    void tell_status(const Ask& ask, std::uint64_t graph) const;
+    void tell_frame(const Json& json, const Ask& ask);
+    void tell_shapes(const Json& json, const Ask& ask);
+    void tell_point(const Json& json, const Ask& ask);
+    void tell_path(const Json& json, const Ask& ask) const;
+    void tell_trails(const Json& json, const Ask& ask);
+    void tell_trace(const Json& json, const Ask& ask);
+    void tell_sheet(const Json& json, const Ask& ask);
+    void tell_region(const Json& json, const Ask& ask);
+    void tell_figures(const Json& json, const Ask& ask) const;
+    void tell_arguments(const Json& json, const Ask& ask);
+    void tell_picture(const Json& json, const Ask& ask);
+    void set_parameters(const Json& json, const Ask& ask);
+
+    std::uint64_t number_of(const MeshPtr& mesh);
+
+    ViewSimulation& simulation_;
+    const std::string title_;
+    const std::function<void(std::function<void()>)> post_;
+    struct Waiting {
+        std::uint64_t since;  // for a newer version than this
+        std::uint64_t graph;
+        Ask ask;
+    };
+    std::vector<Waiting> waiting_;
+    std::map<const Mesh*, std::pair<std::uint64_t, std::weak_ptr<const Mesh>>> meshes_;
+    std::uint64_t next_mesh_ = 1;
+};
+
+}  // namespace rapid

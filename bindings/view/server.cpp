@@ -1,0 +1,344 @@
+#include "bindings/view/server.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <deque>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <random>
+#include <thread>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using Tcp = asio::ip::tcp;
+using Request = http::request<http::string_body>;
+using Response = http::response<http::string_body>;
+
+constexpr std::size_t most_header = 8192, most_body = 1024, most_message = 1 << 20;  // bytes
+constexpr std::size_t most_waiting = 64;  // answers that a page has not taken: it asks for few at a time
+
+std::string random_token()
+{
+    std::random_device device;
+    std::string token;
+    for (int i = 0; i < 4; ++i) token += fmt::format("{:08x}", static_cast<std::uint32_t>(device()));
+    return token;
+}
+
+// In a time that does not depend on where they differ.
+bool same_secret(std::string_view a, std::string_view b)
+{
+    unsigned char differ = a.size() != b.size();
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) differ |= static_cast<unsigned char>(a[i] ^ b[i]);
+    return differ == 0;
+}
+
+bool is_own_host(std::string_view host)
+{
+    const std::size_t colon = host.rfind(':');
+    const std::string_view name =
+        host.substr(0, colon == std::string_view::npos || host.ends_with(']') ? host.size() : colon);
+    return name == "127.0.0.1" || name == "localhost" || name == "[::1]";
+}
+
+const char* type_of(std::string_view name)
+{
+    if (name.ends_with(".html")) return "text/html; charset=utf-8";
+    if (name.ends_with(".js")) return "text/javascript; charset=utf-8";
+    if (name.ends_with(".css")) return "text/css; charset=utf-8";
+    return name.ends_with(".svg") ? "image/svg+xml" : "application/octet-stream";
+}
+
+std::string text_of(const std::filesystem::path& path)
+{
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw Error("can't be read").at({path, 0});
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::filesystem::path three_file()
+{
+    for (const char* name :
+         {"/usr/share/javascript/three/build/three.module.js", "/usr/share/javascript/three/three.module.js",
+          "/usr/share/nodejs/three/build/three.module.js"})
+        if (std::error_code none; std::filesystem::exists(name, none)) return name;
+    throw Error("the viewer draws by three.js, which is not here; install it (apt install libjs-three)");
+}
+
+}  // namespace
+
+class ViewServer::Impl {
+public:
+    Impl(int port, const std::filesystem::path& folder, Handler handler)
+        : folder_(folder), handler_(std::move(handler)), acceptor_(net_), work_guard_(asio::make_work_guard(work_))
+    {
+        std::error_code none;
+        for (const auto& entry : std::filesystem::directory_iterator(folder, none))
+            if (entry.is_regular_file()) files_["/" + entry.path().filename().string()] = entry.path();
+        if (!files_.contains("/index.html")) throw Error("the files of the viewer's page are not here").at({folder, 0});
+        files_["/three.module.js"] = three_file();
+        try {
+            const Tcp::endpoint here(asio::ip::address_v4::loopback(), static_cast<std::uint16_t>(port));
+            acceptor_.open(here.protocol());
+            acceptor_.set_option(asio::socket_base::reuse_address(true));
+            acceptor_.bind(here);
+            acceptor_.listen();
+        } catch (const std::exception& error) {
+            throw Error(fmt::format("--port {}: {}", port, error.what()));
+        }
+        port_ = acceptor_.local_endpoint().port();
+        worker_ = std::thread([this] { work_.run(); });
+    }
+    ~Impl()
+    {
+        work_.stop();
+        net_.stop();
+        worker_.join();
+    }
+
+    std::string address() const { return fmt::format("http://127.0.0.1:{}/?token={}", port_, token_); }
+    asio::io_context& work() { return work_; }
+
+    void run()
+    {
+        accept();
+        net_.run();
+    }
+
+    void repeat(int milliseconds, std::function<void()> f)
+    {
+        auto timer = std::make_shared<asio::steady_timer>(work_, std::chrono::milliseconds(milliseconds));
+        timer->async_wait([this, milliseconds, timer, f = std::move(f)](const beast::error_code& error) mutable {
+            if (error) return;
+            f();
+            repeat(milliseconds, std::move(f));
+        });
+    }
+
+private:
+    class Socket;
+    class Connection;
+
+    void accept();
+
+    std::string cookie() const { return fmt::format("rapid_{}", port_); }
+
+    // Whether the cookie or the query has the token.
+    bool has_token(const Request& request) const
+    {
+        const std::string target(request.target());
+        if (const std::size_t query = target.find("?token="); query != std::string::npos)
+            return same_secret(target.substr(query + 7), token_);
+        std::string_view cookies(request[http::field::cookie].data(), request[http::field::cookie].size());
+        while (!cookies.empty()) {
+            const std::size_t end = std::min(cookies.find(';'), cookies.size());
+            std::string_view one = cookies.substr(0, end);
+            while (one.starts_with(' ')) one.remove_prefix(1);
+            if (one.starts_with(cookie() + "=") && same_secret(one.substr(cookie().size() + 1), token_)) return true;
+            cookies.remove_prefix(std::min(end + 1, cookies.size()));
+        }
+        return false;
+    }
+
+    // Empty, or why the request is refused.
+    std::string refusal(const Request& request) const
+    {
+        const std::string host(request[http::field::host]), origin(request[http::field::origin]);
+        if (!is_own_host(host)) return "the Host is not this machine";
+        if (!origin.empty() && origin != "http://" + host) return "the Origin is another page";
+        if (!has_token(request)) return "the token is missing; open the address that rapid view has printed";
+        return "";
+    }
+
+    Response answer(const Request& request) const
+    {
+        Response response(http::status::ok, request.version());
+        response.keep_alive(request.keep_alive());
+        response.set(http::field::cache_control, "no-store");
+        response.set("X-Content-Type-Options", "nosniff");
+        response.set("Referrer-Policy", "no-referrer");
+        response.set("X-Frame-Options", "DENY");
+        response.set("Cross-Origin-Resource-Policy", "same-origin");
+        response.set("Content-Security-Policy",
+                     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src "
+                     "'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+        response.set(http::field::content_type, "text/plain; charset=utf-8");
+        const auto refuse = [&](http::status status, const std::string& why) {
+            response.result(status);
+            response.body() = why + '\n';
+            response.prepare_payload();
+            return response;
+        };
+        if (const std::string why = refusal(request); !why.empty()) return refuse(http::status::forbidden, why);
+        if (request.method() != http::verb::get)
+            return refuse(http::status::method_not_allowed, "only GET is answered");
+        std::string path(request.target());
+        path = path.substr(0, path.find('?'));
+        const auto file = files_.find(path == "/" ? "/index.html" : path);
+        if (file == files_.end()) return refuse(http::status::not_found, "the page has no such file");
+        try {
+            response.body() = text_of(file->second);
+        } catch (const Error& error) {
+            return refuse(http::status::internal_server_error, error.what());
+        }
+        response.set(http::field::content_type, type_of(file->first));
+        if (path == "/")
+            response.set(http::field::set_cookie,
+                         fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie(), token_));
+        response.prepare_payload();
+        return response;
+    }
+
+    const std::filesystem::path folder_;
+    const Handler handler_;
+    const std::string token_ = random_token();
+    std::map<std::string, std::filesystem::path> files_;  // by the path of a request
+    asio::io_context net_{1}, work_{1};
+    Tcp::acceptor acceptor_;
+    asio::executor_work_guard<asio::io_context::executor_type> work_guard_;
+    int port_ = 0;
+    std::thread worker_;
+};
+
+// A page. Its functions run on the server's thread.
+class ViewServer::Impl::Socket : public std::enable_shared_from_this<Socket> {
+public:
+    Socket(Impl& server, beast::tcp_stream&& stream) : server_(server), stream_(std::move(stream)) {}
+
+    void open(const Request& request)
+    {
+        beast::get_lowest_layer(stream_).expires_never();
+        stream_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
+        stream_.read_message_max(most_message);
+        stream_.write_buffer_bytes(1 << 17);
+        stream_.auto_fragment(false);
+        stream_.async_accept(request, [self = shared_from_this()](const beast::error_code& error) {
+            if (!error) self->read();
+        });
+    }
+
+private:
+    void read()
+    {
+        stream_.async_read(buffer_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+            if (error) return;
+            std::string text = beast::buffers_to_string(self->buffer_.data());
+            self->buffer_.consume(self->buffer_.size());
+            asio::post(self->server_.work_, [self, text = std::move(text)] {
+                self->server_.handler_(text, [self](std::string message, bool binary) {
+                    asio::post(self->server_.net_, [self, message = std::move(message), binary]() mutable {
+                        self->send(std::move(message), binary);
+                    });
+                });
+            });
+            self->read();
+        });
+    }
+
+    void send(std::string message, bool binary)
+    {
+        if (waiting_.size() >= most_waiting) return beast::get_lowest_layer(stream_).close();
+        waiting_.emplace_back(std::move(message), binary);
+        if (waiting_.size() == 1) write();
+    }
+
+    void write()
+    {
+        stream_.binary(waiting_.front().second);
+        stream_.async_write(asio::buffer(waiting_.front().first),
+                            [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+                                if (error) return self->waiting_.clear();
+                                self->waiting_.pop_front();
+                                if (!self->waiting_.empty()) self->write();
+                            });
+    }
+
+    Impl& server_;
+    websocket::stream<beast::tcp_stream> stream_;
+    beast::flat_buffer buffer_;
+    std::deque<std::pair<std::string, bool>> waiting_;
+};
+
+class ViewServer::Impl::Connection : public std::enable_shared_from_this<Connection> {
+public:
+    Connection(Impl& server, Tcp::socket&& socket) : server_(server), stream_(std::move(socket)) {}
+
+    void read()
+    {
+        parser_.emplace();
+        parser_->header_limit(most_header);
+        parser_->body_limit(most_body);
+        stream_.expires_after(std::chrono::seconds(60));
+        http::async_read(stream_, buffer_, *parser_,
+                         [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+                             if (!error) self->respond();
+                         });
+    }
+
+private:
+    void respond()
+    {
+        const Request& request = parser_->get();
+        const std::string_view target(request.target().data(), request.target().size());
+        // A page that opens a socket tells its Origin, always.
+        if (websocket::is_upgrade(request) && target.substr(0, target.find('?')) == "/socket" &&
+            server_.refusal(request).empty() && !request[http::field::origin].empty())
+            return std::make_shared<Socket>(server_, std::move(stream_))->open(request);
+        response_ = server_.answer(request);
+        http::async_write(stream_, response_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+            if (error) return;
+            if (self->response_.keep_alive()) return self->read();
+            beast::error_code none;
+            self->stream_.socket().shutdown(Tcp::socket::shutdown_send, none);
+        });
+    }
+
+    Impl& server_;
+    beast::tcp_stream stream_;
+    beast::flat_buffer buffer_;
+    std::optional<http::request_parser<http::string_body>> parser_;
+    Response response_;
+};
+
+void ViewServer::Impl::accept()
+{
+    acceptor_.async_accept([this](const beast::error_code& error, Tcp::socket socket) {
+        if (!error) {
+            beast::error_code none;
+            socket.set_option(Tcp::no_delay(true), none);
+            std::make_shared<Connection>(*this, std::move(socket))->read();
+        }
+        accept();
+    });
+}
+
+ViewServer::ViewServer(int port, const std::filesystem::path& folder, Handler handler)
+    : impl_(std::make_unique<Impl>(port, folder, std::move(handler)))
+{
+}
+
+ViewServer::~ViewServer() = default;
+
+std::string ViewServer::address() const { return impl_->address(); }
+void ViewServer::post(std::function<void()> f) { asio::post(impl_->work(), std::move(f)); }
+void ViewServer::repeat(int milliseconds, std::function<void()> f) { impl_->repeat(milliseconds, std::move(f)); }
+void ViewServer::run() { impl_->run(); }
+
+}  // namespace rapid

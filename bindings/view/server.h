@@ -1,0 +1,39 @@
+// The viewer's server: the files of the page by HTTP, and requests by WebSocket, on this machine alone.
+//
+// Closed: it listens on the loopback device; a request needs the token of the address that the command prints (the page
+// keeps it as a cookie), a Host of this machine and, where it has one, that host as its Origin. Names of files in
+// requests are looked up among those of the page; none is opened by what a request says.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace rapid {
+
+// Answers a request once, from any thread.
+using Answer = std::function<void(std::string message, bool binary)>;
+
+class ViewServer {
+public:
+    // Called from a thread of its own with each message of a page, one after another.
+    using Handler = std::function<void(const std::string& message, Answer answer)>;
+
+    // port 0: a free one. folder: of the page. Error: the port is taken; the page or three.js is missing.
+    ViewServer(int port, const std::filesystem::path& folder, Handler handler);
+    ~ViewServer();
+
+    std::string address() const;  // with the token
+    // Calls f from the handler's thread: soon, or every so many milliseconds.
+    void post(std::function<void()> f);
+    void repeat(int milliseconds, std::function<void()> f);
+    // Serves until the process ends.
+    void run();
+
+private:
+    class Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace rapid

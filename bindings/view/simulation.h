@@ -1,0 +1,114 @@
+// What a viewer shows: a scene that is run again whenever something changes, or the files of a sequence. The only place
+// where the viewer meets sessions and evaluators.
+//
+// Each run has a thread and a session of its own. A change abandons it: it ends after the frame that it is in, while
+// the next one has begun already. At most two are ending at a time; then the next one waits.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bindings/host/session.h"
+#include "bindings/view/frame_store.h"
+#include "runtime/error.h"
+
+namespace rapid {
+
+struct ViewOptions {
+    std::string graph;
+    SessionOptions session;
+    std::optional<std::uint64_t> seed;
+    std::optional<std::pair<std::int64_t, std::int64_t>> frames;
+    std::map<int, std::filesystem::path> files;  // a sequence: there is no graph
+    int threads = 1;
+    std::size_t memory = 0;  // bytes that frames may take
+};
+
+enum class ViewState { Starting, Computing, Done, Full, Failed };
+
+// What the page has to know besides frames.
+struct ViewStatus {
+    std::uint64_t version = 0;  // grows with every change
+    std::uint64_t run = 0;
+    ViewState state = ViewState::Starting;
+    std::int64_t first = 1, last = 1;
+    double fps = 24;
+    std::optional<Error> error;
+    std::vector<std::pair<std::int64_t, std::string>> warnings;  // with their first frames; 0: of none
+    std::uint64_t more_warnings = 0;                             // that are not kept
+    std::vector<Session::Parameter> parameters;
+    std::vector<std::string> outputs;
+    std::string graph;                 // the picture as JSON; empty where there is none
+    std::uint64_t graph_number = 0;    // grows with every other picture
+    std::string no_graph;              // why
+    std::map<std::string, int> names;  // attributes and groups of the plan, with bytes a point; -1 where left out
+};
+
+class ViewSimulation {
+public:
+    // changed: called from any thread, whenever version grows.
+    ViewSimulation(ViewOptions options, std::function<void()> changed);
+    ~ViewSimulation();
+
+    // Begins again, with other values of parameters.
+    void set(std::map<std::string, std::string> values);
+    std::map<std::string, std::string> values() const;
+    // Whether a file that the last run read has changed; then it begins again.
+    bool check_files();
+
+    ViewStatus status() const;
+    // Null: it is not computed. Of a sequence the file is read. Error: it can't be.
+    ViewFramePtr frame(std::int64_t number);
+    const FrameStore& store() const { return store_; }
+    bool is_sequence() const { return !options_.files.empty(); }
+
+    // Calls `told` from the run's thread with the points as they are after each node in a frame, by name, or with an
+    // error. The run goes on afterwards.
+    using Results = std::map<std::string, PointSet>;
+    void inspect(std::int64_t frame, std::function<void(std::shared_ptr<const Results>, std::string error)> told);
+    // Likewise the arguments of the nodes in a frame, as texts by node and name.
+    using Arguments = std::map<std::string, std::map<std::string, std::string>>;
+    void arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> told);
+    // Likewise the create and the id under which it bore a point of an output in a frame: where chains are merged, ids
+    // are others.
+    struct Origin {
+        std::string create;
+        std::int64_t id;
+    };
+    void origin(std::int64_t frame, std::string output, std::int64_t id,
+                std::function<void(Origin, std::string error)> told);
+    // Likewise the life of a point up to a frame, as JSON, from a thread and a session of their own.
+    void trace(const Origin& point, std::int64_t last, std::function<void(std::string json, std::string error)> told);
+
+private:
+    class Run;
+    void begin();
+    void collect_ended();
+    ViewFramePtr read_file(std::int64_t number);
+
+    const ViewOptions options_;
+    const std::function<void()> changed_;
+    FrameStore store_;
+    mutable std::mutex mutex_;
+    ViewStatus status_;
+    std::map<std::filesystem::path, std::filesystem::file_time_type> read_;  // files, and when they were changed
+    std::map<std::string, std::string> values_;
+    std::unique_ptr<Run> run_;
+    std::deque<std::unique_ptr<Run>> ending_;
+    std::uint64_t file_uses_ = 0;  // of a sequence: counts the files that were read
+    std::thread tracer_;
+    std::shared_ptr<std::atomic<bool>> tracer_stop_;
+};
+
+}  // namespace rapid

@@ -1,0 +1,155 @@
+"""A browser (Debian's chromium, without a screen) by WebDriver, and a `rapid view` for it to look at."""
+import base64
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def wait_for(what, seconds=40, every=0.02):
+    """The first true value of what(); an error after so many seconds."""
+    end = time.monotonic() + seconds
+    while True:
+        value = what()
+        if value:
+            return value
+        if time.monotonic() > end:
+            raise AssertionError(f"waited {seconds} s in vain; the last value was {value!r}")
+        time.sleep(every)
+
+
+class Browser:
+    """One chromium; its pages have WebGL by software."""
+
+    def __init__(self, width=1280, height=800):
+        self.port = free_port()
+        self.driver = subprocess.Popen(["chromedriver", f"--port={self.port}"], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL, start_new_session=True)
+        wait_for(lambda: self.is_up(), 30)
+        options = {"args": ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+                            "--disable-dev-shm-usage", f"--window-size={width},{height}"]}
+        made = self.call("POST", "/session", {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}, "")
+        self.session = f"/session/{made['sessionId']}"
+        self.call("POST", "/timeouts", {"script": 60000})
+
+    def is_up(self):
+        try:
+            return self.call("GET", "/status", None, "")["ready"]
+        except OSError:
+            return False
+
+    def call(self, method, path, body=None, session=None):
+        prefix = self.session if session is None else session
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{prefix}{path}", data, method=method,
+                                         headers={"Content-Type": "application/json"})
+        try:
+            with urllib.request.urlopen(request, timeout=90) as answer:
+                return json.load(answer)["value"]
+        except urllib.error.HTTPError as error:
+            raise AssertionError(json.load(error)["value"]["message"]) from None
+
+    def open(self, address):
+        self.call("POST", "/url", {"url": address})
+
+    def size(self, width, height):
+        """Of the page itself, without the browser's frame."""
+        self.call("POST", "/window/rect", {"width": width, "height": height})
+        inner = self.run("return [innerWidth, innerHeight]")
+        self.call("POST", "/window/rect", {"width": 2 * width - inner[0], "height": 2 * height - inner[1]})
+
+    def run(self, script, *arguments):
+        return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def wait(self, expression, seconds=40):
+        """Waits until an expression of the page is true, and returns it."""
+        return wait_for(lambda: self.run(f"return {expression}"), seconds)
+
+    def promise(self, expression):
+        """The value of a promise; an error where it is refused."""
+        kept = self.call("POST", "/execute/async", {
+            "script": f"const done = arguments[arguments.length - 1]; Promise.resolve({expression})"
+                      ".then((value) => done([value]), (error) => done(String(error)));", "args": []})
+        assert isinstance(kept, list), kept
+        return kept[0]
+
+    def element(self, selector):
+        return next(iter(self.call("POST", "/element", {"using": "css selector", "value": selector}).values()))
+
+    def click(self, selector):
+        self.call("POST", f"/element/{self.element(selector)}/click", {})
+
+    def type(self, text):
+        """Keys, as typed into whatever has the focus."""
+        actions = [{"type": kind, "value": key} for key in text for kind in ("keyDown", "keyUp")]
+        self.call("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": actions}]})
+
+    def click_at(self, x, y):
+        self.call("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "actions": [
+            {"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y)},
+            {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]}]})
+
+    def drag(self, x0, y0, x1, y1, shift=False):
+        keys = [{"type": "keyDown", "value": "\ue008"}, {"type": "pause"}, {"type": "pause"}, {"type": "pause"},
+                {"type": "keyUp", "value": "\ue008"}]
+        actions = [{"type": "pointer", "id": "mouse", "actions": [
+            {"type": "pointerMove", "duration": 0, "x": round(x0), "y": round(y0)}, {"type": "pointerDown", "button": 0},
+            {"type": "pointerMove", "duration": 50, "x": round(x1), "y": round(y1)}, {"type": "pointerUp", "button": 0}]}]
+        if shift:
+            actions[0]["actions"].insert(0, {"type": "pause"})
+            actions.append({"type": "key", "id": "keys", "actions": keys})
+        self.call("POST", "/actions", {"actions": actions})
+
+    def screenshot(self, file):
+        with open(file, "wb") as out:
+            out.write(base64.b64decode(self.call("GET", "/screenshot")))
+
+    def close(self):
+        try:
+            self.call("DELETE", "")
+        except (OSError, AssertionError):
+            pass
+        self.driver.terminate()
+        self.driver.wait()
+
+
+class View:
+    """A `rapid view`, and its address."""
+
+    def __init__(self, rapid, *arguments, cwd=None):
+        self.process = subprocess.Popen([rapid, "view", *arguments, "--no-open"], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True, cwd=cwd)
+        self.address = self.process.stdout.readline().strip()
+        match = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=([0-9a-f]{32})", self.address)
+        if not match:
+            raise AssertionError(f"no address: {self.address!r} {self.process.stderr.read()}")
+        self.port, self.token = int(match[1]), match[2]
+
+    def memory(self):
+        """Resident bytes."""
+        with open(f"/proc/{self.process.pid}/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    def close(self):
+        self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+
+
+def is_installed():
+    return shutil.which("chromium") and shutil.which("chromedriver")

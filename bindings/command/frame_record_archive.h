@@ -94,14 +94,21 @@ void serialize(Archive& keep, StageSeconds& all)
 }
 
 template <StateArchive Archive>
+void serialize(Archive& keep, FrameStatistics::Node& node)
+{
+    auto& [nodes, seconds, points, bytes] = node;
+    keep(nodes, seconds, points, bytes);
+}
+
+template <StateArchive Archive>
 void serialize(Archive& keep, FrameStatistics& statistics)
 {
     auto& [frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
            left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
-           constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds] = statistics;
+           constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds, nodes] = statistics;
     keep(frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
          left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
-         constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds);
+         constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds, nodes);
 }
 
 }  // namespace rapid

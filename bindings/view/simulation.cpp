@@ -7,7 +7,7 @@
 #include <chrono>
 
 #include "bindings/command/graphviz.h"
-#include "bindings/command/picture_scene.h"
+#include "bindings/host/picture_scene.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/format.h"
 #include "runtime/points/id_index.h"

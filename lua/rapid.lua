@@ -43,6 +43,21 @@ local function make(native, load_node, numeric, shapes, studies)
     end
   end
 
+  -- Of a file; or, where the path names a sequence, a function of the frame.
+  local function reader(what)
+    local read = maker(what, "path")
+    return function(...)
+      local path, options = ...
+      if type(path) ~= "string" or not native.names_frames(path) then return read(...) end
+      local asked = options_of("rapid." .. what, options)
+      asked.path = path
+      return function(frame)
+        asked.frame = frame.number
+        return (native.make(what, asked))
+      end
+    end
+  end
+
   rapid.mesh = {
     read = maker("mesh.read", "path"),
     sphere = maker "mesh.sphere",
@@ -119,7 +134,7 @@ local function make(native, load_node, numeric, shapes, studies)
   rapid.shape = {}
   for _, name in ipairs(native.maker_names "shape") do rapid.shape[name] = maker("shape." .. name) end
   rapid.points = {
-    read = maker("points.read", "path"),
+    read = reader "points.read",
     grid = maker "points.grid",
     from = function(columns)
       if type(columns) ~= "table" then

@@ -7,6 +7,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
+#include "runtime/files/left_out.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
@@ -45,15 +46,23 @@ public:
                 all.push_back(tell_snapshot(path));
                 continue;
             }
-            const PointSummary summary = threads.run([&, &file = path] { return describe(read_points(file)); });
+            std::vector<std::string> dropped;
+            const PointSummary summary = threads.run([&, &file = path] {
+                const LeftOut left_out;
+                const PointSet points = read_points(file);
+                dropped = left_out.list();
+                return describe(points);
+            });
             if (json_) {
                 ordered_json json = {{"file", path.string()}};
                 if (cache.sequence) json["frame"] = frame;
                 json.update(to_json(summary));
+                json["left_out"] = dropped;
                 all.push_back(std::move(json));
             } else {
                 if (cache.sequence) print(printable(path.string()) + "\n");
                 print(to_text(summary));
+                for (const std::string& what : dropped) print(fmt::format("left out    {}\n", printable(what)));
             }
         }
         if (json_)

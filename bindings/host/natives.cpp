@@ -16,6 +16,7 @@
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
 #include "runtime/files/content_hash.h"
+#include "runtime/io/frame_pattern.h"
 #include "runtime/points/point_names.h"
 #include "runtime/printable.h"
 #include "runtime/shapes/level_set/density_grid.h"
@@ -47,6 +48,13 @@ int suggest(State& state)
     std::vector<std::string> names;
     read_value(Param(), Value(table_at(state, 2)), names);
     push_text(state.lua(), did_you_mean(text_at(state.lua(), 1), names));
+    return 1;
+}
+
+// native.names_frames(path): whether it names a sequence of files.
+int names_frames(State& state)
+{
+    lua_pushboolean(state.lua(), FramePattern(text_at(state.lua(), 1)).has_frame());
     return 1;
 }
 
@@ -180,6 +188,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"unknown_type", native<unknown_type>},
                                       {"did_you_mean", native<suggest>},
                                       {"kind", native<kind_of>},
+                                      {"names_frames", native<names_frames>},
                                       {"print", native<print_text>},
                                       {"set_index", native<set_object_methods>},
                                       {"run", run_body},

@@ -193,6 +193,7 @@ void PlyFile::read_lists(const PlyElement& element, std::size_t wanted,
                                 element.properties[wanted].name, element.name));
     std::vector<std::int64_t> list;
     if (element.properties.empty()) return;
+    numbers_.assign(element.properties.size(), 0);
     for (std::size_t i = 0; i < element.count; ++i) {
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
             const PlyProperty& property = element.properties[p];
@@ -205,6 +206,7 @@ void PlyFile::read_lists(const PlyElement& element, std::size_t wanted,
             if (p == wanted) list.clear();
             for (auto left = static_cast<std::size_t>(count); left > 0; --left) {
                 const double number = take_number(element, i, property, property.type);
+                numbers_[p] = number;
                 if (p == wanted) list.push_back(static_cast<std::int64_t>(number));
             }
         }

@@ -50,6 +50,8 @@ public:
     PlyRecords read_records(const PlyElement& element);
     void read_lists(const PlyElement& element, std::size_t property,
                     const std::function<void(std::span<const std::int64_t> list)>& row);
+    // Of the row whose list is told: its numbers that are in no list, by property.
+    double number_of_row(std::size_t property) const { return numbers_[property]; }
     void pass_over(const PlyElement& element);
 
 private:
@@ -66,6 +68,7 @@ private:
     std::size_t at_ = 0;
     Encoding encoding_ = Encoding::Ascii;
     std::vector<PlyElement> elements_;
+    std::vector<double> numbers_;  // of the row that is read by read_lists()
 };
 
 }  // namespace rapid

@@ -16,6 +16,7 @@
 #include <cstring>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/point_file.h"
@@ -273,9 +274,11 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
         } else if (type == TextType) {
             reader.take(size);  // its default
             stride += size;
+            LeftOut::add(fmt::format("the attribute \"{}\", a string", name));
         } else if (type == IndexType) {
             for (std::uint32_t entries = reader.integer(4); entries > 0; --entries) reader.take(reader.integer(2));
             stride += 4 * size;
+            LeftOut::add(fmt::format("the attribute \"{}\", a string", name));
         } else {
             throw Error(fmt::format("attribute \"{}\" has the unknown type {}", name, type));
         }
@@ -332,7 +335,10 @@ PointSet read_bgeo(const std::filesystem::path& path)
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
     for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first, has none
         set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
-    if (primitives > 0) return points;
+    if (primitives > 0) {
+        LeftOut::add(fmt::format("its {} primitives{}", primitives, groups > 0 ? ", and its groups behind them" : ""));
+        return points;
+    }
     reader.enter("attributes of the whole");
     if (of_the_whole > 0) reader.take(read_dictionary(reader, of_the_whole, 0).stride);
     reader.enter("groups");

@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -229,7 +230,10 @@ PointSet read_npz(const std::filesystem::path& path)
     const auto with_array = [&](const ZipReader::Member& member, const auto& use) {
         const std::vector<unsigned char> bytes = zip.read(member);
         try {
-            if (const std::optional<Array> array = array_in(bytes)) use(*array);
+            if (const std::optional<Array> array = array_in(bytes))
+                use(*array);
+            else
+                LeftOut::add(fmt::format("the array \"{}\", which is not of numbers of each point", member.name));
         } catch (const Error& error) {
             throw Error(fmt::format("\"{}\": {}", member.name, error.what()));
         }
@@ -253,7 +257,9 @@ PointSet read_npz(const std::filesystem::path& path)
         if (!member.name.ends_with(suffix)) continue;
         const std::string name = member.name.substr(0, member.name.size() - suffix.size());
         with_array(member, [&](const Array& array) {
-            if (array.rows != points.size()) return;
+            if (array.rows != points.size())
+                return LeftOut::add(fmt::format("the array \"{}\" of {} rows; there are {} points", member.name,
+                                                array.rows, points.size()));
             read_array(points, name, array);
             has_id |= name == "id" && array.numbers == 1 && !array.type.truth;
         });

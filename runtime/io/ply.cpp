@@ -10,6 +10,7 @@
 #include <map>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/files/ply_file.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
@@ -127,6 +128,9 @@ PointSet read_ply(const std::filesystem::path& path)
 {
     const InputFile input(path);
     PlyFile file(input.text());
+    for (const PlyElement& element : file.elements())
+        if (element.name != "vertex" && element.count > 0)
+            LeftOut::add(fmt::format("its {} elements \"{}\"", element.count, element.name));
     for (const PlyElement& element : file.elements()) {
         if (element.name == "vertex") return read_vertices(file, element);
         file.pass_over(element);

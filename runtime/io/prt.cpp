@@ -17,6 +17,7 @@
 #include <memory>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
@@ -234,7 +235,10 @@ Channels read_channels(LittleEndianReader& reader)
         const std::size_t begin = static_cast<std::size_t>(offset), size = static_cast<std::size_t>(numbers);
         channels.stride = std::max(channels.stride, begin + size * scalar_bytes(scalar));
         names.push_back(attribute_name(name));
-        if (numbers <= most_numbers) channels.attributes.push_back(attribute_of(name, scalar, size, begin));
+        if (numbers <= most_numbers)
+            channels.attributes.push_back(attribute_of(name, scalar, size, begin));
+        else
+            LeftOut::add(fmt::format("the channel \"{}\" of {} numbers a point", name, numbers));
     }
     check_column_names(names, "");
     return channels;

@@ -13,6 +13,7 @@
 #include <map>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
@@ -224,7 +225,11 @@ PointSet read_usda(const std::filesystem::path& path)
     std::vector<std::string> names;
     for (const UsdArray& array : arrays) {
         const bool constant = array.rows() == 1;
-        if (array.name == "extent" || (array.rows() != points.size() && !constant)) continue;  // of no point
+        if (array.name == "extent") continue;  // of no point
+        if (array.rows() != points.size() && !constant) {
+            LeftOut::add(fmt::format("{} of {} values; there are {} points", array.name, array.rows(), points.size()));
+            continue;
+        }
         RecordAttribute attribute;
         attribute.name = attribute_name(array.name);
         attribute.type = array.type;

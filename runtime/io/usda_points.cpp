@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "runtime/error.h"
+#include "runtime/files/left_out.h"
 
 namespace rapid {
 namespace {
@@ -186,7 +187,10 @@ private:
     {
         constexpr std::string_view samples = ".timeSamples";
         std::optional<UsdArray> array = array_of(type);
-        if (!array) return skip_value();
+        if (!array) {
+            if (type.ends_with("[]")) LeftOut::add(fmt::format("{} of the type {}", name, type));
+            return skip_value();
+        }
         if (!name.ends_with(samples)) {
             if (!is_at('[')) return skip_value();  // None
             array->name = std::string(name);

@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/files/read_apart.h"
 #include "runtime/io/id_order.h"
 #include "runtime/io/point_message.h"
@@ -154,7 +155,10 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
             continue;
         }
         const auto reader = readers().find(type);
-        if (reader == readers().end() || !array.hasConstantStride()) continue;
+        if (reader == readers().end() || !array.hasConstantStride()) {
+            LeftOut::add(fmt::format("the attribute \"{}\" of the type {}", name, type));
+            continue;
+        }
         for (vdb::Index component = 0; component < array.stride(); ++component)
             reader->second(points, ranges, name, array.stride() == 1 ? name : fmt::format("{}{}", name, component),
                            component);
@@ -174,11 +178,13 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
 struct VdbPoints {
     PointSet points;
     bool has_id = false;
+    std::vector<std::string> left_out = {};
 };
 
 VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
 {
     initialize_openvdb();
+    const LeftOut left_out;
     try {
         vdb::io::File file(path.string());
         file.open(/*delayed loading=*/false);
@@ -188,6 +194,7 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
         for (auto name = file.beginName(); name != file.endName(); ++name) {
             const auto metadata = file.readGridMetadata(name.gridName());
             if (!metadata->isType<PointDataGrid>()) {
+                LeftOut::add(fmt::format("the grid \"{}\" ({})", name.gridName(), metadata->type()));
                 others += fmt::format("{}\"{}\" ({})", others.empty() ? "" : ", ", name.gridName(), metadata->type());
                 continue;
             }
@@ -205,6 +212,7 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
             read_grid(*grid, first, read.points, read.has_id);
             for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) first += leaf->getLastValue();
         }
+        read.left_out = left_out.list();
         return read;
     } catch (const vdb::Exception& error) {
         throw Error(fmt::format("can't be read: {}", error.what()));
@@ -214,13 +222,17 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
 void send(const VdbPoints& read, MessageWriter& message)
 {
     message.put(read.has_id);
+    message.put(read.left_out.size());
+    for (const std::string& what : read.left_out) message.put_text(what);
     send_points(read.points, message);
 }
 
 VdbPoints receive(MessageReader& message)
 {
     const bool has_id = message.take<std::uint8_t>() != 0;
-    return {receive_points(message), has_id};
+    std::vector<std::string> left_out;
+    for (auto left = message.take<std::size_t>(); left > 0; --left) left_out.push_back(message.take_text());
+    return {receive_points(message), has_id, std::move(left_out)};
 }
 
 const ApartReader<VdbPoints> reader("points of .vdb", read_grids, send, receive);
@@ -228,7 +240,8 @@ const ApartReader<VdbPoints> reader("points of .vdb", read_grids, send, receive)
 PointSet read_vdb(const std::filesystem::path& path)
 {
     check_readable(path);
-    auto [points, has_id] = reader(path);
+    auto [points, has_id, left_out] = reader(path);
+    for (const std::string& what : left_out) LeftOut::add(what);
     if (points.empty()) return points;
     if (has_id) return reordered(points, id_order(points.id()));
     std::span<std::int64_t> ids = points.id().overwrite();

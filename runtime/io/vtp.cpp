@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -199,10 +200,19 @@ PointSet read_vtp(const std::filesystem::path& path)
     std::vector<std::string> names = {"P"};
     for (const pugi::xml_node node : piece.child("PointData").children("DataArray")) {
         const std::optional<VtkArray> array = vtk.array(node, *n);
-        if (!array) continue;
+        if (!array) {
+            LeftOut::add(fmt::format("the array \"{}\" of the type {}, {} numbers a point",
+                                     node.attribute("Name").value(), node.attribute("type").value(),
+                                     node.attribute("NumberOfComponents").as_string("1")));
+            continue;
+        }
         names.emplace_back(node.attribute("Name").value());
         read(names.back(), *array);
     }
+    for (const auto& [count, what] : {std::pair("NumberOfLines", "lines"), std::pair("NumberOfStrips", "strips"),
+                                      std::pair("NumberOfPolys", "polygons")})
+        if (const unsigned found = piece.attribute(count).as_uint(); found > 0)
+            LeftOut::add(fmt::format("its {} {}", found, what));
     check_column_names(names, "");
     if (!has_id) number_points(points);
     return points;

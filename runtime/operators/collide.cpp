@@ -147,6 +147,8 @@ struct Collide {
     std::shared_ptr<const Collider> dynamic(const Evaluation& now) const
     {
         if (!shape.rest && !shape.deforming) return nullptr;
+        // A frame at which a sequence has nothing is none to collide with, nor is the way there.
+        if (shape.deforming && !shape.deforming->mesh().has(now.frame.number - 1, now.frame.number)) return nullptr;
         auto collider = dynamic_of<Collider>(now, group);
         collider->shape = shape.rest;
         collider->deforming = shape.deforming;

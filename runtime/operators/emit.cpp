@@ -144,7 +144,7 @@ struct Emit {
     static void declare_parents(Declaration<Emit>& type)
     {
         type.param(&Emit::source_group, "source_group", Value(), any_number(), "",
-                   "of a node: only its points in this group bear")
+                   "of a node: only its points in this group bear; of a mesh: only its faces in this group")
             .constant()
             .param(&Emit::on, "on", Value(), any_number(), "",
                    "of a node: births at an event, count of each (1), not all the time: \"hit\", \"death\", \"birth\", "
@@ -199,8 +199,8 @@ struct Emit {
         check_attributes();
         check_kind();
         if (source.is_node) return;
-        if (!source_.is(source.object, from, density)) {
-            BirthSource next(source.object, from, density);
+        if (!source_.is(source.object, from, density, source_group)) {
+            BirthSource next(source.object, from, density, source_group);
             next.follow(source_);
             source_ = std::move(next);
         }
@@ -541,11 +541,9 @@ void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t
     velocities.find(places, draws, speed_draws, source_motion, newborn.v.subspan(first, size));
 }
 
-// What only a node as source, or only one of another kind, has.
-void Emit::check_kind() const
+void Emit::check_kind() const  // what only a node as source has, or only another
 {
-    const std::pair<bool, const char*> of_node[] = {{!source_group.empty(), "source_group"},
-                                                    {on.has_value(), "on"},
+    const std::pair<bool, const char*> of_node[] = {{on.has_value(), "on"},
                                                     {min_speed.has_value(), "min_speed"},
                                                     {limit.has_value(), "limit"},
                                                     {split, "split"},

@@ -3,32 +3,51 @@
 
 #include <fmt/format.h>
 
-#include "bindings/host/maker.h"
+#include "bindings/host/makers/sequence_options.h"
 #include "runtime/io/frame_pattern.h"
+#include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/motion/animated.h"
 
 namespace rapid {
 namespace {
 
-struct ReadMesh {
+struct ReadMesh : SequenceOptions {
     std::string path;
 
     static Maker declare()
     {
-        return maker<ReadMesh>("mesh.read", "Reads OBJ, PLY, STL or glTF, or a sequence of such files.")
+        auto declaration = maker<ReadMesh>("mesh.read", "Reads OBJ, PLY, STL or glTF, or a sequence of such files.");
+        declaration
             .param(&ReadMesh::path, "path", Value(), any_number(), "",
                    "relative to the graph file; with #### or $F4 in it a deforming mesh, a file for each frame")
             .required();
+        return SequenceOptions::declare(declaration);
     }
     ObjectPtr make(MakeContext& context) const
     {
         const FramePattern pattern((context.folder / path).string());  // an absolute path stays itself
-        if (!pattern.has_frame()) return read_mesh(context.resolve(path));
+        check(path, pattern.has_frame());
+        if (!pattern.has_frame()) {
+            const MeshPtr mesh = read_mesh(context.resolve(path));
+            tell_left_out(*mesh, context);
+            return mesh;
+        }
         const auto files = pattern.existing();
         if (context.on_read)
             for (const auto& [frame, file] : files) context.on_read(file);
-        auto sequence = std::make_shared<MeshSequence>(files, pattern.text());
+        auto sequence = std::make_shared<MeshSequence>(files, pattern.text(), order());
+        tell_left_out(*sequence->rest(), context);
         return std::make_shared<AnimatedMesh>(std::move(sequence), constant_motion({}));
+    }
+
+private:
+    static void tell_left_out(const Mesh& mesh, MakeContext& context)
+    {
+        const auto* detailed = dynamic_cast<const DetailedMesh*>(&mesh);
+        if (!detailed) return;
+        for (const std::string& what : detailed->left_out)
+            context.warnings.push_back(
+                fmt::format("rapid.mesh.read: \"{}\": {} can't be read, and is left out", mesh.name, what));
     }
 };
 RAPID_MAKER(ReadMesh);

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 
-#include "bindings/host/maker.h"
+#include "bindings/host/makers/sequence_options.h"
+#include "runtime/files/left_out.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/io/format.h"
+#include "runtime/io/frame_pattern.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
@@ -21,19 +23,56 @@ ObjectPtr numbered(PointSet points)
     return object;
 }
 
-struct ReadPoints {
+struct ReadPoints : SequenceOptions {
     std::string path;
+    std::optional<double> frame;  // of a sequence, as lua/rapid.lua asks for it
 
     static Maker declare()
     {
-        return maker<ReadPoints>("points.read", "Reads points from a file that Rapid can write.")
-            .param(&ReadPoints::path, "path", Value(), any_number(), "", "relative to the graph file")
+        auto declaration =
+            maker<ReadPoints>("points.read", "Reads points from a file that Rapid can write, or a sequence.");
+        declaration
+            .param(&ReadPoints::path, "path", Value(), any_number(), "",
+                   "relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a "
+                   "function of the frame")
             .required();
+        declaration.param(&ReadPoints::frame, "frame", Value(), any_number(), "", "of a sequence").internal();
+        return SequenceOptions::declare(declaration);
     }
-    // The file's ids say which points are the same in another file; without any the places do.
     ObjectPtr make(MakeContext& context) const
     {
-        PointSet points = read_points(context.resolve(path));
+        check(path, frame.has_value());
+        if (!frame) return read(context.resolve(path), context);
+        const FramePattern pattern((context.folder / path).string());
+        const auto files = existing_files(pattern);
+        FrameSequence frames = order();
+        frames.first = files.begin()->first;
+        frames.last = files.rbegin()->first;
+        const std::optional<std::int64_t> file = frames.file_of(static_cast<std::int64_t>(std::ceil(*frame)));
+        if (file) {
+            const auto found = files.find(static_cast<int>(*file));
+            if (found == files.end())
+                throw Error(
+                    fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
+                                *file, pattern.text(), frames.first, frames.last));
+            return read(context.resolve(found->second.string()), context);
+        }
+        // No points, but the attributes that they have at other frames.
+        auto none = std::make_shared<PointsObject>();
+        const ObjectPtr first = read(context.resolve(files.begin()->second.string()), context);
+        none->points = static_cast<const PointsObject&>(*first).points.select({});
+        return none;
+    }
+
+private:
+    // The file's ids say which points are the same in another file; without any the places do.
+    static ObjectPtr read(const std::filesystem::path& file, MakeContext& context)
+    {
+        const LeftOut left_out;
+        PointSet points = read_points(file);
+        for (const std::string& what : left_out.list())
+            context.warnings.push_back(
+                fmt::format("rapid.points.read: \"{}\": {} can't be read, and is left out", file.string(), what));
         if (!has_ids(points)) return numbered(std::move(points));
         auto object = std::make_shared<PointsObject>();
         object->points = std::move(points);

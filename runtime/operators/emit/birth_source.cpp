@@ -9,6 +9,7 @@
 #include "runtime/graph/value.h"
 #include "runtime/operators/emit/point_path.h"
 #include "runtime/shapes/level_set/density_grid.h"
+#include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/scatter/scatter_by_density.h"
 
@@ -33,6 +34,37 @@ PointSet vertices_of(const Mesh& mesh)
     return vertices;
 }
 
+// The corners of its faces, three of each, with all attributes of vertices, corners and faces.
+PointSet corners_of(const DetailedMesh& mesh)
+{
+    PointSet corners;
+    const std::size_t faces = mesh.triangles.size();
+    corners.append(3 * faces);
+    const auto set = [&]<class T>(const std::string& name, const std::vector<T>&, const auto& value_of) {
+        if (name == "P" || name == "v" || name == "id" || corners.has(name)) return;
+        Column<T> column;
+        const std::span<T> to = column.append_for_writing(3 * faces);
+        for (std::size_t f = 0; f < faces; ++f)
+            for (std::size_t k = 0; k < 3; ++k) to[3 * f + k] = value_of(f, k);
+        corners.set(name, std::move(column));
+    };
+    const auto vertex = [&](std::size_t f, std::size_t k) {
+        return static_cast<std::size_t>(mesh.triangles[f][static_cast<int>(k)]);
+    };
+    const auto each = [&](const std::map<std::string, Mesh::VertexValues>& values, const auto& place) {
+        for (const auto& [name, any] : values)
+            std::visit(
+                [&, &key = name](const auto& list) {
+                    set(key, list, [&](std::size_t f, std::size_t k) { return list[place(f, k)]; });
+                },
+                any);
+    };
+    each(mesh.values, vertex);
+    each(mesh.corner_values, [](std::size_t f, std::size_t k) { return 3 * f + k; });
+    each(mesh.face_values, [](std::size_t f, std::size_t) { return f; });
+    return corners;
+}
+
 // Area-weighted vertex normals; not of length 1.
 Column<Vec3f> vertex_normals(const Mesh& mesh)
 {
@@ -54,11 +86,18 @@ Vec3f direction(const Vec3f& normal)
 
 }  // namespace
 
-BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density)
-    : object_(std::move(object)), from_(std::move(from)), density_(std::move(density))
+BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density, std::string group)
+    : object_(std::move(object)), from_(std::move(from)), density_(std::move(density)), group_(std::move(group))
 {
     const auto points = std::dynamic_pointer_cast<const PointsObject>(object_);
     moving_points_ = std::dynamic_pointer_cast<const AnimatedPoints>(object_);
+    const bool is_mesh =
+        std::dynamic_pointer_cast<const Mesh>(object_) || std::dynamic_pointer_cast<const AnimatedMesh>(object_);
+    if (!group_.empty() && !(is_mesh && (from_.empty() || from_ == "surface")))
+        throw Error(
+            fmt::format("source_group = \"{}\" is of the points of a node, or of the faces of a mesh, from its "
+                        "surface; leave it out",
+                        group_));
     if (points || moving_points_) {
         if (!from_.empty() && from_ != "points")
             throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of points take \"points\"", from_));
@@ -151,10 +190,16 @@ BirthSource::Move BirthSource::move_points_to(const FrameClock& clock, std::int6
 
 BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_t step, const PathOptions& options)
 {
+    is_absent_ = false;
     if (is_of_points_ && !moving_points_) return move_points_to(simulation, step, options);
     if (!moving_mesh_ && !moving_shape_ && !moving_points_) return {};
     if (moving_points_ && values_.empty()) return {};
     const bool deforms = moving_mesh_ && moving_mesh_->deforms();
+    if (deforms) {
+        const double to = simulation.at_step(step).number;
+        is_absent_ = !moving_mesh_->has(step > simulation.start ? simulation.at_step(step - 1).number : to, to);
+        if (is_absent_) return path_ = nullptr, Move();
+    }
     FrameClock clock = simulation;
     if (deforms) clock.subframes = 1;
     // At the start there is no interval yet: births take place at the beginning of the next one, unless that jumps.
@@ -198,14 +243,49 @@ void BirthSource::take_mesh(const MeshPtr& mesh)
         scatter_ = scatter_in_volume(mesh);
         return;
     }
-    values_ = vertices_of(*mesh);
+    const DetailedMeshPtr details = detailed(mesh);
+    is_of_corners_ = from_ != "points" && details && (!details->corner_values.empty() || !details->face_values.empty());
+    values_ = is_of_corners_ ? corners_of(*details) : vertices_of(*mesh);
     if (from_ == "points") {
         normals_ = vertex_normals(*mesh);
         take_chances();
         return;
     }
     mesh_ = mesh;
-    scatter_ = density_.empty() ? scatter_on_surface(mesh) : scatter_by_density(mesh, densities());
+    scatter_ = scatter_on(mesh);
+}
+
+// By a density at the corners of faces, 0 on those that are not in the group.
+ScatterPtr BirthSource::scatter_on(const MeshPtr& mesh) const
+{
+    if (density_.empty() && group_.empty()) return scatter_on_surface(mesh);
+    const std::vector<float> values = density_.empty() ? std::vector<float>() : densities();
+    const std::vector<std::uint8_t>* members = nullptr;
+    if (!group_.empty()) {
+        static const std::map<std::string, std::vector<std::uint8_t>> none;
+        const DetailedMeshPtr details = detailed(mesh);
+        const auto& groups = details ? details->face_groups : none;
+        const auto found = groups.find(group_);
+        if (found == groups.end()) {
+            std::vector<std::string> names;
+            for (const auto& [name, faces] : groups) names.push_back(name);
+            const std::string near = did_you_mean(group_, names);
+            throw Error(fmt::format("source_group: the mesh \"{}\" has no group of faces \"{}\"{}", mesh->name, group_,
+                                    !near.empty()   ? near
+                                    : names.empty() ? std::string("; it has none")
+                                                    : fmt::format("; it has {}", fmt::join(names, ", "))));
+        }
+        members = &found->second;
+    }
+    std::vector<float> corners;
+    corners.reserve(3 * mesh->triangles.size());
+    for (std::size_t f = 0; f < mesh->triangles.size(); ++f)
+        for (int k = 0; k < 3; ++k) {
+            const std::size_t place = is_of_corners_ ? corners.size() : static_cast<std::size_t>(mesh->triangles[f][k]);
+            const float density = values.empty() ? 1 : values[place];
+            corners.push_back(members && !(*members)[f] ? 0 : density);
+        }
+    return scatter_by_density(mesh, corners);
 }
 
 std::vector<float> BirthSource::densities() const
@@ -256,7 +336,10 @@ std::vector<std::string> BirthSource::inherited() const
     std::vector<std::string> names;
     for (const std::string& name : values_.column_names()) {
         const auto own = {"P", "v", "id", "dt", "age", "life", "birthtime", "force"};
-        if (std::find(own.begin(), own.end(), name) == own.end() && name.rfind("hit", 0) != 0) names.push_back(name);
+        // The normals of a mesh that turns are those of the mesh at rest.
+        const bool turns = name == "N" && moving_mesh_ && !moving_mesh_->deforms();
+        if (!turns && std::find(own.begin(), own.end(), name) == own.end() && name.rfind("hit", 0) != 0)
+            names.push_back(name);
     }
     return names;
 }

@@ -25,12 +25,14 @@ class BirthSource {
 public:
     BirthSource() = default;
     // from: "surface", "volume", "points" (a mesh's vertices), or empty for the object's default. Error: an object that
-    // is no source, or none of that kind. density: the attribute by which places are drawn, or empty.
-    BirthSource(ObjectPtr object, std::string from, std::string density = "");
+    // is no source, or none of that kind. density: the attribute by which places are drawn, or empty. group: that of a
+    // mesh's faces on which points are born, or empty.
+    BirthSource(ObjectPtr object, std::string from, std::string density = "", std::string group = "");
 
-    bool is(const ObjectPtr& object, const std::string& from, const std::string& density) const
+    bool is(const ObjectPtr& object, const std::string& from, const std::string& density,
+            const std::string& group) const
     {
-        return object_ == object && from_ == from && density_ == density;
+        return object_ == object && from_ == from && density_ == density && group_ == group;
     }
     // Points that take the place of those of `last`, which was the source until now: they travel from there to here.
     void follow(const BirthSource& last);
@@ -48,12 +50,13 @@ public:
     bool moves() const { return path_ != nullptr; }
     const BodyPath& path() const { return *path_; }
 
-    bool empty() const { return !scatter_ && values_.empty(); }  // a set of no points
+    // A set of no points, or a sequence that has nothing in this interval.
+    bool empty() const { return is_absent_ || (!scatter_ && values_.empty()); }
     bool has_normals() const { return has_normals_; }
     // Whether its attribute v is to be added to the velocity of its path.
     bool has_own_velocity() const { return !path_is_of_v_; }
 
-    // Attributes of its points, or of a mesh's vertices, v included; read through value().
+    // Attributes of its points, of a mesh's vertices, or of the corners of its faces, v included; read through value().
     const PointSet& values() const { return values_; }
     // The attributes that newborn points inherit: all but those that every point has of its own (P, v, id, age, ...).
     std::vector<std::string> inherited() const;
@@ -67,6 +70,12 @@ public:
     T value(const Strided<T>& column, const Birthplace& place) const
     {
         if constexpr (std::is_same_v<T, float> || std::is_same_v<T, Vec3f>) {
+            if (scatter_ && is_of_corners_) {
+                const std::size_t first = 3 * static_cast<std::size_t>(place.element);
+                const T &a = column[first], &b = column[first + 1], &c = column[first + 2];
+                if (a == b && b == c) return a;  // of a face
+                return a * (1 - place.b1 - place.b2) + b * place.b1 + c * place.b2;
+            }
             if (scatter_) {
                 const Mesh::Triangle& corner = mesh_->triangles[static_cast<std::size_t>(place.element)];
                 const auto at = [&](int i) { return column[static_cast<std::size_t>(corner[i])]; };
@@ -89,21 +98,23 @@ private:
     void take_fog(const DensityGrid& fog);
     void take_points(PointSet points);
     std::vector<float> densities() const;
+    ScatterPtr scatter_on(const MeshPtr& mesh) const;
     void take_chances();
     Move move_points_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
     FramePath path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const;
 
     ObjectPtr object_;
-    std::string from_, density_;
+    std::string from_, density_, group_;
     std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, where it is one
     std::shared_ptr<const AnimatedShape> moving_shape_;  // likewise
     BodyPathPtr path_;
     ScatterPtr scatter_;  // null: births are at the points of values_
     MeshPtr mesh_;        // birthplaces refer to its triangles
     PointSet values_;
-    Column<Vec3f> normals_;  // of the points
-    AliasTable chances_;     // of the points, by their density
-    bool has_normals_ = false;
+    bool is_of_corners_ = false;  // values_ has three of each triangle of mesh_
+    Column<Vec3f> normals_;       // of the points
+    AliasTable chances_;          // of the points, by their density
+    bool has_normals_ = false, is_absent_ = false;
 
     // Of points: their motion, or the sets before, where a function of the frame gives another at each step.
     std::shared_ptr<const AnimatedPoints> moving_points_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/shapes/mesh/detailed_mesh.h"
+
 namespace rapid {
 
 Box3f Mesh::bounds() const
@@ -69,12 +71,48 @@ Mesh::Openness Mesh::openness() const
     return openness;
 }
 
+namespace {
+
+void turn_normals(DetailedMesh::Values& values, const Eigen::Matrix3d& normal_map)
+{
+    const auto normals = values.find("N");
+    auto* list = normals == values.end() ? nullptr : std::get_if<std::vector<Vec3f>>(&normals->second);
+    if (!list) return;
+    for (Vec3f& N : *list) {
+        const Vec3d turned = normal_map * N.cast<double>();
+        if (turned.norm() > 0) N = turned.normalized().cast<float>();
+    }
+}
+
+// Of the second and third corner of each face.
+void swap_corners(DetailedMesh::Values& values)
+{
+    for (auto& [name, any] : values)
+        std::visit(
+            [](auto& list) {
+                for (std::size_t c = 0; c < list.size(); c += 3) std::swap(list[c + 1], list[c + 2]);
+            },
+            any);
+}
+
+}  // namespace
+
 MeshPtr transformed(const MeshPtr& mesh, const Eigen::Affine3d& map)
 {
-    auto moved = std::make_shared<Mesh>(*mesh);
+    const DetailedMeshPtr details = detailed(mesh);
+    const auto turned = details ? std::make_shared<DetailedMesh>(*details) : nullptr;
+    const std::shared_ptr<Mesh> moved = turned ? turned : std::make_shared<Mesh>(*mesh);
     for (Vec3f& P : moved->positions) P = (map * P.cast<double>()).cast<float>();
-    if (map.linear().determinant() < 0)
+    const Eigen::Matrix3d normal_map = map.linear().inverse().transpose();
+    turn_normals(moved->values, normal_map);
+    const bool mirrors = map.linear().determinant() < 0;
+    if (mirrors)
         for (Mesh::Triangle& t : moved->triangles) std::swap(t[1], t[2]);
+    if (turned) {
+        turn_normals(turned->corner_values, normal_map);
+        turn_normals(turned->face_values, normal_map);
+        if (mirrors) swap_corners(turned->corner_values);
+    }
     return moved;
 }
 

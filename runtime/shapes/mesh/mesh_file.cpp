@@ -1,13 +1,16 @@
 // Meshes from files, by Assimp: OBJ, STL and glTF.
 //
-// A mesh is its surface: normals and texture coordinates are dropped, because at a seam a vertex has several and every
-// point born on the mesh would carry them. Vertex colours become Cd, and Alpha if any is not 1.
+// Vertex colours become Cd, and Alpha if any is not 1; normals N (of STL they are those of the faces, and are left
+// out); texture coordinates uv, and uv2, uv3, ...; faces are in groups by the names of their part, of the node that has
+// it, and of their material. Skins, animations and morph targets, lights and cameras are left out.
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -18,9 +21,53 @@
 namespace rapid {
 namespace {
 
-void append(const aiMesh& part, const aiMatrix4x4& to_world, MeshFile& corners)
+// A vec3 of each corner, so far 0 for corners without one.
+std::vector<Vec3f>& vectors(const std::string& name, MeshFile& corners)
 {
-    const auto first = corners.positions.size();
+    Mesh::VertexValues& values = corners.values.try_emplace(name, std::vector<Vec3f>()).first->second;
+    return std::get<std::vector<Vec3f>>(values);
+}
+
+void append_values(const aiMesh& part, const aiMatrix4x4& to_world, std::size_t first, bool with_normals,
+                   MeshFile& corners)
+{
+    const auto append = [&](const std::string& name, const auto& value_of) {
+        std::vector<Vec3f>& values = vectors(name, corners);
+        values.resize(first, Vec3f::Zero());
+        for (unsigned i = 0; i < part.mNumVertices; ++i) {
+            const aiVector3D value = value_of(i);
+            values.emplace_back(value.x, value.y, value.z);
+        }
+    };
+    for (unsigned set = 0; set < AI_MAX_NUMBER_OF_TEXTURECOORDS; ++set)
+        if (part.HasTextureCoords(set))
+            append(set == 0 ? "uv" : fmt::format("uv{}", set + 1),
+                   [&](unsigned i) { return part.mTextureCoords[set][i]; });
+    if (!with_normals || !part.HasNormals()) return;
+    aiMatrix3x3 turn(to_world);
+    turn.Inverse().Transpose();
+    append("N", [&](unsigned i) { return (turn * part.mNormals[i]).NormalizeSafe(); });
+}
+
+// Of the triangles from `first` on.
+void join_group(const std::string& name, std::size_t first, MeshFile& corners)
+{
+    if (name.empty()) return;
+    std::vector<std::uint8_t>& members = corners.face_groups[name];
+    members.resize(first, 0);
+    members.resize(corners.triangles.size(), 1);
+}
+
+void leave_out(const std::string& what, MeshFile& corners)
+{
+    if (std::find(corners.left_out.begin(), corners.left_out.end(), what) == corners.left_out.end())
+        corners.left_out.push_back(what);
+}
+
+void append(const aiScene& scene, const aiMesh& part, const std::string& node, const aiMatrix4x4& to_world,
+            bool with_normals, MeshFile& corners)
+{
+    const auto first = corners.positions.size(), first_face = corners.triangles.size();
     const bool moved = !to_world.IsIdentity();
     for (unsigned i = 0; i < part.mNumVertices; ++i) {
         const aiVector3D P = moved ? to_world * part.mVertices[i] : part.mVertices[i];
@@ -49,13 +96,37 @@ void append(const aiMesh& part, const aiMatrix4x4& to_world, MeshFile& corners)
         if (mirrored) std::swap(t[1], t[2]);
         corners.triangles.push_back(t);
     }
+    append_values(part, to_world, first, with_normals, corners);
+    std::set<std::string> groups = {part.mName.C_Str(), node};
+    if (part.mMaterialIndex < scene.mNumMaterials) {
+        const std::string material = scene.mMaterials[part.mMaterialIndex]->GetName().C_Str();
+        if (material != AI_DEFAULT_MATERIAL_NAME) groups.insert(material);
+    }
+    for (const std::string& name : groups) join_group(name, first_face, corners);
+    if (part.HasBones()) leave_out("its skin", corners);
+    if (part.mNumAnimMeshes > 0) leave_out("its morph targets", corners);
 }
 
-void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, MeshFile& corners)
+void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, bool with_normals,
+            MeshFile& corners)
 {
     const aiMatrix4x4 to_world = to_parent * node.mTransformation;
-    for (unsigned i = 0; i < node.mNumMeshes; ++i) append(*scene.mMeshes[node.mMeshes[i]], to_world, corners);
-    for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, corners);
+    const std::string name = node.mName.C_Str();
+    for (unsigned i = 0; i < node.mNumMeshes; ++i)
+        append(scene, *scene.mMeshes[node.mMeshes[i]], name, to_world, with_normals, corners);
+    for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, with_normals, corners);
+}
+
+// What is appended later has none of what comes before it.
+void complete(MeshFile& corners)
+{
+    const std::size_t n = corners.positions.size();
+    if (!corners.colours.empty()) {
+        corners.colours.resize(n, Vec3f::Ones());
+        corners.alphas.resize(n, 1.0f);
+    }
+    for (auto& [name, values] : corners.values) std::get<std::vector<Vec3f>>(values).resize(n, Vec3f::Zero());
+    for (auto& [name, members] : corners.face_groups) members.resize(corners.triangles.size(), 0);
 }
 
 // A glTF file names others, which are to be files as well: reading from a pipe might never end.
@@ -75,11 +146,12 @@ MeshFile import(const std::filesystem::path& path)
     const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
     if (!scene) throw Error(fmt::format("{}; it must be an OBJ, STL or glTF file", importer.GetErrorString()));
     MeshFile corners;
-    if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), corners);
-    if (!corners.colours.empty()) {
-        corners.colours.resize(corners.positions.size(), Vec3f::Ones());
-        corners.alphas.resize(corners.positions.size(), 1.0f);
-    }
+    const bool with_normals = path.extension() != ".stl" && path.extension() != ".STL";
+    if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), with_normals, corners);
+    complete(corners);
+    if (scene->mNumAnimations > 0) leave_out("its animations", corners);
+    if (scene->mNumLights > 0) leave_out("its lights", corners);
+    if (scene->mNumCameras > 0) leave_out("its cameras", corners);
     return corners;
 }
 

@@ -17,8 +17,11 @@ struct MeshFile {
     std::vector<Vec3f> positions;
     std::vector<Vec3f> colours;                        // empty, or shape [positions]
     std::vector<float> alphas;                         // empty, or shape [positions]
-    std::map<std::string, Mesh::VertexValues> values;  // others, each of shape [positions]; of PLY
+    std::map<std::string, Mesh::VertexValues> values;  // others, each of shape [positions]
     std::vector<Mesh::Triangle> triangles;
+    std::map<std::string, Mesh::VertexValues> face_values;         // each of shape [triangles]
+    std::map<std::string, std::vector<std::uint8_t>> face_groups;  // likewise
+    std::vector<std::string> left_out;
 };
 
 // Error: no such file, the reader's own, an index without a vertex, a coordinate that is not finite.

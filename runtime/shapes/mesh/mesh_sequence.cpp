@@ -18,14 +18,16 @@ constexpr double same_place = 1e-6;
 
 }  // namespace
 
-MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::string name)
-    : files_(std::move(files)), name_(std::move(name))
+MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::string name, FrameSequence order)
+    : files_(std::move(files)), name_(std::move(name)), order_(order)
 {
     if (files_.empty()) throw Error(fmt::format("there is no mesh file \"{}\", at any frame", name_));
     for (int frame = first(); frame < last(); ++frame)
         if (!files_.count(frame))
             throw Error(fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
                                     frame, name_, first(), last()));
+    order_.first = first();
+    order_.last = last();
     const MeshFile file = read_mesh_file(files_.begin()->second);
     corners_ = file.positions.size();
     faces_ = file.triangles.size();
@@ -36,7 +38,8 @@ MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::stri
 
 MeshPtr MeshSequence::at(std::int64_t frame) const
 {
-    const int held = static_cast<int>(std::clamp<std::int64_t>(frame, first(), last()));
+    const std::int64_t nearest = std::clamp<std::int64_t>(frame - order_.offset, first(), last());
+    const int held = static_cast<int>(order_.file_of(frame).value_or(nearest));
     const std::lock_guard lock(mutex_);
     const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& kept) { return kept.first == held; });
     MeshPtr mesh;

@@ -1,6 +1,7 @@
 // Meshes from PLY files: the element "vertex" with x y z and, where there are some, red green blue (alpha), and any
 // other number: nx ny nz is N, NAMEx NAMEy NAMEz a vec3, the others are floats; the element "face" with a list of
-// indices, vertex_indices or vertex_index. Other properties of faces are left out.
+// indices, vertex_indices or vertex_index, its numbers in the same way, and uchar group_NAME as a group of faces. Other
+// lists of faces, and other elements, are left out.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -124,6 +125,77 @@ void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
         for (std::size_t i = 0; i < vertex.count; ++i) mesh.alphas[i] = alpha[i];
 }
 
+constexpr std::string_view group_prefix = "group_";
+
+// What the faces have besides their corners, in the file's rows.
+class FaceValues {
+public:
+    FaceValues(const PlyElement& face, std::size_t indices, MeshFile& mesh) : mesh_(mesh)
+    {
+        std::vector<PlyProperty> numbers;  // without lists, so that vectors are found among them
+        std::vector<std::size_t> places;
+        for (std::size_t p = 0; p < face.properties.size(); ++p) {
+            const PlyProperty& property = face.properties[p];
+            if (p != indices && property.list)
+                mesh.left_out.push_back(fmt::format("the list \"{}\" of its faces", property.name));
+            if (property.list) continue;
+            numbers.push_back(property);
+            places.push_back(p);
+        }
+        for (std::size_t k = 0; k < numbers.size(); ++k) {
+            const PlyProperty& property = numbers[k];
+            if (property.name == "red" && k + 2 < numbers.size() && numbers[k + 1].name == "green" &&
+                numbers[k + 2].name == "blue") {
+                const bool whole = !is_floating(property.type);
+                add("Cd", {places[k], places[k + 1], places[k + 2]}, whole ? 1.0 / 255 : 1);
+                k += 2;
+            } else if (property.type == ScalarType::UInt8 && property.name.starts_with(group_prefix)) {
+                groups_.push_back({&mesh.face_groups[property.name.substr(group_prefix.size())], places[k]});
+            } else if (const std::string name = vec3_name(numbers, k); !name.empty()) {
+                add(name, {places[k], places[k + 1], places[k + 2]}, 1);
+                k += 2;
+            } else {
+                add(property.name, {places[k]}, 1);
+            }
+        }
+    }
+
+    // For each triangle of a row.
+    void append(const PlyFile& file, std::size_t triangles)
+    {
+        for (const Part& part : parts_) {
+            const auto number = [&](std::size_t c) {
+                return static_cast<float>(part.scale * file.number_of_row(part.places[c]));
+            };
+            if (auto* floats = std::get_if<std::vector<float>>(part.values))
+                floats->insert(floats->end(), triangles, number(0));
+            else
+                std::get<std::vector<Vec3f>>(*part.values)
+                    .insert(std::get<std::vector<Vec3f>>(*part.values).end(), triangles,
+                            Vec3f(number(0), number(1), number(2)));
+        }
+        for (const auto& [members, place] : groups_)
+            members->insert(members->end(), triangles, file.number_of_row(place) != 0);
+    }
+
+private:
+    struct Part {
+        Mesh::VertexValues* values;
+        std::vector<std::size_t> places;  // of properties
+        double scale;
+    };
+    void add(const std::string& name, std::vector<std::size_t> places, double scale)
+    {
+        Mesh::VertexValues& values = mesh_.face_values[name];
+        if (places.size() == 3) values = std::vector<Vec3f>();
+        parts_.push_back({&values, std::move(places), scale});
+    }
+
+    MeshFile& mesh_;
+    std::vector<Part> parts_;
+    std::vector<std::pair<std::vector<std::uint8_t>*, std::size_t>> groups_;
+};
+
 void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
 {
     const auto indices = std::find_if(face.properties.begin(), face.properties.end(), [](const PlyProperty& p) {
@@ -133,18 +205,28 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
     const auto vertices = static_cast<std::int64_t>(mesh.positions.size());
     std::size_t row = 0;
     std::vector<std::int32_t> corners;
-    file.read_lists(
-        face, static_cast<std::size_t>(indices - face.properties.begin()), [&](std::span<const std::int64_t> list) {
-            corners.clear();
-            for (const std::int64_t corner : list) {
-                if (corner < 0 || corner >= vertices)
-                    throw Error(fmt::format("face {} has the vertex {}; there are {}, from 0", row, corner, vertices));
-                corners.push_back(static_cast<std::int32_t>(corner));
-            }
-            // Of one or two corners it is a point or a line, which has no surface.
-            if (corners.size() >= 3) append_polygon(mesh.positions, corners, mesh.triangles);
-            ++row;
-        });
+    const auto place = static_cast<std::size_t>(indices - face.properties.begin());
+    FaceValues values(face, place, mesh);
+    file.read_lists(face, place, [&](std::span<const std::int64_t> list) {
+        corners.clear();
+        for (const std::int64_t corner : list) {
+            if (corner < 0 || corner >= vertices)
+                throw Error(fmt::format("face {} has the vertex {}; there are {}, from 0", row, corner, vertices));
+            corners.push_back(static_cast<std::int32_t>(corner));
+        }
+        // Of one or two corners it is a point or a line, which has no surface.
+        const std::size_t before = mesh.triangles.size();
+        if (corners.size() >= 3) append_polygon(mesh.positions, corners, mesh.triangles);
+        values.append(file, mesh.triangles.size() - before);
+        ++row;
+    });
+}
+
+void leave_out_others(const std::vector<PlyElement>& elements, MeshFile& mesh)
+{
+    for (const PlyElement& element : elements)
+        if (element.name != "vertex" && element.name != "face" && element.count > 0)
+            mesh.left_out.push_back(fmt::format("the {} elements \"{}\"", element.count, element.name));
 }
 
 }  // namespace
@@ -161,6 +243,7 @@ MeshFile read_ply_mesh(const std::filesystem::path& path)
             placed = true;
         } else if (element.name == "face" && placed) {
             read_faces(file, element, mesh);
+            leave_out_others(file.elements(), mesh);
             return mesh;
         } else if (element.name == "face") {
             throw Error("the faces are before the vertices");

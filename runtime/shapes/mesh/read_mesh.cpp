@@ -9,6 +9,7 @@
 
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"
+#include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
 namespace rapid {
@@ -20,6 +21,31 @@ std::string lower_case(std::string text)
     return text;
 }
 
+using NamedValues = std::map<std::string, Mesh::VertexValues>;
+
+void send_values(const NamedValues& values, MessageWriter& message)
+{
+    message.put(values.size());
+    for (const auto& [name, any] : values) {
+        message.put_text(name);
+        message.put<std::uint8_t>(static_cast<std::uint8_t>(any.index()));
+        std::visit([&]<class T>(const std::vector<T>& list) { message.put_array(std::span<const T>(list)); }, any);
+    }
+}
+
+NamedValues receive_values(MessageReader& message, std::size_t size)
+{
+    NamedValues values;
+    for (auto left = message.take<std::size_t>(); left > 0; --left) {
+        const std::string name = message.take_text();
+        if (message.take<std::uint8_t>() == 0)
+            values[name] = message.take_vector<float>(size);
+        else
+            values[name] = message.take_vector<Vec3f>(size);
+    }
+    return values;
+}
+
 void send_mesh(const MeshFile& mesh, MessageWriter& message)
 {
     for (const std::size_t count : {mesh.positions.size(), mesh.colours.size(), mesh.triangles.size()})
@@ -28,6 +54,15 @@ void send_mesh(const MeshFile& mesh, MessageWriter& message)
     message.put_array(std::span(mesh.colours));
     message.put_array(std::span(mesh.alphas));
     message.put_array(std::span(mesh.triangles));
+    send_values(mesh.values, message);
+    send_values(mesh.face_values, message);
+    message.put(mesh.face_groups.size());
+    for (const auto& [name, members] : mesh.face_groups) {
+        message.put_text(name);
+        message.put_array(std::span(members));
+    }
+    message.put(mesh.left_out.size());
+    for (const std::string& what : mesh.left_out) message.put_text(what);
 }
 
 MeshFile receive_mesh(MessageReader& message)
@@ -40,6 +75,13 @@ MeshFile receive_mesh(MessageReader& message)
     mesh.colours = message.take_vector<Vec3f>(colours);
     mesh.alphas = message.take_vector<float>(colours);
     mesh.triangles = message.take_vector<Mesh::Triangle>(triangles);
+    mesh.values = receive_values(message, positions);
+    mesh.face_values = receive_values(message, triangles);
+    for (auto left = message.take<std::size_t>(); left > 0; --left) {
+        const std::string name = message.take_text();
+        mesh.face_groups[name] = message.take_vector<std::uint8_t>(triangles);
+    }
+    for (auto left = message.take<std::size_t>(); left > 0; --left) mesh.left_out.push_back(message.take_text());
     return mesh;
 }
 
@@ -61,6 +103,25 @@ void check(const MeshFile& file)
         if (t.minCoeff() < 0 || t.maxCoeff() >= vertices)
             throw Error(
                 fmt::format("a face has the vertices {}, {} and {}; there are {}, from 0", t[0], t[1], t[2], vertices));
+}
+
+// Whether corners that are one vertex have values of their own.
+template <class T>
+bool differ_at_vertices(const std::vector<T>& of_corners, const std::vector<std::int32_t>& vertex_of,
+                        const std::vector<std::size_t>& first_corners)
+{
+    for (std::size_t i = 0; i < of_corners.size(); ++i)
+        if (of_corners[i] != of_corners[first_corners[static_cast<std::size_t>(vertex_of[i])]]) return true;
+    return false;
+}
+
+template <class T>
+std::vector<T> those_of(const std::vector<T>& values, const std::vector<std::size_t>& places)
+{
+    std::vector<T> result;
+    result.reserve(places.size());
+    for (const std::size_t place : places) result.push_back(values[place]);
+    return result;
 }
 
 }  // namespace
@@ -114,7 +175,7 @@ std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
 
 MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of, std::string name)
 {
-    auto mesh = std::make_shared<Mesh>();
+    auto mesh = std::make_shared<DetailedMesh>();
     mesh->name = std::move(name);
     std::vector<Vec3f> colours;
     std::vector<float> alphas;
@@ -128,11 +189,14 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
             alphas.push_back(file.alphas[i]);
         }
     }
-    for (const Mesh::Triangle& t : file.triangles) {
+    std::vector<std::size_t> kept;  // triangles
+    for (std::size_t f = 0; f < file.triangles.size(); ++f) {
+        const Mesh::Triangle& t = file.triangles[f];
         const Mesh::Triangle joined(vertex_of[t[0]], vertex_of[t[1]], vertex_of[t[2]]);
         // A face with merged corners is a line, and its edges cancel: the mesh is as closed without it.
-        if (joined[0] != joined[1] && joined[1] != joined[2] && joined[2] != joined[0])
-            mesh->triangles.push_back(joined);
+        if (joined[0] == joined[1] || joined[1] == joined[2] || joined[2] == joined[0]) continue;
+        mesh->triangles.push_back(joined);
+        kept.push_back(f);
     }
     if (mesh->triangles.empty())
         throw Error(fmt::format("the mesh \"{}\" has {} vertices and no faces; a mesh needs at least one triangle",
@@ -143,12 +207,26 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
     if (!colours.empty()) mesh->values.emplace("Cd", std::move(colours));
     for (const auto& [key, values] : file.values)
         std::visit(
-            [&, &attribute = key](const auto& of_corners) {
-                std::decay_t<decltype(of_corners)> of_vertices;
+            [&, &attribute = key]<class T>(const std::vector<T>& of_corners) {
+                if (differ_at_vertices(of_corners, vertex_of, first_corners)) {
+                    std::vector<T> of_faces;
+                    for (const std::size_t f : kept)
+                        for (int k = 0; k < 3; ++k)
+                            of_faces.push_back(of_corners[static_cast<std::size_t>(file.triangles[f][k])]);
+                    mesh->corner_values.emplace(attribute, std::move(of_faces));
+                    return;
+                }
+                std::vector<T> of_vertices;
                 for (const std::size_t corner : first_corners) of_vertices.push_back(of_corners[corner]);
                 mesh->values.emplace(attribute, std::move(of_vertices));
             },
             values);
+    for (const auto& [key, values] : file.face_values)
+        std::visit(
+            [&, &name_of = key](const auto& of_all) { mesh->face_values.emplace(name_of, those_of(of_all, kept)); },
+            values);
+    for (const auto& [key, members] : file.face_groups) mesh->face_groups.emplace(key, those_of(members, kept));
+    mesh->left_out = file.left_out;
     return mesh;
 }
 

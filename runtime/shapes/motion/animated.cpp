@@ -5,8 +5,8 @@ namespace rapid {
 FrameRange AnimatedMesh::range() const
 {
     FrameRange range = motion_->range();
-    if (sequence_ && sequence_->first() < sequence_->last())
-        range.extend({double(sequence_->first()), double(sequence_->last())});
+    if (sequence_ && sequence_->order().first < sequence_->order().last)
+        range.extend({sequence_->order().begins(), sequence_->order().ends()});
     return range;
 }
 

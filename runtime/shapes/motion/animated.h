@@ -2,6 +2,8 @@
 // no pose of their own; users ask for it at the frames that they need.
 #pragma once
 
+#include <cmath>
+
 #include "runtime/shapes/mesh/mesh_sequence.h"
 #include "runtime/shapes/motion/motion.h"
 #include "runtime/shapes/shape.h"
@@ -26,6 +28,14 @@ public:
     const MeshPtr& rest() const { return rest_; }  // the first file of a sequence, without the motion
     const MotionPtr& motion() const { return motion_; }
     FrameRange range() const;
+
+    // Whether there is a mesh at a whole frame: a sequence may say that there is nothing beyond its files.
+    bool has(std::int64_t frame) const { return !sequence_ || sequence_->has(frame); }
+    // And on the whole way between two frames, in frames.
+    bool has(double from, double to) const
+    {
+        return has(static_cast<std::int64_t>(std::floor(from))) && has(static_cast<std::int64_t>(std::ceil(to)));
+    }
 
     // With another motion after its own.
     std::shared_ptr<const AnimatedMesh> transformed(const MotionPtr& motion) const;

@@ -68,7 +68,7 @@ ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> densit
         const double face = ab.cross(ac).norm() / 2;
         area += face;
         for (int c = 0; c < 3; ++c) {
-            weights.push_back(face * double(density[static_cast<std::size_t>(t[c])]));
+            weights.push_back(face * double(density[weights.size()]));
             sum += weights.back();
         }
     }

@@ -60,6 +60,37 @@ TEST_CASE("a sequence has each frame's vertices, and holds its first and last fi
     CHECK(sequence.at(4)->triangles == sequence.rest()->triangles);
 }
 
+TEST_CASE("the file of a frame is the one that walking there step by step ends at", "[mesh][sequence]")
+{
+    using Beyond = FrameSequence::Beyond;
+    for (const Beyond how : {Beyond::Hold, Beyond::Repeat, Beyond::Mirror})
+        for (const std::int64_t n : {1, 2, 5}) {
+            const FrameSequence order{10, 10 + n - 1, how, how, 3};
+            // From the first file on and back, a frame at a time.
+            for (const int way : {1, -1}) {
+                std::int64_t file = 10, step = way;
+                if (n == 1 || (how == Beyond::Hold && way < 0)) step = 0;
+                if (how == Beyond::Mirror && way < 0) step = 1;  // it turns at the first file
+                for (std::int64_t frame = 13; std::abs(frame - 13) < 40; frame += way) {
+                    CAPTURE(static_cast<int>(how), n, frame);
+                    CHECK(order.file_of(frame) == file);
+                    std::int64_t next = file + step;
+                    if (next < 10 || next > 10 + n - 1) {
+                        if (how == Beyond::Hold) step = 0;
+                        if (how == Beyond::Mirror) step = -step;
+                        next = how == Beyond::Repeat ? (next < 10 ? 10 + n - 1 : 10) : file + step;
+                    }
+                    file = next;
+                }
+            }
+        }
+    const FrameSequence none{10, 12, Beyond::None, Beyond::None, 3};
+    CHECK(!none.file_of(12));
+    CHECK(none.file_of(13) == 10);
+    CHECK(none.file_of(15) == 12);
+    CHECK(!none.file_of(16));
+}
+
 TEST_CASE("only the files that are needed are read, and the last few are kept", "[mesh]")
 {
     const Folder folder;

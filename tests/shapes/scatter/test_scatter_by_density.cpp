@@ -21,11 +21,18 @@ std::vector<Birthplace> births(const ScatterPtr& scatter, std::size_t n)
 // The square [0, 1]² in the plane y = 0, of two triangles each cell.
 MeshPtr square(int divisions) { return make_grid(1, 1, divisions, Vec3d(0.5, 0, 0.5)); }
 
+// At the corners of faces.
 std::vector<float> by_x(const Mesh& mesh)
 {
     std::vector<float> density;
-    for (const Vec3f& P : mesh.positions) density.push_back(P.x());
+    for (const Mesh::Triangle& t : mesh.triangles)
+        for (int c = 0; c < 3; ++c) density.push_back(mesh.positions[static_cast<std::size_t>(t[c])].x());
     return density;
+}
+
+std::vector<float> everywhere(const Mesh& mesh, float density)
+{
+    return std::vector<float>(3 * mesh.triangles.size(), density);
 }
 
 }  // namespace
@@ -56,8 +63,7 @@ TEST_CASE("births by the density x on a square are distributed as x², and unifo
 TEST_CASE("a birth by density lies on its face, at its weights, with the face's normal", "[scatter][density]")
 {
     const MeshPtr mesh = make_torus(1, 0.3, 12, Vec3d::Zero());
-    for (const Birthplace& birth :
-         births(scatter_by_density(mesh, std::vector<float>(mesh->positions.size(), 3)), 500)) {
+    for (const Birthplace& birth : births(scatter_by_density(mesh, everywhere(*mesh, 3)), 500)) {
         const Mesh::Triangle& t = mesh->triangles.at(static_cast<std::size_t>(birth.element));
         const auto corner = [&](int c) { return mesh->positions[static_cast<std::size_t>(t[c])]; };
         const Vec3f there = (1 - birth.b1 - birth.b2) * corner(0) + birth.b1 * corner(1) + birth.b2 * corner(2);
@@ -79,6 +85,6 @@ TEST_CASE("nothing is born where the density is 0, whatever batch a birth is in"
     std::vector<Birthplace> later(7);
     scatter->place(RandomKey(1, "emit1"), 4000, later);
     for (std::size_t i = 0; i < later.size(); ++i) CHECK(later[i].P == all[4000 + i].P);
-    CHECK(error_of([&] { scatter_by_density(mesh, std::vector<float>(mesh->positions.size(), 0)); }) ==
+    CHECK(error_of([&] { scatter_by_density(mesh, everywhere(*mesh, 0)); }) ==
           "the density is 0 wherever the mesh has area; it must be above 0 somewhere");
 }

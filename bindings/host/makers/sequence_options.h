@@ -1,0 +1,78 @@
+// The parameters of makers that read a sequence of files: what goes beyond its ends, and when it begins.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+
+#include "bindings/host/maker.h"
+#include "runtime/frame_sequence.h"
+#include "runtime/io/frame_pattern.h"
+
+namespace rapid {
+
+// The files of a pattern, by frame. Error: there are none.
+inline std::map<int, std::filesystem::path> existing_files(const FramePattern& pattern)
+{
+    auto files = pattern.existing();
+    if (files.empty()) throw Error(fmt::format("there is no file \"{}\", at any frame", pattern.text()));
+    return files;
+}
+
+struct SequenceOptions {
+    std::string before, after;  // empty: not given
+    std::optional<double> offset;
+
+    template <class T>
+    static Maker declare(MakerDeclaration<T>& declaration)
+    {
+        constexpr double most = 1e9;
+        declaration
+            .param(static_cast<std::string T::*>(&T::before), "before", Value(), any_number(), "",
+                   "what goes before the first file of a sequence: \"hold\" (that file), \"repeat\" (the last ones "
+                   "again), \"mirror\" (back and forth) or \"none\" (nothing)")
+            .param(static_cast<std::string T::*>(&T::after), "after", Value(), any_number(), "",
+                   "and behind the last one")
+            .param(static_cast<std::optional<double> T::*>(&T::offset), "offset", Value(), between(-most, most),
+                   "frames", "by which the files of a sequence come later: frame f has the file f - offset");
+        Maker maker = declaration;
+        for (Param& param : maker.params)
+            if (param.name == "before" || param.name == "after") param.choices = {"hold", "repeat", "mirror", "none"};
+        return maker;
+    }
+
+    // Error: an offset that is not whole; any of them for one file.
+    void check(const std::string& path, bool is_sequence) const
+    {
+        if (offset && *offset != std::floor(*offset))
+            throw Error(fmt::format("offset = {} is not whole; it is a number of frames", *offset));
+        for (const auto& [given, name] : {std::pair(!before.empty(), "before"), std::pair(!after.empty(), "after"),
+                                          std::pair(offset.has_value(), "offset")})
+            if (given && !is_sequence)
+                throw Error(
+                    fmt::format("{} is for a sequence of files, and \"{}\" is one file; give a path with #### "
+                                "or $F4",
+                                name, path));
+    }
+
+    FrameSequence order() const
+    {
+        FrameSequence order;
+        order.before = beyond(before);
+        order.after = beyond(after);
+        order.offset = static_cast<std::int64_t>(offset.value_or(0));
+        return order;
+    }
+
+private:
+    static FrameSequence::Beyond beyond(const std::string& name)
+    {
+        return name == "repeat"   ? FrameSequence::Repeat
+               : name == "mirror" ? FrameSequence::Mirror
+               : name == "none"   ? FrameSequence::None
+                                  : FrameSequence::Hold;
+    }
+};
+
+}  // namespace rapid

@@ -1,0 +1,52 @@
+// Which file of a sequence stands for a frame.
+//
+// A sequence has a file for each whole number from `first` to `last`. Frame f is that of the file f - offset; beyond
+// the ends the first or the last file holds, the files begin again, they run back and forth, or there is nothing.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+namespace rapid {
+
+struct FrameSequence {
+    enum Beyond { Hold, Repeat, Mirror, None };
+
+    std::int64_t first = 1, last = 1;
+    Beyond before = Hold, after = Hold;
+    std::int64_t offset = 0;  // frames by which the files come later
+
+    // Nothing where there is none.
+    std::optional<std::int64_t> file_of(std::int64_t frame) const
+    {
+        const std::int64_t file = frame - offset;
+        if (file >= first && file <= last) return file;
+        const std::int64_t n = last - first + 1;
+        const auto place = [&](std::int64_t period) { return ((file - first) % period + period) % period; };
+        switch (file < first ? before : after) {
+            case Hold:
+                return file < first ? first : last;
+            case Repeat:
+                return first + place(n);
+            case Mirror: {
+                if (n == 1) return first;
+                const std::int64_t at = place(2 * n - 2);  // the ends once each
+                return first + (at < n ? at : 2 * n - 2 - at);
+            }
+            case None:
+                break;
+        }
+        return std::nullopt;
+    }
+
+    // The frames between which the file may change.
+    double begins() const { return goes_on(before) ? -infinite : static_cast<double>(first + offset); }
+    double ends() const { return goes_on(after) ? infinite : static_cast<double>(last + offset); }
+
+private:
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+    static bool goes_on(Beyond beyond) { return beyond == Repeat || beyond == Mirror; }
+};
+
+}  // namespace rapid

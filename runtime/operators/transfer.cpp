@@ -1,0 +1,193 @@
+// transfer: gives points the attributes of the nearest place of a mesh: of its vertices and corners, linear on each
+// face, and of its faces.
+//
+// A mesh that moves or deforms is as it is at the end of the frame.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "runtime/graph/node.h"
+#include "runtime/operators/emit/birth_source.h"
+#include "runtime/parallel.h"
+#include "runtime/points/attribute_like.h"
+#include "runtime/points/members.h"
+#include "runtime/shapes/motion/mesh_surface.h"
+
+namespace rapid {
+namespace {
+
+struct TransferSource {
+    static constexpr std::string_view param_type = "mesh";
+
+    MeshPtr still;
+    std::shared_ptr<const AnimatedMesh> moving;
+
+    const MeshPtr& rest() const { return moving ? moving->rest() : still; }
+};
+
+void read_value(const Param& param, const Value& value, TransferSource& source)
+{
+    source = {};
+    if (!(source.moving = value.object<AnimatedMesh>())) read_value(param, value, source.still);
+}
+
+// The weights of the corners b, c at the place of a triangle that is nearest to P (Ericson 2005, 5.1.5).
+std::array<double, 2> nearest_weights(const Vec3d& P, const Vec3d& a, const Vec3d& b, const Vec3d& c)
+{
+    const Vec3d ab = b - a, ac = c - a;
+    const double d1 = ab.dot(P - a), d2 = ac.dot(P - a);
+    if (d1 <= 0 && d2 <= 0) return {0, 0};
+    const double d3 = ab.dot(P - b), d4 = ac.dot(P - b);
+    if (d3 >= 0 && d4 <= d3) return {1, 0};
+    const double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
+    const double d5 = ab.dot(P - c), d6 = ac.dot(P - c);
+    if (d6 >= 0 && d5 <= d6) return {0, 1};
+    const double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
+    const double va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        const double w = (d4 - d3) / (d4 - d3 + d5 - d6);
+        return {1 - w, w};
+    }
+    return {vb / (va + vb + vc), vc / (va + vb + vc)};
+}
+
+struct Transfer {
+    TransferSource source;
+    std::vector<std::string> attributes;
+    double distance;
+    std::string group;
+
+    static NodeType declare()
+    {
+        return node<Transfer>("transfer", "Gives points the attributes of the nearest place of a mesh.")
+            .reads("P")
+            .param(&Transfer::source, "source", Value(), any_number(), "", "at rest, moving or deforming")
+            .required()
+            .constant()
+            .param(&Transfer::attributes, "attributes", Value(), any_number(), "",
+                   "names of the mesh's attributes, of vertices, corners or faces; all of them where none are given")
+            .constant()
+            .param(&Transfer::distance, "distance", std::numeric_limits<double>::infinity(), or_infinity(at_least(0)),
+                   "m", "points that are farther away keep what they have");
+    }
+
+    void uses(Uses& uses) const
+    {
+        for (const std::string& name : names()) {
+            std::visit([&](const auto& c) { uses.makes.push_back(attribute_like(name, c.fallback())); },
+                       *values_.values().find(name));
+            uses.writes.push_back(name);
+        }
+    }
+
+    // Error: an attribute that the mesh does not have, or has none.
+    void check() const
+    {
+        if (known_ != source.rest()) {
+            known_ = source.rest();
+            values_ = BirthSource(known_, "");
+            surface_ = mesh_surface(known_);
+        }
+        const std::vector<std::string> there = values_.inherited();
+        if (there.empty())
+            throw Error(fmt::format("the mesh \"{}\" has no attributes; nothing can be transferred", known_->name));
+        for (const std::string& name : attributes)
+            if (std::find(there.begin(), there.end(), name) == there.end()) {
+                const std::string near = did_you_mean(name, there);
+                throw Error(fmt::format("attributes: the mesh \"{}\" has no \"{}\"{}", known_->name, name,
+                                        near.empty() ? fmt::format("; it has {}", fmt::join(there, ", ")) : near));
+            }
+        for (const std::string& name : names())
+            if (const AttributeSpec* known = known_attribute(name);
+                known && type_of(known->fallback) != type_of(*values_.values().find(name)))
+                throw Error(fmt::format("the mesh \"{}\" has \"{}\" as {}; it must be {}", known_->name, name,
+                                        type_name(type_of(*values_.values().find(name))),
+                                        type_name(type_of(known->fallback))));
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        const FrameClock clock = flow.simulation->clock();
+        if (!source.moving) {
+            give(flow.points, known_, *surface_, values_, Pose(), now);
+        } else if (!source.moving->deforms()) {
+            // Points are taken into the frame of the mesh at rest.
+            give(flow.points, known_, *surface_, values_, source.moving->motion()->at(now.frame), now);
+        } else {
+            const MeshPtr mesh = source.moving->at(clock, static_cast<std::int64_t>(std::ceil(now.frame.number)));
+            give(flow.points, mesh, *mesh_surface(mesh), BirthSource(mesh, ""), Pose(), now);
+        }
+        return flow;
+    }
+
+private:
+    std::vector<std::string> names() const { return attributes.empty() ? values_.inherited() : attributes; }
+
+    void give(PointSet& points, const MeshPtr& mesh, const MovingBody& surface, const BirthSource& values,
+              const Pose& pose, const Evaluation& now) const
+    {
+        // The place of each point; of an element below 0 where the point keeps what it has.
+        std::vector<Birthplace> places(points.size());
+        const Strided<std::uint8_t> members = members_of(points, group);
+        const Strided<Vec3f> P = std::as_const(points).P().read();
+        const Eigen::Affine3d to_rest = pose.affine().inverse();
+        for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i)
+                if (members[i]) places[i] = nearest(*mesh, surface, to_rest * P[i].cast<double>(), pose.scale);
+        });
+        for (const std::string& name : names()) {
+            const AnyColumn* any = values.values().find(name);
+            if (!any || !now.keeps(name)) continue;
+            std::visit(
+                [&]<class T>(const Column<T>& from) {
+                    const Strided<T> column = from.read();
+                    points.add(attribute_like(name, from.fallback()));
+                    const std::span<T> to = points.column<T>(name).write();
+                    for_each_chunk(to.size(), [&](std::size_t begin, std::size_t end) {
+                        for (std::size_t i = begin; i < end; ++i)
+                            if (places[i].element >= 0) to[i] = turned(name, values.value(column, places[i]), pose);
+                    });
+                },
+                *any);
+        }
+    }
+
+    // Normals turn with the mesh.
+    template <class T>
+    static T turned(const std::string& name, const T& value, const Pose& pose)
+    {
+        if constexpr (std::is_same_v<T, Vec3f>)
+            if (name == "N") return (pose.rotation * value.template cast<double>()).template cast<float>();
+        return value;
+    }
+
+    Birthplace nearest(const Mesh& mesh, const MovingBody& surface, const Vec3d& P, double scale) const
+    {
+        Birthplace place;
+        const std::int32_t face = surface.material_at(P, 0).face;
+        const Mesh::Triangle& t = mesh.triangles[static_cast<std::size_t>(face)];
+        const auto corner = [&](int k) -> Vec3d {
+            return mesh.positions[static_cast<std::size_t>(t[k])].cast<double>();
+        };
+        const Vec3d a = corner(0), b = corner(1), c = corner(2);
+        const auto [b1, b2] = nearest_weights(P, a, b, c);
+        if (scale * (P - (a + b1 * (b - a) + b2 * (c - a))).norm() > distance) return place;
+        place.element = face;
+        place.b1 = static_cast<float>(b1);
+        place.b2 = static_cast<float>(b2);
+        return place;
+    }
+
+    // Of the mesh at rest; a cache.
+    mutable MeshPtr known_;
+    mutable BirthSource values_;
+    mutable std::shared_ptr<const MovingBody> surface_;
+};
+RAPID_NODE(Transfer);
+
+}  // namespace
+}  // namespace rapid

@@ -116,6 +116,18 @@ local Mesh = {}
 ---@param motion rapid.Motion
 ---@return rapid.Mesh
 function Mesh:transform(motion) end
+---To the nearest face, metres; in kernels.
+---@param P rapid.Vec3
+---@return number
+function Mesh:distance(P) end
+---Away from the nearest face; in kernels.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Mesh:gradient(P) end
+---Of the nearest face, m/s; in kernels.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Mesh:velocity(P) end
 
 ---@class rapid.Shape
 local Shape = {}
@@ -127,6 +139,10 @@ function Shape:distance(P) end
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:gradient(P) end
+---Of what is there of the shape, m/s.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Shape:velocity(P) end
 
 ---@class rapid.LevelSet: rapid.Shape
 local LevelSet = {}

@@ -146,9 +146,11 @@ function At:refuse_store(what)
   self:refuse(("%s %s; %s"):format(self.found.subject, what, self.found.remedy))
 end
 
--- The line of the first mention of a name.
+-- The line of the first mention of a name, and its file.
 function At:mention(map, name)
   map[name] = map[name] or self:line()
+  local places = self.found.places
+  places[name] = places[name] or { line = self:line(), source = util.funcinfo(self.f).source }
 end
 
 -- Of object.key or object[key] with a constant.
@@ -516,6 +518,7 @@ local function nothing_found(env, remedy, subject, methods)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
     inside = {}, env = env, remedy = remedy, subject = subject, methods = {},
+    places = {},
   }
   for _, name in ipairs(methods) do found.methods[name] = true end
   return found

@@ -28,6 +28,9 @@ typedef double (*rapid_rand)(uint64_t random, int64_t id, double use, double fra
 // Of a shape's own pointer; gradient: shape [3].
 typedef double (*rapid_shape_distance)(const void* shape, double x, double y, double z, double* gradient);
 
+// The velocity of its surface, m/s; value: shape [3].
+typedef void (*rapid_shape_velocity)(const void* shape, double x, double y, double z, double* value);
+
 // Of a grid of vectors' own pointer; value: shape [3].
 typedef void (*rapid_vector_grid_sample)(const void* grid, double x, double y, double z, double* value);
 

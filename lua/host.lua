@@ -126,6 +126,19 @@ function entry.runner(f, layout, memory)
   return watched(f, runner, true), set_params
 end
 
+-- The userdata that a function reaches.
+function entry.objects_of(f)
+  local objects, walked = {}, shared_state.walk(f, env)
+  for place = 1, walked and walked.count or 0 do
+    local value = walked.values[place]
+    if type(value) == "userdata" then objects[#objects + 1] = value end
+  end
+  return objects
+end
+
+-- Shapes that move are others in each step.
+entry.forget_moving_shapes = shapes.forget_moving
+
 local details_of = {} -- by function: run_detail() for it
 
 -- A :detail function; random: points to the key of the node's random numbers.

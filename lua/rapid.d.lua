@@ -112,6 +112,18 @@ local Mesh = {}
 ---@param motion rapid.Motion
 ---@return rapid.Mesh
 function Mesh:transform(motion) end
+---To the nearest face, metres; in kernels.
+---@param P rapid.Vec3
+---@return number
+function Mesh:distance(P) end
+---Away from the nearest face; in kernels.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Mesh:gradient(P) end
+---Of the nearest face, m/s; in kernels.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Mesh:velocity(P) end
 
 ---@class rapid.Shape
 local Shape = {}
@@ -123,6 +135,10 @@ function Shape:distance(P) end
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:gradient(P) end
+---Of what is there of the shape, m/s.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Shape:velocity(P) end
 
 ---@class rapid.LevelSet: rapid.Shape
 local LevelSet = {}
@@ -456,10 +472,16 @@ function rapid.mesh.from(options) end
 ---@return rapid.Mesh
 function rapid.mesh.grid(options) end
 
+---@class rapid.options.mesh_read
+---@field before? "hold"|"repeat"|"mirror"|"none"  what goes before the first file of a sequence: "hold" (that file), "repeat" (the last ones again), "mirror" (back and forth) or "none" (nothing) [string, one of hold, repeat, mirror, none]
+---@field after? "hold"|"repeat"|"mirror"|"none"  and behind the last one [string, one of hold, repeat, mirror, none]
+---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
+
 ---Reads OBJ, PLY, STL or glTF, or a sequence of such files.
 ---@param path string  relative to the graph file; with #### or $F4 in it a deforming mesh, a file for each frame [string, required]
+---@param options? rapid.options.mesh_read
 ---@return rapid.Mesh
-function rapid.mesh.read(path) end
+function rapid.mesh.read(path, options) end
 
 ---@class rapid.options.mesh_sphere
 ---@field radius? number  of the sphere [number, m, above 0, default 1]
@@ -503,10 +525,16 @@ function rapid.scale(factor) end
 ---@return rapid.Points
 function rapid.points.grid(options) end
 
----Reads points from a file that Rapid can write.
----@param path string  relative to the graph file [string, required]
+---@class rapid.options.points_read
+---@field before? "hold"|"repeat"|"mirror"|"none"  what goes before the first file of a sequence: "hold" (that file), "repeat" (the last ones again), "mirror" (back and forth) or "none" (nothing) [string, one of hold, repeat, mirror, none]
+---@field after? "hold"|"repeat"|"mirror"|"none"  and behind the last one [string, one of hold, repeat, mirror, none]
+---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
+
+---Reads points from a file that Rapid can write, or a sequence.
+---@param path string  relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a function of the frame [string, required]
+---@param options? rapid.options.points_read
 ---@return rapid.Points
-function rapid.points.read(path) end
+function rapid.points.read(path, options) end
 
 ---@class rapid.options.shape_box
 ---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
@@ -805,7 +833,7 @@ function Node:drag(params) end
 ---@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second; of a node, by each of its points [number or rapid.attr, 1/s, at least 0]
 ---@field count? integer|rapid.Attribute|fun(frame: rapid.Frame): integer|rapid.Attribute  points born a frame; of a node, by each of its points, a frame or an event [integer or rapid.attr, at least 0]
 ---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
----@field birth? "random"|"begin"|"end"|"even"|fun(frame: rapid.Frame): "random"|"begin"|"end"|"even"  when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time [string, one of random, begin, end, even, default "random"]
+---@field birth? "random"|"begin"|"end"|"even"  at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, frame) that edits each newborn point once, which is born at random [moment or function of a point, one of random, begin, end, even, default "random"]
 ---@field age? number|number[]|rapid.Attribute|fun(frame: rapid.Frame): number|number[]|rapid.Attribute  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
 ---@field motion? "spline"|"linear"|"none"|fun(frame: rapid.Frame): "spline"|"linear"|"none"  the way of a moving source within a frame: a cubic through the frames around it, a straight line, or none, as if it were where it is at the frame's end, at rest [string, one of spline, linear, none, default "spline"]
 ---@field alpha? number|fun(frame: rapid.Frame): number  tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform [number, default 0.5]
@@ -817,7 +845,7 @@ function Node:drag(params) end
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it they live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  the newborn join this group [string]
 ---@field attributes? table<string, number|rapid.Vec3|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they go before the source's own [attributes]
----@field source_group? string  of a node: only its points in this group bear [string]
+---@field source_group? string  of a node: only its points in this group bear; of a mesh: only its faces in this group [string]
 ---@field on? string|fun(p: rapid.Point, frame: rapid.Frame): any  of a node: births at an event, count of each (1), not all the time: "hit", "death", "birth", when a comparison of an attribute with a number ("age > 0.5", "P.y < 0") begins to hold, or a function of a point begins to be true [event or function of a point]
 ---@field min_speed? number|fun(frame: rapid.Frame): number  with on = "hit": the least speed of approach [number, m/s, at least 0]
 ---@field limit? number|fun(frame: rapid.Frame): number  of a node: the most births of one point [number, at least 0]
@@ -1179,6 +1207,18 @@ function Node:torque(params) end
 ---@param params? rapid.params.trail
 ---@return rapid.Node
 function Node:trail(params) end
+
+---@class rapid.params.transfer
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field source rapid.Mesh  at rest, moving or deforming [mesh, required]
+---@field attributes? string|string[]  names of the mesh's attributes, of vertices, corners or faces; all of them where none are given [names]
+---@field distance? number|fun(frame: rapid.Frame): number  points that are farther away keep what they have [number, m, at least 0, default inf]
+---@field name? string  what the node is called in messages [string]
+
+---Gives points the attributes of the nearest place of a mesh.
+---@param params rapid.params.transfer
+---@return rapid.Node
+function Node:transfer(params) end
 
 ---@class rapid.params.tumble
 ---@field drag? number|fun(frame: rapid.Frame): number  rate at which w falls [number, 1/s, at least 0, default 0]

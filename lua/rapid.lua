@@ -273,8 +273,6 @@ local function make(native, load_node, numeric, shapes, studies)
   end
   local value_methods = {
     ["level set"] = {
-      distance = shapes.queries.distance,
-      gradient = shapes.queries.gradient,
       union = combine_by "union",
       intersect = combine_by "intersect",
       subtract = combine_by "subtract",
@@ -288,12 +286,14 @@ local function make(native, load_node, numeric, shapes, studies)
         return object
       end,
     },
+    mesh = {},
     ["vector grid"] = { sample = shapes.sample, write = write_by "v" },
     fog = { sample = shapes.sample_fog, write = write_by "density" },
     motion = {},
   }
-  for _, kind in ipairs { "shape", "plane", "sphere", "box" } do
-    value_methods[kind] = {}
+  for _, kind in ipairs { "shape", "plane", "sphere", "box", "level set", "mesh", "moving mesh", "moving shape",
+    "deforming level set" } do
+    value_methods[kind] = value_methods[kind] or {}
     for name, query in pairs(shapes.queries) do value_methods[kind][name] = query end
   end
   for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape",

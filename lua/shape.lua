@@ -2,39 +2,56 @@
 --
 --   shape:distance(P)    m, negative inside; beyond a level set's band a bound of the right sign
 --   shape:gradient(P)    a vec3 out of the shape, of length 1 where the distance is exact; zero where there is none
+--   shape:velocity(P)    a vec3, m/s, of what is there of the shape
 --   grid:sample(P)       a vec3, between the voxels' values; of a fog a number, the density
 --
--- An object's pointer is asked of the host once, and then found in a table, which compiled traces can do. The functions
--- are vararg for the reason that vec3.lua gives.
+-- Shapes that move or deform, and meshes, can be asked in kernels alone, where they are as in the step.
+--
+-- An object's pointer is asked of the host once, and then found in a table, which compiled traces can do; of a shape
+-- that moves once a chunk. The functions are vararg for the reason that vec3.lua gives.
 local ffi = require "ffi"
 local vector = require "vec3"
 
 local vec3, istype = vector.type, ffi.istype
 
--- native.shape(object): light userdata, a shape; nil for any other object; native.vector_grid, native.fog likewise.
--- native.shape_distance, native.vector_grid_sample, native.fog_sample: the functions to ask.
+-- native.shape(object): light userdata, a shape; nil for any other object; and whether it moves, so that the pointer is
+-- another one later. native.vector_grid, native.fog likewise. native.shape_distance, native.shape_velocity,
+-- native.vector_grid_sample, native.fog_sample: the functions to ask.
 local function make(native)
   local ask = ffi.cast("rapid_shape_distance", native.shape_distance)
+  local ask_velocity = ffi.cast("rapid_shape_velocity", native.shape_velocity)
   local ask_grid = ffi.cast("rapid_vector_grid_sample", native.vector_grid_sample)
   local ask_fog = ffi.cast("rapid_fog_sample", native.fog_sample)
   local gradient, value = ffi.new "double[3]", ffi.new "double[3]"
 
-  -- The pointer of an object that `find` knows; false for any other.
+  -- The pointer of an object that `find` knows; false for any other. The second function forgets those that move.
   local function pointers_by(find)
     local pointers = setmetatable({}, { __mode = "k" })
+    local moving = {}
     return function(...)
       local object = ...
       local known = pointers[object]
       if known == nil then
-        local pointer = find(object)
+        local pointer, moves = find(object)
         known = pointer ~= nil and ffi.cast("const void*", pointer)
-        pointers[object] = known
+        if not moves then
+          pointers[object] = known
+        elseif known then
+          pointers[object] = known
+          moving[#moving + 1] = object
+        end
       end
       return known
+    end, function()
+      for place = #moving, 1, -1 do
+        pointers[moving[place]] = nil
+        moving[place] = nil
+      end
     end
   end
 
-  local pointer_of, grid_of = pointers_by(native.shape), pointers_by(native.vector_grid)
+  local pointer_of, forget_moving = pointers_by(native.shape)
+  local grid_of = pointers_by(native.vector_grid)
   local fog_of = pointers_by(native.fog)
 
   local function place_shown(P)
@@ -43,6 +60,10 @@ local function make(native)
 
   local function refuse(what, shape, P)
     if type(shape) ~= "userdata" or not pointer_of(shape) then
+      local _, moves = native.shape(shape)
+      if moves then
+        error(("%s is asked in kernels alone of what moves, and of meshes; it is as in the step there"):format(what), 0)
+      end
       error(("shape:%s(P) is asked of a shape: with a colon, not a dot"):format(what), 0)
     end
     error(("shape:%s(P) takes a vec3, not %s"):format(what, place_shown(P)), 0)
@@ -66,6 +87,14 @@ local function make(native)
     return (vec3(gradient[0], gradient[1], gradient[2]))
   end
 
+  function queries.velocity(...)
+    local shape, P = ...
+    local pointer = type(shape) == "userdata" and pointer_of(shape)
+    if not pointer or not istype(vec3, P) then refuse("velocity", shape, P) end
+    ask_velocity(pointer, P.x, P.y, P.z, value)
+    return (vec3(value[0], value[1], value[2]))
+  end
+
   local function sample(...)
     local grid, P = ...
     local pointer = type(grid) == "userdata" and grid_of(grid)
@@ -87,6 +116,7 @@ local function make(native)
   return {
     pointer_of = pointer_of, queries = queries, grid_of = grid_of, sample = sample,
     fog_of = fog_of, sample_fog = sample_fog,
+    forget_moving = forget_moving,
   }
 end
 

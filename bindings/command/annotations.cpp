@@ -43,6 +43,7 @@ std::string lua_type(const Param& param)
         {"function of a place", "fun(P: rapid.Vec3): rapid.Vec3"},
         {"function of a point", "fun(p: rapid.Point, frame: rapid.Frame): any"},
         {"integer", "integer"},
+        {"moment or function of a point", "string|fun(p: rapid.Point, frame: rapid.Frame)"},
         {"list", "any[]"},
         {"list of numbers", "number[]"},
         {"list of frames", "integer[]"},

@@ -13,6 +13,13 @@ void Kernel::analyse()
 {
     analysis_ = analyse_kernel(host_.main(), source);
     fingerprint = fingerprint_of(host_.main(), source.number);
+    if (!source.of_the_set) moving_ = moving_shapes_of(host_.main(), source.number);
+}
+
+void Kernel::begin_step(const FrameClock& clock, const Frame& frame) const
+{
+    step_shapes_.clear();
+    for (const ObjectPtr& object : moving_) step_shapes_.emplace_back(object.get(), step_shape(object, clock, frame));
 }
 
 void Kernel::uses(Uses& uses, const KernelArguments& arguments) const

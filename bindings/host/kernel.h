@@ -6,11 +6,17 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bindings/host/kernel_analysis.h"
 #include "bindings/host/kernel_layout.h"
+#include "runtime/graph/attribute_places.h"
 #include "runtime/graph/point_edit.h"
+#include "runtime/graph/point_editor.h"
 #include "runtime/graph/point_function.h"
+#include "runtime/graph/step_shape.h"
+#include "runtime/graph/step_shape_user.h"
 
 namespace rapid {
 
@@ -24,7 +30,7 @@ struct KernelArguments {
     std::set<std::string> reads, writes, joins;
 };
 
-class Kernel : public PointFunction {
+class Kernel : public PointFunction, public PointEditor, public StepShapeUser, public AttributePlaces {
 public:
     Kernel(ScriptHost& host, KernelSource of) : source(std::move(of)), host_(host) {}
 
@@ -36,6 +42,7 @@ public:
 
     void uses(Uses& uses) const override;
     bool asks_places() const override { return analysis_.asks_places; }
+    void edit(PointSet& points, std::size_t first, const Evaluation& now) const override;
     std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const override;
 
     // As PointEdit's, for the points that are in `group` (all points if it is empty) when they are visited.
@@ -51,6 +58,20 @@ public:
     void uses(Uses& uses, const KernelArguments& arguments) const;
     // As an action, where `force` is that of the sub-step and no attribute.
     void uses_in_action(Uses& uses, const KernelArguments& arguments) const;
+
+    Location place_of(const std::string& attribute) const override
+    {
+        const auto found = analysis_.places.find(attribute);
+        return found == analysis_.places.end() ? Location() : found->second;
+    }
+
+    // Shapes that it asks, and that move or are meshes: found among what it reaches.
+    bool asks_moving_shapes() const override { return !moving_.empty(); }
+    bool varies() const override { return asks_moving_shapes(); }
+    void begin_step(const FrameClock& clock, const Frame& frame) const override;
+    // As they are in this step.
+    using StepShapes = std::vector<std::pair<const Object*, std::shared_ptr<const StepShape>>>;
+    const StepShapes& step_shapes() const { return step_shapes_; }
 
     ScriptHost& host() const { return host_; }
     // Whether it may read a field of this name of something.
@@ -75,6 +96,8 @@ private:
 
     ScriptHost& host_;
     KernelAnalysis analysis_;
+    std::vector<ObjectPtr> moving_;
+    mutable StepShapes step_shapes_;  // written between passes, on one thread
 };
 
 }  // namespace rapid

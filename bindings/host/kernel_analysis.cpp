@@ -7,7 +7,10 @@
 
 #include "bindings/host/lua_text.h"
 #include "bindings/host/state.h"
+#include "bindings/host/values.h"
+#include "runtime/graph/step_shape.h"
 #include "runtime/points/point_names.h"
+#include "runtime/shapes/mesh/mesh.h"
 
 namespace rapid {
 namespace {
@@ -83,6 +86,22 @@ void check_groups(lua_State* L, const KernelSource& kernel)
             .at({kernel.location.file, line});
 }
 
+std::map<std::string, Location> places_in(lua_State* L)
+{
+    std::map<std::string, Location> places;
+    lua_getfield(L, -1, "places");
+    lua_pushnil(L);
+    while (lua_next(L, -2)) {
+        lua_getfield(L, -1, "source");
+        const std::string source = text_at(L, -1);
+        lua_pop(L, 1);
+        places[text_at(L, -2)] = {source.substr(source.starts_with('@') ? 1 : 0), number_of(L, "line")};
+        lua_pop(L, 1);
+    }
+    lua_pop(L, 1);
+    return places;
+}
+
 }  // namespace
 
 StoreOutside::StoreOutside(lua_State* L)
@@ -125,6 +144,7 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     KernelAnalysis found;
     found.reads = keys_of(L, "reads");
     found.writes = keys_of(L, "writes");
+    found.places = places_in(L);
     found.may = keys_of(L, "may");
     found.may_write = keys_of(L, "may_write");
     found.joins = keys_of(L, "joins");
@@ -135,6 +155,25 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
         if (names->count("nage")) names->insert({"age", "life"});
     found.asks_places = flag_of(L, "asks_places") || flag_of(L, "computes_names");
     return found;
+}
+
+std::vector<ObjectPtr> moving_shapes_of(State& state, std::size_t kernel)
+{
+    lua_State* L = state.lua();
+    state.push_entry("objects_of");
+    state.push_kernel(kernel);
+    state.call(1, 1);
+    std::vector<ObjectPtr> shapes;
+    for (int i = 1;; ++i) {
+        lua_rawgeti(L, -1, i);
+        const ObjectPtr object = lua_isnil(L, -1) ? nullptr : to_object(state, lua_gettop(L));
+        const bool ends = lua_isnil(L, -1);
+        lua_pop(L, 1);
+        if (ends) break;
+        if (object && (is_moving_shape(*object) || dynamic_cast<const Mesh*>(object.get()))) shapes.push_back(object);
+    }
+    lua_pop(L, 1);
+    return shapes;
 }
 
 std::string fingerprint_of(State& state, std::size_t kernel)

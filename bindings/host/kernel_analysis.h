@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "runtime/error.h"
+#include "runtime/object.h"
 
 struct lua_State;
 
@@ -30,6 +33,7 @@ private:
 struct KernelAnalysis {
     std::set<std::string> reads, writes;      // of the point itself
     std::set<std::string> may, may_write;     // of values that may be the point
+    std::map<std::string, Location> places;   // where it first names an attribute of the point itself
     std::set<std::string> joins, asks;        // groups that it joins or leaves, and that it asks for
     bool asks_any = false;                    // for groups by computed names
     bool kills = false, asks_places = false;  // whether it may
@@ -45,6 +49,9 @@ struct KernelSource {
 // In the main state, once the file has run. Error: it writes what other points share, assigns what is read only, or
 // calls a method that there is not.
 KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel);
+
+// The shapes that move, and the meshes, that the kernel reaches by its upvalues and globals.
+std::vector<ObjectPtr> moving_shapes_of(State& state, std::size_t kernel);
 
 // Of its bytecode: the same in each state that has run the same file.
 std::string fingerprint_of(State& state, std::size_t kernel);

@@ -1,9 +1,11 @@
 // Kernels between the nodes of a graph: as tests of points, and as edits.
+#include <algorithm>
 #include <optional>
 
 #include "bindings/host/kernel.h"
 #include "bindings/host/kernel_pass.h"
 #include "bindings/host/script_host.h"
+#include "runtime/first_error.h"
 #include "runtime/points/members.h"
 
 namespace rapid {
@@ -50,6 +52,38 @@ private:
 std::unique_ptr<PointTest> Kernel::test_of(const PointSet& points, const Evaluation& now) const
 {
     return std::make_unique<TestPass>(*this, points, now);
+}
+
+void Kernel::edit(PointSet& points, std::size_t first, const Evaluation& now) const
+{
+    for (const std::string& name : analysis_.joins) points.group(name);
+    if (first == points.size()) return;
+    const KernelArguments none;
+    KernelLayout layout = layout_for(points, none, false);
+    layout.make_writable(points);
+    layout.settle(points, false);
+    const KernelCaller caller(now);
+    const Watchdog::Section section(host_.watchdog, caller.title());
+    const KernelPass pass(*this, points, caller, layout, none.values);
+
+    const std::size_t size = points.size();
+    std::vector<std::uint8_t> killed(kills() ? size : 0);
+    FirstError error;
+    for_each_chunk(
+        size - first,
+        [&](std::size_t begin, std::size_t end) {
+            rapid_chunk chunk{};
+            chunk.size = static_cast<std::int32_t>(end - begin);
+            chunk.first = static_cast<double>(first + begin);
+            chunk.kill = killed.empty() ? nullptr : killed.data() + first + begin;
+            error.guard(0, begin, [&] { pass.run(chunk); });
+        },
+        chunk_of(caller, size - first));
+    error.rethrow();
+    if (std::find(killed.begin(), killed.end(), 1) == killed.end()) return;
+    for (std::uint8_t& mark : killed) mark = !mark;
+    points.keep(killed);
+    now.figures.died += size - points.size();
 }
 
 class Kernel::Edit : public EditPass {

@@ -59,6 +59,13 @@ double shape_distance(const void* shape, double x, double y, double z, double* g
     return phi;
 }
 
+void shape_velocity(const void* shape, double x, double y, double z, double* value)
+{
+    const auto* known = static_cast<const Shape*>(shape);
+    const auto* step = known->moves() ? dynamic_cast<const StepShape*>(known) : nullptr;
+    Eigen::Map<Vec3d>(value, 3) = known->velocity_at(Vec3d(x, y, z), step ? KernelMoment::since_begin(*step) : 0);
+}
+
 // So it does the grid.
 template <class G>
 typename G::Value sample(const void* grid, const Vec3d& P)
@@ -92,6 +99,7 @@ void set_kernel_functions(lua_State* L)
     set("noise", &noise_at);
     set("curl_noise", &curl_noise_at);
     set("shape_distance", &shape_distance);
+    set("shape_velocity", &shape_velocity);
     set("vector_grid_sample", &vector_grid_sample);
     set("fog_sample", &fog_sample);
 }

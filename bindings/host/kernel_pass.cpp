@@ -26,6 +26,20 @@ ColumnMemory memory_of(const Column<T>& column)
 
 }  // namespace
 
+namespace {
+
+thread_local const Kernel::StepShapes* shapes_of_pass = nullptr;
+
+}  // namespace
+
+const Shape* KernelPass::shape_now(const Object* object)
+{
+    if (shapes_of_pass)
+        for (const auto& [moving, shape] : *shapes_of_pass)
+            if (moving == object) return shape.get();
+    return nullptr;
+}
+
 std::string KernelCaller::title() const
 {
     return fmt::format("{}:{}: node \"{}\"", location.file, location.line, node);
@@ -33,7 +47,7 @@ std::string KernelCaller::title() const
 
 KernelPass::KernelPass(const Kernel& kernel, const PointSet& points, const KernelCaller& caller,
                        const KernelLayout& layout, const std::map<std::string, Value>& params)
-    : kernel_(kernel), points_(points), caller_(caller), layout_(layout), params_(params)
+    : kernel_(kernel), points_(points), caller_(caller), layout_(layout), params_(params), shapes_(kernel.step_shapes())
 {
     static std::atomic<std::uint64_t> last{0};
     serial_ = ++last;
@@ -97,12 +111,20 @@ void KernelPass::call_runner(State& state, const Call& call) const
 {
     State::Runner& runner = runner_for(state, kernel_.source.number, layout_);
     set_params(state, runner);
+    if (!shapes_.empty()) {
+        state.push_entry("forget_moving_shapes");
+        state.call(0, 0);
+    }
     *runner.chunk = call.chunk;
     runner.chunk->at = runner.chunk->not_finite = -1;
     std::copy(call.pointers.begin(), call.pointers.end(), reinterpret_cast<void**>(runner.chunk + 1));
     lua_rawgeti(state.lua(), LUA_REGISTRYINDEX, runner.run);
     try {
         const State::InKernel in_kernel(state);
+        struct Shapes {
+            const Kernel::StepShapes* before;
+            ~Shapes() { shapes_of_pass = before; }
+        } const restored{std::exchange(shapes_of_pass, &shapes_)};
         const KernelMoment moment(runner.chunk->times, &runner.chunk->at);
         state.call(0, 0);
     } catch (const Error& error) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bindings/host/kernel.h"
 #include "bindings/host/kernel_layout.h"
 #include "runtime/graph/node.h"
 
@@ -14,8 +15,6 @@ extern "C" {
 }
 
 namespace rapid {
-
-class Kernel;
 
 // A copy of what a pass needs from its node's evaluation, as an action runs after it.
 struct KernelCaller {
@@ -55,6 +54,9 @@ public:
 
     void* column(std::size_t place, std::size_t point) const { return columns_[place].at(point); }
 
+    // What an object that moves is in the step of the pass that this thread runs now; null where there is none.
+    static const Shape* shape_now(const Object* object);
+
 private:
     struct Call {
         rapid_chunk chunk;
@@ -72,6 +74,7 @@ private:
     const std::map<std::string, Value>& params_;
     std::uint64_t serial_;  // parameters are given to each state once a pass
     std::vector<ColumnMemory> columns_, groups_;
+    const Kernel::StepShapes shapes_;  // kept for as long as the pass
 };
 
 }  // namespace rapid

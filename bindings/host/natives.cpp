@@ -10,6 +10,7 @@
 #include "bindings/host/graph_node.h"
 #include "bindings/host/graph_parameter.h"
 #include "bindings/host/kernel_functions.h"
+#include "bindings/host/kernel_pass.h"
 #include "bindings/host/lua_text.h"
 #include "bindings/host/maker.h"
 #include "bindings/host/script_error.h"
@@ -21,6 +22,7 @@
 #include "runtime/printable.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
+#include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
@@ -65,8 +67,27 @@ int kind_of(State& state)
     return 1;
 }
 
-// native.shape(object), .vector_grid(object), .fog(object): its pointer, valid while the object is; nil for any other
-// object.
+// native.shape(object): its pointer, valid while the object is; of one that moves, while a kernel runs, that of the
+// step, and true. Nil and true for one that moves, or a mesh, at any other time; nil for any other object.
+int pointer_to_shape(State& state)
+{
+    lua_State* L = state.lua();
+    const ObjectPtr object = to_object(state, 1);
+    if (const auto* shape = dynamic_cast<const Shape*>(object.get())) {
+        lua_pushlightuserdata(L, const_cast<Shape*>(shape));
+        return 1;
+    }
+    const bool moves = object && (is_moving_shape(*object) || dynamic_cast<const Mesh*>(object.get()));
+    const Shape* now = moves ? KernelPass::shape_now(object.get()) : nullptr;
+    if (now)
+        lua_pushlightuserdata(L, const_cast<Shape*>(now));
+    else
+        lua_pushnil(L);
+    lua_pushboolean(L, moves);
+    return 2;
+}
+
+// native.vector_grid(object), .fog(object): its pointer, valid while the object is; nil for any other object.
 template <class T>
 int pointer_to(State& state)
 {
@@ -192,7 +213,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"print", native<print_text>},
                                       {"set_index", native<set_object_methods>},
                                       {"run", run_body},
-                                      {"shape", native<pointer_to<Shape>>},
+                                      {"shape", native<pointer_to_shape>},
                                       {"vector_grid", native<pointer_to<VectorGrid>>},
                                       {"fog", native<pointer_to<DensityGrid>>},
                                       {"outside_kernels", native<outside_kernels>},

@@ -6,11 +6,36 @@
 #include <map>
 
 #include "runtime/at_node.h"
+#include "runtime/graph/attribute_places.h"
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {
 namespace {
+
+// Where a function of the node's names the attribute first; line 0 where none does.
+Location place_of(const Node& node, const std::string& attribute)
+{
+    for (const auto& [param, value] : node.arguments) {
+        const ObjectPtr* object = value.get<ObjectPtr>();
+        const auto* function = object ? dynamic_cast<const AttributePlaces*>(object->get()) : nullptr;
+        if (!function) continue;
+        if (const Location place = function->place_of(attribute); place.line > 0) return place;
+    }
+    return {};
+}
+
+// Errors of check() are at the line, inside of a function of the node's, that names the attribute.
+template <class F>
+void at_mention(const Node& node, const std::string& attribute, const F& check)
+{
+    try {
+        check();
+    } catch (Error& error) {
+        if (const Location place = place_of(node, attribute); place.line > 0) error.at(place);
+        throw;
+    }
+}
 
 // What the nodes of one simulation make.
 struct MadeNames {
@@ -210,7 +235,8 @@ void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t s
             if (nodes[source].simulation != simulation || nodes[source].carries.size() > 1) continue;
             name_errors(planned.node->name, planned.node->location, [&] {
                 const Uses uses = uses_of(planned);
-                for (const std::string& name : uses.reads_of_source) made.check_attribute(name);
+                for (const std::string& name : uses.reads_of_source)
+                    at_mention(*planned.node, name, [&] { made.check_attribute(name); });
                 for (const std::string& name : uses.reads_groups_of_source) made.check_group(name);
             });
         }
@@ -232,7 +258,8 @@ void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
         name_errors(planned.node->name, planned.node->location, [&] {
             const Uses uses = uses_of(planned);
             for (const auto* list : {&uses.reads, &uses.writes})
-                for (const std::string& name : *list) made.check_attribute(name);
+                for (const std::string& name : *list)
+                    at_mention(*planned.node, name, [&] { made.check_attribute(name); });
             for (const std::string& name : uses.reads_groups) made.check_group(name);
         });
     }

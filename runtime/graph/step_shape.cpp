@@ -1,5 +1,7 @@
 #include "runtime/graph/step_shape.h"
 
+#include "runtime/graph/step_shape_user.h"
+
 #include <vector>
 
 #include "runtime/graph/step_grid.h"
@@ -50,6 +52,12 @@ ShapePtr shape_in_step(const ObjectPtr& object, const Step& step)
     return nullptr;
 }
 
+const StepShapeUser* user_in(const Value& value)
+{
+    const ObjectPtr* object = value.get<ObjectPtr>();
+    return object ? dynamic_cast<const StepShapeUser*>(object->get()) : nullptr;
+}
+
 bool takes_step_shape(const Param& param) { return param.type.ends_with(StepShape::param_type); }
 
 }  // namespace
@@ -72,6 +80,7 @@ std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const Frame
 Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame)
 {
     const ObjectPtr* object = value.get<ObjectPtr>();
+    if (const StepShapeUser* user = user_in(value)) user->begin_step(clock, frame);
     if (!object) return value;
     if (const ObjectPtr grid = step_grid(*object, clock, frame)) return grid;
     if (!takes_step_shape(param)) return value;
@@ -81,6 +90,7 @@ Value in_step(const Param& param, const Value& value, const FrameClock& clock, c
 
 bool differs_by_step(const Param& param, const Value& value)
 {
+    if (const StepShapeUser* user = user_in(value)) return user->asks_moving_shapes();
     const ObjectPtr* object = value.get<ObjectPtr>();
     if (!object || !*object) return false;
     return is_grid_sequence(**object) || (takes_step_shape(param) && is_moving_shape(**object));

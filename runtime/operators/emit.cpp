@@ -26,6 +26,7 @@
 #include "runtime/graph/stateful.h"
 #include "runtime/memory_budget.h"
 #include "runtime/operators/emit/birth_age.h"
+#include "runtime/operators/emit/birth_moment.h"
 #include "runtime/operators/emit/birth_source.h"
 #include "runtime/operators/emit/birth_values.h"
 #include "runtime/operators/emit/birth_velocity.h"
@@ -43,8 +44,7 @@
 namespace rapid {
 namespace {
 
-// Births are computed in batches that fit into the first-level cache.
-constexpr std::size_t batch_size = 256;
+constexpr std::size_t batch_size = 256;  // births at a time, in the first-level cache
 
 constexpr double most_births = 2147483647;  // in a frame
 constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness is examined
@@ -54,7 +54,8 @@ constexpr double bytes_a_birth = 2 * 64;
 
 struct Emit {
     EmitSource source;
-    std::string from, density, birth, joins;
+    std::string from, density, joins;
+    BirthMoment birth;
     std::optional<Amount<double>> rate;
     std::optional<Amount<int>> count;
     std::optional<std::map<std::int64_t, double>> impulse;
@@ -106,8 +107,10 @@ struct Emit {
             .param(&Emit::impulse, "impulse", Value(), between(0, most_births), "",
                    "points born in single frames, {[frame] = count}; at the first frame they have not moved yet")
             .param(&Emit::birth, "birth", "random", any_number(), "",
-                   "when in the frame's interval: at its beginning, at its end, at random, or evenly spaced in time")
+                   "at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, "
+                   "frame) that edits each newborn point once, which is born at random")
             .choices({"random", "begin", "end", "even"})
+            .constant()
             .param(
                 &Emit::age, "age", Value(), at_least(0), "s",
                 "age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own "
@@ -169,9 +172,10 @@ struct Emit {
         if (source.is_node) ParentEmitter::use(parent_options(), uses);
         uses.gives.insert(uses.gives.end(), {"age", "birthtime"});
         if (life && (may_end() || uses.functions.count("life"))) uses.gives.push_back("life");
-        const bool whole_frames = !age && birth == "begin" && !uses.functions.count("birth");
+        const bool whole_frames = !age && birth.when == "begin";
         if (source.is_node || !whole_frames) uses.writes.push_back("dt");
         if (!joins.empty()) uses.makes_groups.push_back(joins);
+        if (birth.edit) birth.function->uses(uses);
     }
 
     std::string couples(const Plan&, const PlannedNode&) const
@@ -311,9 +315,9 @@ private:
     {
         const std::int64_t parts = clock.subframes, before = step - 1 - clock.start, part = before % parts;
         const auto n = static_cast<std::size_t>(count ? count->value : impulse_at(clock.start + 1 + before / parts));
-        if (!age && (birth == "random" || birth == "even"))
+        if (!age && (birth.when == "random" || birth.when == "even"))
             return clock_.at_once(n, clock.fps, static_cast<int>(part), clock.subframes);
-        const bool here = part == (age || birth == "end" ? parts - 1 : 0);
+        const bool here = part == (age || birth.when == "end" ? parts - 1 : 0);
         return clock_.at_once(here ? n : 0, clock.fps);
     }
 
@@ -353,7 +357,6 @@ private:
                             fmt::format("give a smaller {}", amount));
     }
 
-    // The steps of emit(), in their order.
     void make_columns(PointSet& points, const BirthAges& ages, const Evaluation& now) const;
     void append(PointSet& points, std::size_t n, const BirthAges& ages, const BirthVelocity& velocity,
                 const Evaluation& now) const;
@@ -399,7 +402,7 @@ void Emit::move_source(const Simulation& simulation, const Evaluation& now)
 void Emit::emit(Flow& flow, Births births, const Evaluation& now)
 {
     PointSet& points = flow.points;
-    const BirthAges ages(age, birth, source_, now.at_start ? 0 : now.frame.dt);
+    const BirthAges ages(age, birth.when, source_, now.at_start ? 0 : now.frame.dt);
     make_columns(points, ages, now);
     if (source_.empty()) births.count = 0;
     if (flow.simulation->trial) births.count = std::min(births.count, trial_births);
@@ -422,6 +425,7 @@ void Emit::emit(Flow& flow, Births births, const Evaluation& now)
     const Items in_frame = chosen.in_frame(0);
     for (std::size_t i = 0; i < n; ++i) newborn.id[i] = first_id + static_cast<std::int64_t>(in_frame[i]);
     now.figures.born += n;
+    if (birth.edit) birth.edit->edit(points, points.size() - n, now);
 }
 
 // Whether anything is born or not: all frames have the same columns.
@@ -563,8 +567,8 @@ void Emit::check_kind() const  // what only a node as source has, or only anothe
         if (given && source.is_node)
             throw Error(fmt::format("{} is not for a source that is a node; leave it out", name));
     if (on && rate) throw Error("rate and on are given together; with an event give count, the births of each");
-    if (on && birth != "random")
-        throw Error(fmt::format("birth = \"{}\" and on are given together; an event has its own moment", birth));
+    if (on && birth.when != "random")
+        throw Error(fmt::format("birth = \"{}\" and on are given together; an event has its own moment", birth.when));
     if (min_speed && !(on && on->kind == BirthEvent::Hit))
         throw Error("min_speed is for on = \"hit\"; leave it out, or give on");
     if (kill_parent && (!on || on->kind == BirthEvent::Death))
@@ -575,7 +579,7 @@ void Emit::check_kind() const  // what only a node as source has, or only anothe
 
 ParentOptions Emit::parent_options(double wait) const
 {
-    return {{rate, count, on, min_speed.value_or(0), limit, birth},
+    return {{rate, count, on, min_speed.value_or(0), limit, birth.when},
             {velocity, speed, spread, inherit_velocity.value_or(inherit.share), life, attributes, inherit.names, joins,
              split, wait},
             source_group,
@@ -588,8 +592,10 @@ void Emit::bear_from_parents(Flow& flow, std::span<const Flow> sources, const Ev
     const Flow& parents = sources.front();
     // Points of the same chain move after this node: their last path is that of the frame before.
     const bool waits = parents.simulation == flow.simulation && !now.at_start;
+    const std::uint64_t born = now.figures.born;
     parents_.bear(flow, parents, parent_options(waits ? now.frame.dt : 0),
                   flow.simulation->trial ? trial_births : SIZE_MAX, now);
+    if (birth.edit) birth.edit->edit(flow.points, flow.points.size() - (now.figures.born - born), now);
 }
 
 }  // namespace

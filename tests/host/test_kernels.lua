@@ -196,13 +196,13 @@ end)
 describe("a kernel that asks for something unknown", function()
   it("is refused before the first frame, with the nearest name", function()
     for body, expected in pairs {
-      ["p.v = p.v * p.haet"] = 'scene.lua:1: node "kernel": no attribute "haet"; did you mean "heat"? ' ..
+      ["p.v = p.v * p.haet"] = 'scene.lua:2: node "kernel": no attribute "haet"; did you mean "heat"? ' ..
         "(or add :attribute{ haet = 0 } before it)",
-      ["p.haet = 1"] = 'scene.lua:1: node "kernel": no attribute "haet"; did you mean "heat"? ' ..
+      ["p.haet = 1"] = 'scene.lua:2: node "kernel": no attribute "haet"; did you mean "heat"? ' ..
         "(or add :attribute{ haet = 0 } before it)",
-      ["p.v = p.v * p.wobble"] = 'scene.lua:1: node "kernel": no attribute "wobble"; ' ..
+      ["p.v = p.v * p.wobble"] = 'scene.lua:2: node "kernel": no attribute "wobble"; ' ..
         "add :attribute{ wobble = 0 } before it",
-      ["p.v = p.v * p.pscal"] = 'scene.lua:1: node "kernel": no attribute "pscal"; did you mean "pscale"? ' ..
+      ["p.v = p.v * p.pscal"] = 'scene.lua:2: node "kernel": no attribute "pscal"; did you mean "pscale"? ' ..
         "(or add :attribute{ pscal = 0 } before it)",
       ["p.id = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.id, which is read only',
       ["p.dt = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.dt, which is read only',

@@ -101,7 +101,7 @@ return rapid.node { name = "fails", doc = "Fails.",
     scene.folder:write("fails.lua", [[
 local rapid = require "rapid"
 return rapid.node { name = "fails", doc = "Fails.", points = function(p) p.v = p.v * p.haet end }]])
-    assert.equal('scene.lua:1: node "fails1": no attribute "haet"; did you mean "heat"? ' ..
+    assert.equal('fails.lua:2: node "fails1": no attribute "haet"; did you mean "heat"? ' ..
       "(or add :attribute{ haet = 0 } before it)",
       scene.error "return rapid.create { points = two } :attribute { heat = 1 } :fails {} :solve {}")
     scene.folder:write("fails.lua", [[

@@ -1,0 +1,18 @@
+// An argument of a node that names attributes in its text, as the body of a function of a point does.
+#pragma once
+
+#include <string>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+class AttributePlaces {
+public:
+    virtual ~AttributePlaces() = default;
+
+    // Where it names an attribute first; line 0 where it does not.
+    virtual Location place_of(const std::string& attribute) const = 0;
+};
+
+}  // namespace rapid

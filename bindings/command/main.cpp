@@ -1,16 +1,19 @@
 // The command `rapid`: finds the command among the arguments, reads its options and runs it.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <new>
 #include <optional>
 
 #include "bindings/command/command.h"
 #include "bindings/command/untrusted.h"
+#include "runtime/files/output_file.h"
 #include "runtime/graph/plugin.h"
 
 namespace rapid {
@@ -184,8 +187,30 @@ int run(const Arguments& arguments)
 }  // namespace
 }  // namespace rapid
 
+namespace {
+
+// What ends a process from within libraries that can't pass an exception on: CLI11 and libstdc++ take memory in
+// functions that may not throw. Nothing here takes any.
+void end_without_exception()
+{
+    const char* text = "an exception could not be passed on, as a rule for want of memory\n";
+    try {
+        if (std::current_exception()) throw;
+    } catch (const std::bad_alloc&) {
+        text = "out of memory\n";
+    } catch (...) {
+        __gnu_cxx::__verbose_terminate_handler();  // a fault of Rapid: it aborts
+    }
+    rapid::remove_unfinished_files();
+    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text, std::strlen(text));
+    ::_exit(rapid::status_failed);
+}
+
+}  // namespace
+
 int main(int argc, char** argv)
 {
+    std::set_terminate(end_without_exception);
     std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
     try {
         return rapid::run({argv + 1, argv + argc});

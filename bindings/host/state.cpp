@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <lua.hpp>
@@ -15,9 +16,18 @@
 #include "bindings/host/script_error.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/values.h"
+#include "runtime/files/output_file.h"
 
 namespace rapid {
 namespace {
+
+// LuaJIT ends by a signal where memory runs out while it makes a state, and was there for a part of it.
+[[noreturn]] void end_out_of_memory()
+{
+    remove_unfinished_files();
+    std::fputs("out of memory\n", stderr);
+    std::_Exit(1);
+}
 
 constexpr char state_field[] = "rapid.state";  // in the registry
 
@@ -57,10 +67,10 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
 {
     L_ = lua_newstate(allocate, this);
     if (!L_) throw std::bad_alloc();
-    if (const std::exception_ptr error = set_up()) {
-        lua_close(L_);
-        std::rethrow_exception(error);
-    }
+    const std::exception_ptr error = set_up();
+    if (!error) return;
+    close();
+    std::rethrow_exception(error);
 }
 
 // In a protected call, since Lua's own error (out of memory) is no C++ exception: one that was caught as such could not
@@ -71,6 +81,7 @@ std::exception_ptr State::set_up()
         State& state;
         std::exception_ptr error;
     } now{*this, nullptr};
+    const Protected inside(*this);
     const int status = lua_cpcall(
         L_,
         [](lua_State* L) {
@@ -91,8 +102,11 @@ std::exception_ptr State::set_up()
     return std::make_exception_ptr(status == LUA_ERRMEM ? Error("out of memory") : Error(lua_tostring(L_, -1)));
 }
 
-State::~State()
+State::~State() { close(); }
+
+void State::close()
 {
+    protected_ = true;  // Lua calls finalizers so, and nothing else of it allocates
     if (!is_broken_) lua_close(L_);
 }
 
@@ -105,7 +119,10 @@ State& State::of(lua_State* L)
 }
 
 // Lua's memory of one state is limited while scripts run: a request beyond it is Lua's own out-of-memory error. The
-// host's own requests between them are not limited: outside of a protected call that error would end the process.
+// host's own requests between them are not limited.
+//
+// Outside of a protected call Lua's error would end the process without a word. Memory that runs out there is a C++
+// exception, which leaves Lua at the place where its own would.
 void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t new_size)
 {
     State& state = *static_cast<State*>(self);
@@ -118,7 +135,13 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         state.memory_ + (new_size - old_size) > state.host_.options().script_memory)
         return nullptr;
     void* moved = std::realloc(block, new_size);
-    if (moved) state.memory_ += new_size - old_size;
+    if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
+    if (moved)
+        state.memory_ += new_size - old_size;
+    else if (!state.L_ && state.memory_ > 0)
+        end_out_of_memory();
+    else if (state.L_ && !state.protected_)
+        throw std::bad_alloc();
     return moved;
 }
 
@@ -162,7 +185,10 @@ void State::call(int arguments, int results)
     lua_pushcfunction(L_, describe_error);
     lua_insert(L_, base);
     const bool limited = std::exchange(limited_, true);
-    const int status = protected_call(arguments, results, base);
+    const int status = [&] {
+        const Protected inside(*this);
+        return protected_call(arguments, results, base);
+    }();
     limited_ = limited;
     lua_remove(L_, base);
     if (status != 0) throw take_error(L_);

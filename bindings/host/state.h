@@ -10,6 +10,7 @@
 #include <exception>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bindings/host/interruption.h"
@@ -99,8 +100,20 @@ public:
     std::size_t memory() const { return memory_; }
 
 private:
+    // While Lua runs in a protected call, its errors have somewhere to go.
+    class Protected {
+    public:
+        explicit Protected(State& state) : state_(state), before_(std::exchange(state.protected_, true)) {}
+        ~Protected() { state_.protected_ = before_; }
+
+    private:
+        State& state_;
+        const bool before_;
+    };
+
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     int protected_call(int arguments, int results, int handler);
+    void close();
     // Fills a new state; the error, where there is one.
     std::exception_ptr set_up();
     void open_libraries();
@@ -112,6 +125,7 @@ private:
     bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;    // to options().script_memory, now
     bool is_broken_ = false;  // compiled code was left by a jump
+    bool protected_ = false;  // now
     Interruption::Slot slot_;
     lua_State* L_ = nullptr;
     int entries_ = 0;

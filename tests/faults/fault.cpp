@@ -3,13 +3,19 @@
 //   RAPID_FAULT=CALL:N:ERROR   the N-th call (from 1) of CALL ends with ERROR, and all later ones if ERROR ends in "+"
 //
 // CALL: open, write, fsync, close, link, rename (of files that are written, and of their folders), read (of any regular
-// file) or alloc (of memory, after main began). ERROR: an error's number, or "short": half the bytes, or one, are
-// written or read.
+// file) or alloc (of memory, after main began, by whatever name: malloc, calloc, realloc, aligned). ERROR: an error's
+// number, or "short": half the bytes, or one, are written or read.
+//
+//   RAPID_STRESS=collector   Lua collects garbage all the time
+//   RAPID_STRESS=guard       what reads or writes behind a block of memory, or one that was freed, ends the process
+//                            (both: collector,guard)
+//   RAPID_FAULT_COUNT=FILE   the calls that there were of CALL, written when the process ends by itself
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdarg>
@@ -18,9 +24,12 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "tests/faults/guard.h"
+
 namespace {
 
 constexpr int short_count = -1;
+constexpr std::size_t malloc_alignment = 16;
 
 struct Fault {
     char call[16] = "";
@@ -47,6 +56,15 @@ struct Arm {
         fault.error = std::strncmp(error, "short", 5) == 0 ? short_count : std::atoi(error);
         armed = true;
     }
+    ~Arm()
+    {
+        armed = false;
+        const char* path = std::getenv("RAPID_FAULT_COUNT");
+        std::FILE* file = path ? std::fopen(path, "w") : nullptr;
+        if (!file) return;
+        std::fprintf(file, "%ld\n", calls.load());
+        std::fclose(file);
+    }
 } arm;
 
 // The error of this call; 0: none.
@@ -57,12 +75,18 @@ int error_of(const char* call)
     return now == fault.nth || (fault.lasting && now > fault.nth) ? fault.error : 0;
 }
 
+// How deep this thread is in opening a library: its constructors have nobody to tell that there is no memory.
+thread_local int loading __attribute__((tls_model("initial-exec"))) = 0;
+
 // libgcc registers the code that LuaJIT compiles, in memory that it does not check (gcc 12): it can't report a fault.
 bool is_unwinder(void* caller)
 {
     Dl_info found;
     return ::dladdr(caller, &found) && std::strstr(found.dli_fname, "libgcc_s");
 }
+
+// Whether this request of memory, by `caller`, is to fail.
+bool fails(void* caller) { return armed && began && loading == 0 && !is_unwinder(caller) && error_of("alloc") > 0; }
 
 bool is_regular(int descriptor)
 {
@@ -177,15 +201,91 @@ int rename(const char* from, const char* to) noexcept
     return original(from, to);
 }
 
+// dlsym() may allocate, so the C library's own names for these are taken.
 void* __libc_malloc(std::size_t bytes) noexcept;
+void* __libc_calloc(std::size_t count, std::size_t bytes) noexcept;
+void* __libc_realloc(void* block, std::size_t bytes) noexcept;
+void* __libc_memalign(std::size_t alignment, std::size_t bytes) noexcept;
+void __libc_free(void* block) noexcept;
 
-// dlsym() may allocate, so the C library's own name for it is taken.
 void* malloc(std::size_t bytes) noexcept
 {
-    if (began)
-        if (const int error = error_of("alloc"); error > 0 && !is_unwinder(__builtin_return_address(0)))
-            return errno = error, nullptr;
-    return __libc_malloc(bytes);
+    if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
+    void* const guarded = guard::take(malloc_alignment, bytes);
+    return guarded ? guarded : __libc_malloc(bytes);
+}
+
+void* calloc(std::size_t count, std::size_t bytes) noexcept
+{
+    if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
+    std::size_t all = 0;
+    if (__builtin_mul_overflow(count, bytes, &all)) return errno = ENOMEM, nullptr;
+    void* const guarded = guard::take(malloc_alignment, all);
+    return guarded ? std::memset(guarded, 0, all) : __libc_calloc(count, bytes);
+}
+
+void* realloc(void* block, std::size_t bytes) noexcept
+{
+    if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
+    // A block that was not guarded stays so: its size is not known.
+    const bool was_guarded = guard::is_guarded(block);
+    if (block && !was_guarded) return __libc_realloc(block, bytes);
+    void* moved = guard::take(malloc_alignment, bytes);
+    if (!moved) moved = __libc_malloc(bytes);
+    if (!moved || !block) return moved;
+    std::memcpy(moved, block, std::min(bytes, guard::size_of(block)));
+    guard::give_back(block);
+    return moved;
+}
+
+void free(void* block) noexcept { guard::is_guarded(block) ? guard::give_back(block) : __libc_free(block); }
+
+std::size_t malloc_usable_size(void* block) noexcept
+{
+    static const auto original = next<std::size_t (*)(void*)>("malloc_usable_size");
+    return guard::is_guarded(block) ? guard::size_of(block) : original(block);
+}
+
+void* memalign(std::size_t alignment, std::size_t bytes) noexcept
+{
+    if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
+    void* const guarded = guard::take(alignment, bytes);
+    return guarded ? guarded : __libc_memalign(alignment, bytes);
+}
+
+void* aligned_alloc(std::size_t alignment, std::size_t bytes) noexcept { return memalign(alignment, bytes); }
+
+int posix_memalign(void** block, std::size_t alignment, std::size_t bytes) noexcept
+{
+    void* const found = memalign(alignment, bytes);
+    if (!found) return ENOMEM;
+    *block = found;
+    return 0;
+}
+
+void* dlopen(const char* file, int mode) noexcept
+{
+    static const auto original = next<void* (*)(const char*, int)>("dlopen");
+    ++loading;
+    void* const library = original(file, mode);
+    --loading;
+    return library;
+}
+
+struct lua_State;
+
+lua_State* lua_newstate(void* (*allocate)(void*, void*, std::size_t, std::size_t), void* data)
+{
+    static const auto original = next<decltype(&lua_newstate)>("lua_newstate");
+    lua_State* const state = original(allocate, data);
+    const char* const stress = std::getenv("RAPID_STRESS");
+    if (state && stress && std::strstr(stress, "collector")) {
+        constexpr int set_pause = 6, set_step = 7;  // as in lua.h
+        const auto collect = next<int (*)(lua_State*, int, int)>("lua_gc");
+        collect(state, set_pause, 0);
+        collect(state, set_step, 1000);
+    }
+    return state;
 }
 
 // Starts main(), from which on allocations are counted: before it nobody could report one that fails.

@@ -11,11 +11,14 @@ local judged = {}
 local address_space = 3 * 2 ^ 20 -- KiB: --memory, and what libraries and threads map and never touch
 local longest_message = 10000
 
--- seconds: of the processor, the same on a machine that has other work.
+-- seconds: of the processor, the same on a machine that has other work. environment: further variables. address_space:
+-- KiB, or "unlimited".
 function judged.run(folder, text, limits)
   folder:write("scene.lua", text)
-  local result = command.shell(('ulimit -t %d; ulimit -v %d; timeout -k 1 120 "$RAPID" run scene.lua -f 1-3 --quiet ' ..
-    "--memory 1G --threads 2 %s"):format(limits.seconds, address_space, limits.arguments), { cwd = folder.path })
+  local result = command.shell(('ulimit -t %d; ulimit -v %s; timeout -k 1 120 "$RAPID" run scene.lua -f 1-3 --quiet ' ..
+    "--memory 1G --threads 2 %s"):format(limits.seconds, limits.address_space or address_space,
+    limits.arguments), {
+    cwd = folder.path, environment = limits.environment })
   if result.status > 2 then
     result.complaint = "ended with " .. result.status
   elseif result.status > 0 and (#result.stderr == 0 or #result.stderr > longest_message) then

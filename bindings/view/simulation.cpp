@@ -220,8 +220,10 @@ private:
             for (const auto& [name, node] : plan_->outputs) status.outputs.push_back(name);
             status.names.clear();
             for (const PlannedSimulation& simulation : plan_->simulations)
-                for (const PlannedAttribute& attribute : simulation.attributes)
-                    status.names[attribute.name] = attribute.kept ? static_cast<int>(attribute.bytes_per_point()) : -1;
+                for (const PlannedAttribute& attribute : simulation.attributes) {
+                    int& bytes = status.names.try_emplace(attribute.name, -1).first->second;
+                    if (attribute.kept) bytes = std::max(bytes, static_cast<int>(attribute.bytes_per_point()));
+                }
             for (const std::string& text : session_->take_warnings()) warn(status, 0, text);
             for (const std::string& text : plan_->warnings) warn(status, 0, text);
         });

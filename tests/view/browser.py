@@ -85,6 +85,13 @@ class Browser:
         assert isinstance(kept, list), kept
         return kept[0]
 
+    def draw_nothing(self):
+        """From the next page on WebGL gets its buffers, and draws nothing."""
+        self.call("POST", "/goog/cdp/execute", {"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {
+            "source": "WebGLRenderingContext.prototype.drawArrays = WebGL2RenderingContext.prototype.drawArrays = "
+                      "WebGLRenderingContext.prototype.drawElements = "
+                      "WebGL2RenderingContext.prototype.drawElements = () => {}"}})
+
     def element(self, selector):
         return next(iter(self.call("POST", "/element", {"using": "css selector", "value": selector}).values()))
 
@@ -129,8 +136,8 @@ class View:
     """A `rapid view`, and its address."""
 
     def __init__(self, rapid, *arguments, cwd=None):
-        self.process = subprocess.Popen([rapid, "view", *arguments, "--no-open"], stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE, text=True, cwd=cwd)
+        words = ["setpriv", "--pdeathsig", "KILL", rapid, "view", *arguments, "--no-open"]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd)
         self.address = self.process.stdout.readline().strip()
         match = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=([0-9a-f]{32})", self.address)
         if not match:

@@ -399,9 +399,12 @@ function LevelSet:offset(metres) end
 
 ---@class rapid.options.levelset_read
 ---@field grid? string  its name; the only level set, when not given [string]
+---@field before? "hold"|"repeat"|"mirror"|"none"  what goes before the first file of a sequence: "hold" (that file), "repeat" (the last ones again), "mirror" (back and forth) or "none" (nothing) [string, one of hold, repeat, mirror, none]
+---@field after? "hold"|"repeat"|"mirror"|"none"  and behind the last one [string, one of hold, repeat, mirror, none]
+---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
 
----Reads a level set from a .vdb file.
----@param path string  relative to the graph file [string, required]
+---Reads a level set from a .vdb file, or a sequence.
+---@param path string  relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a function of the frame [string, required]
 ---@param options? rapid.options.levelset_read
 ---@return rapid.LevelSet
 function rapid.levelset.read(path, options) end

@@ -69,7 +69,7 @@ local function make(native, load_node, numeric, shapes, studies)
   rapid.levelset = {
     from_mesh = maker("levelset.from_mesh", "mesh"),
     from_points = maker("levelset.from_points", "points"),
-    read = maker("levelset.read", "path"),
+    read = reader "levelset.read",
     sphere = maker "levelset.sphere",
     box = maker "levelset.box",
     torus = maker "levelset.torus",

@@ -201,6 +201,7 @@ void push(State& state, std::map<std::string, Value> entries) { push_table(state
 void push_object(State& state, const ObjectPtr& object)
 {
     lua_State* L = state.lua();
+    if (!object) return lua_pushnil(L);  // of a sequence that has none at a frame
     hold(L, *object);
     new (lua_newuserdata(L, sizeof(ObjectPtr))) ObjectPtr(object);
     luaL_getmetatable(L, object_metatable);

@@ -104,6 +104,32 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}} }
   end)
 end)
 
+describe("a sequence of level sets", function()
+  it("has the file of each frame that counting gives, and none where there is nothing", function()
+    for file = 3, 6 do
+      local made = scene.command("run", ([[
+local ball = rapid.levelset.sphere { radius = 0.2, center = {%d, 0, 0}, voxel = 0.05 }:write("ball.%04d.vdb")
+return rapid.create { points = two } :solve {}]]):format(file, file), "-f 1 --quiet")
+      assert.equal(0, made.status, made.stderr)
+    end
+    for _, how in ipairs { { "hold", "repeat" }, { "mirror", "none" }, { "none", "mirror" } } do
+      -- Points at x = 1 to 9 die in the ball that is there.
+      local result = scene.run(([[
+local ball = rapid.levelset.read("ball.####.vdb", { before = %q, after = %q, offset = 1 })
+return rapid.create { fps = 24 }
+  :emit { source = rapid.points.grid { size = {9, 0, 0}, spacing = 1, center = {5, 0, 0} }, count = 9, birth = "end",
+          life = 0.03 }
+  :collide { shape = ball, response = "die" } :solve {}]]):format(how[1], how[2]), { frames = {2, 14} })
+      for frame = 2, 14 do
+        local file = file_of(frame, 3, 6, { before = how[1], after = how[2] }, 1)
+        local there = {}
+        for i = 1, #result[frame] do there[result[frame][i].P.x] = true end
+        for x = 1, 9 do assert.equal(x ~= file, there[x] == true, ("%s %s %d: %d"):format(how[1], how[2], frame, x)) end
+      end
+    end
+  end)
+end)
+
 describe("a sequence of points", function()
   local function write_points(first, last, name)
     for file = first, last do

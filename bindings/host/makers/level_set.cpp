@@ -8,7 +8,7 @@
 #include <mutex>
 #include <tuple>
 
-#include "bindings/host/maker.h"
+#include "bindings/host/makers/sequence_options.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/motion/deforming.h"
@@ -244,18 +244,33 @@ struct ResampleLevelSet {
 };
 RAPID_MAKER(ResampleLevelSet);
 
-struct ReadLevelSet {
+struct ReadLevelSet : SequenceOptions {
     std::string path, grid;
+    std::optional<double> frame;  // of a sequence, as lua/rapid.lua asks for it
 
     static Maker declare()
     {
-        return maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file.")
-            .param(&ReadLevelSet::path, "path", Value(), any_number(), "", "relative to the graph file")
+        auto declaration = maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file, or a sequence.");
+        declaration
+            .param(&ReadLevelSet::path, "path", Value(), any_number(), "",
+                   "relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a "
+                   "function of the frame")
             .required()
             .param(&ReadLevelSet::grid, "grid", Value(), any_number(), "",
-                   "its name; the only level set, when not given");
+                   "its name; the only level set, when not given")
+            .param(&ReadLevelSet::frame, "frame", Value(), any_number(), "", "of a sequence")
+            .internal();
+        return SequenceOptions::declare(declaration);
     }
-    ObjectPtr make(MakeContext& context) const { return read_level_set(context.resolve(path), grid); }
+    // Null at a frame that has none: a function of the frame then returns nil.
+    ObjectPtr make(MakeContext& context) const
+    {
+        check(path, frame.has_value());
+        if (!frame) return read_level_set(context.resolve(path), grid);
+        const FramePattern pattern((context.folder / path).string());
+        const auto file = file_at(pattern, existing_files(pattern), *frame);
+        return file ? read_level_set(context.resolve(file->string()), grid) : nullptr;
+    }
 };
 RAPID_MAKER(ReadLevelSet);
 

@@ -45,18 +45,7 @@ struct ReadPoints : SequenceOptions {
         if (!frame) return read(context.resolve(path), context);
         const FramePattern pattern((context.folder / path).string());
         const auto files = existing_files(pattern);
-        FrameSequence frames = order();
-        frames.first = files.begin()->first;
-        frames.last = files.rbegin()->first;
-        const std::optional<std::int64_t> file = frames.file_of(static_cast<std::int64_t>(std::ceil(*frame)));
-        if (file) {
-            const auto found = files.find(static_cast<int>(*file));
-            if (found == files.end())
-                throw Error(
-                    fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
-                                *file, pattern.text(), frames.first, frames.last));
-            return read(context.resolve(found->second.string()), context);
-        }
+        if (const auto file = file_at(pattern, files, *frame)) return read(context.resolve(file->string()), context);
         // No points, but the attributes that they have at other frames.
         auto none = std::make_shared<PointsObject>();
         const ObjectPtr first = read(context.resolve(files.begin()->second.string()), context);

@@ -56,6 +56,22 @@ struct SequenceOptions {
                                 name, path));
     }
 
+    // The file of a frame; nothing where there is none. Error: a file is missing between others.
+    std::optional<std::filesystem::path> file_at(const FramePattern& pattern,
+                                                 const std::map<int, std::filesystem::path>& files, double frame) const
+    {
+        FrameSequence frames = order();
+        frames.first = files.begin()->first;
+        frames.last = files.rbegin()->first;
+        const std::optional<std::int64_t> file = frames.file_of(static_cast<std::int64_t>(std::ceil(frame)));
+        if (!file) return std::nullopt;
+        const auto found = files.find(static_cast<int>(*file));
+        if (found == files.end())
+            throw Error(fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
+                                    *file, pattern.text(), frames.first, frames.last));
+        return found->second;
+    }
+
     FrameSequence order() const
     {
         FrameSequence order;

@@ -11,8 +11,7 @@ struct ReadFog : GridFiles {
     {
         auto declaration =
             maker<ReadFog>("fog.read", "Reads a fog, in which points are born by density, from a .vdb file.");
-        GridFiles::declare(declaration, "its name; the only fog of floats, when not given");
-        return declaration;
+        return GridFiles::declare(declaration, "its name; the only fog of floats, when not given");
     }
     ObjectPtr make(MakeContext& context) const { return make_with<DensityGrid>(context, read_density_grid); }
 };

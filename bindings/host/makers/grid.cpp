@@ -13,8 +13,7 @@ struct ReadGrid : GridFiles {
     static Maker declare()
     {
         auto declaration = maker<ReadGrid>("grid.read", "Reads a grid of vectors from a .vdb file.");
-        GridFiles::declare(declaration, "its name; the only grid of vectors, when not given");
-        return declaration;
+        return GridFiles::declare(declaration, "its name; the only grid of vectors, when not given");
     }
     ObjectPtr make(MakeContext& context) const { return make_with<VectorGrid>(context, read_vector_grid); }
 };

@@ -4,31 +4,24 @@
 #include <string>
 
 #include "bindings/host/maker.h"
+#include "bindings/host/makers/sequence_options.h"
 #include "runtime/shapes/level_set/grid_sequence.h"
 
 namespace rapid {
 
 // The parameters of what may be read from a sequence of .vdb files; T derives from it.
-struct GridFiles {
-    std::string path, grid, before, after;
-    int offset;
+struct GridFiles : SequenceOptions {
+    std::string path, grid;
 
     template <class T>
-    static void declare(MakerDeclaration<T>& declaration, const std::string& grid_doc)
+    static Maker declare(MakerDeclaration<T>& declaration, const std::string& grid_doc)
     {
-        const auto outside = [&](std::string T::*field, const char* name, const char* doc) {
-            declaration.param(field, name, std::string("hold"), any_number(), "", doc)
-                .choices({"hold", "repeat", "mirror", "nothing"});
-        };
         declaration
             .param(static_cast<std::string T::*>(&T::path), "path", Value(), any_number(), "",
                    "relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some")
             .required();
         declaration.param(static_cast<std::string T::*>(&T::grid), "grid", Value(), any_number(), "", grid_doc);
-        outside(static_cast<std::string T::*>(&T::before), "before", "what holds before the first file of a sequence");
-        outside(static_cast<std::string T::*>(&T::after), "after", "what holds after the last");
-        declaration.param(static_cast<int T::*>(&T::offset), "offset", 0.0, any_number(), "frames",
-                          "by which a sequence begins later");
+        return SequenceOptions::declare(declaration);
     }
 
     bool is_sequence(const MakeContext& context) const;
@@ -39,12 +32,13 @@ struct GridFiles {
     template <class G, class Read>
     ObjectPtr make_with(MakeContext& context, const Read& read) const
     {
+        check(path, is_sequence(context));
         if (!is_sequence(context)) return read(context.resolve(path), grid);
         SequenceFiles sequence = files(context);
-        const int first = sequence.files.begin()->first;
+        const std::int64_t first = sequence.files.begin()->first + sequence.order.offset;
         const auto read_file = [&read, name = grid](const std::filesystem::path& file) { return read(file, name); };
         auto made = std::make_shared<GridSequence<G>>(std::move(sequence), read_file);
-        made->over(first + offset);
+        made->over(first);
         return made;
     }
 };

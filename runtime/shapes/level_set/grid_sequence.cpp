@@ -1,31 +1,15 @@
 #include "runtime/shapes/level_set/grid_sequence.h"
 
 namespace rapid {
-namespace {
-
-// The remainder that is at least 0.
-std::int64_t modulo(std::int64_t x, std::int64_t period) { return (x % period + period) % period; }
-
-}  // namespace
 
 std::optional<int> SequenceFiles::frame_of(std::int64_t frame) const
 {
-    const std::int64_t first = files.begin()->first, last = files.rbegin()->first, at = frame - offset;
-    if (at >= first && at <= last) return static_cast<int>(at);
-    const std::int64_t length = last - first;
-    switch (at < first ? before : after) {
-        case Outside::Nothing:
-            return std::nullopt;
-        case Outside::Repeat:  // the first file comes a frame after the last
-            return static_cast<int>(first + modulo(at - first, length + 1));
-        case Outside::Mirror: {
-            const std::int64_t way = length == 0 ? 0 : modulo(at - first, 2 * length);
-            return static_cast<int>(first + (way > length ? 2 * length - way : way));
-        }
-        case Outside::Hold:
-            break;
-    }
-    return static_cast<int>(at < first ? first : last);
+    FrameSequence sequence = order;
+    sequence.first = files.begin()->first;
+    sequence.last = files.rbegin()->first;
+    const std::optional<std::int64_t> file = sequence.file_of(frame);
+    if (!file) return std::nullopt;
+    return static_cast<int>(*file);
 }
 
 SequenceFiles::Interval SequenceFiles::interval(std::int64_t frame) const

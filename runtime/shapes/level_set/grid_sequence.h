@@ -14,6 +14,7 @@
 #include <string_view>
 #include <utility>
 
+#include "runtime/frame_sequence.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 
@@ -21,11 +22,8 @@ namespace rapid {
 
 // The files of a sequence, and which of them hold at a frame.
 struct SequenceFiles {
-    enum class Outside { Hold, Repeat, Mirror, Nothing };
-
     std::map<int, std::filesystem::path> files;  // by frame; at least one
-    Outside before = Outside::Hold, after = Outside::Hold;
-    int offset = 0;  // frames by which it begins later
+    FrameSequence order = {};                    // what is beyond them; its ends are not used
 
     // From a whole frame to the next: the part of the way from file a to file b at its beginning and at its end.
     // Without a or b there is nothing at that end.

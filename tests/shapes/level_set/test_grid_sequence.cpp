@@ -3,14 +3,14 @@
 #include "tests/test.h"
 
 using namespace rapid;
-using Outside = SequenceFiles::Outside;
+using Beyond = FrameSequence::Beyond;
 
 namespace {
 
-SequenceFiles files(std::initializer_list<int> frames, Outside before = Outside::Hold, Outside after = Outside::Hold,
+SequenceFiles files(std::initializer_list<int> frames, Beyond before = Beyond::Hold, Beyond after = Beyond::Hold,
                     int offset = 0)
 {
-    SequenceFiles sequence{{}, before, after, offset};
+    SequenceFiles sequence{{}, {.before = before, .after = after, .offset = offset}};
     for (const int frame : frames) sequence.files[frame] = "file";
     return sequence;
 }
@@ -34,33 +34,33 @@ TEST_CASE("between files a sequence goes on a straight line, whether or not each
 
 TEST_CASE("outside of its files a sequence holds, repeats, is mirrored, or is nothing", "[grid_sequence]")
 {
-    const auto at = [](Outside outside, int frame) { return files({3, 4, 5, 6}, outside, outside).frame_of(frame); };
-    CHECK(at(Outside::Hold, -10) == 3);
-    CHECK(at(Outside::Hold, 99) == 6);
-    CHECK(at(Outside::Nothing, 2) == std::nullopt);
-    CHECK(at(Outside::Nothing, 7) == std::nullopt);
+    const auto at = [](Beyond outside, int frame) { return files({3, 4, 5, 6}, outside, outside).frame_of(frame); };
+    CHECK(at(Beyond::Hold, -10) == 3);
+    CHECK(at(Beyond::Hold, 99) == 6);
+    CHECK(at(Beyond::None, 2) == std::nullopt);
+    CHECK(at(Beyond::None, 7) == std::nullopt);
     const int repeated[] = {3, 4, 5, 6, 3, 4, 5, 6}, mirrored[] = {3, 4, 5, 6, 5, 4, 3, 4};
     for (int k = 0; k < 8; ++k) {
-        CHECK(at(Outside::Repeat, 3 + k) == repeated[k]);
-        CHECK(at(Outside::Repeat, 3 + k - 8) == repeated[k]);
-        CHECK(at(Outside::Mirror, 3 + k) == mirrored[k]);
-        CHECK(at(Outside::Mirror, 3 + k - 6) == mirrored[k]);
+        CHECK(at(Beyond::Repeat, 3 + k) == repeated[k]);
+        CHECK(at(Beyond::Repeat, 3 + k - 8) == repeated[k]);
+        CHECK(at(Beyond::Mirror, 3 + k) == mirrored[k]);
+        CHECK(at(Beyond::Mirror, 3 + k - 6) == mirrored[k]);
     }
-    CHECK(files({5}, Outside::Mirror, Outside::Repeat).frame_of(77) == 5);
-    CHECK(files({5}, Outside::Mirror, Outside::Repeat).frame_of(-77) == 5);
-    CHECK(files({3, 4, 5, 6}, Outside::Hold, Outside::Hold, 10).frame_of(14) == 4);
+    CHECK(files({5}, Beyond::Mirror, Beyond::Repeat).frame_of(77) == 5);
+    CHECK(files({5}, Beyond::Mirror, Beyond::Repeat).frame_of(-77) == 5);
+    CHECK(files({3, 4, 5, 6}, Beyond::Hold, Beyond::Hold, 10).frame_of(14) == 4);
 }
 
 TEST_CASE("a sequence goes on where one end meets the other", "[grid_sequence]")
 {
-    const SequenceFiles repeated = files({3, 4, 5, 6}, Outside::Repeat, Outside::Repeat);
+    const SequenceFiles repeated = files({3, 4, 5, 6}, Beyond::Repeat, Beyond::Repeat);
     CHECK(value(repeated, 6, 0) == 6);
     CHECK(value(repeated, 6, 0.5) == Approx(4.5));  // from 6 to 3
     CHECK(value(repeated, 7, 0.5) == Approx(3.5));
-    const SequenceFiles mirrored = files({3, 5, 6}, Outside::Mirror, Outside::Mirror);
+    const SequenceFiles mirrored = files({3, 5, 6}, Beyond::Mirror, Beyond::Mirror);
     CHECK(value(mirrored, 7, 0.25) == Approx(4.75));  // 5 at frame 7, 4 at frame 8
     CHECK(value(mirrored, 2, 0.25) == Approx(3.75));  // 4 at frame 2
-    const SequenceFiles held = files({3, 4}, Outside::Nothing, Outside::Hold);
+    const SequenceFiles held = files({3, 4}, Beyond::None, Beyond::Hold);
     CHECK(value(held, 1, 1) == 0);
     CHECK(value(held, 2, 0.5) == Approx(1.5));  // from nothing to 3
     CHECK(value(held, 8, 0.5) == 4);

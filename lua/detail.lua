@@ -9,6 +9,7 @@
 --   points:sum "heat", :mean, :min, :max, :bounds() two corners
 --   points:sort "heat", points:sort(function(p) return p.P.y end)
 --   points.detail.total = 3                         a value that kernels read as frame.detail.total
+--   points.events.hits, .deaths, .births            lists of what happened in the last step, { id =, P =, time =, ... }
 --
 -- The host gives a column's memory when it is first read, and again when it is first written: until then other sets may
 -- share it. Views of points are invalid when the function has ended: each knows the number of its run. The types and
@@ -92,6 +93,7 @@ local function make(native, rand, point_names)
   local read_only = point_names.read_only
   -- Of the run: one at a time.
   local columns, groups, killed, added, size, frame, random, details
+  local happened -- what points.events has, where it has been asked for
   local serial = ffi.cast("const int32_t*", native.serial) -- of the run; another one as soon as it has ended
 
   -- Fields hide attributes of the same name from __index, so they have unlikely names.
@@ -343,7 +345,7 @@ local function make(native, rand, point_names)
 
   -- "add, bounds, detail, ... and sum"
   local function names_of_set()
-    local names = { "detail" }
+    local names = { "detail", "events" }
     for name in pairs(set) do names[#names + 1] = name end
     table.sort(names)
     local last = table.remove(names)
@@ -357,6 +359,10 @@ local function make(native, rand, point_names)
       if points.rapid_serial ~= serial[0] then error(over, 0) end
       if type(key) == "number" then return point_view(place_of("points", key), serial[0]) end
       if key == "detail" then return values_view end
+      if key == "events" then
+        happened = happened or native.events()
+        return happened
+      end
       local known = set[key]
       if known == nil then
         error(("points have no %s; they have %s"):format(describe.value(key), names_of_set()), 0)
@@ -390,7 +396,7 @@ local function make(native, rand, point_names)
 
   return function(f, now, params, count, key, detail_values)
     columns, groups, killed, added = {}, {}, {}, {}
-    size, frame, random, details = count, now, key, detail_values
+    size, frame, random, details, happened = count, now, key, detail_values, nil
     f(set_view(serial[0]), now, params)
     append_added()
     local places = {}

@@ -86,7 +86,7 @@ void run_detail(const Kernel& function, Flow& flow, const Evaluation& now, const
     ScriptHost& host = function.host();
     State& state = host.main();
     const Watchdog::Section section(host.watchdog, KernelCaller(now).title());
-    const DetailRun run(state, flow.points);
+    const DetailRun run(state, flow.points, flow.simulation->record.get());
     const std::size_t before = flow.points.size();
     call_function(function, flow.points, now, arguments);
 

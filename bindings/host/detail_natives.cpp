@@ -7,6 +7,7 @@
 #include "bindings/host/lua_text.h"
 #include "bindings/host/script_error.h"
 #include "bindings/host/state.h"
+#include "bindings/host/values.h"
 
 namespace rapid {
 namespace {
@@ -120,9 +121,68 @@ int reorder(State& state)
     return 0;
 }
 
+using Entry = std::map<std::string, Value>;
+
+Value list_of(std::vector<Value> entries)
+{
+    auto list = std::make_shared<Table>();
+    list->list = std::move(entries);
+    return Value(std::shared_ptr<const Table>(std::move(list)));
+}
+Value entry_of(Entry values)
+{
+    auto entry = std::make_shared<Table>();
+    entry->named = std::move(values);
+    return Value(std::shared_ptr<const Table>(std::move(entry)));
+}
+Value vector_of(const Vec3f& v) { return Value(Vec3d(v.cast<double>())); }
+
+std::vector<Value> deaths_in(const PointSet& dead, const std::vector<double>& times)
+{
+    std::vector<Value> deaths;
+    for (std::size_t i = 0; i < dead.size(); ++i)
+        deaths.push_back(entry_of({{"id", static_cast<double>(dead.id()[i])},
+                                   {"P", vector_of(dead.P()[i])},
+                                   {"v", vector_of(dead.v()[i])},
+                                   {"time", times[i]}}));
+    return deaths;
+}
+
+// native.events(): what happened in the last step: { hits = {...}, deaths = {...}, births = {...} }.
+int events(State& state)
+{
+    const StepRecord* record = detail_run_of(state).record;
+    if (!record) throw Error("points.events is kept where a :solve ends the chain; end it with :solve {}");
+    const PointSet& before = record->before;
+    std::vector<Value> hits, births;
+    for (const LoggedHit& hit : record->hits)
+        hits.push_back(entry_of({{"id", static_cast<double>(before.id()[hit.point])},
+                                 {"P", vector_of(hit.P)},
+                                 {"N", vector_of(hit.n)},
+                                 {"v", vector_of(hit.v1)},
+                                 {"time", hit.time},
+                                 {"speed", static_cast<double>(hit.speed)},
+                                 {"impulse", static_cast<double>(hit.impulse)}}));
+    const Column<float>* dt = before.find<float>("dt");
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        if (before.id()[i] < record->first_new) continue;
+        births.push_back(entry_of({{"id", static_cast<double>(before.id()[i])},
+                                   {"P", vector_of(before.P()[i])},
+                                   {"v", vector_of(before.v()[i])},
+                                   {"time", record->time - (dt ? static_cast<double>((*dt)[i]) : record->h)}}));
+    }
+    std::vector<Value> deaths = deaths_in(record->killed, record->killed_at);
+    for (Value& old : deaths_in(record->old, record->old_at)) deaths.push_back(std::move(old));
+    push(state, entry_of({{"hits", list_of(std::move(hits))},
+                          {"deaths", list_of(std::move(deaths))},
+                          {"births", list_of(std::move(births))}}));
+    return 1;
+}
+
 }  // namespace
 
-DetailRun::DetailRun(State& state, PointSet& of) : points(of), state_(state), top_(lua_gettop(state.lua()))
+DetailRun::DetailRun(State& state, PointSet& of, const StepRecord* of_step)
+    : points(of), record(of_step), state_(state), top_(lua_gettop(state.lua()))
 {
     ++state_.detail_serial;
     lua_pushlightuserdata(state_.lua(), this);
@@ -142,7 +202,8 @@ void push_detail_natives(State& state)
     lua_State* L = state.lua();
     constexpr luaL_Reg functions[] = {{"column", native<column>},         {"has", native<has>},
                                       {"group", native<group>},           {"append", native<append>},
-                                      {"neighbours", native<neighbours>}, {"reorder", native<reorder>}};
+                                      {"neighbours", native<neighbours>}, {"reorder", native<reorder>},
+                                      {"events", native<events>}};
     lua_newtable(L);
     for (const luaL_Reg& f : functions) {
         lua_pushcfunction(L, f.func);

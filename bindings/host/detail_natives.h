@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 
+#include "runtime/graph/step_record.h"
 #include "runtime/points/neighbours.h"
 #include "runtime/points/point_set.h"
 
@@ -15,12 +16,14 @@ class State;
 // longer valid, and the stack is as before.
 class DetailRun {
 public:
-    DetailRun(State& state, PointSet& of);
+    // record: of the last step of the simulation; null where the graph keeps none.
+    DetailRun(State& state, PointSet& of, const StepRecord* record);
     ~DetailRun();
     DetailRun(const DetailRun&) = delete;
     DetailRun& operator=(const DetailRun&) = delete;
 
     PointSet& points;
+    const StepRecord* const record;
     // By radius, of the positions at the first search.
     std::map<double, std::unique_ptr<const Neighbours>> neighbours;
 

@@ -63,6 +63,12 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     if (options.seed)
         for (PlannedSimulation& simulation : simulations) simulation.seed = *options.seed;
     bind_all();
+    // points.events of :detail is the record of the last step; a function names it in its text.
+    for (const PlannedNode& planned : nodes) {
+        const std::vector<std::string> named = uses_of(planned).may;
+        PlannedSimulation& simulation = simulations[planned.simulation];
+        simulation.recorded |= simulation.solve && std::find(named.begin(), named.end(), "events") != named.end();
+    }
     find_changes();
     warn_of_idle_dynamics();
     for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, s);

@@ -208,8 +208,8 @@ describe("an error in a detail function", function()
       ["points:add { heta = 3 }"] = 'no attribute "heta"; did you mean "heat"?',
       ["points:neighbours(1, 0)"] = "neighbours within 0 m of points up to 3 m from the origin; the radius must be " ..
         "above 0, and above 2.79397e-09 m there",
-      ["points:average 'heat'"] = 'points have no "average"; they have add, bounds, detail, kill, max, mean, min, ' ..
-        "neighbours, sort and sum",
+      ["points:average 'heat'"] = 'points have no "average"; they have add, bounds, detail, events, kill, max, ' ..
+        "mean, min, neighbours, sort and sum",
       ["points:sort(function(p) return p.P end)"] =
         "points:sort: the key of point 1 is vec3(0, 0, 0); it must be a number",
       ["error {}"] = "error raised with a table instead of a message",
@@ -242,5 +242,68 @@ return rapid.create { points = two } :attribute { n = 0 } :count { radius = %s }
     assert.equal(1, scene.run(text:format "1.5", { frames = {1, 2} })[2][1].n)
     assert.equal(0, scene.run(text:format "0.5", { frames = {1, 2} })[2][1].n)
     assert.match('node "count1": radius = %-1 is out of range', scene.error(text:format "-1"))
+  end)
+end)
+
+describe("points.events", function()
+  -- A ball falls from 1 m, hits the floor once a bounce, and one of 0.3 s of life dies on the way.
+  local function text(before, after)
+    return ([[
+return rapid.create { fps = 24, points = rapid.points.from {
+    P = {{0, 1, 0}, {5, 9, 0}}, life = {math.huge, 0.3}, mass = {2, 1} } }
+  :emit { source = rapid.points.from { P = {{9, 9, 9}} }, impulse = {[3] = 1}, birth = "even" }
+  %s :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.5 } :solve {} %s]]):format(before, after)
+  end
+  local keep = [[:detail("keep", function(points)
+    local events = points.events
+    local d = points.detail
+    d.hits, d.deaths, d.births = #events.hits, #events.deaths, #events.births
+    for _, hit in ipairs(events.hits) do
+      d.at, d.speed, d.impulse, d.id, d.P, d.N = hit.time, hit.speed, hit.impulse, hit.id, hit.P, hit.N
+      d.v = hit.v
+    end
+    for _, death in ipairs(events.deaths) do d.died, d.dead = death.time, death.id end
+    for _, birth in ipairs(events.births) do d.born, d.new = birth.time, birth.id end
+  end)
+  :attribute { a = {0, 0, 0}, b = {0, 0, 0}, c = {0, 0, 0} }
+  :points("show", function(p, frame)
+    local d = frame.detail
+    p.a = vec3(d.hits, d.deaths, d.births)
+    if d.hits > 0 then p.b, p.c = vec3(d.at, d.speed, d.impulse), vec3(d.id, d.P.y, d.v.y * d.N.y) end
+    if d.deaths > 0 then p.b = vec3(d.died, d.dead, 0) end
+    if d.births > 0 then p.b = vec3(d.born, d.new, 0) end
+  end)]]
+
+  it("behind Solve are those of the frame: contacts, deaths and births, with their times", function()
+    local result = scene.run(text("", keep), { frames = {2, 14} })
+    local meets = math.sqrt(2 / 9.81)
+    for frame, points in result:frames() do
+      local from, to = (frame - 2) / 24, (frame - 1) / 24
+      local function within(time) return from < time and time <= to and 1 or 0 end
+      assert.near({within(meets), within(0.3), frame == 3 and 1 or 0}, points[1].a, 0, tostring(frame))
+      if within(meets) == 1 then
+        assert.near({meets, 9.81 * meets, 2 * 1.5 * 9.81 * meets}, points[1].b, 1e-5)
+        assert.near({0, 0, 0.5 * 9.81 * meets}, points[1].c, 1e-5)
+      elseif within(0.3) == 1 then
+        assert.near({0.3, 1, 0}, points[1].b, 1e-6)
+      elseif frame == 3 then
+        assert.near(2, points[1].b.y, 0)
+        assert.near(2 / 24, points[1].b.x, 1e-6)
+      end
+    end
+  end)
+
+  it("in front of Solve are those of the frame before", function()
+    local result = scene.run(text(keep, ""), { frames = {2, 14} })
+    local meets = math.sqrt(2 / 9.81)
+    for frame, points in result:frames() do
+      local from, to = (frame - 3) / 24, (frame - 2) / 24
+      assert.equal(from < meets and meets <= to and 1 or 0, points[1].a.x)
+    end
+  end)
+
+  it("need a Solve", function()
+    assert.matches("points.events is kept where a :solve ends the chain", scene.error [[
+return rapid.create { points = two } :detail("d", function(points) return #points.events.hits end)]], 1, true)
   end)
 end)

@@ -241,6 +241,12 @@ function rapid.translate(x, y, z) end
 ---@return rapid.Points
 function rapid.points.from(columns) end
 
+---Points at even distances along a curve, with its direction N and the part u of its length.
+---@param curve rapid.Place[]
+---@param options? { count?: integer, closed?: boolean }
+---@return rapid.Points
+function rapid.points.along(curve, options) end
+
 ---@param x number
 ---@param lo number
 ---@param hi number

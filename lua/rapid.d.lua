@@ -237,6 +237,12 @@ function rapid.translate(x, y, z) end
 ---@return rapid.Points
 function rapid.points.from(columns) end
 
+---Points at even distances along a curve, with its direction N and the part u of its length.
+---@param curve rapid.Place[]
+---@param options? { count?: integer, closed?: boolean }
+---@return rapid.Points
+function rapid.points.along(curve, options) end
+
 ---@param x number
 ---@param lo number
 ---@param hi number
@@ -783,6 +789,21 @@ function Node:contact(params) end
 ---@param params? rapid.params.create
 ---@return rapid.Node
 function rapid.create(params) end
+
+---@class rapid.params.curve_force
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field curve rapid.Place[]|rapid.Points|fun(frame: rapid.Frame): rapid.Place[]|rapid.Points  {{x, y, z}, ...} or points, in the order of the curve [list of vec3, or points, m, required]
+---@field closed? boolean|fun(frame: rapid.Frame): boolean  from the last point to the first, too [boolean, default false]
+---@field speed? number|rapid.Attribute|fun(frame: rapid.Frame): number  along the curve; below 0: backwards [number, m/s, default 1, takes rapid.attr]
+---@field pull? number|rapid.Attribute|fun(frame: rapid.Frame): number  towards the curve, a metre of distance [number, 1/s², at least 0, default 10, takes rapid.attr]
+---@field drag? number|rapid.Attribute|fun(frame: rapid.Frame): number  the rate at which points come to the speed [number, 1/s, at least 0, default 3, takes rapid.attr]
+---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  the distance at which the force has fallen to 0; without it, it does not fall [number, m, above 0, takes rapid.attr]
+---@field name? string  what the node is called in messages [string]
+
+---Draws points to a curve, and drives them along it.
+---@param params rapid.params.curve_force
+---@return rapid.Node
+function Node:curve_force(params) end
 
 ---@class rapid.params.delete
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]

@@ -131,11 +131,54 @@ local function make(native, load_node, numeric, shapes, studies)
     end,
   }
   rapid.fog = { read = maker("fog.read", "path"), from_points = maker("fog.from_points", "points") }
+  -- Points at even distances along a curve, with its direction as N and the part of its length as u.
+  local function along(curve, options)
+    options = options_of("rapid.points.along", options)
+    for name in pairs(options) do
+      if name ~= "count" and name ~= "closed" then
+        error(("rapid.points.along: unknown parameter %q%s"):format(describe.name(name),
+          native.did_you_mean(describe.name(name), { "closed", "count" })), 2)
+      end
+    end
+    local count, closed = options.count or 100, options.closed or false
+    if type(count) ~= "number" or count % 1 ~= 0 or count < 2 or count > 1e6 then
+      error(("rapid.points.along: count = %s; it must be whole, from 2 to 1,000,000"):format(describe.value(count)), 2)
+    end
+    if type(closed) ~= "boolean" then
+      error(("rapid.points.along: closed = %s; it must be true or false"):format(describe.value(closed)), 2)
+    end
+    local places = {}
+    for k, place in ipairs(type(curve) == "table" and curve or {}) do
+      if type(place) == "table" and #place == 3 then place = vector.make(place[1], place[2], place[3]) end
+      if not ffi.istype(vector.type, place) then
+        error(("rapid.points.along: point %d is %s; it must be a vec3 or {x, y, z}")
+          :format(k, describe.value(place)), 2)
+      end
+      places[k] = place
+    end
+    if #places < 2 then error("rapid.points.along: a curve is a list of at least two points", 2) end
+    if closed then places[#places + 1] = places[1] end
+    local from = { 0 } -- the length up to each place
+    for k = 2, #places do from[k] = from[k - 1] + (places[k] - places[k - 1]):length() end
+    local whole = from[#from]
+    if not (whole > 0 and whole < math.huge) then error("rapid.points.along: the curve has no length", 2) end
+    local P, N, u, k = {}, {}, {}, 1
+    for i = 1, count do
+      local part = (i - 1) / (closed and count or count - 1)
+      while k < #places - 1 and (from[k + 1] <= part * whole or from[k + 1] == from[k]) do k = k + 1 end
+      local way = places[k + 1] - places[k]
+      P[i] = places[k] + way * ((part * whole - from[k]) / (from[k + 1] - from[k]))
+      N[i], u[i] = way:normalized(), part
+    end
+    return native.make("points.from", { columns = { P = P, N = N, u = u } })
+  end
+
   rapid.shape = {}
   for _, name in ipairs(native.maker_names "shape") do rapid.shape[name] = maker("shape." .. name) end
   rapid.points = {
     read = reader "points.read",
     grid = maker "points.grid",
+    along = along,
     from = function(columns)
       if type(columns) ~= "table" then
         error("rapid.points.from takes a table of columns: { P = {{x, y, z}, ...} }", 2)

@@ -50,6 +50,7 @@ std::string lua_type(const Param& param)
         {"list of vec3", "rapid.Place[]"},
         {"level set", "rapid.Shape"},
         {"mesh", "rapid.Mesh"},
+        {"list of vec3, or points", "rapid.Place[]|rapid.Points"},
         {"mesh, level set, shape, fog, points or node", "rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node"},
         {"motion", "rapid.Motion"},
         {"camera", "rapid.Camera|table<integer, rapid.Camera>"},

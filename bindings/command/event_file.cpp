@@ -74,6 +74,8 @@ PointSet points_of(std::span<const Event> events, std::int64_t frame)
     return points;
 }
 
+bool holds_events(const Format& format) { return format.read && !format.places_alone; }
+
 }  // namespace
 
 void EventFile::declare(CLI::App& app)
@@ -100,10 +102,10 @@ void EventFile::check() const
 {
     std::string known;
     for (const Format& format : formats())
-        if (format.read) known += (known.empty() ? "" : ", ") + format.extension;
+        if (holds_events(format)) known += (known.empty() ? "" : ", ") + format.extension;
     const std::string extension = std::filesystem::path(path_).extension();
-    const auto is_points = [&](const Format& format) { return format.read && format.extension == extension; };
-    if (std::none_of(formats().begin(), formats().end(), is_points))
+    const auto fits = [&](const Format& format) { return holds_events(format) && format.extension == extension; };
+    if (std::none_of(formats().begin(), formats().end(), fits))
         throw Error(fmt::format("--events {}: the events are points; give a file of {}", path_, known));
 }
 

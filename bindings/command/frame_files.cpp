@@ -79,7 +79,7 @@ void FrameFiles::declare(CLI::App& app)
                for (const std::string& text : texts) targets_.push_back({parse_output_target(text), text, {}});
            },
            "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
-           ".usda .npz .csv .png, films: .mp4 .webm .gif); "
+           ".usda .npz .obj .csv .png, films: .mp4 .webm .gif); "
            "attributes behind a colon are written besides P, v and id, without them all are")
         ->type_name("PATTERN[:ATTR,ATTR]")
         ->allow_extra_args(false);

@@ -8,23 +8,30 @@ namespace {
 
 constexpr int most_values = 5;  // at steps, of which four give the value and all five its error
 constexpr std::size_t most_used = 4;
-constexpr std::size_t most_coordinates = 16;
+constexpr std::size_t most_coordinates = 3 * 4096;
+
+// Adds the numbers of a value, lists of lists too; false where it has anything else.
+bool add_numbers(const Value& value, std::vector<double>& numbers)
+{
+    if (const double* number = value.get<double>()) {
+        numbers.push_back(*number);
+    } else if (const Vec3d* v = value.get<Vec3d>()) {
+        numbers.insert(numbers.end(), v->data(), v->data() + 3);
+    } else if (const Table* table = value.table(); table && table->named.empty() && table->numbered.empty()) {
+        for (const Value& entry : table->list)
+            if (numbers.size() >= most_coordinates || !add_numbers(entry, numbers)) return false;
+    } else {
+        return false;
+    }
+    return true;
+}
 
 // The numbers of a value; empty where it has others, or none.
 std::vector<double> numbers_of(const Value& value)
 {
     std::vector<double> numbers;
-    if (const double* number = value.get<double>())
-        numbers.push_back(*number);
-    else if (const Vec3d* v = value.get<Vec3d>())
-        numbers.assign(v->data(), v->data() + 3);
-    else if (const Table* table = value.table(); table && table->named.empty() && table->numbered.empty())
-        for (const Value& entry : table->list) {
-            const double* coordinate = entry.get<double>();
-            if (!coordinate || table->list.size() > most_coordinates) return {};
-            numbers.push_back(*coordinate);
-        }
-    if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); })) return {};
+    const auto is_finite = [](double x) { return std::isfinite(x); };
+    if (!add_numbers(value, numbers) || !std::all_of(numbers.begin(), numbers.end(), is_finite)) return {};
     return numbers;
 }
 
@@ -37,13 +44,17 @@ bool same(const Value& a, const Value& b)
     return object && another && *object == *another;
 }
 
-// Numbers in the form of another value.
-Value in_form_of(const Value& value, const std::vector<double>& numbers)
+// Numbers in the form of another value, from `next` on.
+Value in_form_of(const Value& value, const std::vector<double>& numbers, std::size_t& next)
 {
-    if (value.get<double>()) return numbers[0];
-    if (value.get<Vec3d>()) return Vec3d(numbers[0], numbers[1], numbers[2]);
+    if (value.get<double>()) return numbers[next++];
+    if (value.get<Vec3d>()) {
+        const Vec3d v(numbers[next], numbers[next + 1], numbers[next + 2]);
+        next += 3;
+        return v;
+    }
     auto table = std::make_shared<Table>();
-    table->list.assign(numbers.begin(), numbers.end());
+    for (const Value& entry : value.table()->list) table->list.push_back(in_form_of(entry, numbers, next));
     return std::shared_ptr<const Table>(std::move(table));
 }
 
@@ -141,7 +152,8 @@ Value FrameCurve::at(double part, bool finer) const
         const double curve = is_curve ? interpolated(values, first_, used, part) : finer ? end : line;
         numbers.push_back(param_.range.contains(curve) ? curve : line);
     }
-    return in_form_of(end_, numbers);
+    std::size_t next = 0;
+    return in_form_of(end_, numbers, next);
 }
 
 }  // namespace rapid

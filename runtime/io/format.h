@@ -24,6 +24,8 @@ struct Format {
     PointSet (*read)(const std::filesystem::path& path);
     // Whether a file shows all frames of a sequence, one after another (film.h).
     bool film = false;
+    // Whether it holds the places of points, and nothing else of them.
+    bool places_alone = false;
 };
 
 // All formats, in order of extension.

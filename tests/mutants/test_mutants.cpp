@@ -103,6 +103,7 @@ void write_density_grid(const Path& path)
 // A tetrahedron.
 constexpr const char* obj =
     "o t\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nf 1 3 2\nf 1//1 2//1 4//1\nf 2 3 4\nf 3 1 4\n";
+constexpr const char* lines = "# two\nv 0 0 0\nv 1 0 .5\nv 0 1e-3 0\nl 1 2 3\nv 4 4 4\nl -1 2/1 3/2/1\np 1 4\n";
 constexpr const char* ply =
     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar "
     "red\n"
@@ -173,6 +174,7 @@ const std::vector<Reader>& readers()
         {"points .npz", "a.npz", "", write_points_of, use_points},
         {"points .prt", "a.prt", "", write_points_of, use_points},
         {"points .usda", "a.usda", "", write_points_of, use_points},
+        {"points .obj", "a.obj", lines, nullptr, use_points},
         {"points .vtp, raw", "a.vtp", "", write_points_of, use_points},
         {"points .vtp, text and base64", "a.vtp", vtp, nullptr, use_points},
         {"mesh .ply", "a.ply", ply, nullptr, use_mesh},

@@ -1,0 +1,142 @@
+// .obj: Wavefront's text, as lines.
+//
+//   v x y z          each point, and behind them the places of its trail, from the newest on
+//   p 1 2 ...        the points without a trail
+//   l 1 7 8 ...      a trail, from the point itself backwards
+//
+// It holds places alone: no velocities, attributes and groups. The places of the lines of any such file are read as
+// points in the order of the lines, with the number of the line as the attribute `curve`, from 0; where there are no
+// lines, all of its vertices are.
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "runtime/files/input_file.h"
+#include "runtime/io/format.h"
+#include "runtime/io/ordered_chunks.h"
+#include "runtime/points/trail.h"
+
+namespace rapid {
+namespace {
+
+void add_place(std::string& text, const Vec3f& P)
+{
+    fmt::format_to(std::back_inserter(text), "v {} {} {}\n", P.x(), P.y(), P.z());
+}
+
+void write_obj(OutputFile& file, const PointSet& points, const FrameInfo&)
+{
+    const Trails trails(points);
+    const std::size_t n = points.size();
+    std::vector<std::size_t> begin(n + 1, n);  // of each point's trail among the vertices
+    for (std::size_t i = 0; i < n; ++i) begin[i + 1] = begin[i] + static_cast<std::size_t>(trails.count(i));
+
+    const std::string head = "# Rapid points, metres\n";
+    file.append(head.data(), head.size());
+    append_chunks(file, n, [&](std::size_t first, std::size_t last) {
+        std::string text;
+        for (std::size_t i = first; i < last; ++i) add_place(text, points.P()[i]);
+        return text;
+    });
+    append_chunks(file, n, [&](std::size_t first, std::size_t last) {
+        std::string text;
+        for (std::size_t i = first; i < last; ++i)
+            for (int place = 1; place <= trails.count(i); ++place) add_place(text, trails.at(i, place));
+        return text;
+    });
+    append_chunks(file, n, [&](std::size_t first, std::size_t last) {
+        std::string text;
+        for (std::size_t i = first; i < last; ++i) {
+            text += fmt::format("{} {}", begin[i] == begin[i + 1] ? 'p' : 'l', i + 1);
+            for (std::size_t k = begin[i]; k < begin[i + 1]; ++k) text += fmt::format(" {}", k + 1);
+            text += '\n';
+        }
+        return text;
+    });
+}
+
+// The words of a line, one after the other.
+class Words {
+public:
+    explicit Words(std::string_view line) : line_(line) {}
+
+    std::string_view next()
+    {
+        const std::size_t begin = line_.find_first_not_of(" \t\r");
+        if (begin == std::string_view::npos) return line_ = {};
+        line_.remove_prefix(begin);
+        const std::string_view word = line_.substr(0, line_.find_first_of(" \t\r"));
+        line_.remove_prefix(word.size());
+        return word;
+    }
+
+private:
+    std::string_view line_;
+};
+
+// The whole of a word, or Error.
+template <class T>
+T number_of(std::string_view word, std::size_t line)
+{
+    T number{};
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+    if (error != std::errc() || end != word.data() + word.size())
+        throw Error(fmt::format("line {}: \"{}\" is no number", line, word.substr(0, 40)));
+    return number;
+}
+
+// The vertex that an element of a line names: from 1, or from the last one backwards below 0; what follows a slash
+// is of its texture.
+std::size_t vertex_of(std::string_view word, std::size_t vertices, std::size_t line)
+{
+    const auto index = number_of<std::int64_t>(word.substr(0, word.find('/')), line);
+    const auto count = static_cast<std::int64_t>(vertices);
+    const std::int64_t place = index < 0 ? count + index : index - 1;
+    if (place < 0 || place >= count)
+        throw Error(fmt::format("line {}: there is no vertex {} of {}", line, index, vertices));
+    return static_cast<std::size_t>(place);
+}
+
+PointSet read_obj(const std::filesystem::path& path)
+{
+    const InputFile file(path);
+    std::string_view text = file.text();
+    std::vector<Vec3f> vertices, places;
+    std::vector<std::int32_t> curves;
+    std::int32_t curve = 0;
+    for (std::size_t number = 1; !text.empty(); ++number) {
+        const std::string_view line = text.substr(0, text.find('\n'));
+        text.remove_prefix(std::min(text.size(), line.size() + 1));
+        Words words(line);
+        const std::string_view kind = words.next();
+        if (kind == "v") {
+            Vec3f P;
+            for (int axis = 0; axis < 3; ++axis) P[axis] = number_of<float>(words.next(), number);
+            if (!P.allFinite()) throw Error(fmt::format("line {}: a place must be finite", number));
+            vertices.push_back(P);
+        } else if (kind == "l") {
+            for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+                places.push_back(vertices[vertex_of(word, vertices.size(), number)]);
+                curves.push_back(curve);
+            }
+            ++curve;
+        }
+    }
+    if (vertices.empty()) throw Error("is no .obj file with vertices");
+    if (curve == 0) places = vertices, curves.assign(vertices.size(), 0);
+
+    PointSet points;
+    points.append(places.size());
+    points.P() = Column<Vec3f>(std::span<const Vec3f>(places));
+    const std::span<std::int64_t> id = points.id().overwrite();
+    for (std::size_t i = 0; i < id.size(); ++i) id[i] = static_cast<std::int64_t>(i);
+    points.set("curve", Column<std::int32_t>(std::span<const std::int32_t>(curves)));
+    return points;
+}
+
+RAPID_FORMAT(Format{".obj", "Wavefront lines: places alone, with trails as polylines", write_obj, read_obj,
+                    /*film=*/false,
+                    /*places_alone=*/true});
+
+}  // namespace
+}  // namespace rapid

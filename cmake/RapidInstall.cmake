@@ -8,13 +8,29 @@ install(TARGETS rapid rapid_public EXPORT rapidTargets)
 install(TARGETS rapid_host_library EXPORT rapidHostTargets)
 install(TARGETS rapid_command)
 install(TARGETS rapid_deferred LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-# Headers that bring OpenVDB are the library's own.
-rapid_openvdb_headers(own)
-set(excluded "")
-foreach(header ${own})
-  list(APPEND excluded PATTERN ${header} EXCLUDE)
+# Of the runtime's headers those that are promised to plugins and to programs without Lua, and what they include; the
+# others are the library's own.
+set(promised
+  runtime/error.h runtime/files/input_file.h runtime/graph/node.h runtime/graph/plugin.h runtime/graph/registry.h
+  runtime/graph/stateful.h runtime/io/format.h runtime/parallel.h runtime/points/members.h runtime/points/point_set.h
+  runtime/shapes/analytic/shape_type.h runtime/shapes/first_contact.h runtime/shapes/level_set/level_set.h
+  runtime/shapes/mesh/mesh.h runtime/solver/constraints/rows.h)
+set(installed "")
+while(promised)
+  list(POP_FRONT promised header)
+  if(header IN_LIST installed OR NOT EXISTS ${PROJECT_SOURCE_DIR}/${header})  # abi.h is made
+    continue()
+  endif()
+  list(APPEND installed ${header})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${header})
+  file(STRINGS ${PROJECT_SOURCE_DIR}/${header} includes REGEX "^#include \"runtime/")
+  list(TRANSFORM includes REPLACE "^#include \"(.*)\".*" "\\1")
+  list(APPEND promised ${includes})
+endwhile()
+foreach(header ${installed})
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid/${folder})
 endforeach()
-install(DIRECTORY runtime DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid FILES_MATCHING PATTERN "*.h" ${excluded})
 install(FILES ${PROJECT_BINARY_DIR}/include/runtime/graph/abi.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rapid/runtime/graph)
 install(DIRECTORY include/rapid DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})

@@ -80,6 +80,94 @@ TEST_CASE("a scene runs in C", "[c]")
     REQUIRE(rapid_frame_release(frame, nullptr) == RAPID_OK);
 }
 
+TEST_CASE("the header is of the library's version", "[c]")
+{
+    CHECK_THAT(rapid_version(), Catch::StartsWith(std::to_string(RAPID_VERSION_MAJOR) + "." +
+                                                  std::to_string(RAPID_VERSION_MINOR) + "."));
+}
+
+TEST_CASE("what is offered in C is taken", "[c]")
+{
+    rapid_offers* offers = nullptr;
+    REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+    const float P[] = {0, 5, 0, 0, 6, 0}, heat[] = {1, 2};
+    rapid_column columns[2] = {sized<rapid_column>(), sized<rapid_column>()};
+    columns[0].name = "P";
+    columns[0].type = RAPID_FLOAT_VEC3;
+    columns[0].data = P;
+    columns[1].name = "heat";
+    columns[1].type = RAPID_FLOAT;
+    columns[1].data = heat;
+    REQUIRE(rapid_offers_points(offers, "cloud", 2, columns, 2, nullptr) == RAPID_OK);
+
+    const rapid_node_parameter rate = {"rate", "by which it grows", "1/s", {RAPID_NUMBER, {2, 0, 0}, nullptr}};
+    const rapid_node_column grown = {"heat", RAPID_FLOAT};
+    auto grow = sized<rapid_node_type>();
+    grow.name = "grow";
+    grow.doc = "Adds to the heat.";
+    grow.kind = RAPID_EDIT;
+    grow.parameters = &rate;
+    grow.parameter_count = 1;
+    grow.writes = &grown;
+    grow.write_count = 1;
+    int calls = 0;
+    grow.user = &calls;
+    grow.call = [](void* user, const rapid_call* now) {
+        ++*static_cast<int*>(user);
+        for (size_t i = 0; i < now->count; ++i) now->writes[0][i] += static_cast<float>(now->parameters[0] * now->dt);
+        return now->frame > 13 ? 7 : 0;
+    };
+    REQUIRE(rapid_offers_node(offers, &grow, nullptr) == RAPID_OK);
+
+    rapid_options options = RAPID_OPTIONS;
+    options.offers = offers;
+    rapid_scene* scene = nullptr;
+    REQUIRE(rapid_scene_open_text("offered.lua",
+                                  "local rapid = require 'rapid'\n"
+                                  "return rapid.create { points = rapid.host 'cloud' } :grow {} :solve {}",
+                                  &options, &scene, nullptr) == RAPID_OK);
+    CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance_to(scene, 13, &frame, nullptr) == RAPID_OK);
+    CHECK(calls == 12);
+    auto found = sized<rapid_column>();
+    REQUIRE(rapid_frame_column(frame, "heat", &found, nullptr) == RAPID_OK);
+    CHECK(static_cast<const float*>(found.data)[1] == Approx(3));
+    Told told;
+    CHECK(rapid_scene_advance(scene, nullptr, told) == RAPID_FAILED_FRAME);
+    CHECK_THAT(told.message(), Contains("it returned 7"));
+    rapid_frame_release(frame, nullptr);
+    rapid_scene_close(scene, nullptr);
+}
+
+TEST_CASE("wrong offers in C are errors by name", "[c]")
+{
+    rapid_offers* offers = nullptr;
+    REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+    const auto refused = [](const char* what, const auto& call) {
+        Told told;
+        CHECK(call(told) == RAPID_WRONG_CALL);
+        CHECK_THAT(told.message(), Contains(what));
+    };
+    auto shape = sized<rapid_shape>();
+    auto type = sized<rapid_node_type>();
+    refused("offers is NULL", [&](rapid_error** e) { return rapid_offers_new(nullptr, e); });
+    refused("the offers is NULL", [&](rapid_error** e) { return rapid_offers_guard(nullptr, 1, e); });
+    refused("name is NULL", [&](rapid_error** e) { return rapid_offers_shape(offers, nullptr, &shape, e); });
+    refused("shape is NULL", [&](rapid_error** e) { return rapid_offers_shape(offers, "a", nullptr, e); });
+    refused("shape->distance", [&](rapid_error** e) { return rapid_offers_shape(offers, "a", &shape, e); });
+    refused("positions", [&](rapid_error** e) { return rapid_offers_mesh(offers, "a", nullptr, 3, nullptr, 0, e); });
+    refused("columns", [&](rapid_error** e) { return rapid_offers_points(offers, "a", 1, nullptr, 1, e); });
+    refused("type->call", [&](rapid_error** e) { return rapid_offers_node(offers, &type, e); });
+    type.call = [](void*, const rapid_call*) { return 0; };
+    refused("type->name", [&](rapid_error** e) { return rapid_offers_node(offers, &type, e); });
+    type.name = "a";
+    type.kind = 9;
+    refused("type->kind = 9", [&](rapid_error** e) { return rapid_offers_node(offers, &type, e); });
+    CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
+    refused("no open offers", [&](rapid_error** e) { return rapid_offers_release(offers, e); });
+}
+
 TEST_CASE("an error in C has message, file, line and node", "[c]")
 {
     rapid_scene* scene = nullptr;

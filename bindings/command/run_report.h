@@ -47,8 +47,8 @@ public:
 
     // The statistics file and the summary. Error: the file can't be written.
     void finish();
-    // A signal that ends the run between two frames: says so, and writes the statistics and the profile of the frames so far. Returns
-    // the status of the process.
+    // A signal that ends the run between two frames: says so, and writes the statistics and the profile of the frames
+    // so far. Returns the status of the process.
     int interrupted(int signal, const std::string& why);
     // An error that ends the run: reports it, and writes the statistics and the profile of the frames so far.
     int fail(const Error& error);

@@ -115,7 +115,7 @@ private:
     WriteHook write_;
     ResultHook result_;
     InputHook input_;
-    Stopwatch frame_clock_;  // since advance() began
+    Stopwatch frame_clock_;      // since advance() began
     std::function<void()> ask_;  // may be empty
     std::int64_t next_;
     int subframes_ = 1;  // of all simulations

@@ -44,8 +44,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t batch_size = 256;  // births at a time, in the first-level cache
-
+constexpr std::size_t batch_size = 256;     // births at a time, in the first-level cache
 constexpr double most_births = 2147483647;  // in a frame
 constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness is examined
 
@@ -128,8 +127,7 @@ struct Emit {
                 "given, a step of 8 times those around it and half the source's size is a jump, and reported")
             .param(&Emit::inherit, "inherit", 1.0, any_number(), "",
                    "fraction of the source's velocity that is added; of a node, also names of attributes that the "
-                   "newborn have "
-                   "of their parents")
+                   "newborn have of their parents")
             .param(&Emit::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean direction and size")
             .param(&Emit::speed, "speed", 0.0, any_number(), "m/s",
                    "along the source's normal N, added to velocity; a number or {min, max}")

@@ -1,4 +1,5 @@
--- The statistics of a run without what differs from run to run: times, threads and memory.
+-- The statistics of a run without what differs from run to run: times, threads and memory; and passes over the points,
+-- of which a run that goes on behind a snapshot makes those again that are made once.
 local json = require "dkjson"
 
 local same = {}
@@ -8,7 +9,7 @@ function same.of(text)
   local run = json.decode(text)
   run.seconds, run.threads, run.peak_bytes = nil, nil, nil
   for _, frame in ipairs(run.frames) do
-    frame.seconds = nil
+    frame.seconds, frame.nodes = nil, nil
     if frame.contact_grids then frame.contact_grids.search_seconds = nil end
     for _, band in ipairs(frame.bands or {}) do band.seconds = nil end
   end

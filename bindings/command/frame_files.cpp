@@ -130,7 +130,7 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
         const std::string& pattern = target.to.pattern;
         if (has_part(pattern))
             throw Error(fmt::format("-o {}: names the whole, where --parts is given; leave {{part}} out", target.text));
-        if (const Format& format = format_of(pattern); !format.read || format.film)
+        if (const Format& format = format_of(pattern); !format.read || format.film || format.places_alone)
             throw Error(
                 fmt::format("-o {}: a {} file of parts can't be put together; write points, or leave --parts "
                             "out",

@@ -191,11 +191,11 @@ private:
     void check_output(const std::vector<PartFiles>& parts) const
     {
         const Format& format = format_of(output_);
-        if (!format.read || format.film)
+        if (!format.read || format.film || format.places_alone)
             throw Error(fmt::format("-o {}: a {} file holds no points; merge to a format that does", output_,
                                     format.extension));
         for (const PartFiles& part : parts)
-            if (const Format& own = format_of(part.text); !own.read)
+            if (const Format& own = format_of(part.text); !own.read || own.places_alone)
                 throw Error(fmt::format("{}: a {} file holds no points that could be read", part.text, own.extension));
         const FramePattern pattern(output_);
         if (parts.front().frames.size() > 1 && !pattern.has_frame())

@@ -69,7 +69,7 @@ private:
     Evaluator evaluator_;
 };
 
-// What a frame is, without times: statistics as text, every estimated error, and the points.
+// What a frame is, without times and what each pass took: statistics as text, every estimated error, and the points.
 struct Seen {
     std::string statistics;
     std::vector<double> errors, frame_errors, energy_drift;
@@ -82,6 +82,7 @@ struct Seen {
     {
         FrameStatistics figures = statistics_of(result);
         figures.seconds = {};
+        figures.nodes.clear();
         for (BandFigures& band : figures.bands) band.seconds = 0;
         if (figures.contact_search) figures.contact_search->seconds = 0;
         statistics = json_line(figures, true);

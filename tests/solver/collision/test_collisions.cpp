@@ -328,23 +328,23 @@ TEST_CASE("of several shapes the first along the path is met, in any order of th
 
 TEST_CASE("a point between two walls makes all its bounces in one step", "[collide]")
 {
-    // 4.1666 m in a slit of 1 mm: 4,166 bounces.
-    Scene scene(points({{0.0005f, 0, 0}}).v({{100, 0, 0}}));
-    scene.collide(make_plane({1, 0, 0}, 0), 1.0f).collide(make_plane({-1, 0, 0}, -0.001), 1.0f).run(1);
-    CHECK(scene.last.collisions == 4167);
+    // 4.1666 m in a slit of 50 mm, from its middle: 83 bounces.
+    Scene scene(points({{0.025f, 0, 0}}).v({{100, 0, 0}}));
+    scene.collide(make_plane({1, 0, 0}, 0), 1.0f).collide(make_plane({-1, 0, 0}, -0.05), 1.0f).run(1);
+    CHECK(scene.last.collisions == 83);
     CHECK(std::abs(scene.v().x()) == 100);
     CHECK(scene.last.contact_limit == 0);
     CHECK(scene.last.penetration_max < 1e-9);
 }
 
-TEST_CASE("at the limit of contacts a point stays at its last one, and is counted", "[collide][extreme]")
+TEST_CASE("at the limit of contacts a point rests at its last one, and is counted", "[collide][extreme]")
 {
     Scene scene(points({{5e-7f, 0, 0}, {0.5f, 0, 0}}).v({{100, 0, 0}, {1, 0, 0}}));
     scene.collide(make_plane({1, 0, 0}, 0), 1.0f, 0.0f).collide(make_plane({-1, 0, 0}, -1e-6), 1.0f, 0.0f, "slit");
     scene.points.group("slit").write()[0] = 1;
     scene.run(1);
     CHECK(scene.last.contact_limit == 1);
-    CHECK(std::abs(scene.v().x()) == 100);
+    CHECK(scene.v().x() == 0);
     CHECK(scene.P().x() >= 0);
     CHECK(scene.P().x() <= 1e-6 * (1 + 1e-6));
     CHECK_THAT(scene.P(1), close_to(Vec3d(0.5 + h, 0, 0), 1e-7));

@@ -142,6 +142,7 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
         return rapid.create { seed = 4 }
           :emit { source = rapid.mesh.grid {}, rate = 50 }
           :field { grid = up }
+          :curve_force { curve = function(frame) return {{-1, frame.time, 0}, {1, 0.5, frame.time}} end, radius = 1 }
           :write { file = "/nowhere/points.####.csv" }
           :group { name = "high", where = function(p) return p.P.y > 0 end }
           :solve {})"},

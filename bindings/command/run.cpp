@@ -18,7 +18,6 @@
 #include "bindings/command/untrusted.h"
 #include "bindings/command/watch.h"
 #include "bindings/host/threads.h"
-#include "runtime/files/content_hash.h"
 #include "runtime/files/output_file.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/evaluate.h"
@@ -117,7 +116,7 @@ public:
             if (cache_.asked()) events_.keep_all();
             events_.begin();
             if (cache_.asked()) {
-                cache_.begin(*session, plan, frames, fingerprint_options(common), files_, events_);
+                cache_.begin(*session, plan, frames, fingerprint_options(), files_, events_);
                 report.set_cache(&cache_);
             }
             report.begin(plan.first_frame(), frames.last);
@@ -216,7 +215,7 @@ private:
     bool estimates_errors() const { return !quiet_ || !stats_.empty(); }
 
     // What else changes what a run keeps.
-    Fingerprint fingerprint_options(const CommonOptions& common) const
+    Fingerprint fingerprint_options() const
     {
         const auto answer = [](bool is) { return is ? "yes" : "no"; };
         Fingerprint options = {{"the estimate of errors", answer(estimates_errors())},
@@ -224,8 +223,6 @@ private:
                                {"--keep-all", answer(keep_all_)}};
         if (part_.part()) options["--part"] = name_of(*part_.part());
         if (part_.sample()) options["--sample"] = fmt::format("{}", *part_.sample());
-        for (const std::string& plugin : common.plugins)
-            options["plugin " + std::filesystem::path(plugin).filename().string()] = hash_text(file_hash(plugin));
         return options;
     }
 

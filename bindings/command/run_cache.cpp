@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <chrono>
+#include <thread>
 #include <utility>
 
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/report/memory.h"
+#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {
@@ -19,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+constexpr double longest_wait = 5;  // s, for a run that ends
 constexpr std::string_view prefix = "snapshot.", suffix = ".rapid";
 
 // What a snapshot's file holds.
@@ -94,9 +97,16 @@ void RunCache::lock()
     fs::create_directories(folder_, error);
     if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
     lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
-    if (lock_ && ::flock(lock_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        throw Error(
-            fmt::format("--cache {}: another run has it; wait for its end, or give another folder", folder_.string()));
+    // One that was killed keeps it until the system has taken its memory back.
+    const Stopwatch waited;
+    while (lock_ && ::flock(lock_.number(), LOCK_EX | LOCK_NB) != 0) {
+        if (errno == EINTR) continue;
+        if (errno != EWOULDBLOCK) return;  // a file system without locks
+        if (waited.seconds() > longest_wait)
+            throw Error(fmt::format("--cache {}: another run has it; wait for its end, or give another folder",
+                                    folder_.string()));
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
 }
 
 void RunCache::refuse(const std::vector<std::string>& differences)

@@ -36,7 +36,15 @@ std::string mark_of(const std::string& file)
     return bytes.substr(begin, std::min<std::size_t>(bytes.find('\0', begin) - begin, 256));
 }
 
+std::vector<std::string>& loaded()
+{
+    static std::vector<std::string> files;
+    return files;
+}
+
 }  // namespace
+
+const std::vector<std::string>& loaded_plugins() { return loaded(); }
 
 void load_plugin(const std::string& file)
 {
@@ -59,6 +67,7 @@ void load_plugin(const std::string& file)
     } catch (const Error& error) {
         throw Error(fmt::format("{}: {}", file, error.message()));
     }
+    loaded().push_back(file);
 }
 
 void load_plugins(const std::string& path)

@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "runtime/graph/abi.h"
 #include "runtime/graph/node.h"
@@ -30,6 +31,9 @@ void load_plugin(const std::string& file);
 
 // path: a list separated by colons, of plugins and of folders, from which all *.so are loaded in order of name.
 void load_plugins(const std::string& path);
+
+// The files of those that were loaded, in order.
+const std::vector<std::string>& loaded_plugins();
 
 // A constraint from a function of the points that returns its rows (solver/constraints/rows.h), called before each
 // frame.

@@ -300,6 +300,13 @@ flock -n 9
 "$RAPID" run scene.lua -f 1-2 --cache cache 2>&1 || echo "status $?"
 ]]
     assert.equal("--cache cache: another run has it; wait for its end, or give another folder\nstatus 2\n", said)
+    -- One that ends is waited for.
+    assert.truthy(folder:shell [[
+flock cache/.lock sleep 0.5 &
+until [ -e cache/.lock ]; do sleep 0.01; done
+"$RAPID" run scene.lua -f 1-2 --cache cache
+wait
+]]:find("\nframe 2  ", 1, true))
   end)
 
   it("ends the frame on SIGTERM, keeps it in a snapshot, and goes on from there", function()
@@ -348,6 +355,19 @@ ls cache | grep snapshot
 ]]
     assert.equal("status 143\ninterrupted; the frame took longer than the --grace, and is dropped\n" ..
       "snapshot.0002.rapid\n", said)
+    -- With a second signal, at once.
+    said = folder:shell [[
+"$RAPID" run scene.lua -f 1-8 --cache other --grace 1000 >said 2>&1 &
+one=$!
+until grep -q '^frame 3 ' said; do sleep 0.01; done
+kill -TERM $one
+sleep 0.1
+kill -TERM $one
+wait $one
+echo "status $?"
+tail -n 1 said
+]]
+    assert.equal("status 143\ninterrupted\n", said)
   end)
 
   it("goes on where snapshots can't be written, says so, and writes its files", function()

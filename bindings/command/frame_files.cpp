@@ -143,14 +143,15 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
     return merges;
 }
 
-// A file that was complete is none while it is written again.
-void FrameFiles::note_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info)
+// A part that was complete is none while it is written again.
+void FrameFiles::begin_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info)
 {
     const std::filesystem::path file = part_record_file(pattern, output);
-    const auto start = static_cast<std::int64_t>(info.number - std::llround(info.time * info.fps));
-    if (!of_part_.emplace(file, Sequence{info.fps, start}).second) return;
+    if (!begun_.insert(file).second) return;
     std::error_code none;
     std::filesystem::remove(file, none);
+    const auto start = static_cast<std::int64_t>(info.number - std::llround(info.time * info.fps));
+    of_part_.emplace(file, Sequence{info.fps, start});  // of a `:write` node
 }
 
 void FrameFiles::write_part_records() const
@@ -233,6 +234,10 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
         try {
             check(target.to.pattern);
             resolve(target, plan);
+            for (const std::string& output : target.outputs) {
+                const PlannedSimulation& of = plan.simulations[plan.nodes[plan.outputs.at(output)].simulation];
+                if (part_) of_part_.emplace(part_record_file(target.to.pattern, output), Sequence{of.fps, of.start});
+            }
         } catch (const Error& error) {
             throw Error(fmt::format("-o {}: {}", target.text, error.message()));
         }
@@ -324,12 +329,12 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     const FramePattern pattern(to.pattern);
     const std::string path = pattern.expand(info.number, output), how = how_of(to, selection_);
     const auto film = whole_.films.empty() ? whole_.films.end() : whole_.films.find(absolute(path));
-    if (part_) note_sequence(to.pattern, output, info);
     if (whole_file(info.number, path, how) || (film != whole_.films.end() && film->second == how)) return;
     std::shared_ptr<const PictureFit> before;
     if (const std::int64_t last = info.number - selection_.step; pattern.has_frame() && last >= selection_.first)
         if (const auto* file = whole_file(last, pattern.expand(frame_number(last), output), how)) before = file->fit;
     if (named_.insert(key + '\n' + output).second) first_names_.push_back(path);
+    if (part_) begin_sequence(to.pattern, output, info);
     FrameWriter* writer = nullptr;
     {
         const std::lock_guard lock(mutex_);

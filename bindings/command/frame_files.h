@@ -98,7 +98,7 @@ private:
     void resolve(Target& target, const Plan& plan) const;
     std::string name_in_part(const std::string& pattern) const;
     void check_part(const std::string& pattern) const;
-    void note_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info);
+    void begin_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info);
     void write_part_records() const;
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
@@ -118,6 +118,7 @@ private:
         std::int64_t start;
     };
     std::map<std::filesystem::path, Sequence> of_part_;  // by the file of the record
+    std::set<std::filesystem::path> begun_;              // likewise: those of which a frame was written
 
     std::set<std::string> named_;
     std::vector<std::string> first_names_;

@@ -110,7 +110,10 @@ public:
             if (!part_.subset().is_all()) take_subset(plan, part_.subset());
 
             const FrameSelection frames = range_of(plan);
-            if (record_) record_->frames = frames;
+            if (record_) {
+                record_->frames = frames;
+                read_.put_into(record_->identity, folder_of(graph_.file()));
+            }
             files_.resolve(plan, !frames.single());
             if (farm_.asked()) return submit(plan);
             if (cache_.asked()) events_.keep_all();
@@ -163,14 +166,23 @@ private:
         job.outputs = folders.empty() ? "." : folders.front();
         job.words = farm_.words(*app_, {"--parts"});
         job.words.emplace_back("--quiet");
+        // Each task has a cache of its own.
+        std::string cache = (std::filesystem::absolute(job.scripts()) / "cache").string();
+        std::erase_if(job.words, [&](const std::string& word) {
+            if (!word.starts_with("--cache=")) return false;
+            cache = word.substr(std::string_view("--cache=").size());
+            return true;
+        });
         if (parts_ == 1) {
-            job.tasks.push_back({"run", {}});
+            job.tasks.push_back({"run", {"--cache=" + cache}});
             return farm_.submit(std::move(job));
         }
         take_subset(plan, Subset(Part{1, static_cast<int>(parts_)}, std::nullopt));
         for (int number = 1; number <= parts_; ++number) {
-            const Part part{number, static_cast<int>(parts_)};
-            job.tasks.push_back({"part " + name_of(part), {fmt::format("--part={}/{}", part.number, part.count)}});
+            const std::string name = name_of({number, static_cast<int>(parts_)});
+            job.tasks.push_back(
+                {"part " + name,
+                 {fmt::format("--part={}/{}", number, parts_), fmt::format("--cache={}/{}", cache, name)}});
         }
         for (const auto& [whole, parts] : files_.merges())
             job.last.push_back({"merge", "--quiet", "--output=" + whole, parts});
@@ -250,7 +262,6 @@ private:
                 if (end.signal() != 0) return interrupted(result.frame, report, end.signal());
                 for (const std::string& warning : cache_.take_warnings()) report.warning(warning, result.frame);
             }
-            if (record_) read_.put_into(record_->identity, folder_of(graph_.file()));
             if (cache_.first_due())  // what an earlier run has computed behind it
                 for (const FrameRecord* record : cache_.records(last + 1, frames.last))
                     report.known_frame(*record, false);

@@ -126,7 +126,10 @@ private:
         for (std::size_t row = 0; row < rows.size(); ++row) {
             std::vector<std::string> words = words_of(rows[row], statistics_of(folder, row), outputs, common);
             words.erase(words.begin());  // the name of the program
-            std::erase_if(words, [](const std::string& word) { return word.starts_with("--threads="); });
+            // A task that begins again goes on behind its last snapshot.
+            std::erase_if(words, [](const std::string& word) {
+                return word.starts_with("--threads=") || word == "--cache-every=0";
+            });
             job.tasks.push_back({rows[row].label(), {words.begin() + 2, words.end()}});
             job.words.assign(words.begin(), words.begin() + 2);  // run GRAPH
         }

@@ -122,6 +122,32 @@ describe("rapid run --part", function()
   end)
 end)
 
+describe("parts with a cache", function()
+  it("are the whole run when they were interrupted, and complete where all frames were there", function()
+    done "run drops.lua -f 1-12 -o 'cw.####.csv' --quiet"
+    for k = 1, 2 do -- a folder each
+      done(("run drops.lua --part %d/2 -f 1-5 -o 'cc.####.csv' --cache caches/%d --cache-every 2 --quiet"):format(k, k))
+      done(("run drops.lua --part %d/2 -f 1-12 -o 'cc.####.csv' --cache caches/%d --quiet"):format(k, k))
+    end
+    command.shell("rm cc_part1of2.csv.json", { cwd = folder.path })
+    done "run drops.lua --part 1/2 -f 1-12 -o 'cc.####.csv' --cache caches/1 --quiet"
+    done "merge -o 'cm.####.csv' 'cc_part{part}.####.csv'"
+    for frame = 1, 12 do
+      local name = (".%04d.csv"):format(frame)
+      assert.truthy(folder:read("cw" .. name) == folder:read("cm" .. name), name)
+    end
+  end)
+
+  it("refuse the cache of another part", function()
+    done "run drops.lua --part 1/2 -f 1-3 -o 'co.####.csv' --cache other --quiet"
+    for _, option in ipairs { "--part 2/2", "--part 1/3", "", "--sample 0.5" } do
+      local result = rapid("run drops.lua -f 1-3 -o 'co.####.csv' --cache other --quiet " .. option)
+      assert.equal(2, result.status, option)
+      assert.matches("it is of another run", result.stderr)
+    end
+  end)
+end)
+
 describe("rapid run --sample", function()
   it("has the points of the whole run at its ids, to the bit", function()
     done "run drops.lua -f 1-12 -o 'w.####.csv' --quiet"

@@ -123,6 +123,41 @@ describe("rapid run --farm slurm", function()
     assert.truthy(folder:read "whole/a.0008.bgeo" == folder:read "kill/a.0008.bgeo")
   end)
 
+  it("goes on behind the last snapshot of a task that was put back into the queue, or killed", function()
+    folder:write("slow.lua", [[
+local rapid = require "rapid"
+local function rate(frame)
+  local sum = 0
+  for k = 1, 2e7 do sum = sum + k % 7 end
+  return sum > 0 and 500 + frame.number or 0
+end
+return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = rate } :gravity {} :solve {}
+]])
+    done "run slow.lua -f 1-40 -o 'slow/w.####.ply' --quiet"
+    done "run slow.lua -f 1-40 -o 'slow/a.####.ply' --cache-every 2 --farm slurm --parts 2"
+    local array = json.decode((folder:read "slow/FARM.json")).tasks[1].job
+    for _ = 1, 300 do
+      local snapshots = 0
+      for part = 1, 2 do
+        local found = shell(("ls slow/FARM/cache/%dof2"):format(part)).stdout:match "snapshot"
+        snapshots = snapshots + (found and 1 or 0)
+      end
+      if snapshots == 2 then break end
+      shell "sleep 0.1"
+    end
+    assert.equal(0, shell(("scontrol requeue %d_1"):format(array)).status)
+    assert.equal(0, shell(("scancel --signal=KILL %d_2"):format(array)).status)
+    assert.matches("^done %l+ waiting$", states(settled "slow/FARM.json"))
+    assert.equal(1, rapid("farm status slow/FARM.json").status)
+    assert.is_nil(folder:read "slow/a_part2of2.0040.ply") -- it was killed on the way
+    done "farm retry slow/FARM.json"
+    assert.equal("done done done", states(settled "slow/FARM.json"))
+    for frame = 1, 40 do
+      local name = (".%04d.ply"):format(frame)
+      assert.truthy(folder:read("slow/w" .. name) == folder:read("slow/a" .. name), name)
+    end
+  end)
+
   it("submits the whole run as one task without --parts", function()
     done "run drops.lua -f 1-4 --set rate=500 -o 'one/a.####.csv' --farm slurm"
     assert.equal("done", states(settled "one/FARM.json"))
@@ -135,7 +170,7 @@ describe("rapid run --farm slurm", function()
                                  { cwd = folder.path, environment = { PATH = "/usr/bin/none" } })
     assert.equal("", result.stderr)
     assert.equal(0, result.status)
-    assert.matches("--part=2/3 ;;  # part 2of3", result.stdout, 1, true)
+    assert.matches("2) set -- --part=2/3 ", result.stdout, 1, true)
     assert.matches("#SBATCH --requeue", result.stdout, 1, true)
     assert.is_nil(folder:read "it's/FARM.json")
     folder:write("printed.sh", result.stdout)

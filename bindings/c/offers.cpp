@@ -83,17 +83,17 @@ HostNode node_of(const rapid_node_type& given)
     HostNode node;
     node.name = &not_null(given.name, "type->name");
     node.doc = given.doc ? given.doc : "";
-    if (given.kind != RAPID_FORCE && given.kind != RAPID_EDIT)
-        refuse(fmt::format("type->kind = {}; it must be RAPID_FORCE or RAPID_EDIT", given.kind));
-    node.kind = given.kind == RAPID_FORCE ? HostNode::Force : HostNode::Edit;
+    if (given.kind < RAPID_FORCE || given.kind > RAPID_CONSTRAINT)
+        refuse(fmt::format("type->kind = {}; it must be RAPID_FORCE, RAPID_EDIT or RAPID_CONSTRAINT", given.kind));
+    node.kind = static_cast<HostNode::Kind>(given.kind);
     if (given.parameter_count > 0) not_null(given.parameters, "type->parameters");
     for (std::size_t i = 0; i < given.parameter_count; ++i)
         node.parameters.push_back(parameter_of(given.parameters[i]));
     node.reads = columns_of(given.reads, given.read_count);
     node.writes = columns_of(given.writes, given.write_count);
     node.call = [call = given.call, user = given.user](const HostCall& now) {
-        const rapid_call in_c{now.count, now.frame,        now.time,  now.dt,     now.parameters, now.P,
-                              now.v,     now.acceleration, now.reads, now.writes, now.kill};
+        const rapid_call in_c{now.count,        now.frame, now.time,   now.dt,   now.parameters, now.P,   now.v,
+                              now.acceleration, now.reads, now.writes, now.kill, now.id,         now.rods};
         expect_done(call(user, &in_c));
     };
     return node;
@@ -181,6 +181,15 @@ int rapid_offers_node(rapid_offers* offers, const rapid_node_type* type, rapid_e
         HostNode node = node_of(known_part(type, "type"));
         const std::lock_guard lock(open->mutex);
         open->nodes.push_back(std::move(node));
+    });
+}
+
+int rapid_call_add_rod(const rapid_call* call, int64_t a, int64_t b, double length, double compliance,
+                       rapid_error** error)
+{
+    return guarded(error, [&] {
+        if (!not_null(call, "call").rods) refuse("the call is not of a constraint: it takes no rods");
+        static_cast<std::vector<HostRod>*>(call->rods)->push_back({a, b, length, compliance});
     });
 }
 

@@ -6,6 +6,7 @@
 
 #include "bindings/scene/guarded_array.h"
 #include "bindings/scene/host_object.h"
+#include "bindings/scene/host_rods.h"
 #include "bindings/scene/scene_error.h"
 #include "runtime/graph/evaluation.h"
 #include "runtime/points/members.h"
@@ -204,11 +205,15 @@ public:
     void* fields() override { return &fields_; }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override
     {
-        if (declared_->kind == HostNode::Force)
+        if (declared_->kind == HostNode::Constraint) {
+            auto rods = rods_of(*declared_, fields_.values, fields_.group, inputs[0].points, now);
+            if (rods) inputs[0].dynamics.add(std::move(rods));
+        } else if (declared_->kind == HostNode::Force) {
             inputs[0].dynamics.add(std::shared_ptr<const Force>(
                 dynamic_of<HostForce>(now, fields_.group, declared_, fields_, now.frame, guarded_)));
-        else
+        } else {
             Edit(*declared_, fields_, now, guarded_).run(inputs[0].points);
+        }
         return std::move(inputs[0]);
     }
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
@@ -282,11 +287,17 @@ try {
     if (!node.call) throw Error("it has no function to call");
     if (node.kind == HostNode::Force && !node.writes.empty())
         throw Error("a force writes no columns; it gives accelerations");
+    if (node.kind == HostNode::Constraint && !(node.reads.empty() && node.writes.empty()))
+        throw Error("a constraint reads and writes no columns; it gives rods");
     NodeType type;
     type.name = node.name;
     type.doc = node.doc;
-    type.kind = node.kind == HostNode::Force ? NodeKind::Dynamic : NodeKind::Points;
+    type.kind = node.kind == HostNode::Edit ? NodeKind::Points : NodeKind::Dynamic;
     if (node.kind == HostNode::Force) type.stages = {Stage::Forces};
+    if (node.kind == HostNode::Constraint) {
+        type.stages = {Stage::Constraints};
+        type.uses.takes.push_back("mass");
+    }
     type.varies = node.kind == HostNode::Edit;
     type.params.push_back(param_of(&HostFields::group, "group", Value(), any_number(), "", "acts on this group only"));
     std::size_t place = 0;

@@ -64,6 +64,13 @@ struct HostParameter {
     double most = std::numeric_limits<double>::infinity();
 };
 
+// Two points that a constraint keeps at a distance.
+struct HostRod {
+    std::int64_t a = 0, b = 0;  // ids
+    double length = 0;          // m
+    double compliance = 0;      // m/N; 0: rigid
+};
+
 // The points that a node's callback works on.
 struct HostCall {
     std::size_t count = 0;  // of points in this call
@@ -71,6 +78,11 @@ struct HostCall {
     double time = 0;        // s since the start: of a force that of the first point, in the middle of its sub-step
     double dt = 0;          // s, of a frame
     const double* parameters = nullptr;  // in the order of the declaration; a vector is three numbers
+
+    // Of a constraint: the points' ids, where they are (below, at the frame's beginning), and the rods of this frame,
+    // none at first.
+    const std::int64_t* id = nullptr;
+    std::vector<HostRod>* rods = nullptr;
 
     // Of a force: where the points are in the middle of a sub-step, m, and their velocities, m/s; and the accelerations
     // that it adds, m/s², zero at first. Shape [count][3].
@@ -88,8 +100,9 @@ struct HostCall {
 // A node of the program's, as good in Lua as any other: `:magnet { strength = 3 }`.
 struct HostNode {
     enum Kind {
-        Force,  // called for chunks of points, in each sub-step
-        Edit,   // called once a frame, for all points of its group, on the scene's thread
+        Force,       // called for chunks of points, in each sub-step
+        Edit,        // called once a frame, for all points of its group, on the scene's thread
+        Constraint,  // gives rods between points, once a frame, for all points, on the scene's thread
     };
     std::string name, doc;
     Kind kind = Force;

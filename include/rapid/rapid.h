@@ -221,7 +221,13 @@ typedef struct rapid_call {
     const float* const* reads; /* columns, in the order of the declaration, shape [count][1 or 3] */
     float* const* writes;      /* of an edit, with their values */
     uint8_t* kill;             /* of an edit: 0 at first; points with 1 are taken away behind it */
+    const int64_t* id;         /* of a constraint, with P at the frame's beginning */
+    void* rods;                /* of a constraint: for rapid_call_add_rod() */
 } rapid_call;
+
+/* Of a constraint: keeps two points, by their ids, at a length, m, in this frame; compliance in m/N, 0: rigid. */
+int rapid_call_add_rod(const rapid_call* call, int64_t a, int64_t b, double length, double compliance,
+                       rapid_error** error);
 
 typedef struct rapid_node_parameter {
     const char* name;
@@ -235,13 +241,15 @@ typedef struct rapid_node_column {
     int type; /* RAPID_FLOAT or RAPID_FLOAT_VEC3 */
 } rapid_node_column;
 
-enum { RAPID_FORCE = 0, RAPID_EDIT = 1 };
+enum { RAPID_FORCE = 0, RAPID_EDIT = 1, RAPID_CONSTRAINT = 2 };
 
 typedef struct rapid_node_type {
     size_t size; /* sizeof(rapid_node_type) */
     const char* name;
     const char* doc;
-    int kind; /* RAPID_FORCE: for chunks of points, in each sub-step; RAPID_EDIT: once a frame, on the scene's thread */
+    /* RAPID_FORCE: called for chunks of points, in each sub-step; RAPID_EDIT, RAPID_CONSTRAINT: once a frame, for all
+     * points, on the scene's thread */
+    int kind;
     const rapid_node_parameter* parameters;
     size_t parameter_count;
     const rapid_node_column* reads;

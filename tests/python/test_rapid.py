@@ -168,6 +168,16 @@ class Offers(unittest.TestCase):
         self.assertAlmostEqual(frame["heat"][0], 10 / 24, places=5)
         self.assertEqual(len(scene.advance_to(14)), 0)
 
+    def test_a_constraint(self):
+        def chain(now, length):
+            return [(a, b, length, 0) for a, b in zip(now.id, now.id[1:])]
+        scene = rapid.Scene("chain.lua", nodes=[rapid.Constraint("chain", chain, parameters={"length": 1.0})], text="""
+            return require('rapid').create { points = require('rapid').points.from { P = {{0, 0, 0}, {1, 0, 0}},
+              v = {{0, 1, 0}, {0, -1, 0}} } } :chain {} :solve { substeps = 20 }""")
+        P = scene.advance_to(30)["P"].astype(float)
+        self.assertAlmostEqual(numpy.linalg.norm(P[0] - P[1]), 1, places=3)
+        self.assertAlmostEqual(P[0, 0], 0.5 - 0.5 * math.cos(2 * 29 / 24), places=2)
+
     def test_what_a_force_raises_rises(self):
         def broken(now):
             raise ZeroDivisionError("in a force")

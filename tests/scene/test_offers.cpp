@@ -229,6 +229,49 @@ TEST_CASE("a program's edit reads and writes columns, in a group, and takes poin
     CHECK(fifth.statistics().died == 50);
 }
 
+TEST_CASE("a program's constraint keeps points at a distance", "[offers]")
+{
+    HostNode node;
+    node.name = "chain";
+    node.doc = "Ties each point to the next.";
+    node.kind = HostNode::Constraint;
+    node.parameters = {{"length", "of a link", 1.0, "m", 0}};
+    node.call = [](const HostCall& now) {
+        for (std::size_t i = 1; i < now.count; ++i)
+            now.rods->push_back({now.id[i - 1], now.id[i], now.parameters[0], 0});
+    };
+    SceneOptions options;
+    options.nodes = {node};
+    const std::string text =
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}},"
+        " v = {{0, 3, 0}, {0, 0, 0}, {0, 0, 5}} } }\n"
+        ":gravity {} :chain {} :solve { substeps = 20 }";
+    Scene scene = good(Scene::open_text("chain.lua", text, options));
+    for (int frame = 1; frame <= 48; ++frame) {
+        const SceneFrame now = good(scene.advance());
+        const SceneColumn P = *now.column("P");
+        for (std::size_t i = 1; i < 3; ++i) {
+            const float *a = P.at<float>(i - 1), *b = P.at<float>(i);
+            REQUIRE(std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) == Approx(1).epsilon(1e-3));
+        }
+        // The middle of their masses falls freely.
+        const double t = (frame - 1) / 24.0;
+        const float sum = P.at<float>(0)[1] + P.at<float>(1)[1] + P.at<float>(2)[1];
+        REQUIRE(sum / 3 == Approx(t - 9.81 / 2 * t * t).margin(1e-3));
+    }
+
+    const auto error_with = [&](const HostRod& rod) {
+        options.nodes[0].call = [rod](const HostCall& now) { now.rods->push_back(rod); };
+        return error_of(text, options);
+    };
+    CHECK_THAT(error_with({0, 7, 1, 0}).message, Contains("between the ids 0 and 7"));
+    CHECK_THAT(error_with({1, 1, 1, 0}).message, Contains("two points"));
+    CHECK_THAT(error_with({0, 1, -1, 0}).message, Contains("length -1"));
+    CHECK_THAT(error_with({0, 1, 1, NAN}).message, Contains("compliance nan"));
+    CHECK(error_with({0, 1, -1, 0}).node == "chain1");
+}
+
 TEST_CASE("a program's points and meshes are taken", "[offers]")
 {
     const std::vector<float> P = {0, 1, 0, 0, 2, 0, 0, 3, 0}, heat = {5, 0, 6, 0, 7, 0};

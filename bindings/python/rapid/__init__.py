@@ -18,9 +18,9 @@ import numpy
 from ._library import (Column, Error, Find, FrameInfo, Log, Node, Options, Parameter, Progress, Value, call, from_value,
                        get, library, sized, to_settings)
 
-from ._offers import Edit, Force, Held, Mesh, Points, Shape, from_numpy, make_offers
+from ._offers import Constraint, Edit, Force, Held, Mesh, Points, Shape, from_numpy, make_offers
 
-__all__ = ["Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy"]
+__all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy"]
 __version__ = library.rapid_version().decode()
 
 _types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8]
@@ -182,7 +182,7 @@ class Scene:
     the text of a module, or None; find_file(path) the path of a file that the scene names, or None.
 
     objects={"floor": rapid.Shape(...)}: what the scene takes as rapid.host "floor", and set={"collide2.shape": "host:floor"}
-    for a parameter of a node. nodes: further types of nodes, rapid.Force and rapid.Edit. guard_callbacks=True finds those
+    for a parameter of a node. nodes: further types of nodes, rapid.Force, rapid.Edit and rapid.Constraint. guard_callbacks=True finds those
     that write past the ends of their arrays.
     """
 

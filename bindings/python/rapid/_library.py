@@ -64,7 +64,8 @@ class Call(ctypes.Structure):
     _fields_ = [("count", c_size_t), ("frame", c_double), ("time", c_double), ("dt", c_double),
                 ("parameters", POINTER(c_double)), ("P", POINTER(c_double)), ("v", POINTER(c_double)),
                 ("acceleration", POINTER(c_double)), ("reads", POINTER(POINTER(ctypes.c_float))),
-                ("writes", POINTER(POINTER(ctypes.c_float))), ("kill", POINTER(ctypes.c_uint8))]
+                ("writes", POINTER(POINTER(ctypes.c_float))), ("kill", POINTER(ctypes.c_uint8)),
+                ("id", POINTER(c_int64)), ("rods", c_void_p)]
 
 
 class NodeParameter(ctypes.Structure):
@@ -155,6 +156,7 @@ for _name, _types in {
         "offers_points": [c_void_p, c_char_p, c_size_t, POINTER(Column), c_size_t],
         "offers_shape": [c_void_p, c_char_p, POINTER(Shape)],
         "offers_node": [c_void_p, POINTER(NodeType)],
+        "call_add_rod": [POINTER(Call), c_int64, c_int64, c_double, c_double],
         "scene_offer": [c_void_p, c_void_p],
         "offers_release": [c_void_p],
         "scene_picture": [c_void_p, c_void_p, c_int, c_int, POINTER(c_void_p), POINTER(c_size_t)],

@@ -128,12 +128,14 @@ class Now:
 
     def __init__(self, now, node):
         self.count, self.frame, self.time, self.dt = now.count, now.frame, now.time, now.dt
-        self._columns = {}
+        self._now, self._columns = now, {}
         for pointers, columns in ((now.reads, node._reads), (now.writes, node._writes)):
             for place, (name, width) in enumerate(columns):
                 shape = (now.count,) if width == 1 else (now.count, 3)
                 self._columns[name] = _array(pointers[place], shape)
-        if now.P:
+        if now.id:
+            self.P, self.id = _array(now.P, (now.count, 3)), _array(now.id, (now.count,))
+        elif now.P:
             self.P, self.v = _array(now.P, (now.count, 3)), _array(now.v, (now.count, 3))
             self.acceleration = _array(now.acceleration, (now.count, 3))
         if now.kill:
@@ -158,6 +160,16 @@ class Edit(_Node):
 
     def _call(self, now, numbers):
         self._function(now, **numbers)
+
+
+class Constraint(_Node):
+    """A constraint: function(now, **parameters) returns rods [(id, id, length in m, compliance in m/N), ...] for the points
+    now.id at now.P, once a frame."""
+    _kind = 2
+
+    def _call(self, now, numbers):
+        for a, b, length, compliance in self._function(now, **numbers):
+            call("call_add_rod", byref(now._now), int(a), int(b), length, compliance)
 
 
 class Held(list):

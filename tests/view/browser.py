@@ -35,11 +35,14 @@ class Browser:
 
     def __init__(self, width=1280, height=800):
         self.port = free_port()
-        self.driver = subprocess.Popen(["chromedriver", f"--port={self.port}"], stdout=subprocess.DEVNULL,
-                                       stderr=subprocess.DEVNULL, start_new_session=True)
+        words = ["setpriv", "--pdeathsig", "TERM", "chromedriver", f"--port={self.port}"]
+        self.driver = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                       start_new_session=True)
         wait_for(lambda: self.is_up(), 30)
         options = {"args": ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-                            "--disable-dev-shm-usage", f"--window-size={width},{height}"]}
+                            "--disable-dev-shm-usage", "--disable-background-timer-throttling",
+                            "--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding",
+                            f"--window-size={width},{height}"]}
         made = self.call("POST", "/session", {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}, "")
         self.session = f"/session/{made['sessionId']}"
         self.call("POST", "/timeouts", {"script": 60000})
@@ -130,6 +133,10 @@ class Browser:
             pass
         self.driver.terminate()
         self.driver.wait()
+        try:
+            os.killpg(self.driver.pid, signal.SIGKILL)  # a browser that did not hear
+        except ProcessLookupError:
+            pass
 
 
 class View:

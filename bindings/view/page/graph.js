@@ -35,7 +35,7 @@ export class Graph {
 
   show(picture, why) {
     if (!picture) {
-      this.root.replaceChildren(element("p", { class: "quiet" }, why || "Files have no graph."));
+      this.root.replaceChildren(element("p", { class: "quiet" }, why || "The graph is drawn after the first frame."));
       return;
     }
     this.picture = picture;

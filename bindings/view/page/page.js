@@ -301,11 +301,11 @@ async function showPoint() {
     const row = await ask("point", { ...shown(), id });
     const { path } = await ask("path", { id, output: state.output || undefined });
     if (id !== state.point) return;
-    inspector.point(id, row, state.life);
+    inspector.point(id, row, state.status.sequence ? "" : state.life);
     picture.mark(row.values.P, path.map(([, ...place]) => place.slice(0, 3)));
   } catch (error) {
     if (id !== state.point) return;
-    inspector.point(id, { values: { id, state: error.message }, groups: [] }, state.life);
+    inspector.point(id, { values: { id, state: error.message }, groups: [] }, state.status.sequence ? "" : state.life);
     picture.mark(null);
   }
 }
@@ -462,6 +462,11 @@ async function follow() {
     bar.state.textContent = status.state === "computing" ? `computing ${newest() || status.first} of ${status.last}` : words[status.state];
     showChoices(status);
     showError(status.error);
+    if (status.sequence && !parameterPart.hidden) {
+      // Files have no parameters, no graph and no figures of a run.
+      parameterPart.hidden = tabs.graph.button.hidden = tabs.figures.button.hidden = true;
+      openTab("sheet");
+    }
     parameters.show(status);
     inspector.messages(status);
     timeline.show(status);
@@ -469,8 +474,6 @@ async function follow() {
       graphNumber = status.graph_number;
       graph.show(status.graph, status.no_graph);
       if (state.after && !graph.node(state.after)) chooseNode("");
-    } else if (status.sequence && !graph.picture) {
-      graph.show(null);
     }
     // The newest frame while nobody has chosen another; then the one chosen, as soon as this run has it.
     const end = newest();

@@ -53,7 +53,7 @@ export class Parameters {
       this.shape = shape;
       this.fields.clear();
       this.list.replaceChildren(...(this.known.length ? this.known.map((p) => this.row(p))
-        : [element("div", { class: "quiet" }, status.sequence ? "Files have no parameters." : "The scene declares none: rapid.param(name, default, doc).")]));
+        : [element("div", { class: "quiet" }, "The scene declares none: rapid.param(name, default, doc).")]));
     }
     for (const parameter of this.known) {
       const field = this.fields.get(parameter.name);

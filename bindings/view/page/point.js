@@ -27,7 +27,9 @@ export class Inspector {
     const rows = Object.entries(row.values).map(([name, value]) =>
       element("tr", { "data-attribute": name }, element("th", {}, name), element("td", { class: "number" }, exact(value))));
     if (row.groups.length) rows.push(element("tr", {}, element("th", {}, "groups"), element("td", { class: "number" }, row.groups.join(", "))));
-    this.put("point", `Point ${id}`, element("table", { id: "attributes" }, ...rows),
+    const table = element("table", { id: "attributes" }, ...rows);
+    if (life === "") return this.put("point", `Point ${id}`, table); // files tell none
+    this.put("point", `Point ${id}`, table,
       element("h2", { class: "life-head" }, "Life", element("span", { class: "gap" }),
         life ? null : element("button", { id: "trace", title: "computes what happened to the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
       life ? this.life(life) : element("div", { class: "quiet" }, "Birth, edits by nodes, contacts and death: computed when asked for."));
@@ -97,8 +99,15 @@ export class Inspector {
 
   messages(status) {
     if (!status.warnings.length) return this.hide("messages");
-    const rows = status.warnings.map(({ frame, text }) => element("li", {},
-      frame > 0 ? element("button", { class: "small", title: "go to this frame", onclick: () => this.actions.go(frame) }, frame) : null, ` ${text}`));
+    // Of those that differ in numbers alone the first, and how many more there are.
+    const kinds = new Map();
+    for (const warning of status.warnings) {
+      const kind = warning.text.replace(/\d[\d.e+-]*/g, "#"), known = kinds.get(kind);
+      if (known) { ++known.more; known.last = warning.frame; } else kinds.set(kind, { ...warning, more: 0 });
+    }
+    const rows = [...kinds.values()].map(({ frame, text, more, last }) => element("li", {},
+      frame > 0 ? element("button", { class: "small", title: "go to this frame", onclick: () => this.actions.go(frame) }, frame) : null, ` ${text}`,
+      more > 0 ? element("span", { class: "quiet" }, ` (${more} more like it, the last in frame ${last})`) : null));
     if (status.more_warnings) rows.push(element("li", { class: "quiet" }, `and ${status.more_warnings} more`));
     this.put("messages", "Warnings", element("ul", { class: "list" }, ...rows));
   }

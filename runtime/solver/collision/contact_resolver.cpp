@@ -16,9 +16,11 @@ constexpr double tangential = 1e-9;
 // in the valley: what two responses leave of a velocity across it.
 constexpr double valley = 1e-6;
 
-// Impacts of a point in one sub-step, after which it rests where it is for what is left of that: between shapes that
-// close in on it there is no end of them.
-constexpr int max_impacts = 100;
+// Impacts of a point in one sub-step that come soon after another, after which it rests where it is for what is left of
+// that: between shapes that close in on it there is no end of them. Those of a fast point that crosses a room, or of
+// one that comes to rest on a surface, are farther apart, or fewer.
+constexpr int max_impacts = 1000;
+constexpr double soon = 1e-4;  // of the sub-step
 
 // Counts an impact towards max_contacts, as what it makes of max_impacts; chatter is looked for by the rest.
 bool is_jammed(CollidingPoint& point)
@@ -135,7 +137,7 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
         rest(point, support, contact_response(v, contact.vc, n, 0, friction));
     else
         bounce(point, support, epsilon);
-    if (hits && is_jammed(point)) {
+    if (hits && contact.time < soon * block_.dt[i] && is_jammed(point)) {
         audit_.add_limited();
         block_.v[i] = contact.vc;
         point.left = 0;

@@ -16,27 +16,29 @@ local function statistics(text, frames)
 end
 
 describe("the limit of impacts", function()
-  it("ends a jam of points at a hundred impacts of each, counts it and tells", function()
+  it("ends a jam of points at a thousand impacts of each, counts it and tells", function()
     local stats, result = statistics(lid, "1-24")
     local impacts, limits = 0, 0
     for _, frame in ipairs(stats.frames) do
-      assert.is_true(frame.collisions <= 4 * 100, ("frame %d: %d"):format(frame.frame, frame.collisions))
+      assert.is_true(frame.collisions <= 4 * 1010, ("frame %d: %d"):format(frame.frame, frame.collisions))
       impacts, limits = impacts + frame.collisions, limits + frame.contact_limit
     end
-    assert.is_true(limits >= 4 and impacts < 4 * 24 * 100, ("%d, %d"):format(limits, impacts))
+    assert.is_true(limits >= 4 and impacts < 4 * 24 * 1010, ("%d, %d"):format(limits, impacts))
     assert.matches("points reached the limit of contacts", result.stdout)
     assert.matches("rest where they are", result.stderr)
   end)
 
-  it("lets what is jammed rest on the surface that it met last", function()
-    local points = scene.run(lid, { frames = {24, 24} })[24]
-    for i = 1, 4 do assert.near({i - 1, points[1].P.y, 0}, points[i].P, 1e-6) end
-    assert.is_true(points[1].v:length() < 0.1)
+  it("lets what is jammed rest where it is", function()
+    local result = scene.run(lid, { frames = {12, 24} })
+    for frame = 12, 24 do
+      for i = 1, 4 do assert.near(result[12][i].P, result[frame][i].P, 1e-6) end
+    end
+    for i = 1, 4 do assert.near({i - 1, 0, 0}, result[24][i].P, 0.05) end
   end)
 
-  it("is not met by a point that bounces on, however fast, up to ninety times a step", function()
+  it("is not met by a fast point that bounces on between walls, two thousand times a step", function()
     -- Between walls 0.11 m apart, less a diameter of 0.01 m on each side: a way of 0.1 m.
-    local speed = 90 * 0.1 * 24
+    local speed = 2000 * 0.1 * 24
     local points = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{%g, 0, 0}}, pscale = {0.005} } }
   :collide { shape = rapid.shape.plane { normal = {1, 0, 0}, offset = -0.055 }, bounce = 1 }

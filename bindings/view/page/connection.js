@@ -26,7 +26,12 @@ export class Connection {
   open() {
     this.socket = new WebSocket(`ws://${location.host}/socket`);
     this.socket.binaryType = "arraybuffer";
-    this.ready = new Promise((resolve) => { this.socket.onopen = () => { resolve(); this.found(); }; });
+    let refuse;
+    this.ready = new Promise((resolve, reject) => {
+      this.socket.onopen = () => { resolve(); this.found(); };
+      refuse = reject;
+    });
+    this.ready.catch(() => {}); // those that wait are told
     this.socket.onmessage = (event) => {
       const answer = typeof event.data === "string" ? JSON.parse(event.data) : decode(event.data);
       const waiting = this.waiting.get(answer.re);
@@ -36,6 +41,7 @@ export class Connection {
       else waiting.resolve(answer);
     };
     this.socket.onclose = () => {
+      refuse(new Error("the server has gone"));
       for (const { reject } of this.waiting.values()) reject(new Error("the server has gone"));
       this.waiting.clear();
       this.lost();
@@ -45,6 +51,7 @@ export class Connection {
 
   async ask(what, given = {}) {
     await this.ready;
+    if (this.socket.readyState !== WebSocket.OPEN) throw new Error("the server has gone");
     const re = this.next++;
     return new Promise((resolve, reject) => {
       this.waiting.set(re, { resolve, reject });

@@ -497,5 +497,5 @@ let saved = null;
 try { saved = localStorage.getItem("theme"); } catch { /* none */ }
 theme(saved ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 openTab("graph");
-window.rapidView = { state, picture, go, ask, choosePoint }; // for the browser's console, and tests
+window.rapidView = { state, picture, go, ask, choosePoint, connection }; // for the browser's console, and tests
 follow();

@@ -137,6 +137,14 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
             end)
           :points ("follow", function(p, frame) p.v = p.v + frame.detail.middle * 0.01 + vec3(frame.detail.total, 0, 0) * 1e-4 end)
           :solve {})"},
+    {"values of the nearest place of a mesh that turns", R"(
+        local sheet = rapid.mesh.from { points = {{-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}},
+                                        faces = {{1, 2, 3}, {1, 3, 4}}, values = { heat = {0, 1, 2, 3} } }
+        return rapid.create { seed = 4 }
+          :emit { source = rapid.mesh.grid {}, rate = 50 }
+          :transfer { source = sheet:transform(function(frame) return rapid.rotate({0, 1, 0}, 20 * frame.number) end) }
+          :points ("rise", function(p) p.v = p.v + vec3(0, p.heat * p.dt, 0) end)
+          :solve {})"},
     {"a vector grid, and files on the way", R"(
         local up = rapid.grid.from { size = {4, 4, 4}, voxel = 1, at = function() return vec3(0, 1, 0) end }
         return rapid.create { seed = 4 }

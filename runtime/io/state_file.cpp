@@ -140,6 +140,8 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
 
 bool StateFile::is_one(const std::filesystem::path& path)
 {
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(path, none)) return false;  // of a pipe reading would wait
     std::ifstream file(path, std::ios::binary);
     std::array<char, magic.size()> head{};
     return file.read(head.data(), head.size()) && std::string_view(head.data(), head.size()) == magic;

@@ -315,9 +315,9 @@ function rapid.fog.from_points(points, options) end
 
 ---@class rapid.options.fog_read
 ---@field grid? string  its name; the only fog of floats, when not given [string]
----@field before? "hold"|"repeat"|"mirror"|"nothing"  what holds before the first file of a sequence [string, one of hold, repeat, mirror, nothing, default "hold"]
----@field after? "hold"|"repeat"|"mirror"|"nothing"  what holds after the last [string, one of hold, repeat, mirror, nothing, default "hold"]
----@field offset? integer  by which a sequence begins later [integer, frames, default 0]
+---@field before? "hold"|"repeat"|"mirror"|"none"  what goes before the first file of a sequence: "hold" (that file), "repeat" (the last ones again), "mirror" (back and forth) or "none" (nothing) [string, one of hold, repeat, mirror, none]
+---@field after? "hold"|"repeat"|"mirror"|"none"  and behind the last one [string, one of hold, repeat, mirror, none]
+---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
 
 ---Reads a fog, in which points are born by density, from a .vdb file.
 ---@param path string  relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some [string, required]
@@ -350,9 +350,9 @@ function rapid.grid.from_points(points, options) end
 
 ---@class rapid.options.grid_read
 ---@field grid? string  its name; the only grid of vectors, when not given [string]
----@field before? "hold"|"repeat"|"mirror"|"nothing"  what holds before the first file of a sequence [string, one of hold, repeat, mirror, nothing, default "hold"]
----@field after? "hold"|"repeat"|"mirror"|"nothing"  what holds after the last [string, one of hold, repeat, mirror, nothing, default "hold"]
----@field offset? integer  by which a sequence begins later [integer, frames, default 0]
+---@field before? "hold"|"repeat"|"mirror"|"none"  what goes before the first file of a sequence: "hold" (that file), "repeat" (the last ones again), "mirror" (back and forth) or "none" (nothing) [string, one of hold, repeat, mirror, none]
+---@field after? "hold"|"repeat"|"mirror"|"none"  and behind the last one [string, one of hold, repeat, mirror, none]
+---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
 
 ---Reads a grid of vectors from a .vdb file.
 ---@param path string  relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some [string, required]

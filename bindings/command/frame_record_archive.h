@@ -44,6 +44,18 @@ void serialize(Archive& keep, ContactEnergy& energy)
     keep(added, lost);
 }
 
+// As cereal has it, which clang refuses for a class within a class: it takes that for one without a default
+// constructor.
+template <StateArchive Archive, class T>
+void keep_optional(Archive& keep, std::optional<T>& value)
+{
+    bool is_there = value.has_value();
+    T held = is_there ? std::move(*value) : T();
+    keep(is_there, held);
+    value.reset();
+    if (is_there) value = std::move(held);
+}
+
 template <StateArchive Archive>
 void serialize(Archive& keep, EnergyChanges::Split& split)
 {
@@ -55,7 +67,8 @@ template <StateArchive Archive>
 void serialize(Archive& keep, EnergyChanges& changes)
 {
     auto& [rods, contacts, pins, drag, split] = changes;
-    keep(rods, contacts, pins, drag, split);
+    keep(rods, contacts, pins, drag);
+    keep_optional(keep, split);
 }
 
 template <StateArchive Archive>
@@ -69,7 +82,8 @@ template <StateArchive Archive>
 void serialize(Archive& keep, Ledger& ledger)
 {
     auto& [kinetic, potential, elastic, by, by_motion, momentum, angular_momentum, residue] = ledger;
-    keep(kinetic, potential, elastic, by, by_motion, momentum, angular_momentum, residue);
+    keep(kinetic, potential, elastic, by, by_motion, momentum, angular_momentum);
+    keep_optional(keep, residue);
 }
 
 template <StateArchive Archive>
@@ -109,7 +123,8 @@ void serialize(Archive& keep, FrameStatistics& statistics)
         statistics;
     keep(frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
          left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
-         constraint_residual_max, constraint_rows, loose_constraints, asleep, contact_search, seconds, nodes);
+         constraint_residual_max, constraint_rows, loose_constraints, asleep, seconds, nodes);
+    keep_optional(keep, contact_search);
 }
 
 }  // namespace rapid

@@ -166,6 +166,7 @@ int run(const Arguments& arguments)
     app.footer(
         "`rapid COMMAND --help` tells more. Exit status: 0 done; 1 found while a frame ran, a failed test, a\n"
         "difference; 2 found before (usage, a mistake in the graph, a missing file).");
+    app.require_subcommand(0, 1);  // behind one the name of another is an argument: `rapid nodes merge`
     CommonOptions common;
     const std::vector<std::unique_ptr<Command>> commands = make_commands();
     for (const auto& command : commands) {

@@ -68,9 +68,8 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
     L_ = lua_newstate(allocate, this);
     if (!L_) throw std::bad_alloc();
     const std::exception_ptr error = set_up();
-    if (!error) return;
-    close();
-    std::rethrow_exception(error);
+    // One that is not whole is given up: closing it, LuaJIT takes it for granted that its library ffi is.
+    if (error) std::rethrow_exception(error);
 }
 
 // In a protected call, since Lua's own error (out of memory) is no C++ exception: one that was caught as such could not
@@ -102,12 +101,11 @@ std::exception_ptr State::set_up()
     return std::make_exception_ptr(status == LUA_ERRMEM ? Error("out of memory") : Error(lua_tostring(L_, -1)));
 }
 
-State::~State() { close(); }
-
-void State::close()
+State::~State()
 {
+    if (is_broken_) return;
     protected_ = true;  // Lua calls finalizers so, and nothing else of it allocates
-    if (!is_broken_) lua_close(L_);
+    lua_close(L_);
 }
 
 State& State::of(lua_State* L)

@@ -113,7 +113,6 @@ private:
 
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     int protected_call(int arguments, int results, int handler);
-    void close();
     // Fills a new state; the error, where there is one.
     std::exception_ptr set_up();
     void open_libraries();

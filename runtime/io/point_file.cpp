@@ -44,14 +44,14 @@ void append_points(PointSet& to, const PointSet& from)
 {
     const std::size_t before = to.size();
     to.append(from.size());
-    for (const auto& [name, column] : from.columns())
+    for (const auto& named : from.columns())
         std::visit(
             [&](const auto& values) {
                 using T = std::decay_t<decltype(values[0])>;
-                const std::span<T> place = to.column<T>(name).write().subspan(before);
+                const std::span<T> place = to.column<T>(named.first).write().subspan(before);
                 for (std::size_t i = 0; i < from.size(); ++i) place[i] = values[i];
             },
-            column);
+            named.second);
 }
 
 PointFile::PointFile(const std::filesystem::path& path, const PointSet& like)

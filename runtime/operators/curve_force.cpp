@@ -7,6 +7,8 @@
 //
 // The integrator solves both parts together: no pull is too stiff. c is that in the middle of a sub-step, and held for
 // it: of second order along the curve. Beyond the ends of an open curve there is no force.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 

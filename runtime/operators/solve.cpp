@@ -341,7 +341,8 @@ private:
         };
         if (result.contact_limit > 0)
             warn(
-                "points reached the limit of contacts in a step, a thousand impacts, and rest where they are for what "
+                "points reached the limit of contacts in a step, two thousand impacts, and rest where they are for "
+                "what "
                 "was "
                 "left of it; take more substeps");
         if (result.residual.loose > 0)

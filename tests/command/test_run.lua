@@ -77,7 +77,7 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
 ]]
     local result = folder:run "-f 1-4 --stats s.json"
     assert.equal(0, result.status)
-    assert.equal('warning: frame 2: node "solve1": points reached the limit of contacts in a step, a thousand ' ..
+    assert.equal('warning: frame 2: node "solve1": points reached the limit of contacts in a step, two thousand ' ..
       "impacts, and rest where they are for what was left of it; take more substeps\n", result.stderr)
     assert.truthy(result.stdout:find(
       "\nwarning  points reached the limit of contacts 3 times, in 3 frames from 2 to 4\n$"), result.stdout)

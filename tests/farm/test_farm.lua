@@ -146,6 +146,8 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
       shell "sleep 0.1"
     end
     assert.equal(0, shell(("scontrol requeue %d_1"):format(array)).status)
+    shell "sleep 2"
+    assert.equal(0, shell(("scontrol update JobId=%d_1 StartTime=now"):format(array)).status) -- not in two minutes
     assert.equal(0, shell(("scancel --signal=KILL %d_2"):format(array)).status)
     assert.matches("^done %l+ waiting$", states(settled "slow/FARM.json"))
     assert.equal(1, rapid("farm status slow/FARM.json").status)

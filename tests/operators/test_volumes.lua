@@ -51,10 +51,10 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{-1.5, 0, 0}} 
     assert.near(9, velocity("", 14), 1e-3)
     assert.near(3.5, velocity("after = 'repeat'", 13), 1e-3)
     assert.near(5.5, velocity("after = 'mirror'", 13), 1e-3)
-    assert.near(0, velocity("after = 'nothing'", 13), 1e-6)
+    assert.near(0, velocity("after = 'none'", 13), 1e-6)
     assert.near(1.5, velocity("offset = 3", 5), 1e-3)
     assert.near(1, velocity("offset = 3", 3), 1e-3)
-    assert.near(0, velocity("offset = 3, before = 'nothing'", 3), 1e-6)
+    assert.near(0, velocity("offset = 3, before = 'none'", 3), 1e-6)
   end)
 
   it("is asked by nodes in Lua that take a grid, at the time of each sub-step", function()

@@ -133,7 +133,9 @@ RAPID_MAKER(TorusMesh);
 std::map<std::string, Mesh::VertexValues> vertex_values(const std::map<std::string, Value>& lists, std::size_t vertices)
 {
     std::map<std::string, Mesh::VertexValues> values;
-    for (const auto& [name, list] : lists) {
+    for (const auto& named : lists) {
+        const auto& name = named.first;
+        const auto& list = named.second;
         if (name == "P" || name == "v" || name == "id")
             throw Error(
                 fmt::format("values: {} is no attribute of vertices that births could have; take another name", name));

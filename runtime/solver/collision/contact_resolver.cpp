@@ -19,8 +19,8 @@ constexpr double valley = 1e-6;
 // Impacts of a point in one sub-step that come soon after another, after which it rests where it is for what is left of
 // that: between shapes that close in on it there is no end of them. Those of a fast point that crosses a room, or of
 // one that comes to rest on a surface, are farther apart, or fewer.
-constexpr int max_impacts = 1000;
-constexpr double soon = 1e-4;  // of the sub-step
+constexpr int max_impacts = 2000;  // more than after which chatter is looked for (path_planner.cpp)
+constexpr double soon = 1e-4;      // of the sub-step
 
 // Counts an impact towards max_contacts, as what it makes of max_impacts; chatter is looked for by the rest.
 bool is_jammed(CollidingPoint& point)

@@ -16,14 +16,14 @@ local function statistics(text, frames)
 end
 
 describe("the limit of impacts", function()
-  it("ends a jam of points at a thousand impacts of each, counts it and tells", function()
+  it("ends a jam of points at two thousand impacts of each, counts it and tells", function()
     local stats, result = statistics(lid, "1-24")
     local impacts, limits = 0, 0
     for _, frame in ipairs(stats.frames) do
-      assert.is_true(frame.collisions <= 4 * 1010, ("frame %d: %d"):format(frame.frame, frame.collisions))
+      assert.is_true(frame.collisions <= 4 * 2010, ("frame %d: %d"):format(frame.frame, frame.collisions))
       impacts, limits = impacts + frame.collisions, limits + frame.contact_limit
     end
-    assert.is_true(limits >= 4 and impacts < 4 * 24 * 1010, ("%d, %d"):format(limits, impacts))
+    assert.is_true(limits >= 4 and impacts < 4 * 24 * 2010, ("%d, %d"):format(limits, impacts))
     assert.matches("points reached the limit of contacts", result.stdout)
     assert.matches("rest where they are", result.stderr)
   end)

@@ -172,15 +172,15 @@ private:
     {
         const FrameSelection& wanted = part.record.frames;
         const FramePattern pattern(part.text);
-        std::map<int, fs::path> there = pattern.existing();
-        if (!pattern.has_frame() && !there.empty()) there = {{static_cast<int>(wanted.first), there.begin()->second}};
         std::vector<int> missing;
+        std::error_code none;
         for (std::int64_t frame = wanted.first; frame <= wanted.last; frame += wanted.step) {
-            const auto found = there.find(static_cast<int>(frame));
-            if (found == there.end())
-                missing.push_back(static_cast<int>(frame));
+            const int number = static_cast<int>(frame);
+            const fs::path path = pattern.expand(number);
+            if (fs::exists(path, none))
+                part.frames.emplace(number, path);
             else
-                part.frames.insert(*found);
+                missing.push_back(number);
         }
         if (!missing.empty())
             problems.push_back(fmt::format("of {} {} missing: {}", part.text,

@@ -1,12 +1,12 @@
 #include "bindings/command/part_record.h"
 
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "bindings/command/whole_file.h"
+#include "runtime/files/content_hash.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/frame_pattern.h"
 
@@ -95,9 +95,7 @@ void ReadFiles::add(const std::filesystem::path& file)
     const std::lock_guard lock(mutex_);
     std::string& hash = hashes_[file.lexically_normal().string()];
     if (!hash.empty()) return;
-    const InputFile content(file);
-    const XXH128_hash_t bits = XXH3_128bits(content.bytes().data(), content.bytes().size());
-    hash = fmt::format("{:016x}{:016x}", bits.high64, bits.low64);
+    hash = hash_text(file_hash(file));
 }
 
 void ReadFiles::put_into(std::map<std::string, std::string>& identity, const std::filesystem::path& folder) const

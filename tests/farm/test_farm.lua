@@ -3,12 +3,11 @@ local command = require "testing.command"
 local json = require "dkjson"
 
 local folder = command.folder()
-local root = command.shell("pwd").stdout:gsub("%s+$", "")
 local slurm = folder:file "slurm"
 
 -- The cluster ends with this process, whose id the shell has as its parent's.
-local started = command.shell(("exec %s/tests/farm/private_slurm start %s %s 4"):format(
-  root, slurm, command.shell("echo $PPID").stdout:gsub("%s+$", "")))
+local started = command.shell(("exec tests/farm/private_slurm start %s %s 4"):format(
+  slurm, command.shell("echo $PPID").stdout:gsub("%s+$", "")))
 local environment = { SLURM_CONF = slurm .. "/slurm.conf" }
 
 local function rapid(arguments)

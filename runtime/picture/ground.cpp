@@ -12,19 +12,16 @@ const Vec3f grid_colour(0.070f, 0.076f, 0.088f);
 
 }  // namespace
 
-Ground::Ground(const PictureScene::Plane& plane, const Box3d& bounds, bool is_solid)
+Ground::Ground(const PictureScene::Plane& plane, const PictureView& view, bool is_solid)
     : normal(plane.normal.normalized().cast<float>()),
       offset(static_cast<float>(plane.offset / plane.normal.norm())),
+      spacing(static_cast<float>(view.line_spacing)),
+      center(view.bounds.center().cast<float>()),
+      extent(static_cast<float>(1.2 * std::max(1e-6, view.bounds.diagonal().norm()))),
       solid(is_solid)
 {
     u = std::abs(normal.y()) > 0.99f ? Vec3f::UnitX().eval() : any_tangent(normal);
     v = u.cross(normal);
-    const double size = std::max(1e-6, bounds.diagonal().norm());
-    const double decade = std::pow(10.0, std::floor(std::log10(size / 8)));
-    const double rest = size / 8 / decade;
-    spacing = static_cast<float>(decade * (rest < 2 ? 1 : rest < 5 ? 2 : 5));
-    center = bounds.center().cast<float>();
-    extent = static_cast<float>(1.2 * size);
 }
 
 // The part of a pixel that a line covers; x: m from the origin, pixel: its width on the ground, m.

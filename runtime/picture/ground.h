@@ -11,7 +11,7 @@ struct ShadedSample {
     Vec3f lamp;    // the part of that which points can take
 };
 
-// Lines on a ground plane, a round number of metres apart, that fade out far from the scene.
+// Lines on a ground plane that fade out far from the scene.
 struct Ground {
     Vec3f normal, u, v;
     float offset;
@@ -20,7 +20,7 @@ struct Ground {
     float extent;  // m, where lines have faded to 1/e
     bool solid;
 
-    Ground(const PictureScene::Plane& plane, const Box3d& bounds, bool is_solid);
+    Ground(const PictureScene::Plane& plane, const PictureView& view, bool is_solid);
 
     // Where the ray meets the plane; infinite where it does not.
     float depth(const Vec3f& origin, const Vec3f& ray) const;

@@ -17,6 +17,7 @@ struct Painter::StillLayer {
     std::shared_ptr<const PictureScene> scene;
     Camera camera;
     Box3d bounds;
+    double line_spacing;
     std::vector<bool> vessels;
     Light light;
     std::vector<SurfaceTile> tiles;
@@ -27,6 +28,7 @@ struct Painter::StillLayer {
           scene(in),
           camera(view.camera),
           bounds(view.bounds),
+          line_spacing(view.line_spacing),
           vessels(std::move(which)),
           light(*in, view),
           tiles(draw_surfaces(of, *in, view, vessels, light))
@@ -39,7 +41,7 @@ struct Painter::StillLayer {
         return options.width == of.width && options.height == of.height && options.grid == of.grid && scene == in &&
                camera.position == view.camera.position && camera.target == view.camera.target &&
                camera.fov == view.camera.fov && bounds.min() == view.bounds.min() &&
-               bounds.max() == view.bounds.max() && vessels == which;
+               bounds.max() == view.bounds.max() && line_spacing == view.line_spacing && vessels == which;
     }
 };
 

@@ -80,6 +80,14 @@ Box3d scaled(const Box3d& box, double factor)
     return Box3d(box.center() - half, box.center() + half);
 }
 
+// Lines so many round metres apart that some eight are across the scene.
+double spacing_of_lines(const Box3d& bounds)
+{
+    const double wanted = std::max(1e-6, bounds.diagonal().norm()) / 8;
+    const double decade = std::pow(10.0, std::floor(std::log10(wanted))), rest = wanted / decade;
+    return decade * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
+}
+
 // Of the scene's shapes: emitters as they are, colliders as far as they are near what moves. A floor of a hundred
 // metres is no reason to stand a hundred metres away.
 Box3d shape_bounds(const PictureScene& scene, const Box3d& moving)
@@ -181,6 +189,7 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     if (first) {
         view_.emplace();
         view_->bounds = goal_ = all;
+        view_->line_spacing = spacing_of_lines(all);
     } else if (!group.empty()) {
         // Its middle is followed at once, its size as a camera zooms.
         view_->bounds.translate(all.center() - goal_.center());

@@ -2,7 +2,7 @@
 //
 // The later frames are unknown when the first is drawn, and a camera that jumps or drifts makes a sequence useless. So
 // the first frame with points is framed with room for where they go, and the camera holds still until something leaves
-// its view; then it glides back far enough to hold still again.
+// its view; then it glides back far enough to hold still again. The lines on the ground keep the first frame's scale.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ public:
         if (is_there) {
             if (!view_) view_.emplace();
             keep(view_->camera.position, view_->camera.target, view_->camera.fov, view_->full_speed,
-                 view_->least_radius, view_->bounds.min(), view_->bounds.max());
+                 view_->least_radius, view_->bounds.min(), view_->bounds.max(), view_->line_spacing);
         }
         keep(seen_.min(), seen_.max(), goal_.min(), goal_.max(), time_, most_points_);
     }

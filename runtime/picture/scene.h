@@ -64,6 +64,7 @@ struct PictureView {
     double full_speed = 1;    // m/s, the upper end of the colour ramp
     double least_radius = 1;  // pixels
     Box3d bounds;             // what the camera is fitted to, m
+    double line_spacing = 1;  // m, of the lines on the ground
 };
 
 }  // namespace rapid

@@ -99,10 +99,10 @@ public:
             drawn.emplace_back(scene.bodies[b], vessels[b], lens_, near, tiles_);
         }
         for (const PictureScene::Plane& plane : scene.planes) {
-            const Ground ground(plane, view.bounds, true);
+            const Ground ground(plane, view, true);
             if (!ground.stands_before(lens_.origin)) grounds_.push_back(ground);
         }
-        if (scene.planes.empty() && options.grid) grounds_.emplace_back(PictureScene::Plane(), view.bounds, false);
+        if (scene.planes.empty() && options.grid) grounds_.emplace_back(PictureScene::Plane(), view, false);
     }
 
     SurfaceTile draw(int tile) const

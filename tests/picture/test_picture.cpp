@@ -21,6 +21,7 @@ PictureView front_view()
     PictureView view;
     view.camera = {Vec3d(0, 0, 10), Vec3d::Zero(), std::acos(0.0)};
     view.bounds = Box3d(Vec3d(-10, -10, -10), Vec3d(10, 10, 10));
+    view.line_spacing = 2;
     return view;
 }
 
@@ -387,6 +388,35 @@ TEST_CASE("over a sequence the camera holds still, and glides back a few times w
         }
     }
     CHECK(rests > 216 / 2);
+}
+
+// From straight above, lines are where the picture changes along a row.
+TEST_CASE("the lines on the ground keep their scale over a sequence, however wide the scene becomes", "[io][picture]")
+{
+    PictureOptions options{.width = 400, .height = 400};
+    options.position = Vec3d(0, 20, 0);
+    options.target = Vec3d::Zero();
+    PictureFit fit;
+    const auto lines = [&](double reach, int frame) {
+        const PointSet points = balls({{float(-reach), 0, 0}, {float(reach), 0, 0}}, {red, red}, 1e-3f);
+        const FrameInfo info{
+            .number = frame, .time = frame / 24.0, .picture = std::make_shared<PictureOptions>(options)};
+        const PictureView view = fit.next(points, info);
+        const Picture picture = render(PointSet(), options, {}, view);
+        int found = 0;
+        for (int x = 1; x < 399; ++x) {
+            const auto light = [&](int at) { return picture.pixel(at, 190)[1]; };
+            found += light(x) > light(x - 1) && light(x) >= light(x + 1) && light(x) > light(0) + 3;
+        }
+        return std::pair(found, view.line_spacing);
+    };
+    const auto first = lines(2.5, 1);
+    CHECK(first.first > 4);
+    for (int frame = 2; frame < 60; ++frame) {
+        const auto later = lines(2.5 * std::pow(1.05, frame), frame);
+        CHECK(later.second == first.second);
+        if (frame == 59) CHECK(later.first >= first.first);
+    }
 }
 
 TEST_CASE("a scene's camera is taken where the options give none", "[io][picture]")

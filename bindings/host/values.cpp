@@ -45,7 +45,10 @@ Value to_table(State& state, int index)
 {
     lua_State* L = state.lua();
     auto table = std::make_shared<Table>();
-    const std::size_t length = lua_objlen(L, index);
+    // The length of a table of keys, {[2] = a, [14] = b}, may be any of them that has none behind it.
+    lua_rawgeti(L, index, 1);
+    const std::size_t length = lua_isnil(L, -1) ? 0 : lua_objlen(L, index);
+    lua_pop(L, 1);
     table->list.reserve(length);
     for (std::size_t i = 1; i <= length; ++i) {
         lua_rawgeti(L, index, static_cast<int>(i));

@@ -24,3 +24,18 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
     assert.near(5 * math.cos(math.sqrt(6) / 24), p.P.y, 1e-6)
   end)
 end)
+
+-- Lua may take any of these keys that has none behind it for the length of the table.
+describe("numbered keys that do not begin with 1", function()
+  it("are keys, whatever Lua counts of them", function()
+    for _, keys in ipairs { "[2] = 1, [14] = 2, [26] = 3", "[2] = 1, [3] = 4, [4] = 5", "[8] = 1, [16] = 2" } do
+      local result = scene.run(("return rapid.create {} :emit { source = two, impulse = { %s } } :solve {}")
+        :format(keys), { frames = {1, 26} })
+      local count = 0
+      for frame = 1, 26 do
+        count = count + tonumber(keys:match(("%%[%d%%] = (%%d+)"):format(frame)) or 0)
+        assert.equal(count, #result[frame])
+      end
+    end
+  end)
+end)

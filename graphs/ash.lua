@@ -1,7 +1,7 @@
 -- ash: glowing flakes are born in the smoke of a fire, and carried by it.
 --
--- The smoke is a sequence of volumes, one for each sixteenth frame, which graphs/smoke has made. Between two files its
--- density and its velocity change evenly.
+-- The smoke is a sequence of volumes, one for each sixteenth frame, which graphs/smoke/smoke.lua has made. Between two
+-- its density and its velocity change evenly.
 --
 -- Shows:  rapid.fog.read as a source, rapid.grid.read as the velocity of a flow, sequences with gaps.
 -- Proves: flakes are born where there is smoke, and go as it goes (tests/graphs/test_ash.lua).

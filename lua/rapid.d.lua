@@ -1190,6 +1190,20 @@ function Node:spin(params) end
 
 ---@class rapid.params.spring
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@class rapid.params.rasterize
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field file string  pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute [string, required]
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
+---@field attributes? string|string[]  vectors of which a grid has the mean of the points around, by their weights; {"v"} when not given [names]
+---@field name? string  what the node is called in messages [string]
+
+---Writes the points as they are here as volumes, and passes them on.
+---@param params rapid.params.rasterize
+---@return rapid.Node
+function Node:rasterize(params) end
+
 ---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape at rest or moving, m, default {0, 0, 0}]
 ---@field stiffness? number|rapid.Attribute|fun(frame: rapid.Frame): number  force a metre [number, N/m, at least 0, default 1, takes rapid.attr]
 ---@field damping? number|rapid.Attribute|fun(frame: rapid.Frame): number  force by speed [number, N s/m, at least 0, default 0, takes rapid.attr]

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "bindings/command/part_options.h"
+#include "runtime/operators/rasterize.h"
 
 namespace rapid {
 namespace {
@@ -221,9 +222,13 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
     };
     for (const PlannedNode& planned : plan.nodes) {
         const auto file = planned.node->arguments.find("file");
-        if (planned.node->type->name != "write" || file == planned.node->arguments.end()) continue;
+        const bool is_volume = planned.node->type->name == "rasterize";
+        if ((planned.node->type->name != "write" && !is_volume) || file == planned.node->arguments.end()) continue;
         try {
-            if (const std::string* pattern = file->second.get<std::string>()) check(name_in_part(*pattern));
+            const std::string* pattern = file->second.get<std::string>();
+            if (!pattern) continue;
+            check(name_in_part(*pattern));
+            if (is_volume) volumes_[*pattern] = static_cast<const Rasterize*>(planned.op->fields());
         } catch (const Error& error) {
             throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()))
                 .in_node(planned.node->name)
@@ -339,10 +344,21 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     {
         const std::lock_guard lock(mutex_);
         auto found = writers_.find(key);
-        if (found == writers_.end()) found = writers_.emplace(key, std::make_unique<Writer>(to, how, of_node)).first;
+        if (found == writers_.end())
+            found = writers_.emplace(key, std::make_unique<Writer>(to, how, of_node, write_of(to.pattern))).first;
         writer = &found->second->frames;
     }
     writer->submit(std::move(points), std::move(info), output, std::move(before));
+}
+
+// Empty where the format of the extension writes.
+FrameWriter::Write FrameFiles::write_of(const std::string& pattern) const
+{
+    const auto volume = volumes_.find(pattern);
+    if (volume == volumes_.end()) return {};
+    return [node = *volume->second](const std::filesystem::path& path, const PointSet& points) {
+        node.write_volumes(path, points);
+    };
 }
 
 void FrameFiles::write(const FrameResult& result)
@@ -360,7 +376,7 @@ void FrameFiles::write_node(const std::string& pattern, const PointSet& points, 
 {
     const OutputTarget to{name_in_part(pattern), std::nullopt};
     PointSet written = points;
-    remove_unasked(written);
+    if (!volumes_.count(pattern)) remove_unasked(written);
     submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main", true);
 }
 

@@ -1,7 +1,8 @@
-// The output files of a run: those of -o and of `:write` nodes. Each pattern has a writer of its own.
+// The output files of a run: those of -o, and of `:write` and `:rasterize` nodes. Each pattern has a writer of its own.
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -18,6 +19,8 @@
 #include "runtime/io/frame_writer.h"
 
 namespace rapid {
+
+struct Rasterize;
 
 class FrameFiles {
 public:
@@ -70,7 +73,7 @@ public:
 
     // Queues the files of a frame. Error: one of an earlier frame that could not be written.
     void write(const FrameResult& result);
-    // Queues the file of a `:write` node.
+    // Queues the file of a `:write` or `:rasterize` node.
     void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
 
     // Waits until all files are written; complete: with all frames, else there are no films and no records of a part.
@@ -84,7 +87,7 @@ public:
     // have been queued. From any thread.
     struct Written : FrameWriter::Written {
         std::string how;
-        bool of_node;  // a `:write`
+        bool of_node;  // a `:write` or `:rasterize`
     };
     std::vector<Written> take_written();
     std::optional<std::int64_t> first_unwritten() const;
@@ -105,9 +108,11 @@ private:
     void remove_unasked(PointSet& points) const;
     std::string how_of(const OutputTarget& to, const FrameSelection& frames) const;
     const WholeFiles::File* whole_file(std::int64_t frame, const std::string& path, const std::string& how) const;
+    FrameWriter::Write write_of(const std::string& pattern) const;
     void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output, bool of_node);
 
     std::vector<Target> targets_;
+    std::map<std::string, const Rasterize*> volumes_;  // by pattern; of the plan
     std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
     std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
     std::unique_ptr<SceneOfPlan> scene_;
@@ -129,8 +134,8 @@ private:
         bool of_node;
         FrameWriter frames;
 
-        Writer(const OutputTarget& to, std::string how_it_is_made, bool is_of_node)
-            : how(std::move(how_it_is_made)), of_node(is_of_node), frames({to})
+        Writer(const OutputTarget& to, std::string how_it_is_made, bool is_of_node, FrameWriter::Write write)
+            : how(std::move(how_it_is_made)), of_node(is_of_node), frames({to}, 2, std::move(write))
         {
         }
     };

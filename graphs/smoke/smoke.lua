@@ -1,8 +1,10 @@
--- smoke: a plume of points that rises and curls; grids.lua makes of them the sequence of volumes that ash.lua reads.
+-- smoke: a plume of points that rises and curls, and the sequence of volumes that ash.lua reads.
 --
--- Run:    rapid run graphs/smoke/smoke.lua -f 1-113 -o /tmp/smoke.####.bgeo
---         rapid run graphs/smoke/grids.lua -f 1 --set points=/tmp/smoke.%04d.bgeo --set to=graphs/smoke/smoke.%04d.vdb
+-- Run:    rapid run graphs/smoke/smoke.lua -f 49-113x16 --set to=graphs/smoke/smoke.####.vdb
 local rapid = require "rapid"
+
+local to = rapid.param("to", "smoke.####.vdb", "pattern of the files that are written")
+local voxel = rapid.param("voxel", 0.3, "edge of a voxel, metres")
 
 return rapid.create { fps = 24, seed = 8 }
   :emit       { source = rapid.mesh.sphere { radius = 0.3, center = {0, 0.2, 0} }, from = "volume", rate = 1500,
@@ -15,3 +17,4 @@ return rapid.create { fps = 24, seed = 8 }
   :wind       { velocity = {0.25, 0.4, 0}, drag = 1.1 }
   :turbulence { amplitude = 4, size = 0.9, speed = 0.6, octaves = 2 }
   :solve      { substeps = 2 }
+  :rasterize  { file = to, voxel = voxel, radius = 1.6 * voxel }

@@ -130,7 +130,7 @@ void Plan::collect_nodes(const Graph& graph)
     for (const NodePtr& node : graph.nodes) {
         if (reached.count(node->serial)) continue;
         left_out.push_back(node);
-        if (node->type->name == "write")
+        if (node->type->name == "write" || node->type->name == "rasterize")
             warnings.push_back(
                 fmt::format("{}:{}: node \"{}\": writes nothing: no output comes from it; return it, or go on from it",
                             node->location.file, node->location.line, node->name));

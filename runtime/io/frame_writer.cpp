@@ -13,7 +13,8 @@ constexpr std::size_t most_waiting = 100;  // pictures; each may hold the shapes
 
 }  // namespace
 
-FrameWriter::FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting) : waiting_(waiting)
+FrameWriter::FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting, Write write)
+    : waiting_(waiting), write_(std::move(write))
 {
     for (const OutputTarget& target : targets) {
         const Format& format = format_of(target.pattern);
@@ -164,6 +165,8 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
         const PointSet points = target.attributes ? select_attributes(job.points, *target.attributes) : job.points;
         if (target.film)
             add_to_film(path, points, frame);
+        else if (write_)
+            write_(path, points);
         else
             write_points(path, points, frame);
     } catch (Error& error) {

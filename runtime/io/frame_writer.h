@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -36,8 +37,10 @@ public:
         std::shared_ptr<const PictureFit> fit = nullptr;
     };
 
-    // waiting: the most frames in the queue, besides the one that is being written. Error: an unknown extension.
-    explicit FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting = 2);
+    using Write = std::function<void(const std::filesystem::path& file, const PointSet& points)>;
+    // waiting: the most frames in the queue, besides the one that is being written. write: what writes a file in place
+    // of the format of its extension, or empty. Error: an unknown extension.
+    explicit FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting = 2, Write write = {});
     // Completes the file that is being written, and drops the queue, which finish() would write.
     ~FrameWriter();
 
@@ -92,6 +95,7 @@ private:
 
     std::vector<Target> targets_;
     const std::size_t waiting_;
+    const Write write_;
     std::map<std::string, Pictures> pictures_;  // by output; used by the thread, and by finish() while that is idle
 
     std::map<std::string, std::unique_ptr<RunningFilm>> films_;  // by file; likewise

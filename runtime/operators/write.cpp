@@ -3,9 +3,7 @@
 // It also writes the first frame, wherever it is in the chain, so that a sequence of files begins with the frames.
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
-#include "runtime/points/members.h"
-
-#include <algorithm>
+#include "runtime/operators/written_points.h"
 
 namespace rapid {
 namespace {
@@ -40,10 +38,9 @@ struct Write {
     void edit(PointSet& points, const Evaluation& now) const
     {
         if (!now.write) return;
-        PointSet written = points;
+        PointSet written = members_alone(points, group);
         written.remove("dt");
-        if (!attributes.empty()) keep_columns(written);
-        if (!group.empty()) keep_members(written);
+        if (!attributes.empty()) keep_columns(written, attributes);
         now.write(file, written);
     }
 
@@ -51,23 +48,6 @@ struct Write {
     {
         edit(inputs[0].points, now);
         return std::move(inputs[0]);
-    }
-
-private:
-    void keep_members(PointSet& set) const
-    {
-        const Strided<std::uint8_t> members = members_of(set, group);
-        std::vector<std::uint8_t> mask(set.size());
-        for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = members[i];
-        set.keep(mask);
-    }
-
-    void keep_columns(PointSet& set) const
-    {
-        for (const std::string& name : set.column_names())
-            if (name != "P" && name != "v" && name != "id" &&
-                std::find(attributes.begin(), attributes.end(), name) == attributes.end())
-                set.remove(name);
     }
 };
 RAPID_NODE(Write);

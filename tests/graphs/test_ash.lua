@@ -63,6 +63,29 @@ return rapid.create { fps = 24, seed = 3, start = 49 } %s]]):format(folder, chai
     assert.is_true(off < 0.02, off)
   end)
 
+  it("has the volumes that graphs/smoke/smoke.lua writes", function()
+    local made = scene.folder.path .. "/smoke.####.vdb"
+    local result = command.rapid(("run graphs/smoke/smoke.lua -f 49 --quiet --set to=%s"):format(command.quoted(made)))
+    assert.equal(0, result.status, result.stderr)
+    local points = scene.run(([[
+local made = rapid.fog.read("smoke.0049.vdb", { grid = "density" })
+local there = rapid.fog.read(%q, { grid = "density" })
+local v_made, v_there = rapid.grid.read("smoke.0049.vdb", { grid = "v" }), rapid.grid.read(%q, { grid = "v" })
+return rapid.create { points = rapid.points.grid { size = {4, 5, 4}, spacing = 0.2, center = {0, 2.4, 0} } }
+  :attribute { a = 0, b = 0, v_a = {0, 0, 0}, v_b = {0, 0, 0} }
+  :points("read", function(p)
+      p.a, p.b, p.v_a, p.v_b = made:sample(p.P), there:sample(p.P), v_made:sample(p.P), v_there:sample(p.P)
+    end) :solve {}]]):format(folder .. "/smoke.0049.vdb", folder .. "/smoke.0049.vdb"), { frames = {2, 2} })[2]
+    local most = 0
+    for i = 1, #points do
+      local p = points[i]
+      assert.equal(p.b, p.a)
+      assert.equal(p.v_b, p.v_a)
+      most = math.max(most, p.a)
+    end
+    assert.is_true(most > 10, most)
+  end)
+
   it("is carried up by it, though flakes fall", function()
     local points = rapid.run("graphs/ash.lua", { frames = {1, 40}, set = { rate = 1000 } })[40]
     assert.is_true(#points > 1000 and points:mean("v").y > 0.5)

@@ -185,9 +185,16 @@ function Grid:sample(P) end
 ---@return rapid.Grid
 function Grid:write(path, options) end
 
+---@class rapid.Curve  lines from place to place
+local Curve = {}
+---@param motion rapid.Motion|fun(frame: rapid.Frame): rapid.Motion|table<integer, rapid.Motion>
+---@return rapid.Curve
+function Curve:transform(motion) end
+
 ---@class rapid
 local rapid = {}
 rapid.mesh, rapid.levelset, rapid.grid, rapid.fog, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}, {}
+rapid.curve = {}
 
 ---A value that --set can replace.
 ---@generic T
@@ -294,7 +301,7 @@ function rapid.math.rotation(axis, degrees) end
 ---@param to rapid.Vec3
 ---@return rapid.Quat
 function rapid.math.rotation_between(from, to) end
---@makers except levelset.combine levelset.write motion.product motion.translate points.from transform
+--@makers except levelset.at levelset.combine levelset.write motion.product motion.translate points.from transform
 
 ---The point that a kernel sees. Other attributes are those that the scene makes.
 ---@class rapid.Point

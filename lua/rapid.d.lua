@@ -181,9 +181,16 @@ function Grid:sample(P) end
 ---@return rapid.Grid
 function Grid:write(path, options) end
 
+---@class rapid.Curve  lines from place to place
+local Curve = {}
+---@param motion rapid.Motion|fun(frame: rapid.Frame): rapid.Motion|table<integer, rapid.Motion>
+---@return rapid.Curve
+function Curve:transform(motion) end
+
 ---@class rapid
 local rapid = {}
 rapid.mesh, rapid.levelset, rapid.grid, rapid.fog, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}, {}
+rapid.curve = {}
 
 ---A value that --set can replace.
 ---@generic T
@@ -302,6 +309,27 @@ function rapid.math.rotation_between(from, to) end
 ---@return rapid.Camera
 function rapid.camera(options) end
 
+---@class rapid.options.curve_from
+---@field points rapid.Place[]|rapid.Points|fun(frame: rapid.Frame): rapid.Place[]|rapid.Points  {{x, y, z}, ...} or points, in the order of the curve; or a function of the frame that returns either, always as many [list of vec3, points, or function of the frame, m, required]
+---@field closed? boolean  from the last point to the first, too [boolean, default false]
+
+---A curve through places, or one that deforms.
+---@param options? rapid.options.curve_from
+---@return rapid.Curve
+function rapid.curve.from(options) end
+
+---@class rapid.options.curve_read
+---@field closed? boolean  from the last point to the first, too [boolean, default false]
+---@field before? "hold"|"repeat"|"mirror"|"none"  what goes before the first file of a sequence: "hold" (that file), "repeat" (the last ones again), "mirror" (back and forth) or "none" (nothing) [string, one of hold, repeat, mirror, none]
+---@field after? "hold"|"repeat"|"mirror"|"none"  and behind the last one [string, one of hold, repeat, mirror, none]
+---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
+
+---Reads curves from a file of points: the lines of an .obj, or all points.
+---@param path string  relative to the graph file; with #### or $F4 in it a file for each frame: a curve that deforms [string, required]
+---@param options? rapid.options.curve_read
+---@return rapid.Curve
+function rapid.curve.read(path, options) end
+
 ---@class rapid.options.fog_from_points
 ---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
 ---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
@@ -410,7 +438,7 @@ function LevelSet:offset(metres) end
 ---@field offset? number  by which the files of a sequence come later: frame f has the file f - offset [number, frames, from -1000000000 to 1000000000]
 
 ---Reads a level set from a .vdb file, or a sequence.
----@param path string  relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a function of the frame [string, required]
+---@param path string  relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some [string, required]
 ---@param options? rapid.options.levelset_read
 ---@return rapid.LevelSet
 function rapid.levelset.read(path, options) end
@@ -792,7 +820,7 @@ function rapid.create(params) end
 
 ---@class rapid.params.curve_force
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field curve rapid.Place[]|rapid.Points|fun(frame: rapid.Frame): rapid.Place[]|rapid.Points  {{x, y, z}, ...} or points, in the order of the curve [list of vec3, or points, m, required]
+---@field curve rapid.Place[]|rapid.Points|rapid.Curve|fun(frame: rapid.Frame): rapid.Place[]|rapid.Points|rapid.Curve  {{x, y, z}, ...} or points, in the order of the curve; or rapid.curve, which may move and deform: points are driven along it at its velocity [list of vec3, points, or curve, m, required]
 ---@field closed? boolean|fun(frame: rapid.Frame): boolean  from the last point to the first, too [boolean, default false]
 ---@field speed? number|rapid.Attribute|fun(frame: rapid.Frame): number  along the curve; below 0: backwards [number, m/s, default 1, takes rapid.attr]
 ---@field pull? number|rapid.Attribute|fun(frame: rapid.Frame): number  towards the curve, a metre of distance [number, 1/s², at least 0, default 10, takes rapid.attr]
@@ -851,7 +879,7 @@ function Node:distance(params) end
 function Node:drag(params) end
 
 ---@class rapid.params.emit
----@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, fog, points or node, required]
+---@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, fog, curve, points or node, required]
 ---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  where on the source; without it "points" of points, else "surface". A mesh's points are its vertices. With count or impulse points are taken in order, so that as many births as points take each once; with rate at random [string, one of surface, volume, points]
 ---@field density? string|fun(frame: rapid.Frame): string  an attribute of the source's points, or of a mesh's vertices: births are drawn in proportion to it [string]
 ---@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second; of a node, by each of its points [number or rapid.attr, 1/s, at least 0]
@@ -1162,6 +1190,20 @@ function Node:ramp(params) end
 ---@return rapid.Node
 function Node:randomize(params) end
 
+---@class rapid.params.rasterize
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field file string  pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute [string, required]
+---@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
+---@field attributes? string|string[]  vectors of which a grid has the mean of the points around, by their weights; {"v"} when not given [names]
+---@field name? string  what the node is called in messages [string]
+
+---Writes the points as they are here as volumes, and passes them on.
+---@param params rapid.params.rasterize
+---@return rapid.Node
+function Node:rasterize(params) end
+
 ---@class rapid.params.solve
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field substeps? integer|fun(frame: rapid.Frame): integer  steps a frame [integer, from 1 to 1048576, default 1]
@@ -1190,20 +1232,6 @@ function Node:spin(params) end
 
 ---@class rapid.params.spring
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@class rapid.params.rasterize
----@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
----@field file string  pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute [string, required]
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
----@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
----@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
----@field attributes? string|string[]  vectors of which a grid has the mean of the points around, by their weights; {"v"} when not given [names]
----@field name? string  what the node is called in messages [string]
-
----Writes the points as they are here as volumes, and passes them on.
----@param params rapid.params.rasterize
----@return rapid.Node
-function Node:rasterize(params) end
-
 ---@field target? rapid.Place|rapid.Attribute|rapid.Shape|fun(frame: rapid.Frame): rapid.Place|rapid.Attribute|rapid.Shape  a place, rapid.attr "NAME" for each point's own, or a shape [vec3, attribute or shape at rest or moving, m, default {0, 0, 0}]
 ---@field stiffness? number|rapid.Attribute|fun(frame: rapid.Frame): number  force a metre [number, N/m, at least 0, default 1, takes rapid.attr]
 ---@field damping? number|rapid.Attribute|fun(frame: rapid.Frame): number  force by speed [number, N s/m, at least 0, default 0, takes rapid.attr]

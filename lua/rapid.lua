@@ -69,7 +69,7 @@ local function make(native, load_node, numeric, shapes, studies)
   rapid.levelset = {
     from_mesh = maker("levelset.from_mesh", "mesh"),
     from_points = maker("levelset.from_points", "points"),
-    read = reader "levelset.read",
+    read = maker("levelset.read", "path"),
     sphere = maker "levelset.sphere",
     box = maker "levelset.box",
     torus = maker "levelset.torus",
@@ -131,6 +131,7 @@ local function make(native, load_node, numeric, shapes, studies)
     end,
   }
   rapid.fog = { read = maker("fog.read", "path"), from_points = maker("fog.from_points", "points") }
+  rapid.curve = { read = maker("curve.read", "path"), from = maker "curve.from" }
   -- Points at even distances along a curve, with its direction as N and the part of its length as u.
   local function along(curve, options)
     options = options_of("rapid.points.along", options)
@@ -335,12 +336,12 @@ local function make(native, load_node, numeric, shapes, studies)
     motion = {},
   }
   for _, kind in ipairs { "shape", "plane", "sphere", "box", "level set", "mesh", "moving mesh", "moving shape",
-    "deforming level set" } do
+    "deforming level set", "level set sequence" } do
     value_methods[kind] = value_methods[kind] or {}
     for name, query in pairs(shapes.queries) do value_methods[kind][name] = query end
   end
   for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape",
-    "deforming level set", "points", "moving points" } do
+    "deforming level set", "points", "moving points", "curve", "moving curve" } do
     value_methods[kind] = value_methods[kind] or {}
     value_methods[kind].transform = transformed
   end
@@ -366,6 +367,10 @@ local function make(native, load_node, numeric, shapes, studies)
     error(("%s no %q%s"):format(what, name, native.did_you_mean(name, names_of(known))), 2)
   end, function(a, b)
     return native.make("motion.product", { first = a, second = b })
+  end, function(object, frame)
+    local kind = native.kind(object)
+    if kind ~= "level set sequence" then error(("a %s can't be called"):format(kind), 2) end
+    return (native.make("levelset.at", { levelset = object, frame = frame.number }))
   end)
 
   -- A misspelt name is an error of its own, before it is called.
@@ -378,7 +383,7 @@ local function make(native, load_node, numeric, shapes, studies)
       __metatable = false,
     })
   end
-  for _, name in ipairs { "math", "mesh", "levelset", "grid", "fog", "shape", "points" } do
+  for _, name in ipairs { "math", "mesh", "levelset", "grid", "fog", "shape", "points", "curve" } do
     closed(rapid[name], "rapid." .. name)
   end
   return closed(rapid, "rapid")

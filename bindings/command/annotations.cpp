@@ -50,8 +50,11 @@ std::string lua_type(const Param& param)
         {"list of vec3", "rapid.Place[]"},
         {"level set", "rapid.Shape"},
         {"mesh", "rapid.Mesh"},
-        {"list of vec3, or points", "rapid.Place[]|rapid.Points"},
-        {"mesh, level set, shape, fog, points or node", "rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Points|rapid.Node"},
+        {"list of vec3, points, or curve", "rapid.Place[]|rapid.Points|rapid.Curve"},
+        {"list of vec3, points, or function of the frame",
+         "rapid.Place[]|rapid.Points|fun(frame: rapid.Frame): rapid.Place[]|rapid.Points"},
+        {"mesh, level set, shape, fog, curve, points or node",
+         "rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Node"},
         {"motion", "rapid.Motion"},
         {"camera", "rapid.Camera|table<integer, rapid.Camera>"},
         {"name of a group", "string"},
@@ -161,8 +164,8 @@ std::string maker_of(const Maker& maker)
 {
     static const std::map<std::string_view, std::string_view> results = {
         {"mesh", "rapid.Mesh"},     {"levelset", "rapid.LevelSet"}, {"grid", "rapid.Grid"},
-        {"fog", "rapid.Fog"},       {"shape", "rapid.Shape"},       {"points", "rapid.Points"},
-        {"motion", "rapid.Motion"}, {"camera", "rapid.Camera"}};
+        {"fog", "rapid.Fog"},       {"curve", "rapid.Curve"},       {"shape", "rapid.Shape"},
+        {"points", "rapid.Points"}, {"motion", "rapid.Motion"},     {"camera", "rapid.Camera"}};
     const std::size_t dot = maker.name.find('.');
     const std::string family = maker.name.substr(0, dot), own = maker.name.substr(dot + 1);
     const std::string called = family == "motion" ? own : maker.name;

@@ -9,6 +9,7 @@
 #include "runtime/graph/param.h"
 #include "runtime/operators/picture.h"
 #include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/level_set_sequence.h"
 
 namespace rapid {
 namespace {
@@ -123,6 +124,10 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
             } else if (const auto deforming = given.object<DeformingLevelSet>()) {
                 moves = true;
                 add(*scene, deforming->mesh().at(clock, frame), place, role);
+            } else if (const auto sequence = given.object<LevelSetSequence>()) {
+                moves = true;
+                const auto number = static_cast<double>(frame);
+                add(*scene, sequence->over({clock.fps, clock.start}, number, number), place, role);
             } else if (const ObjectPtr* object = given.get<ObjectPtr>()) {
                 add(*scene, *object, place, role);
             }

@@ -235,6 +235,8 @@ int set_object_methods(State& state)
     lua_setfield(L, -2, "__index");
     lua_pushvalue(L, 2);
     lua_setfield(L, -2, "__mul");
+    lua_pushvalue(L, 3);
+    lua_setfield(L, -2, "__call");
     lua_pushcfunction(L, [](lua_State* of_object) {
         return guarded(of_object, [](State& s) {
             push_text(s.lua(), describe(Value(to_object(s, 1))));

@@ -23,7 +23,7 @@ void push_object(State& state, const ObjectPtr& object);
 // Makes the metatable of objects in a new state. Its fields are set by set_object_methods().
 void register_objects(lua_State* L);
 
-// native.set_index(index, product): sets what reading a field of an object, and multiplying two, call.
+// native.set_index(index, product, call): sets what reading a field of an object, multiplying two, and calling one do.
 int set_object_methods(State& state);
 
 }  // namespace rapid

@@ -2,12 +2,16 @@
 
 #include "runtime/graph/step_shape_user.h"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "runtime/graph/step_curves.h"
 #include "runtime/graph/step_grid.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/shapes/motion/mesh_surface.h"
 #include "runtime/shapes/motion/moving.h"
 
@@ -40,8 +44,35 @@ ShapePtr deforming_in_step(const DeformingLevelSetPtr& body, const Step& step)
     return Deformation(body).over(frames, step.from(), step.to(), nullptr, {}, 0).shape;
 }
 
+ShapePtr sequence_in_step(const LevelSetSequence& sequence, const Step& step)
+{
+    const FrameClock frames{step.clock.fps, step.clock.start};
+    const auto start = static_cast<double>(step.clock.start);
+    return step.is_start() ? sequence.over(frames, start, start) : sequence.over(frames, step.from(), step.to());
+}
+
+// Where a sequence has nothing: far away.
+class Nowhere final : public Shape {
+public:
+    Box3d bounds() const override { return Box3d(); }
+    void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
+    {
+        constexpr double far = 1e30;
+        std::fill_n(phi.begin(), P.size(), far);
+        std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
+    }
+    void first_contact(std::span<const Path>, std::span<Contact> contacts) const override
+    {
+        std::fill(contacts.begin(), contacts.end(), Contact());
+    }
+};
+
 ShapePtr shape_in_step(const ObjectPtr& object, const Step& step)
 {
+    if (const auto sequence = std::dynamic_pointer_cast<const LevelSetSequence>(object)) {
+        const ShapePtr shape = sequence_in_step(*sequence, step);
+        return shape ? shape : std::make_shared<Nowhere>();
+    }
     if (const auto shape = std::dynamic_pointer_cast<const AnimatedShape>(object)) return rigid_in_step(*shape, step);
     if (const auto body = std::dynamic_pointer_cast<const DeformingLevelSet>(object))
         return deforming_in_step(body, step);
@@ -58,6 +89,7 @@ const StepShapeUser* user_in(const Value& value)
     return object ? dynamic_cast<const StepShapeUser*>(object->get()) : nullptr;
 }
 
+bool takes_step_curves(const Param& param) { return param.type == StepCurves::param_type; }
 bool takes_step_shape(const Param& param) { return param.type.ends_with(StepShape::param_type); }
 
 }  // namespace
@@ -65,7 +97,7 @@ bool takes_step_shape(const Param& param) { return param.type.ends_with(StepShap
 bool is_moving_shape(const Object& object)
 {
     return dynamic_cast<const AnimatedShape*>(&object) || dynamic_cast<const DeformingLevelSet*>(&object) ||
-           dynamic_cast<const AnimatedMesh*>(&object);
+           dynamic_cast<const AnimatedMesh*>(&object) || dynamic_cast<const LevelSetSequence*>(&object);
 }
 
 std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const FrameClock& clock, const Frame& frame)
@@ -83,7 +115,18 @@ Value in_step(const Param& param, const Value& value, const FrameClock& clock, c
     if (const StepShapeUser* user = user_in(value)) user->begin_step(clock, frame);
     if (!object) return value;
     if (const ObjectPtr grid = step_grid(*object, clock, frame)) return grid;
-    if (!takes_step_shape(param)) return value;
+    if (takes_step_curves(param))
+        if (const auto curves = step_curves(*object, clock, frame)) return Value(ObjectPtr(curves));
+    if (!takes_step_shape(param)) {
+        const auto sequence = std::dynamic_pointer_cast<const LevelSetSequence>(*object);
+        if (!sequence) return value;
+        const Step step{clock, clock.step_at(frame)};
+        const double number = step.is_start() ? static_cast<double>(clock.start) : step.to();
+        const ObjectPtr there = param.type == Shape::param_type
+                                    ? ObjectPtr(sequence_in_step(*sequence, step))
+                                    : ObjectPtr(sequence->at(static_cast<std::int64_t>(std::ceil(number))));
+        return there ? Value(there) : Value();
+    }
     const auto shape = step_shape(*object, clock, frame);
     return shape ? Value(ObjectPtr(shape)) : value;
 }
@@ -93,6 +136,8 @@ bool differs_by_step(const Param& param, const Value& value)
     if (const StepShapeUser* user = user_in(value)) return user->asks_moving_shapes();
     const ObjectPtr* object = value.get<ObjectPtr>();
     if (!object || !*object) return false;
+    if (takes_step_curves(param) && (*object)->varies()) return true;
+    if (dynamic_cast<const LevelSetSequence*>(object->get())) return true;
     return is_grid_sequence(**object) || (takes_step_shape(param) && is_moving_shape(**object));
 }
 

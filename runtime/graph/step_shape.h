@@ -60,8 +60,8 @@ bool is_moving_shape(const Object& object);
 // sequence.
 std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const FrameClock& clock, const Frame& frame);
 
-// An argument as a parameter gets it in that step: a step_shape() where it takes one, a step_grid() of a sequence of
-// grids, else the value itself.
+// An argument as a parameter gets it in that step: a step_shape() or step_curves() where it takes one; a step_grid() of
+// a sequence of grids; of one of level sets the shape, for others the file of the frame, or nil; else the value itself.
 Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame);
 
 // Whether that differs from step to step.

@@ -9,6 +9,7 @@
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
 #include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/solver/collision/hits.h"
 
 namespace rapid {
@@ -123,8 +124,9 @@ struct Collide {
             const auto given = node.node->arguments.find(name);
             return given != node.node->arguments.end() && given->second.function();
         };
-        const bool has_band =
-            shape.deforming || std::dynamic_pointer_cast<const LevelSet>(shape.rest) || is_function("shape");
+        const bool is_sequence = node.node->arguments.at("shape").object<LevelSetSequence>() != nullptr;
+        const bool has_band = shape.deforming || std::dynamic_pointer_cast<const LevelSet>(shape.rest) || is_sequence ||
+                              is_function("shape");
         if (!has_band) return {};
         if (method != "continuous" || is_function("method"))
             return fmt::format("with method = \"{}\" its level set reaches as deep as the fastest of all points goes",

@@ -5,6 +5,8 @@
 //   c    the place of the curve nearest to P, at the distance d
 //   t    the curve's direction there: between those at the ends of a segment, each along its two neighbours
 //
+//   vc   the velocity of c, where the curve moves:  a = -k (v - vc - speed t) - ...
+//
 // The integrator solves both parts together: no pull is too stiff. c is that in the middle of a sub-step, and held for
 // it: of second order along the curve. Beyond the ends of an open curve there is no force.
 #include <fmt/format.h>
@@ -12,38 +14,60 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/graph/curve_value.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/graph/step_curves.h"
 
 namespace rapid {
 namespace {
 
-// {{x, y, z}, ...}, or points in the order in which the curve goes through them.
-struct CurvePoints {
-    static constexpr std::string_view param_type = "list of vec3, or points";
+// {{x, y, z}, ...}, points in the order in which the curve goes through them, or curves, which may move.
+struct AnyCurves {
+    static constexpr std::string_view param_type = StepCurves::param_type;
 
-    std::vector<Vec3d> P;
+    std::vector<Vec3d> P;                            // where it is at rest
+    std::shared_ptr<const CurveLines> open, closed;  // of curves that say so themselves, the same
+    std::shared_ptr<const StepCurves> step;          // where it moves
+    bool is_list = false;
 };
 
-void read_value(const Param& param, const Value& value, CurvePoints& curve)
+void read_value(const Param& param, const Value& value, AnyCurves& field)
 {
-    curve.P.clear();
-    if (const auto points = value.object<PointsObject>()) {
-        for (std::size_t i = 0; i < points->points.size(); ++i) curve.P.push_back(points->points.P()[i].cast<double>());
-    } else {
-        if (!value.table()) wrong_type(param, value);
-        rapid::read_value(param, value, curve.P);
+    field = {};
+    if (const auto step = value.object<StepCurves>()) {
+        field.step = step;
+        field.open = field.closed = step->lines();
+        return;
     }
-    for (std::size_t i = 0; i + 1 < curve.P.size(); ++i)
-        if (curve.P[i] == curve.P[i + 1])
-            throw Error(fmt::format("{}: points {} and {} are at one place; a curve goes from place to place",
-                                    param.name, i + 1, i + 2));
-    if (curve.P.size() < 2)
-        throw Error(fmt::format("{} has {} points; a curve needs at least two", param.name, curve.P.size()));
+    CurvesPtr curves = value.object<Curves>();
+    if (value.table()) {
+        rapid::read_value(param, value, field.P);
+        if (field.P.size() < 2)
+            throw Error(fmt::format("{} has {} points; a curve needs at least two", param.name, field.P.size()));
+        for (std::size_t i = 0; i + 1 < field.P.size(); ++i)
+            if (field.P[i] == field.P[i + 1])
+                throw Error(fmt::format("{}: points {} and {} are at one place; a curve goes from place to place",
+                                        param.name, i + 1, i + 2));
+        const std::size_t count = field.P.size();
+        field.open = std::make_shared<CurveLines>(std::span(&count, 1), false);
+        field.closed = std::make_shared<CurveLines>(std::span(&count, 1), true);
+        field.is_list = true;
+        return;
+    }
+    if (const auto points = value.object<PointsObject>()) {
+        curves = curves_of(points->points, false, param.name);
+        field.closed = curves_of(points->points, true, param.name)->lines();
+        field.is_list = true;
+    }
+    if (!curves) wrong_type(param, value);
+    field.open = curves->lines();
+    if (!field.closed) field.closed = field.open;
+    for (const Vec3f& P : curves->points()) field.P.push_back(P.cast<double>());
 }
 
 struct CurveForce {
-    CurvePoints curve;
+    AnyCurves curve;
     bool closed;
     PerPoint<float> speed, pull, drag;
     std::optional<PerPoint<float>> radius;
@@ -53,7 +77,8 @@ struct CurveForce {
     {
         return node<CurveForce>("curve_force", "Draws points to a curve, and drives them along it.")
             .param(&CurveForce::curve, "curve", Value(), any_number(), "m",
-                   "{{x, y, z}, ...} or points, in the order of the curve")
+                   "{{x, y, z}, ...} or points, in the order of the curve; or rapid.curve, which may move and deform: "
+                   "points are driven along it at its velocity")
             .required()
             .param(&CurveForce::closed, "closed", false, any_number(), "", "from the last point to the first, too")
             .param(&CurveForce::speed, "speed", 1.0, any_number(), "m/s", "along the curve; below 0: backwards")
@@ -63,58 +88,75 @@ struct CurveForce {
                    "the distance at which the force has fallen to 0; without it, it does not fall");
     }
 
+    void check() const
+    {
+        if (closed && !curve.is_list)
+            throw Error(
+                "closed is for a list of places; a curve is closed by rapid.curve.from { points = ..., closed = true "
+                "}");
+    }
+
     void contribute(const Chunk& chunk, Forces& forces) const
     {
+        const CurveLines* lines = (closed ? curve.closed : curve.open).get();
+        if (!lines) return;  // a sequence that has none in this step
         const Strided<float> along = chunk.read(speed), towards = chunk.read(pull), rate = chunk.read(drag);
         const Strided<float> reach = radius ? chunk.read(*radius) : Strided<float>{nullptr, 0};
+        std::vector<Vec3d> P, v;
+        double time = std::numeric_limits<double>::quiet_NaN();  // of these
         for (std::size_t i = 0; i < chunk.size(); ++i) {
-            const Nearest nearest = nearest_to(chunk.P[i]);
+            if (curve.step && chunk.time[i] != time) curve.step->at(time = chunk.time[i], P, v);
+            const Nearest nearest = nearest_to(chunk.P[i], *lines, curve.step ? P : curve.P, v);
             if (nearest.beyond) continue;
             const double part = radius ? 1 - nearest.distance2 / std::pow(double(reach[i]), 2) : 1;
             if (part <= 0) continue;
-            forces.add_drag(i, rate[i] * part * part, along[i] * nearest.direction);
+            forces.add_drag(i, rate[i] * part * part, along[i] * nearest.direction + nearest.v);
             forces.add_spring(i, towards[i] * part * part, nearest.place);
         }
     }
 
 private:
     struct Nearest {
-        Vec3d place, direction;
+        Vec3d place, direction, v = Vec3d::Zero();
         double distance2 = std::numeric_limits<double>::infinity();
         bool beyond = false;  // an end of an open curve
     };
 
-    std::size_t segments() const { return closed ? curve.P.size() : curve.P.size() - 1; }
-    const Vec3d& at(std::size_t i) const { return curve.P[i % curve.P.size()]; }
-
-    // The curve's direction at one of its points: of length 1.
-    Vec3d direction_at(std::size_t i) const
+    // The curve's direction at one of its points: of length 1. on_line: that of the line.
+    static Vec3d direction_at(std::int32_t i, const Vec3d& on_line, const CurveLines& lines,
+                              const std::vector<Vec3d>& P)
     {
-        const std::size_t n = curve.P.size();
-        const Vec3d& before = closed ? at(i + n - 1) : at(i == 0 ? 0 : i - 1);
-        const Vec3d& after = closed ? at(i + 1) : at(std::min(i + 1, n - 1));
-        const Vec3d d = after - before;
-        const Vec3d& next = at(i + 1 < n || closed ? i + 1 : i);
-        return d.norm() > 0 ? Vec3d(d.normalized()) : Vec3d((next - at(i)).normalized());  // it turns back there
+        const auto at = [&](std::int32_t k) -> const Vec3d& { return P[static_cast<std::size_t>(k >= 0 ? k : i)]; };
+        const auto place = static_cast<std::size_t>(i);
+        const Vec3d d = at(lines.after[place]) - at(lines.before[place]);
+        return d.norm() > 0 ? Vec3d(d.normalized()) : on_line;  // it turns back there
     }
 
-    Nearest nearest_to(const Vec3d& P) const
+    // v: of the curve's points; empty where it is at rest.
+    static Nearest nearest_to(const Vec3d& from, const CurveLines& lines, const std::vector<Vec3d>& P,
+                              const std::vector<Vec3d>& v)
     {
         Nearest found;
-        std::size_t on = 0;
+        CurveLines::Line on{};
         double part = 0;
-        for (std::size_t k = 0; k < segments(); ++k) {
-            const Vec3d way = at(k + 1) - at(k);
-            const double u = (P - at(k)).dot(way) / way.squaredNorm();
-            const Vec3d place = at(k) + std::clamp(u, 0.0, 1.0) * way;
-            const double d2 = (P - place).squaredNorm();
-            if (d2 < found.distance2) found.place = place, found.distance2 = d2, on = k, part = u;
+        const auto at = [](const std::vector<Vec3d>& of, std::int32_t k) -> const Vec3d& {
+            return of[static_cast<std::size_t>(k)];
+        };
+        for (const CurveLines::Line& line : lines.lines) {
+            const Vec3d &a = at(P, line.a), way = at(P, line.b) - a;
+            const double length2 = way.squaredNorm(), u = length2 > 0 ? (from - a).dot(way) / length2 : 0;
+            const Vec3d place = a + std::clamp(u, 0.0, 1.0) * way;
+            const double d2 = (from - place).squaredNorm();
+            if (d2 < found.distance2) found.place = place, found.distance2 = d2, on = line, part = u;
         }
-        if (!closed) found.beyond = (on == 0 && part < 0) || (on + 1 == segments() && part > 1);
+        found.beyond = (part < 0 && lines.before[static_cast<std::size_t>(on.a)] < 0) ||
+                       (part > 1 && lines.after[static_cast<std::size_t>(on.b)] < 0);
         part = std::clamp(part, 0.0, 1.0);
-        const Vec3d direction = (1 - part) * direction_at(on) + part * direction_at((on + 1) % curve.P.size());
-        found.direction =
-            direction.norm() > 0 ? Vec3d(direction.normalized()) : Vec3d((at(on + 1) - at(on)).normalized());
+        const Vec3d way = (at(P, on.b) - at(P, on.a)).normalized();
+        const Vec3d direction =
+            (1 - part) * direction_at(on.a, way, lines, P) + part * direction_at(on.b, way, lines, P);
+        found.direction = direction.norm() > 0 ? Vec3d(direction.normalized()) : way;
+        if (!v.empty()) found.v = at(v, on.a) + part * (at(v, on.b) - at(v, on.a));
         return found;
     }
 };

@@ -99,15 +99,16 @@ describe("docs/lua-api.md", function()
 
   it("shows scenes that run", function()
     local folder = command.folder()
-    local scene, generations, picture, node = unpack(document.blocks(page, "lua"))
+    local scene, generations, picture, node, curve = unpack(document.blocks(page, "lua"))
     folder:write("scene.lua", scene)
     folder:write("generations.lua", generations)
     folder:write("picture.lua", picture)
+    folder:write("curve.lua", curve)
     folder:write("swirl.lua", node)
     folder:write("turned.lua", [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :solve {}]])
-    for _, name in ipairs { "scene", "generations", "picture", "turned" } do
+    for _, name in ipairs { "scene", "generations", "picture", "curve", "turned" } do
       local result = command.rapid(("run %s.lua -f 1-3 --quiet"):format(name), { cwd = folder.path })
       assert.equal(0, result.status, result.stderr)
     end
@@ -115,7 +116,7 @@ return rapid.create { points = rapid.points.grid {} } :swirl { strength = 2 } :s
 
   it("shows a test that passes", function()
     local folder = command.folder()
-    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[5])
+    local file = folder:write("test_sparks.lua", document.blocks(page, "lua")[6])
     assert.equal(0, command.rapid("test " .. command.quoted(file)).status)
   end)
 end)

@@ -583,7 +583,7 @@ TEST_CASE("emit refuses illegal arguments, and names legal ones", "[emit]")
     CHECK(refusal({{"rate", 1.0}, {"from", "surface"}}, one_point()) ==
           "from = \"surface\" needs a mesh or a shape; of points take \"points\"");
     CHECK(refusal({{"rate", 1.0}}, 5.0) ==
-          "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, points or node");
+          "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, curve, points or node");
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"id", 1.0}})}}, mesh).find("\"id\"") != std::string::npos);
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"life", 1.0}})}}, mesh) ==
           "attributes: \"life\" has its own way; use life");

@@ -65,7 +65,7 @@ values["name of a group"] = function() return '"some"' end
 values["list of vec3"] = function()
   return ("{{0, 0, 0}, %s, {1, 0, 0}, %s}"):format(vector(-3, 3), vector(-3, 3))
 end
-values["mesh, level set, shape, fog, points or node"] = function()
+values["mesh, level set, shape, fog, curve, points or node"] = function()
   return pick { "solid", "rapid.mesh.sphere { radius = 0.5 }", "rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} }",
     ("rapid.mesh.box { size = {1, 0.1, 1} }:transform(%s)"):format(values.motion()) }
 end

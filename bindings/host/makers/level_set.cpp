@@ -3,15 +3,17 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <tuple>
 
-#include "bindings/host/makers/sequence_options.h"
+#include "bindings/host/makers/grid_files.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/level_set_sequence.h"
 
 namespace rapid {
 namespace {
@@ -244,35 +246,43 @@ struct ResampleLevelSet {
 };
 RAPID_MAKER(ResampleLevelSet);
 
-struct ReadLevelSet : SequenceOptions {
-    std::string path, grid;
-    std::optional<double> frame;  // of a sequence, as lua/rapid.lua asks for it
-
+struct ReadLevelSet : GridFiles {
     static Maker declare()
     {
         auto declaration = maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file, or a sequence.");
-        declaration
-            .param(&ReadLevelSet::path, "path", Value(), any_number(), "",
-                   "relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a "
-                   "function of the frame")
-            .required()
-            .param(&ReadLevelSet::grid, "grid", Value(), any_number(), "",
-                   "its name; the only level set, when not given")
-            .param(&ReadLevelSet::frame, "frame", Value(), any_number(), "", "of a sequence")
-            .internal();
-        return SequenceOptions::declare(declaration);
+        return GridFiles::declare(declaration, "its name; the only level set, when not given");
     }
-    // Null at a frame that has none: a function of the frame then returns nil.
     ObjectPtr make(MakeContext& context) const
     {
-        check(path, frame.has_value());
-        if (!frame) return read_level_set(context.resolve(path), grid);
-        const FramePattern pattern((context.folder / path).string());
-        const auto file = file_at(pattern, existing_files(pattern), *frame);
-        return file ? read_level_set(context.resolve(file->string()), grid) : nullptr;
+        check(path, is_sequence(context));
+        if (!is_sequence(context)) return read_level_set(context.resolve(path), grid);
+        const SequenceFiles sequence = files(context);
+        const auto read = [name = grid](const std::filesystem::path& file) { return read_level_set(file, name); };
+        const std::int64_t first = sequence.files.begin()->first + sequence.order.offset;
+        auto made = std::make_shared<LevelSetSequence>(sequence, path, read);
+        made->at(first);
+        return made;
     }
 };
 RAPID_MAKER(ReadLevelSet);
+
+// What a sequence is called with a frame for.
+struct LevelSetOfFrame {
+    std::shared_ptr<const LevelSetSequence> levelset;
+    double frame;
+
+    static Maker declare()
+    {
+        return maker<LevelSetOfFrame>("levelset.at", "The file of a frame of a sequence of level sets.")
+            .param(&LevelSetOfFrame::levelset, "levelset", Value(), any_number(), "", "the sequence")
+            .required()
+            .param(&LevelSetOfFrame::frame, "frame", Value(), any_number(), "", "its number")
+            .required();
+    }
+    // Null at a frame that has none: a function of the frame then returns nil.
+    ObjectPtr make(MakeContext&) const { return levelset->at(static_cast<std::int64_t>(std::ceil(frame))); }
+};
+RAPID_MAKER(LevelSetOfFrame);
 
 struct WriteLevelSet {
     LevelSetPtr levelset;

@@ -7,6 +7,7 @@
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/level_set/placed.h"
+#include "runtime/shapes/motion/curves.h"
 #include "runtime/shapes/motion/deforming.h"
 
 namespace rapid {
@@ -79,8 +80,8 @@ struct Transform {
 
     static Maker declare()
     {
-        return maker<Transform>("transform", "A mesh, a shape or points, moved.")
-            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh, a shape or points")
+        return maker<Transform>("transform", "A mesh, a shape, a curve or points, moved.")
+            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh, a shape, a curve or points")
             .required()
             .param(&Transform::motion, "motion", Value(), any_number(), "",
                    "rapid.translate, .rotate, .scale, or a product; a function of the frame that returns one; keys")
@@ -111,7 +112,13 @@ struct Transform {
             if (motion->varies()) return std::make_shared<AnimatedPoints>(points, motion);
             return transformed(*points, motion->at({}));
         }
-        throw Error(fmt::format("{} can't be moved; it must be a mesh, a shape or points", describe(object)));
+        if (const auto moving = std::dynamic_pointer_cast<const MovingCurves>(object))
+            return moving->transformed(motion);
+        if (const auto curves = std::dynamic_pointer_cast<const Curves>(object)) {
+            if (motion->varies()) return std::make_shared<MovingCurves>(curves, nullptr, motion);
+            return transformed(curves, motion->at({}).affine());
+        }
+        throw Error(fmt::format("{} can't be moved; it must be a mesh, a shape, a curve or points", describe(object)));
     }
 };
 RAPID_MAKER(Transform);

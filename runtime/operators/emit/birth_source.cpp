@@ -10,6 +10,7 @@
 #include "runtime/operators/emit/point_path.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
+#include "runtime/shapes/motion/curves.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/scatter/scatter_by_density.h"
 
@@ -112,12 +113,16 @@ BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density
         take_shape(shape);
     } else if (const auto fog = std::dynamic_pointer_cast<const DensityGrid>(object_)) {
         take_fog(*fog);
+    } else if ((moving_curves_ = std::dynamic_pointer_cast<const MovingCurves>(object_))) {
+        take_curves(*moving_curves_->rest());
+    } else if (const auto curves = std::dynamic_pointer_cast<const Curves>(object_)) {
+        take_curves(*curves);
     } else if (std::dynamic_pointer_cast<const DeformingLevelSet>(object_)) {
         throw Error("source = a deforming level set can't bear points; give the mesh that it was made from");
     } else {
         throw Error(
-            fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape, a fog "
-                        "or points",
+            fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape, a fog, "
+                        "a curve or points",
                         describe(object_)));
     }
 }
@@ -132,6 +137,20 @@ void BirthSource::take_fog(const DensityGrid& fog)
                         "its own",
                         density_));
     scatter_ = fog.scatter();
+}
+
+void BirthSource::take_curves(const Curves& curves)
+{
+    if (!from_.empty())
+        throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; along a curve leave it out", from_));
+    if (!density_.empty())
+        throw Error(fmt::format("density = \"{}\" is of points or of a mesh's vertices; a curve bears evenly by length",
+                                density_));
+    has_normals_ = true;
+    mesh_ = curves.mesh();
+    values_ = corners_of(*detailed(mesh_));
+    is_of_corners_ = true;
+    scatter_ = curves.scatter();
 }
 
 void BirthSource::take_shape(const ShapePtr& shape)
@@ -155,11 +174,20 @@ FramePath BirthSource::path_at(const FrameClock& clock, std::int64_t step, const
         for (std::size_t i = 0; i < values_.size(); ++i) bounds.extend(values_.P()[i].cast<double>());
         return path_of(*moving_points_->motion(), bounds, clock, step, options);
     }
+    if (moving_curves_) return path_of(*moving_curves_, clock, step, options);
     return moving_mesh_ ? path_of(*moving_mesh_, clock, step, options) : path_of(*moving_shape_, clock, step, options);
 }
 
 void BirthSource::follow(const BirthSource& last)
 {
+    const auto is_curve = [](const BirthSource& source) {
+        return std::dynamic_pointer_cast<const Curves>(source.object_) != nullptr;
+    };
+    if (is_curve(*this) && is_curve(last))
+        throw Error(
+            "source: a function of the frame that returns another curve each time can't be followed between the "
+            "frames; give the function to rapid.curve.from: source = rapid.curve.from { points = function(frame) ... "
+            "end }");
     if (!is_of_points_ || !last.is_of_points_ || moving_points_) return;
     before_ = last.values_;
     earlier_ = last.before_;
@@ -192,12 +220,13 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
 {
     is_absent_ = false;
     if (is_of_points_ && !moving_points_) return move_points_to(simulation, step, options);
-    if (!moving_mesh_ && !moving_shape_ && !moving_points_) return {};
+    if (!moving_mesh_ && !moving_shape_ && !moving_points_ && !moving_curves_) return {};
     if (moving_points_ && values_.empty()) return {};
-    const bool deforms = moving_mesh_ && moving_mesh_->deforms();
+    const bool deforms = (moving_mesh_ && moving_mesh_->deforms()) || (moving_curves_ && moving_curves_->deforms());
     if (deforms) {
         const double to = simulation.at_step(step).number;
-        is_absent_ = !moving_mesh_->has(step > simulation.start ? simulation.at_step(step - 1).number : to, to);
+        const double from = step > simulation.start ? simulation.at_step(step - 1).number : to;
+        is_absent_ = !(moving_mesh_ ? moving_mesh_->has(from, to) : moving_curves_->has(from, to));
         if (is_absent_) return path_ = nullptr, Move();
     }
     FrameClock clock = simulation;
@@ -212,7 +241,10 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
         end = step;
         path = FramePath();
     }
-    if (!deforms) {
+    if (moving_curves_) {
+        take_curves(*moving_curves_->at(clock, end));
+        path_ = curves_path(*moving_curves_, clock, end, path);
+    } else if (!deforms) {
         const Motion& motion = *(moving_mesh_    ? moving_mesh_->motion()
                                  : moving_shape_ ? moving_shape_->motion()
                                                  : moving_points_->motion());
@@ -223,10 +255,10 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
                                                 : PlacesOn::Faces;
         take_mesh(moving_mesh_->at(clock, end));
         path_ = deforming_path(*moving_mesh_, clock, end, path, on);
-        if (parts > 1) {
-            const double length = 1.0 / static_cast<double>(parts);
-            path_ = part_of(path_, static_cast<double>((last - 1 - clock.start) % parts) * length, length);
-        }
+    }
+    if (parts > 1) {
+        const double length = 1.0 / static_cast<double>(parts);
+        path_ = part_of(path_, static_cast<double>((last - 1 - clock.start) % parts) * length, length);
     }
     return {at_beginning ? std::nullopt : path.jump, at_beginning};
 }

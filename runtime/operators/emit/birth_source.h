@@ -1,4 +1,5 @@
-// The source of an emitter: a mesh, a level set, an analytic shape, a fog, or points; at rest, moving or deforming.
+// The source of an emitter: a mesh, a level set, an analytic shape, a fog, a curve, or points; at rest, moving or
+// deforming.
 //
 // It gives the place of a birth, the normal there, and the attribute values that newborn points inherit. All of these
 // depend only on the random key and the birth's number.
@@ -19,7 +20,9 @@
 
 namespace rapid {
 
+class Curves;
 class DensityGrid;
+class MovingCurves;
 
 class BirthSource {
 public:
@@ -96,6 +99,7 @@ private:
     void take_mesh(const MeshPtr& mesh);
     void take_shape(const ShapePtr& shape);
     void take_fog(const DensityGrid& fog);
+    void take_curves(const Curves& curves);
     void take_points(PointSet points);
     std::vector<float> densities() const;
     ScatterPtr scatter_on(const MeshPtr& mesh) const;
@@ -107,6 +111,7 @@ private:
     std::string from_, density_, group_;
     std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, where it is one
     std::shared_ptr<const AnimatedShape> moving_shape_;  // likewise
+    std::shared_ptr<const MovingCurves> moving_curves_;  // likewise
     BodyPathPtr path_;
     ScatterPtr scatter_;  // null: births are at the points of values_
     MeshPtr mesh_;        // birthplaces refer to its triangles

@@ -10,7 +10,7 @@
 namespace rapid {
 
 struct EmitSource {
-    static constexpr std::string_view param_type = "mesh, level set, shape, fog, points or node";
+    static constexpr std::string_view param_type = "mesh, level set, shape, fog, curve, points or node";
     ObjectPtr object;
     bool is_node = false;
 };

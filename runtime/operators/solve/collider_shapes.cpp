@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/shapes/motion/moving.h"
 #include "runtime/solver/collision_radii.h"
 #include "runtime/stopwatch.h"
@@ -82,6 +83,17 @@ void ColliderShapes::widen(Dynamics& dynamics, const PointSet& points, int subst
     std::map<std::string, Band> bands;
     for (std::size_t i = 0; i < dynamics.colliders().size(); ++i) {
         const std::shared_ptr<const Collider> collider = dynamics.colliders()[i];
+        if (const auto blended = std::dynamic_pointer_cast<const BlendedLevelSets>(collider->shape)) {
+            const double needed =
+                needed_band(*collider, dynamics, points, blended->voxel(), blended->bounds(), now.frame.dt, substeps);
+            const Stopwatch stopwatch;
+            auto replacement = std::make_shared<Collider>(*collider);
+            const auto wide = blended->with_band(needed);
+            now.figures.bands.push_back({collider->node, wide->band(), wide->active_voxels(), stopwatch.seconds()});
+            replacement->shape = wide;
+            dynamics.replace_collider(i, std::move(replacement));
+            continue;
+        }
         const auto level_set = std::dynamic_pointer_cast<const LevelSet>(collider->shape);
         if (!level_set) continue;
         const double needed =

@@ -5,9 +5,9 @@
 #include <map>
 #include <mutex>
 
-#include "runtime/shapes/contact_walk.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/motion/moving_body.h"
+#include "runtime/shapes/motion/moving_contact.h"
 #include "runtime/shapes/motion/moving_triangles.h"
 
 namespace rapid {
@@ -291,32 +291,10 @@ public:
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {
         for (std::size_t i = 0; i < paths.size(); ++i)
-            contacts[i] = may_reach(paths[i], bounds_) ? first_contact(paths[i]) : Contact();
+            contacts[i] = may_reach(paths[i], bounds_) ? first_contact_of<DeformingField>(body_, paths[i]) : Contact();
     }
 
 private:
-    Contact first_contact(const Path& path) const
-    {
-        DeformingField field{body_, path, path.radius};
-        const auto start = body_.at(path.P, path.begin, field.exact_within(Exact::AtStart));
-        const double f = start.phi - path.radius;
-        const double flush = flush_within(path.P, path.radius, body_.rounding());
-        if (f < -flush) {
-            Contact contact;
-            const double slope = start.gradient.norm();
-            contact.time = 0;
-            contact.n = unit_normal(start.gradient, path.v - start.vc);
-            contact.vc = start.vc;
-            contact.depth = slope > 0 ? -f / slope : -f;
-            return contact;
-        }
-        // A point that rounding left a little below the surface goes by the level that it is on.
-        field.level = path.radius + std::min(f, 0.0);
-        ContactWalk walk(field, field.sample(0, std::max(f, 0.0), start), 0, path.duration);
-        if (f <= flush) walk.leave_surface(2 * flush);
-        return walk.walk();
-    }
-
     DeformingDistance body_;
     Box3d bounds_;
 };

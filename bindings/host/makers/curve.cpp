@@ -1,0 +1,131 @@
+// rapid.curve: lines from place to place, at rest or moving.
+#include <fmt/format.h>
+
+#include <deque>
+#include <map>
+#include <mutex>
+
+#include "bindings/host/maker.h"
+#include "bindings/host/makers/sequence_options.h"
+#include "runtime/graph/curve_value.h"
+#include "runtime/io/format.h"
+
+namespace rapid {
+namespace {
+
+CurvesPtr read_curves(const std::filesystem::path& file, bool closed)
+{
+    try {
+        return curves_of(read_points(file), closed, file.string());
+    } catch (Error& error) {
+        throw error.at({file.string(), 0});
+    }
+}
+
+struct CurveFrom {
+    CurveValue points;
+    bool closed;
+
+    static Maker declare()
+    {
+        return maker<CurveFrom>("curve.from", "A curve through places, or one that deforms.")
+            .param(&CurveFrom::points, "points", Value(), any_number(), "m",
+                   "{{x, y, z}, ...} or points, in the order of the curve; or a function of the frame that returns "
+                   "either, always as many")
+            .required()
+            .param(&CurveFrom::closed, "closed", false, any_number(), "", "from the last point to the first, too");
+    }
+    ObjectPtr make(MakeContext&) const { return points.curves(closed); }
+};
+RAPID_MAKER(CurveFrom);
+
+// A file for each frame, all with as many points on as many lines.
+class CurveFiles final : public CurveFrames {
+public:
+    CurveFiles(std::map<int, std::filesystem::path> files, std::string name, FrameSequence order, bool closed)
+        : files_(std::move(files)), name_(std::move(name)), order_(order), closed_(closed)
+    {
+        order_.first = files_.begin()->first;
+        order_.last = files_.rbegin()->first;
+        for (std::int64_t frame = order_.first; frame <= order_.last; ++frame)
+            if (!files_.count(static_cast<int>(frame)))
+                throw Error(
+                    fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to "
+                                "{}",
+                                frame, name_, order_.first, order_.last));
+        first_ = read(static_cast<int>(order_.first));
+    }
+    const CurvesPtr& first() const { return first_; }
+
+    CurvesPtr at(const FrameClock&, std::int64_t frame) const override
+    {
+        const std::int64_t nearest = std::clamp(frame - order_.offset, order_.first, order_.last);
+        const int held = static_cast<int>(order_.file_of(frame).value_or(nearest));
+        const std::lock_guard lock(mutex_);
+        for (const auto& [number, curves] : kept_)
+            if (number == held) return curves;
+        kept_.emplace_front(held, read(held));
+        if (kept_.size() > most_kept) kept_.pop_back();
+        return kept_.front().second;
+    }
+    bool has(std::int64_t frame) const override { return order_.file_of(frame).has_value(); }
+    FrameRange range() const override
+    {
+        return order_.first < order_.last ? FrameRange{order_.begins(), order_.ends()} : FrameRange();
+    }
+
+private:
+    static constexpr std::size_t most_kept = 8;  // as of the files of a mesh
+
+    CurvesPtr read(int frame) const
+    {
+        CurvesPtr curves = read_curves(files_.at(frame), closed_);
+        if (first_ && curves->lines()->after != first_->lines()->after)
+            throw Error(
+                fmt::format("\"{}\" changes at frame {}: it has {} points there, and {} at frame {}, or other lines "
+                            "between them; a curve that deforms keeps its points",
+                            name_, frame, curves->points().size(), first_->points().size(), order_.first));
+        return curves;
+    }
+
+    std::map<int, std::filesystem::path> files_;
+    std::string name_;
+    FrameSequence order_;
+    bool closed_;
+    CurvesPtr first_;
+    mutable std::mutex mutex_;
+    mutable std::deque<std::pair<int, CurvesPtr>> kept_;  // most recent first
+};
+
+struct ReadCurve : SequenceOptions {
+    std::string path;
+    bool closed;
+
+    static Maker declare()
+    {
+        auto declaration =
+            maker<ReadCurve>("curve.read", "Reads curves from a file of points: the lines of an .obj, or all points.");
+        declaration
+            .param(&ReadCurve::path, "path", Value(), any_number(), "",
+                   "relative to the graph file; with #### or $F4 in it a file for each frame: a curve that deforms")
+            .required()
+            .param(&ReadCurve::closed, "closed", false, any_number(), "", "from the last point to the first, too");
+        return SequenceOptions::declare(declaration);
+    }
+    ObjectPtr make(MakeContext& context) const
+    {
+        const FramePattern pattern((context.folder / path).string());
+        check(path, pattern.has_frame());
+        if (!pattern.has_frame()) return read_curves(context.resolve(path), closed);
+        const auto files = existing_files(pattern);
+        if (context.on_read)
+            for (const auto& [frame, file] : files) context.on_read(file);
+        auto frames = std::make_shared<CurveFiles>(files, pattern.text(), order(), closed);
+        const CurvesPtr first = frames->first();
+        return std::make_shared<MovingCurves>(first, std::move(frames), constant_motion({}));
+    }
+};
+RAPID_MAKER(ReadCurve);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,144 @@
+#include "runtime/shapes/motion/level_set_sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+// Two files as read, and both widened twice: as it is first asked, and for the radius of points.
+constexpr std::size_t most_kept = 8;
+constexpr double most_voxels = 0x1p27;  // of a widened level set
+
+// How far the vertices of a surface are from the other level set, as far as its band tells.
+double farthest(const LevelSet& from, const LevelSet& other)
+{
+    const MeshPtr surface = from.surface();
+    std::vector<Vec3d> P;
+    P.reserve(surface->positions.size());
+    for (const Vec3f& vertex : surface->positions) P.push_back(vertex.cast<double>());
+    std::vector<double> phi(P.size());
+    other.distance(P, phi, {});
+    double most = 0;
+    for (const double distance : phi) most = std::max(most, std::abs(distance));
+    return most;
+}
+
+}  // namespace
+
+LevelSetSequence::LevelSetSequence(SequenceFiles files, std::string name, Read read)
+    : files_(std::move(files)), name_(std::move(name)), read_(std::move(read))
+{
+}
+
+LevelSetPtr LevelSetSequence::read(int file) const { return widened(file, 0); }
+
+LevelSetPtr LevelSetSequence::widened(int file, double band) const
+{
+    const auto find = [&](double wanted) -> LevelSetPtr {
+        const std::lock_guard lock(mutex_);
+        for (const Kept& kept : kept_)
+            if (kept.file == file && kept.band == wanted) return kept.level_set;
+        return nullptr;
+    };
+    LevelSetPtr found = find(band);
+    if (found) return found;
+    if (band == 0) {
+        found = read_(files_.files.at(file));
+    } else {
+        const LevelSetPtr as_read = widened(file, 0);
+        if (as_read->band() >= band) return as_read;
+        found = as_read->with_band(band);
+    }
+    const std::lock_guard lock(mutex_);
+    kept_.push_front({file, band, found});
+    if (kept_.size() > most_kept) kept_.pop_back();
+    return found;
+}
+
+// In whole steps of four voxels, so that the same width serves many pairs.
+LevelSetSequence::Pair LevelSetSequence::pair(int a, int b, double band) const
+{
+    Pair found;
+    bool known = false;
+    {
+        const std::lock_guard lock(mutex_);
+        if (const auto kept = pairs_.find({a, b}); kept != pairs_.end()) found = kept->second, known = true;
+    }
+    const LevelSetPtr first = read(a), second = read(b);
+    const double voxel = std::max(first->voxel(), second->voxel());
+    const auto stepped = [&](double metres) { return 4 * voxel * std::ceil(metres / (4 * voxel) * (1 - 1e-9)); };
+    const Box3d both = first->bounds().merged(second->bounds());
+    const auto fits = [&](double metres) {
+        const double smaller = std::min(first->voxel(), second->voxel());
+        return ((both.sizes().array() + 2 * metres) / smaller).prod() < most_voxels;
+    };
+    if (!known) {
+        const double half = 0.5 * std::max(first->bounds().diagonal().norm(), second->bounds().diagonal().norm());
+        double reach = std::min(first->band(), second->band());
+        for (found.a = first, found.b = second;; reach = std::min(2 * reach, half + 2 * voxel)) {
+            if (reach > std::min(first->band(), second->band())) {
+                if (found.jumps = !fits(stepped(reach)); found.jumps) break;
+                found.a = widened(a, stepped(reach)), found.b = widened(b, stepped(reach));
+            }
+            found.travel = std::max(farthest(*found.a, *found.b), farthest(*found.b, *found.a));
+            if (found.travel < reach - voxel) break;
+            if (found.jumps = reach >= half + 2 * voxel; found.jumps) break;
+        }
+        found.jumps = found.jumps || found.travel > half;
+        const std::lock_guard lock(mutex_);
+        pairs_[{a, b}] = {nullptr, nullptr, found.travel, found.jumps};
+    }
+    const double needed = stepped(found.travel + std::max(band, 2 * voxel));
+    found.jumps = found.jumps || !fits(needed);
+    found.a = found.jumps ? first : widened(a, needed);
+    found.b = found.jumps ? second : widened(b, needed);
+    return found;
+}
+
+LevelSetPtr LevelSetSequence::at(std::int64_t frame) const
+{
+    const std::optional<int> file = files_.frame_of(frame);
+    if (!file) return nullptr;
+    if (!files_.files.count(*file))
+        throw Error(
+            fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {} where "
+                        "what asks is not a collider or a force",
+                        *file, name_, files_.files.begin()->first, files_.files.rbegin()->first));
+    return read(*file);
+}
+
+ShapePtr LevelSetSequence::over(const FrameClock& clock, double from, double to) const
+{
+    const double whole = std::floor(from);
+    const SequenceFiles::Interval interval = files_.interval(static_cast<std::int64_t>(whole));
+    // Where the files begin or end, what is there at the end of the step is there throughout.
+    if (const std::optional<int> last = from == to ? interval.a : interval.b; !interval.a || !interval.b)
+        return last ? read(*last) : nullptr;
+    SequenceFiles::Interval part = interval;
+    part.begin = interval.begin + (from - whole) * (interval.end - interval.begin);
+    part.end = interval.begin + (to - whole) * (interval.end - interval.begin);
+    if (*part.a == *part.b || (part.begin == part.end && part.begin == 0)) return read(*part.a);
+    if (part.begin == part.end && part.begin == 1) return read(*part.b);
+    constexpr double tags = 0x1p30;
+    const auto tag = static_cast<std::int32_t>(std::fmod(std::abs(std::round(from * 4096)), tags));
+    if (const auto blended = blend(part, (to - from) / clock.fps, tag, 0)) return blended;
+    return read(interval.end >= interval.begin ? *part.b : *part.a);
+}
+
+std::shared_ptr<const BlendedLevelSets> LevelSetSequence::blend(const SequenceFiles::Interval& part, double duration,
+                                                                std::int32_t tag, double band) const
+{
+    const Pair both = pair(*part.a, *part.b, band);
+    if (both.jumps) return nullptr;
+    const auto widen = [self = shared_from_this(), part, duration, tag](double metres) {
+        return self->blend(part, duration, tag, metres);
+    };
+    return blended_level_sets({both.a, both.b, part.begin, part.end, duration, both.travel, tag, widen});
+}
+
+}  // namespace rapid

@@ -1,0 +1,35 @@
+// The first contact of a path with a body of which samples are known at any place and time.
+#pragma once
+
+#include <algorithm>
+
+#include "runtime/shapes/contact_walk.h"
+
+namespace rapid {
+
+// Body has at(P, time, exact) with phi, gradient and vc, and rounding(); Field is what ContactWalk asks for, made of
+// {body, path, level}.
+template <class Field, class Body>
+Contact first_contact_of(const Body& body, const Path& path)
+{
+    Field field{body, path, path.radius};
+    const auto start = body.at(path.P, path.begin, field.exact_within(Exact::AtStart));
+    const double f = start.phi - path.radius;
+    const double flush = flush_within(path.P, path.radius, body.rounding());
+    if (f < -flush) {
+        Contact contact;
+        const double slope = start.gradient.norm();
+        contact.time = 0;
+        contact.n = unit_normal(start.gradient, path.v - start.vc);
+        contact.vc = start.vc;
+        contact.depth = slope > 0 ? -f / slope : -f;
+        return contact;
+    }
+    // A point that rounding left a little below the surface goes by the level that it is on.
+    field.level = path.radius + std::min(f, 0.0);
+    ContactWalk walk(field, field.sample(0, std::max(f, 0.0), start), 0, path.duration);
+    if (f <= flush) walk.leave_surface(2 * flush);
+    return walk.walk();
+}
+
+}  // namespace rapid

@@ -1,6 +1,5 @@
 // rapid graph: a picture of a scene's graph.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "bindings/command/command.h"
 #include "bindings/command/graph_options.h"
@@ -33,11 +32,7 @@ public:
             throw Error(fmt::format("-o {}: it must be a file of .svg, .dot or .json", file_));
         Threads threads(common.threads);
         return threads.run([&] {
-            const std::unique_ptr<Session> session = graph_.load(false, [&](const std::string& message) {
-                print_error(Error(message), common.verbose);
-                _exit(status_failed);
-            });
-            for (const std::string& warning : session->take_warnings()) print_warning(warning);
+            const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
             PlanOptions options;
             options.seed = graph_.seed();
             const Plan plan(session->graph(), options);

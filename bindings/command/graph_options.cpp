@@ -1,6 +1,7 @@
 #include "bindings/command/graph_options.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "runtime/memory_budget.h"
 
@@ -50,6 +51,16 @@ std::unique_ptr<Session> GraphOptions::load(bool may_write, std::function<void(c
     options.on_timeout = std::move(on_timeout);
     options.on_read = std::move(on_read);
     return std::make_unique<Session>(file_, std::move(options));
+}
+
+std::unique_ptr<Session> GraphOptions::load_to_look_at(const CommonOptions& common) const
+{
+    std::unique_ptr<Session> session = load(false, [&common](const std::string& message) {
+        print_error(Error(message), common.verbose);
+        _exit(status_failed);
+    });
+    for (const std::string& warning : session->take_warnings()) print_warning(warning);
+    return session;
 }
 
 std::unique_ptr<Session> GraphOptions::load_other(const std::string& file,

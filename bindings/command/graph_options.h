@@ -26,6 +26,9 @@ public:
     // Error: the file or a --set is wrong. may_write, on_timeout, on_read: see SessionOptions.
     std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,
                                   std::function<void(const std::filesystem::path& file)> on_read = {}) const;
+    // The same for a command that only looks at the graph: its warnings are printed, and a script that runs into its
+    // timeout ends the process.
+    std::unique_ptr<Session> load_to_look_at(const CommonOptions& common) const;
     // Another graph, with the same limits; --set applies to the first one only.
     std::unique_ptr<Session> load_other(const std::string& file,
                                         std::function<void(const std::string& message)> on_timeout) const;

@@ -1,6 +1,5 @@
 // rapid trace: the lives of single points.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <sstream>
 
@@ -50,11 +49,7 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            const std::unique_ptr<Session> session = graph_.load(false, [&](const std::string& message) {
-                print_error(Error(message), common.verbose);
-                _exit(status_failed);
-            });
-            for (const std::string& warning : session->take_warnings()) print_warning(warning);
+            const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
             PlanOptions options;
             options.seed = graph_.seed();
             options.keep_steps = true;

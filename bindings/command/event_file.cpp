@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <tuple>
+#include <type_traits>
 
 #include "runtime/io/format.h"
 #include "runtime/io/frame_pattern.h"
@@ -25,6 +27,7 @@ struct Event {
     float speed = 0, impulse = 0;
     std::int32_t collider = -1;
 };
+static_assert(std::is_trivially_destructible_v<Event>, "events go into logs as bytes");
 
 void add_events(const StepRecord& record, std::int32_t chain, std::vector<Event>& events)
 {
@@ -74,6 +77,27 @@ PointSet points_of(std::span<const Event> events, std::int64_t frame)
     return points;
 }
 
+// Of a frame, as a log has them.
+std::string piece_of(std::int64_t frame, const std::vector<Event>& events)
+{
+    std::string piece(sizeof frame + events.size() * sizeof(Event), '\0');
+    std::memcpy(piece.data(), &frame, sizeof frame);
+    std::memcpy(piece.data() + sizeof frame, static_cast<const void*>(events.data()), events.size() * sizeof(Event));
+    return piece;
+}
+
+PointSet points_of_piece(std::string_view piece)
+{
+    std::int64_t frame = 0;
+    if (piece.size() < sizeof frame || (piece.size() - sizeof frame) % sizeof(Event) != 0)
+        throw Error("it is no log of events");
+    std::memcpy(&frame, piece.data(), sizeof frame);
+    piece.remove_prefix(sizeof frame);
+    std::vector<Event> events(piece.size() / sizeof(Event));
+    std::memcpy(static_cast<void*>(events.data()), piece.data(), piece.size());
+    return points_of(events, frame);
+}
+
 bool holds_events(const Format& format) { return format.read && !format.places_alone; }
 
 }  // namespace
@@ -121,18 +145,42 @@ void EventFile::add(const FrameResult& result)
     const auto key = [](const Event& e) { return std::tuple(e.time, e.chain, e.kind, e.id, e.collider); };
     std::sort(events.begin(), events.end(), [&](const Event& a, const Event& b) { return key(a) < key(b); });
     if (events.empty()) return;
-    const PointSet points = points_of(events, result.frame);
-    file_->append(points);
-    if (kept_) append_points(*kept_, points);
+    file_->append(points_of(events, result.frame));
+    if (log_) try {
+            log_->add(piece_of(result.frame, events));
+        } catch (const std::exception& error) {
+            log_.reset();
+            failure_ = fmt::format("{}: {}; no further snapshots are kept", log_path_.string(), error.what());
+        }
 }
 
-void EventFile::keep_all() { kept_ = points_of({}, 0); }
-
-void EventFile::set_events(PointSet events)
+void EventFile::log_to(const std::filesystem::path& log)
 {
-    if (!file_) return;
-    if (events.size() > 0) file_->append(events);
-    kept_ = std::move(events);
+    log_path_ = log;
+    try {
+        log_.emplace(log);
+    } catch (const Error& error) {
+        failure_ = fmt::format("{}: {}; no snapshots are kept", log.string(), error.what());
+    }
+}
+
+std::optional<std::uint64_t> EventFile::logged() const { return log_ ? std::optional(log_->bytes()) : std::nullopt; }
+
+void EventFile::check_log(std::uint64_t bytes) const
+{
+    if (!log_) throw Error(fmt::format("its events can't be read from {}", log_path_.string()));
+    try {
+        log_->read(bytes, points_of_piece);
+    } catch (const Error& error) {
+        throw Error(fmt::format("its events in {}: {}", log_path_.string(), error.what()));
+    }
+}
+
+void EventFile::go_on_behind(std::uint64_t bytes)
+{
+    if (!log_) return;
+    log_->read(bytes, [this](std::string_view piece) { file_->append(points_of_piece(piece)); });
+    log_->go_on_behind(bytes);
 }
 
 void EventFile::finish()

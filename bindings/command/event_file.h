@@ -1,10 +1,13 @@
 // The events of a run, as points in a file: --events.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "bindings/command/command.h"
+#include "bindings/command/piece_log.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/point_file.h"
 
@@ -23,21 +26,28 @@ public:
 
     // The events of a frame, in the order of their times.
     void add(const FrameResult& result);
-    // From now on all events are kept in memory, too.
-    void keep_all();
-    // Of all frames so far, where they are kept.
-    const PointSet& events() const { return *kept_; }
-    // Those of frames that are not computed again: before the first that is.
-    void set_events(PointSet events);
     // Names the file, which there is not before.
     void finish();
+
+    // From now on events go to this file, too, from which another run takes them up. Error: it can't be opened.
+    void log_to(const std::filesystem::path& log);
+    // How far the log is, in bytes; nothing where there is none, or not any more.
+    std::optional<std::uint64_t> logged() const;
+    // Why there is none any more, once.
+    std::string take_failure() { return std::exchange(failure_, {}); }
+    // Error: what the log has up to there is not whole.
+    void check_log(std::uint64_t bytes) const;
+    // The events so far are those of the log up to there; it goes on behind them.
+    void go_on_behind(std::uint64_t bytes);
 
 private:
     void check() const;
 
     std::string path_;
     std::optional<PointFile> file_;
-    std::optional<PointSet> kept_;
+    std::filesystem::path log_path_;
+    std::optional<PieceLog> log_;
+    std::string failure_;
 };
 
 }  // namespace rapid

@@ -173,7 +173,8 @@ std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& 
 void InputContents::add(const fs::path& file)
 {
     std::error_code ignored;
-    if (file.extension() == ".lua" || !fs::is_regular_file(file, ignored)) return;
+    if (code_ == Code::LeftOut && file.extension() == ".lua") return;
+    if (!fs::is_regular_file(file, ignored)) return;
     const std::string name = content + name_of(file, folder_);
     {
         const std::lock_guard lock(mutex_);

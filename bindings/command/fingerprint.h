@@ -24,11 +24,14 @@ std::string hash_of(const Fingerprint& fingerprint);
 // "rate was 20000, is 30000"; "the function in line 12 of scene.lua is another one"; empty where nothing differs.
 std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& is);
 
-// The contents of the files that a run reads, besides its code, which is known by what it does.
+// The contents of the files that a run reads.
 class InputContents {
 public:
+    // With those of its code, or without: what that does may be known besides.
+    enum class Code { Included, LeftOut };
+
     // folder: of the graph, from which names are told.
-    explicit InputContents(std::filesystem::path folder) : folder_(std::move(folder)) {}
+    InputContents(std::filesystem::path folder, Code code) : folder_(std::move(folder)), code_(code) {}
 
     // Before the file is read; from any thread.
     void add(const std::filesystem::path& file);
@@ -41,6 +44,7 @@ public:
 
 private:
     const std::filesystem::path folder_;
+    const Code code_;
     std::mutex mutex_;
     Fingerprint known_, fresh_;
 };

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "bindings/command/whole_file.h"
-#include "runtime/files/content_hash.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/frame_pattern.h"
 
@@ -18,6 +17,12 @@ using nlohmann::ordered_json;
 constexpr int format_version = 1;
 
 }  // namespace
+
+void PartRecord::identify(const std::map<std::string, std::string>& contents)
+{
+    identity.insert(contents.begin(), contents.end());
+    identity["the version of rapid"] = RAPID_VERSION;
+}
 
 PartRecord PartRecord::read(const std::filesystem::path& file)
 {
@@ -86,24 +91,6 @@ std::string difference(const PartRecord& there, const PartRecord& here)
 std::filesystem::path part_record_file(const std::string& pattern, std::string_view output)
 {
     return FramePattern(pattern).without_frame(output) + ".json";
-}
-
-void ReadFiles::add(const std::filesystem::path& file)
-{
-    std::error_code none;
-    if (!std::filesystem::is_regular_file(file, none)) return;
-    const std::lock_guard lock(mutex_);
-    std::string& hash = hashes_[file.lexically_normal().string()];
-    if (!hash.empty()) return;
-    hash = hash_text(file_hash(file));
-}
-
-void ReadFiles::put_into(std::map<std::string, std::string>& identity, const std::filesystem::path& folder) const
-{
-    const std::lock_guard lock(mutex_);
-    for (const auto& [file, hash] : hashes_)
-        identity["file " + std::filesystem::proximate(file, folder).string()] = hash;
-    identity["the version of rapid"] = RAPID_VERSION;
 }
 
 }  // namespace rapid

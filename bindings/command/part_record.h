@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -24,8 +23,11 @@ struct PartRecord {
     FrameSelection frames;
     double fps = 24;         // of the output's simulation
     std::int64_t start = 1;  // likewise: its first frame
-    // What decides the bits of a run, by names that a user knows: "rate", "--seed", "file fog.vdb" (a hash).
+    // What decides the bits of a run, by names that a user knows: "rate", "--seed", "content of fog.vdb" (a hash).
     std::map<std::string, std::string> identity;
+
+    // Adds the files that the run reads, and the version of Rapid.
+    void identify(const std::map<std::string, std::string>& contents);
 
     // Error: the file can't be read, or is no such record.
     static PartRecord read(const std::filesystem::path& file);
@@ -37,17 +39,5 @@ std::string difference(const PartRecord& there, const PartRecord& here);
 
 // The record of a sequence, or of a file: by its pattern with the part's name.
 std::filesystem::path part_record_file(const std::string& pattern, std::string_view output = "main");
-
-// The files that a run reads, and hashes of their contents. From any thread.
-class ReadFiles {
-public:
-    void add(const std::filesystem::path& file);
-    // By their paths from the folder; and the version of Rapid.
-    void put_into(std::map<std::string, std::string>& identity, const std::filesystem::path& folder) const;
-
-private:
-    mutable std::mutex mutex_;
-    std::map<std::string, std::string> hashes_;
-};
 
 }  // namespace rapid

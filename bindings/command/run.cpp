@@ -6,6 +6,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/event_file.h"
 #include "bindings/command/farm_options.h"
+#include "bindings/command/fingerprint.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graceful_end.h"
@@ -112,11 +113,10 @@ public:
             const FrameSelection frames = range_of(plan);
             if (record_) {
                 record_->frames = frames;
-                read_.put_into(record_->identity, folder_of(graph_.file()));
+                record_->identify(read_->take());
             }
             files_.resolve(plan, !frames.single());
             if (farm_.asked()) return submit(plan);
-            if (cache_.asked()) events_.keep_all();
             events_.begin();
             if (cache_.asked()) {
                 cache_.begin(*session, plan, frames, fingerprint_options(), files_, events_);
@@ -133,6 +133,7 @@ private:
     {
         if (!part_.part()) return;
         const std::string name = name_of(*part_.part());
+        read_.emplace(folder_of(graph_.file()), InputContents::Code::Included);
         record_ = std::make_shared<PartRecord>();
         record_->part = *part_.part();
         record_->sample = part_.sample();
@@ -194,7 +195,7 @@ private:
     {
         if (!record_ && !cache_.asked()) return tell_ ? Watch::tell : nullptr;
         return [this](const std::filesystem::path& file) {
-            if (record_) read_.add(file);
+            if (record_) read_->add(file);
             if (cache_.asked()) cache_.was_read(file);
             if (tell_) Watch::tell(file);
         };
@@ -326,7 +327,7 @@ private:
     std::optional<FrameSelection> frames_;
     PartOptions part_;
     std::shared_ptr<PartRecord> record_;  // null where all points are simulated
-    ReadFiles read_;                      // of a part
+    std::optional<InputContents> read_;   // of a part
     std::string stats_, profile_;
     EventFile events_;
     RunCache cache_;

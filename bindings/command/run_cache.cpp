@@ -27,7 +27,7 @@ constexpr std::string_view prefix = "snapshot.", suffix = ".rapid";
 // What a snapshot's file holds.
 struct KeptRun {
     Snapshot snapshot;
-    PointSet events;
+    std::uint64_t events = 0;  // how far the log of events was
 
     template <class Archive>
     void serialize(Archive& keep)
@@ -82,7 +82,7 @@ void RunCache::check() const
 void RunCache::set_graph(const fs::path& graph)
 {
     graph_ = graph;
-    read_ = std::make_unique<InputContents>(graph.parent_path());
+    read_ = std::make_unique<InputContents>(graph.parent_path(), InputContents::Code::LeftOut);
 }
 
 void RunCache::was_read(const fs::path& file)
@@ -160,10 +160,12 @@ void RunCache::begin_anew()
         std::error_code ignored;
         fs::remove(file, ignored);
     }
+    std::error_code ignored;
+    fs::remove(events_log(), ignored);
 }
 
 void RunCache::begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
-                     FrameFiles& files, const EventFile& events)
+                     FrameFiles& files, EventFile& events)
 {
     frames_ = frames;
     first_frame_ = plan.first_frame();
@@ -178,6 +180,7 @@ void RunCache::begin(const Session& session, const Plan& plan, const FrameSelect
     if (!events.path().empty()) {  // those up to the last frame are known when it is computed
         last_due_ = frames_.last;
         if (!first_due_) first_due_ = last_due_;
+        if (every_ > 0) events.log_to(events_log());
     }
     try {
         journal_.begin(folder_ / "journal", known_);
@@ -281,12 +284,13 @@ bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluat
         if (file.header().at("frame") != frame || hash_of(of_graph) != hash_of(fingerprint_))
             throw Error(fmt::format("it is of another run: {}", list_of(differences(of_graph, fingerprint_))));
         rapid::restore(kept, file.state());
+        if (!events.path().empty()) events.check_log(kept.events);
     } catch (const std::exception& error) {
         failures_.push_back(shown_error(path.string(), error) + "; it is left out");
         return false;
     }
     evaluator.load(kept.snapshot);
-    events.set_events(std::move(kept.events));
+    events.go_on_behind(kept.events);
     last_kept_ = frame;
     return true;
 }
@@ -298,6 +302,7 @@ void RunCache::restore(Evaluator& evaluator, EventFile& events)
     for (auto one = all.rbegin(); one != all.rend(); ++one)
         if (one->first < *first_due_ && one->first >= first_frame_ && load(one->first, one->second, evaluator, events))
             return;
+    events.go_on_behind(0);
 }
 
 std::vector<const FrameRecord*> RunCache::records(std::int64_t first, std::int64_t last) const
@@ -361,12 +366,14 @@ void RunCache::add(const FrameRecord& record)
     }
 }
 
-void RunCache::keep(const Evaluator& evaluator, const EventFile& events, bool in_any_case)
+void RunCache::keep(const Evaluator& evaluator, EventFile& events, bool in_any_case)
 {
     const std::int64_t frame = evaluator.next_frame() - 1;
     const bool is_due = every_ > 0 && ((frame - first_frame_ + 1) % every_ == 0 || frame == frames_.last);
     if (!writer_ || !(is_due || in_any_case) || last_kept_ == frame || frame < first_frame_) return;
-    KeptRun kept{evaluator.save(), events.events()};
+    if (std::string failure = events.take_failure(); !failure.empty()) failures_.push_back(std::move(failure));
+    if (!events.path().empty() && !events.logged()) return;
+    KeptRun kept{evaluator.save(), events.logged().value_or(0)};
     ordered_json header = {{"what", "snapshot of a run"}, {"graph", graph_.string()}, {"frame", frame}};
     for (const auto& [name, state] : kept.snapshot.simulations) header["simulations"][name] = state.size();
     for (const auto& [name, state] : kept.snapshot.nodes) header["nodes"][name] = state.size();

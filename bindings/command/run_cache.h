@@ -36,7 +36,7 @@ public:
     // What is asked for, and what the folder has of it. options: of the fingerprint. Error: another run has the folder,
     // or it is of a run of another fingerprint.
     void begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
-               FrameFiles& files, const EventFile& events);
+               FrameFiles& files, EventFile& events);
 
     // The frames that are to be computed; nothing: all that was asked for is there.
     std::optional<std::int64_t> first_due() const { return first_due_; }
@@ -55,7 +55,7 @@ public:
     void complete_before(std::optional<std::int64_t> frame);
 
     // After a frame: a snapshot, where one is due, or in any case.
-    void keep(const Evaluator& evaluator, const EventFile& events, bool in_any_case);
+    void keep(const Evaluator& evaluator, EventFile& events, bool in_any_case);
     // The frame of the last snapshot that was submitted.
     std::optional<std::int64_t> last_kept() const { return last_kept_; }
     // Waits for the snapshots. complete: films are, too.
@@ -73,6 +73,7 @@ private:
     void find_due(const Plan& plan, FrameFiles& files);
     void leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const;
     std::filesystem::path snapshot_file(std::int64_t frame) const;
+    std::filesystem::path events_log() const { return folder_ / "events"; }
     std::map<std::int64_t, std::filesystem::path> snapshots() const;
     bool load(std::int64_t frame, const std::filesystem::path& file, Evaluator& evaluator, EventFile& events);
     void add(const FrameRecord& record);

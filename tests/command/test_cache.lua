@@ -65,6 +65,32 @@ describe("rapid run --cache", function()
     folder:shell "cmp whole.csv a.csv"
   end)
 
+  it("takes events up again, whatever ended the run, and leaves out a snapshot whose events are damaged", function()
+    local folder = new_folder()
+    folder:done "-f 1-40 --set rate=4000 --events whole.csv --quiet"
+    local said = folder:shell [[
+run() { $limit "$RAPID" run scene.lua -f 1-40 --set rate=4000 --cache cache --cache-every 3 --events a.csv "$@"; }
+for wait in 0.1 0.2 0.15 0.3 0.25; do
+  limit="timeout -s KILL $wait"
+  run --threads $((1 + ${wait#0.} % 3)) --quiet
+  [ ! -e a.csv ] || { cmp whole.csv a.csv && rm a.csv; }
+done 2>/dev/null
+limit=
+run --threads 2 --quiet && cmp whole.csv a.csv && rm a.csv || exit 1
+# A byte behind the events of half of the frames.
+at=$(($(stat -c %s cache/events) / 2))
+printf '\125' | dd of=cache/events bs=1 seek=$at conv=notrunc status=none
+run --quiet 2>&1 && cmp whole.csv a.csv
+]]
+    assert.matches("warning: cache/snapshot.0039.rapid: its events in cache/events: it is damaged; it is left out",
+      said, 1, true)
+    assert.truthy(not said:find("snapshot.0003", 1, true))
+    -- Once more from what has been mended.
+    folder:shell "rm a.csv"
+    assert.equal("", folder:done("-f 1-40 --set rate=4000 --cache cache --cache-every 3 --events a.csv --quiet"))
+    folder:shell "cmp whole.csv a.csv"
+  end)
+
   it("keeps a snapshot after every tenth frame, and the last", function()
     local folder = new_folder()
     folder:done "-f 1-24 --cache cache --quiet"

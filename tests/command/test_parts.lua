@@ -374,7 +374,7 @@ describe("rapid merge", function()
     folder:write("drops.lua", text .. "-- changed\n")
     done "run drops.lua --part 2/2 -f 1-4 -o 'm.####.csv' --quiet"
     folder:write("drops.lua", text)
-    refused("'m_part{part}.####.csv'", "file drops.lua is ")
+    refused("'m_part{part}.####.csv'", "content of drops.lua is ")
   end)
 
   it("does not take a part that was begun again and not finished", function()

@@ -21,7 +21,7 @@ for path in io.popen(("ls %s/graphs/*.lua"):format(command.quoted(root))):lines(
 end
 
 local script = [[
-outputs="-o DIR/{output}.####.bgeo -o DIR/{output}.####.png --size 64x36"
+outputs="-o DIR/{output}.####.bgeo -o DIR/{output}.####.png --size 64x36 --events DIR/events.bgeo"
 run() {
   folder=$1; shift
   $limit "$RAPID" run "$SCENE" -f 1-$FRAMES $(echo "$outputs" | sed "s|DIR|$folder|g") "$@" >said 2>&1

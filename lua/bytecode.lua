@@ -13,6 +13,7 @@
 --                    computed name
 --   calls            names on the point itself that it calls like methods
 --   kills            whether `kill` is called or could be
+--   reads_points     of a function of the whole set: whether it may do more with its points than to name points.detail
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
 --
 -- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
@@ -41,6 +42,7 @@ end
 local point = { kind = "point" }
 local shared = { kind = "shared" } -- of unknown value
 local parameters = { kind = "shared", value = {} } -- of a Lua node
+local set = { kind = "set" } -- all points, of a :detail
 
 local function join(a, b)
   if a == b then return a end
@@ -184,6 +186,29 @@ function At:write_element(object)
   if object and object ~= parameters and object.kind == "shared" then
     self:refuse_store "assigns into a table that all points share"
   end
+end
+
+-- Operands of an instruction, by their kinds in vmdef.bcmode.
+local variable, base = 3, 2
+
+local returns = { RET = true, RET1 = true, RETM = true }
+
+-- Whether the instruction does more with the set than to copy it into another register, or to find points.detail.
+function At:reads_set(name, mode)
+  if name == "MOV" or name == "TGETS" and self:string_constant(self.c) == "detail" then return false end
+  local regs = self.regs
+  local has_d = band(rshift(mode, 3), 15) == 0 -- one operand in place of b and c
+  for _, operand in ipairs { { band(mode, 7), self.a }, { band(rshift(mode, 3), 15), self.b },
+                             { band(rshift(mode, 7), 15), has_d and self.d or self.c } } do
+    local kind, slot = operand[1], operand[2]
+    if kind == variable and regs[slot] == set then return true end
+    if kind == base or returns[name] and slot == self.a then
+      for higher = slot, 250 do
+        if regs[higher] == set then return true end
+      end
+    end
+  end
+  return name == "FNEW" -- a closure may see it
 end
 
 function At:forget(first, last)
@@ -424,6 +449,7 @@ local function step(f, pc, regs, found, outer, following)
     f = f, pc = pc, regs = regs, found = found, outer = outer, call = following,
     a = band(rshift(ins, 8), 0xff), b = rshift(ins, 24), c = band(rshift(ins, 16), 0xff), d = rshift(ins, 16),
   }, At)
+  if found.of_the_set and at:reads_set(name, mode) then found.reads_points = true end
   local effect = effects[name]
   local result
   if effect then result = effect(at) end
@@ -488,6 +514,7 @@ function analyse_function(f, found, given, outer)
         local changed = false
         for slot = 0, 255 do
           local joined = join(known[slot], regs[slot])
+          if known[slot] ~= regs[slot] and (known[slot] == set or regs[slot] == set) then found.reads_points = true end
           if joined ~= known[slot] then
             known[slot], changed = joined, true
           end
@@ -532,8 +559,12 @@ local function analyse(kernel, env, of_a_point, point_names)
   end
   local found = nothing_found(env, to_remember(of_a_point), "the kernel", point_names.methods)
   -- Behind the point and the frame come the parameters of a Lua node, which all points share.
-  analyse_function(kernel, found, of_a_point and { [0] = point, [2] = parameters } or { [2] = parameters })
-  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "subject", "methods" } do found[own] = nil end
+  found.of_the_set = not of_a_point
+  found.reads_points = found.of_the_set and util.funcinfo(kernel).isvararg or false
+  analyse_function(kernel, found, { [0] = of_a_point and point or set, [2] = parameters })
+  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "subject", "methods", "of_the_set" } do
+    found[own] = nil
+  end
   return found
 end
 

@@ -153,7 +153,8 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     found.kills = flag_of(L, "kills");
     for (std::set<std::string>* names : {&found.reads, &found.may})
         if (names->count("nage")) names->insert({"age", "life"});
-    found.asks_places = flag_of(L, "asks_places") || flag_of(L, "computes_names");
+    found.asks_places =
+        kernel.of_the_set ? flag_of(L, "reads_points") : flag_of(L, "asks_places") || flag_of(L, "computes_names");
     return found;
 }
 

@@ -36,7 +36,7 @@ struct KernelAnalysis {
     std::map<std::string, Location> places;   // where it first names an attribute of the point itself
     std::set<std::string> joins, asks;        // groups that it joins or leaves, and that it asks for
     bool asks_any = false;                    // for groups by computed names
-    bool kills = false, asks_places = false;  // whether it may
+    bool kills = false, asks_places = false;  // whether it may; a function of the whole set, whether it reads points
 };
 
 struct KernelSource {

@@ -33,11 +33,21 @@ bool has_stage(const NodeType& type, Stage stage)
     return std::find(type.stages.begin(), type.stages.end(), stage) != type.stages.end();
 }
 
-// A parameter for a function of all points at once.
-bool takes_whole_set(const NodeType& type)
+// A parameter for a function of all points at once; null where there is none.
+const Param* whole_set_function_of(const NodeType& type)
 {
-    return std::any_of(type.params.begin(), type.params.end(),
-                       [](const Param& param) { return param.type == whole_set_function_type; });
+    const auto found = std::find_if(type.params.begin(), type.params.end(),
+                                    [](const Param& param) { return param.type == whole_set_function_type; });
+    return found == type.params.end() ? nullptr : &*found;
+}
+
+// One that only makes detail values of the frame, and of those that there were, does not.
+bool reads_whole_set(const PlannedNode& planned, const Param& param)
+{
+    const auto argument = planned.node->arguments.find(param.name);
+    if (argument == planned.node->arguments.end()) return true;
+    const auto function = argument->second.object<PointFunction>();
+    return !function || function->asks_places();
 }
 
 bool asks_places(const PlannedNode& planned)
@@ -52,7 +62,8 @@ bool asks_places(const PlannedNode& planned)
 std::string what_couples(const Plan& plan, const PlannedNode& planned)
 {
     const NodeType& type = *planned.node->type;
-    if (takes_whole_set(type)) return "its function is given all points";
+    if (const Param* param = whole_set_function_of(type))
+        return reads_whole_set(planned, *param) ? "its function is given all points, and reads them" : "";
     if (asks_places(planned)) return of_place;
     if (has_stage(type, Stage::Constraints)) return "its constraints are solved for all points together";
     const CouplingRule* rule = rule_of(type.name);

@@ -31,7 +31,7 @@ public:
 
     // The attributes that it reads, by its code.
     virtual void uses(Uses& uses) const = 0;
-    // Whether it may read a point's index in the set.
+    // Whether it may read a point's index in the set; a function of all points at once, whether it may read any.
     virtual bool asks_places() const = 0;
 
     // The set and `now` outlive the result.

@@ -167,6 +167,35 @@ describe("rapid run --sample", function()
   end)
 end)
 
+describe("a :detail that reads no points", function()
+  it("is no obstacle to parts: what it makes of the frame is the same in each", function()
+    folder:write("gusts.lua", [[
+local rapid = require "rapid"
+local strength = 3
+local function gust(time) return strength * math.sin(2 * time) end
+return rapid.create { fps = 24, seed = 5 }
+  :emit { source = rapid.shape.sphere {}, rate = 2000, life = {0.2, 1} }
+  :detail("wind", function(points, frame)
+    points.detail.gust = gust(frame.time)
+    local before = points.detail.sum or 0
+    points.detail.sum = before
+    if frame.number > 3 then points.detail.sum = before + points.detail.gust end
+  end)
+  :points("blow", function(p, frame) p.v = p.v + vec3(frame.detail.gust, frame.detail.sum, 0) * p.dt end)
+  :gravity {}
+  :solve {}
+]])
+    assert.is_true(json.decode(done("explain gusts.lua --json").stdout).parts.possible)
+    done "run gusts.lua -f 1-12 -o 'g.####.ply' --quiet"
+    for k = 1, 3 do done("run gusts.lua -f 1-12 -o 'g.####.ply' --quiet --part " .. k .. "/3") end
+    done "merge --quiet -o 'gm.####.ply' 'g_part{part}.####.ply'"
+    for frame = 1, 12 do
+      local name = (".%04d.ply"):format(frame)
+      assert.truthy(folder:read("g" .. name) == folder:read("gm" .. name), name)
+    end
+  end)
+end)
+
 -- What couples, by a scene's chain: each is refused by run and explained by explain.
 local emitter = ":emit { source = rapid.shape.sphere {}, rate = 50, attributes = { pscale = 0.1 } }"
 local coupled = {
@@ -176,6 +205,22 @@ local coupled = {
   ["clump1"] = { emitter .. ":clump {} :contact {}", "together" },
   ["index"] = { emitter .. ':points("index", function(p) p.v = vec3(p.index, 0, 0) end)', "p.index" },
   ["sums"] = { emitter .. ':detail("sums", function(points) points.detail.n = #points end)', "given all points" },
+  ["passes_on"] = { [[
+    :emit { source = rapid.shape.sphere {}, rate = 50 }
+    :detail("passes_on", function(points)
+      local function count(all) return all and 1 or 0 end
+      points.detail.n = count(points)
+    end)]], "given all points" },
+  ["copies"] = { emitter .. [[:detail("copies", function(points)
+      local all = points.detail
+      if points.detail.n then all = points end
+      points.detail.n = all and 1 or 0
+    end)]], "given all points" },
+  ["adds"] = { emitter .. ':detail("adds", function(points) points:add { P = vec3(0, 0, 0) } end)',
+    "given all points" },
+  ["returns"] = { emitter .. ':detail("returns", function(points) return points end)', "given all points" },
+  ["any"] = { emitter .. ':detail("any", function(...) local points = ... points.detail.n = 1 end)',
+    "given all points" },
   ["delete1"] = { emitter .. ":delete { where = function(p) return p.index > 9 end }", "p.index" },
   ["collide1"] = { [[:emit { source = rapid.shape.sphere {}, rate = 50, attributes = { pscale = {0.1, 0.2} } }
     :collide { shape = rapid.levelset.sphere { radius = 0.3, voxel = 0.1 } }]], "largest radius" },

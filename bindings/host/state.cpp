@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <lua.hpp>
@@ -16,18 +15,9 @@
 #include "bindings/host/script_error.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/values.h"
-#include "runtime/files/output_file.h"
 
 namespace rapid {
 namespace {
-
-// LuaJIT ends by a signal where memory runs out while it makes a state, and was there for a part of it.
-[[noreturn]] void end_out_of_memory()
-{
-    remove_unfinished_files();
-    std::fputs("out of memory\n", stderr);
-    std::_Exit(1);
-}
 
 constexpr char state_field[] = "rapid.state";  // in the registry
 
@@ -65,11 +55,22 @@ void leave_out_current_folder(lua_State* L)
 
 State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host.interruption)
 {
-    L_ = lua_newstate(allocate, this);
+    make();
     if (!L_) throw std::bad_alloc();
     const std::exception_ptr error = set_up();
     // One that is not whole is given up: closing it, LuaJIT takes it for granted that its library ffi is.
     if (error) std::rethrow_exception(error);
+}
+
+// Where memory runs out behind its first block, LuaJIT closes what it has of the state, takes it for granted that this
+// is more, and ends by a signal. So it is left by a jump, over functions of C alone, and the part, some kilobytes, is
+// lost.
+void State::make()
+{
+    std::jmp_buf place;
+    making_ = &place;
+    if (setjmp(place) == 0) L_ = lua_newstate(allocate, this);
+    making_ = nullptr;
 }
 
 // In a protected call, since Lua's own error (out of memory) is no C++ exception: one that was caught as such could not
@@ -98,7 +99,8 @@ std::exception_ptr State::set_up()
         },
         &now);
     if (now.error || status == 0) return now.error;
-    return std::make_exception_ptr(status == LUA_ERRMEM ? Error("out of memory") : Error(lua_tostring(L_, -1)));
+    if (status == LUA_ERRMEM) return std::make_exception_ptr(std::bad_alloc());
+    return std::make_exception_ptr(Error(lua_tostring(L_, -1)));
 }
 
 State::~State()
@@ -136,8 +138,8 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
     if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
     if (moved)
         state.memory_ += new_size - old_size;
-    else if (!state.L_ && state.memory_ > 0)
-        end_out_of_memory();
+    else if (state.making_ && state.memory_ > 0)
+        std::longjmp(*state.making_, 1);
     else if (state.L_ && !state.protected_)
         throw std::bad_alloc();
     return moved;

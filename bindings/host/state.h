@@ -5,6 +5,7 @@
 // calls, so that no mesh is read and no level set built twice.
 #pragma once
 
+#include <csetjmp>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -113,6 +114,8 @@ private:
 
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     int protected_call(int arguments, int results, int handler);
+    // Has LuaJIT make the state; none where there is no memory.
+    void make();
     // Fills a new state; the error, where there is one.
     std::exception_ptr set_up();
     void open_libraries();
@@ -122,9 +125,10 @@ private:
     bool main_;
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
-    bool limited_ = false;    // to options().script_memory, now
-    bool is_broken_ = false;  // compiled code was left by a jump
-    bool protected_ = false;  // now
+    bool limited_ = false;            // to options().script_memory, now
+    bool is_broken_ = false;          // compiled code was left by a jump
+    bool protected_ = false;          // now
+    std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory
     Interruption::Slot slot_;
     lua_State* L_ = nullptr;
     int entries_ = 0;

@@ -3,16 +3,21 @@
 //   RAPID_FAULT=CALL:N:ERROR   the N-th call (from 1) of CALL ends with ERROR, and all later ones if ERROR ends in "+"
 //
 // CALL: open, write, fsync, close, link, rename (of files that are written, and of their folders), read (of any regular
-// file) or alloc (of memory, after main began, by whatever name: malloc, calloc, realloc, aligned). ERROR: an error's
-// number, or "short": half the bytes, or one, are written or read.
+// file), alloc (of memory, after main began, by whatever name: malloc, calloc, realloc, aligned) or state (of memory,
+// while LuaJIT makes a state). ERROR: an error's number, or "short": half the bytes, or one, are written or read.
 //
+//   RAPID_FAULT_LIST=FILE   a list of faults, a line each: for the k-th a copy of the process, which has loaded its
+//   libraries but
+//                       not begun, runs in a folder of its own, k, and says all in k/said; "k STATUS" is printed
 //   RAPID_STRESS=collector   Lua collects garbage all the time
 //   RAPID_STRESS=guard       what reads or writes behind a block of memory, or one that was freed, ends the process
 //                            (both: collector,guard)
 //   RAPID_FAULT_COUNT=FILE   the calls that there were of CALL, written when the process ends by itself
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <link.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +28,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <string>
+#include <vector>
 
 #include "tests/faults/guard.h"
 
@@ -45,17 +53,39 @@ std::atomic<bool> armed{false}, began{false};
 using Main = int (*)(int, char**, char**);
 Main program_main;
 
+// libgcc registers the code that LuaJIT compiles, in memory that it does not check (gcc 12): it can't report a fault.
+// Where it is loaded:
+std::uintptr_t unwinder_begin = 0, unwinder_end = 0;
+
+int find_unwinder(dl_phdr_info* library, std::size_t, void*)
+{
+    if (!std::strstr(library->dlpi_name, "libgcc_s")) return 0;
+    unwinder_begin = unwinder_end = library->dlpi_addr;
+    for (int k = 0; k < library->dlpi_phnum; ++k)
+        unwinder_end =
+            std::max(unwinder_end, unwinder_begin + library->dlpi_phdr[k].p_vaddr + library->dlpi_phdr[k].p_memsz);
+    return 1;
+}
+
+bool is_unwinder(void* caller)
+{
+    const auto at = reinterpret_cast<std::uintptr_t>(caller);
+    return at >= unwinder_begin && at < unwinder_end;
+}
+
+void arm_with(const char* text)
+{
+    char error[16] = "";
+    if (!text || std::sscanf(text, "%15[^:]:%ld:%15s", fault.call, &fault.nth, error) != 3) return;
+    fault.lasting = std::strchr(error, '+') != nullptr;
+    fault.error = std::strncmp(error, "short", 5) == 0 ? short_count : std::atoi(error);
+    ::dl_iterate_phdr(find_unwinder, nullptr);
+    armed = true;
+}
+
 // At the first call after the libraries are there.
 struct Arm {
-    Arm()
-    {
-        const char* text = std::getenv("RAPID_FAULT");
-        char error[16] = "";
-        if (!text || std::sscanf(text, "%15[^:]:%ld:%15s", fault.call, &fault.nth, error) != 3) return;
-        fault.lasting = std::strchr(error, '+') != nullptr;
-        fault.error = std::strncmp(error, "short", 5) == 0 ? short_count : std::atoi(error);
-        armed = true;
-    }
+    Arm() { arm_with(std::getenv("RAPID_FAULT")); }
     ~Arm()
     {
         armed = false;
@@ -78,15 +108,17 @@ int error_of(const char* call)
 // How deep this thread is in opening a library: its constructors have nobody to tell that there is no memory.
 thread_local int loading __attribute__((tls_model("initial-exec"))) = 0;
 
-// libgcc registers the code that LuaJIT compiles, in memory that it does not check (gcc 12): it can't report a fault.
-bool is_unwinder(void* caller)
-{
-    Dl_info found;
-    return ::dladdr(caller, &found) && std::strstr(found.dli_fname, "libgcc_s");
-}
+// While this thread is in lua_newstate(), which may be left by a jump where memory runs out.
+thread_local bool makes_state __attribute__((tls_model("initial-exec"))) = false;
 
 // Whether this request of memory, by `caller`, is to fail.
-bool fails(void* caller) { return armed && began && loading == 0 && !is_unwinder(caller) && error_of("alloc") > 0; }
+bool fails(void* caller)
+{
+    if (!armed || !began || loading > 0 || is_unwinder(caller)) return false;
+    if (!makes_state || error_of("state") == 0) return error_of("alloc") > 0;
+    makes_state = false;
+    return true;
+}
 
 bool is_regular(int descriptor)
 {
@@ -104,6 +136,34 @@ template <class F>
 F next(const char* name)
 {
     return reinterpret_cast<F>(::dlsym(RTLD_NEXT, name));
+}
+
+// Returns in each copy; this process ends.
+void copy_for_each(const char* list)
+{
+    constexpr unsigned most_seconds = 300;
+    std::ifstream file(list);
+    std::vector<std::string> faults;
+    for (std::string line; std::getline(file, line);) faults.push_back(line);
+    file.close();  // a copy that shared it would move the place in it
+    for (std::size_t k = 1; k <= faults.size(); ++k) {
+        const std::string folder = std::to_string(k);
+        const pid_t copy = ::fork();
+        if (copy < 0) std::exit(1);
+        if (copy == 0) {
+            if (::mkdir(folder.c_str(), 0777) != 0 || ::chdir(folder.c_str()) != 0) std::_Exit(100);
+            const int said = ::creat("said", 0666);
+            for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(said, stream);
+            ::close(said);
+            ::alarm(most_seconds);
+            return arm_with(faults[k - 1].c_str());
+        }
+        int status = 0;
+        ::waitpid(copy, &status, 0);
+        std::printf("%zu %d\n", k, WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));
+        std::fflush(stdout);
+    }
+    std::exit(0);
 }
 
 int open_file(const char* path, int flags, unsigned mode)
@@ -277,7 +337,9 @@ struct lua_State;
 lua_State* lua_newstate(void* (*allocate)(void*, void*, std::size_t, std::size_t), void* data)
 {
     static const auto original = next<decltype(&lua_newstate)>("lua_newstate");
+    makes_state = true;
     lua_State* const state = original(allocate, data);
+    makes_state = false;
     const char* const stress = std::getenv("RAPID_STRESS");
     if (state && stress && std::strstr(stress, "collector")) {
         constexpr int set_pause = 6, set_step = 7;  // as in lua.h
@@ -295,6 +357,7 @@ int __libc_start_main(Main program, int count, char** arguments, void (*init)(),
     using Start = int (*)(Main, int, char**, void (*)(), void (*)(), void (*)(), void*);
     program_main = program;
     const auto begin = [](int c, char** a, char** environment) {
+        if (const char* list = std::getenv("RAPID_FAULT_LIST")) copy_for_each(list);
         began = true;
         return program_main(c, a, environment);
     };

@@ -1,7 +1,8 @@
 -- Faults of the system in a small run: a disk that is full or breaks, short counts. Whatever fails, the run ends with a
 -- documented status and says what was wrong, and every file that is there is whole.
 --
---   RAPID_FAULTS=10000 rapid test tests/faults      as many faults (1,000)
+--   RAPID_FAULTS=10000 rapid test tests/faults/test_faults.lua      as many faults (1,000)
+--   RAPID_FAULT_SEED=2 rapid test tests/faults/test_faults.lua      others (1)
 local command = require "testing.command"
 local lehmer = require "tests.lehmer"
 
@@ -10,7 +11,7 @@ local faults = tonumber(os.getenv "RAPID_FAULTS" or 1000)
 local scene = [[
 local rapid = require "rapid"
 local ball = rapid.levelset.sphere { radius = 0.5, voxel = 0.1 }
-ball:write("out/ball.vdb")
+ball:write("ball.vdb")
 return rapid.create { seed = 3 }
   :emit { source = rapid.points.read "points.csv", from = "points", count = 40, velocity = {0, 1, 0} }
   :gravity {} :collide { shape = ball } :solve {}
@@ -46,46 +47,77 @@ local kinds = {
   { call = "read", errors = { "EIO", "short" }, calls = 2 },
 }
 
-local below = lehmer.new(1).below
+local below = lehmer.new(tonumber(os.getenv "RAPID_FAULT_SEED" or 1)).below
 
 local library = require "tests.faults.library"
 
--- Runs a scene with a fault, and compares its files with those of a run without: `complaint` is what is wrong with it.
-local judge = [[
-fault() {
-  rm -rf out && mkdir out
-  RAPID_FAULT=$1 LD_PRELOAD=$LIBRARY "$RAPID" run $SCENE --quiet --durable $OUTPUTS >said 2>&1
-  status=$?
-  complaint=
-  case $status in 0 | 1 | 2) ;; *) complaint="status $status" ;; esac
-  [ $status = 0 ] || [ -s said ] || complaint="no message"
-  cd out
-  for file in * .r*; do
-    [ -e "$file" ] || continue
-    # A level set's file has an identifier of its own before its 57th byte.
-    [ "$file" = ball.vdb ] && skip=57 || skip=0
-    cmp -s -i $skip "$file" "../whole/$file" || complaint="$complaint $file is not whole"
-  done
-  cd ..
-  [ $status != 0 ] || [ "$(ls -A out)" = "$(ls -A whole)" ] || complaint="$complaint files are missing without a word"
-  [ -z "$complaint" ] || echo "$1: $complaint: $(cat said)"
-}
-mkdir out
-"$RAPID" run $SCENE --quiet $OUTPUTS || exit 1
-mv out whole
-]]
-
--- The complaints about a run with each of the faults.
-local function complaints(text, outputs, list)
+-- Runs of a scene, each in a copy of a process that has loaded what it needs.
+local function folder_of(text)
   local folder = command.folder()
   folder:write("scene.lua", text)
   folder:write("points.csv", "id,Px,Py,Pz\n0,0,1,0\n1,1,1,0\n")
-  local script = judge
-  for _, fault in ipairs(list) do script = script .. "fault " .. fault .. "\n" end
-  local result = command.shell(script, { cwd = folder.path, environment = {
-    LIBRARY = library, SCENE = "scene.lua -f 1-4", OUTPUTS = outputs } })
+  return folder
+end
+
+-- The files below the folder of a run, by name; a level set's has an identifier of its own before its 57th byte.
+local function files_of(folder, names, run)
+  local files = {}
+  for name in names:gmatch(("\n%d/([^\n]*)"):format(run)) do
+    local text = folder:read(("%d/%s"):format(run, name))
+    files[name] = name == "ball.vdb" and text:sub(58) or text
+  end
+  local said = files.said
+  files.said = nil
+  return files, said
+end
+
+local function complaint_of(status, said, files, whole)
+  if status > 2 then return "status " .. status end
+  if status > 0 and #said == 0 then return "no message" end
+  for name, text in pairs(files) do
+    if text ~= whole[name] then return name .. " is not whole" end
+  end
+  for name in pairs(whole) do
+    if status == 0 and not files[name] then return name .. " is missing without a word" end
+  end
+end
+
+-- The complaints about a run with each of the faults. libraries: to be loaded, besides those that every run has.
+local function complaints(text, outputs, list, libraries)
+  local found = {}
+  for first = 1, #list, 100 do
+    local folder = folder_of(text)
+    local some = { unpack(list, first, math.min(first + 99, #list)) }
+    table.insert(some, 1, "write:0:5") -- none
+    folder:write("faults", table.concat(some, "\n") .. "\n")
+    local result = command.shell('RAPID_FAULT_LIST=faults LD_PRELOAD=$LIBRARIES "$RAPID" run ../scene.lua -f 1-4 ' ..
+      "--quiet --durable " .. outputs .. " && find . -type f | sed 's|^\\./||' >names", {
+      cwd = folder.path, environment = { LIBRARIES = library .. (libraries or "") } })
+    assert.equal(0, result.status, result.stderr)
+    local names, whole = "\n" .. folder:read "names"
+    for run, status in result.stdout:gmatch "(%d+) (%d+)\n" do
+      local files, said = files_of(folder, names, tonumber(run))
+      if run == "1" then
+        assert.equal("0", status, said)
+        whole = files
+      else
+        local complaint = complaint_of(tonumber(status), said, files, whole)
+        if complaint then found[#found + 1] = ("%s: %s: %s\n"):format(some[tonumber(run)], complaint, said) end
+      end
+    end
+    assert.truthy(result.stdout:find(("\n%d %%d+\n$"):format(#some)), result.stdout)
+  end
+  return table.concat(found)
+end
+
+-- How often memory is asked for while LuaJIT makes the first state of a run.
+local function requests_of_a_state(text)
+  local folder = command.folder()
+  folder:write("scene.lua", text)
+  local result = command.rapid("check scene.lua", { cwd = folder.path, environment = {
+    LD_PRELOAD = library, RAPID_FAULT = "state:1000000:" .. errors.ENOMEM, RAPID_FAULT_COUNT = "count" } })
   assert.equal(0, result.status, result.stderr)
-  return result.stdout
+  return tonumber(folder:read "count")
 end
 
 describe("a fault of the system", function()
@@ -97,16 +129,26 @@ describe("a fault of the system", function()
       list[i] = ("%s:%d:%s%s"):format(kind.call, 1 + below(kind.calls), errors[kind.errors[1 + below(#kind.errors)]],
         lasting)
     end
-    assert.equal("", complaints(scene, "-o out/a.####.ply -o out/b.####.csv -o out/c.####.vdb", list))
+    local deferred = ":" .. library:gsub("[^/]*$", "librapid_deferred.so")
+    assert.equal("", complaints(scene, "-o a.####.ply -o b.####.csv -o c.####.vdb", list, deferred))
+  end)
+
+  it("of memory while LuaJIT makes a state is an error, whichever request it is", function()
+    local list = {}
+    for n = 1, requests_of_a_state(scripted) do
+      list[n] = ("state:%d:%d"):format(n, errors.ENOMEM)
+    end
+    assert.truthy(#list > 5, #list)
+    assert.equal("", complaints(scripted, "-o a.####.ply", list))
   end)
 
   it("of memory is an error, too", function()
-    for text, requests in pairs { [plain] = 12000, [scripted] = 22000 } do
+    for _, scene_of in ipairs { { text = plain, requests = 12000 }, { text = scripted, requests = 22000 } } do
       local list = {}
       for i = 1, math.floor(faults / 6) do
-        list[i] = ("alloc:%d:%d%s"):format(1 + below(requests), errors.ENOMEM, i % 2 == 1 and "+" or "")
+        list[i] = ("alloc:%d:%d%s"):format(1 + below(scene_of.requests), errors.ENOMEM, i % 2 == 1 and "+" or "")
       end
-      assert.equal("", complaints(text, "-o out/a.####.ply", list))
+      assert.equal("", complaints(scene_of.text, "-o a.####.ply", list))
     end
   end)
 end)

@@ -1,0 +1,66 @@
+// A program that embeds Rapid goes on where memory runs out while a state of Lua is made: an error says so, and the
+// next scene opens.
+#include <cstdlib>
+#include <fstream>
+
+#include "include/rapid/rapid.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char tried_again[] = "opens a scene where memory runs out and another";
+
+// Runs that test in a process of its own, in which the n-th request of memory for a state fails; whether it passed.
+// counted: receives the number of these requests.
+bool passes(int n, const fs::path& counted)
+{
+    const fs::path program = fs::read_symlink("/proc/self/exe");
+    const fs::path library = program.parent_path().parent_path() / "lib/librapid_fault.so";
+    REQUIRE(fs::exists(library));
+    const std::string command = "RAPID_FAULT=state:" + std::to_string(n) + ":12 RAPID_FAULT_COUNT='" +
+                                counted.string() + "' LD_PRELOAD='" + library.string() + "' '" + program.string() +
+                                "' '" + tried_again + "' > /dev/null";
+    return std::system(command.c_str()) == 0;
+}
+
+int open_scene(std::string& message)
+{
+    rapid_scene* scene = nullptr;
+    rapid_error* error = nullptr;
+    const int status = rapid_scene_open_text("scene.lua", "return require(\"rapid\").create {}:gravity {}:solve {}",
+                                             nullptr, &scene, &error);
+    if (error) message = rapid_error_message(error);
+    rapid_error_free(error);
+    if (scene) rapid_scene_close(scene, nullptr);
+    return status;
+}
+
+}  // namespace
+
+TEST_CASE(tried_again, "[.]")
+{
+    std::string message;
+    CHECK(open_scene(message) == RAPID_OUT_OF_MEMORY);
+    CHECK(message == "out of memory");
+    CHECK(open_scene(message) == RAPID_OK);
+}
+
+TEST_CASE("memory that runs out while a state of Lua is made is an error of the scene, whichever request it is", "[c]")
+{
+    const test::TemporaryFolder folder;
+    REQUIRE(passes(1, folder / "count"));
+    int requests = 0;  // of the first, and all of the second
+    std::ifstream(folder / "count") >> requests;
+    REQUIRE(requests > 5);
+    for (int n = 2; n < requests; ++n) {
+        CAPTURE(n);
+        CHECK(passes(n, folder / "count"));
+    }
+    CHECK_FALSE(passes(requests, folder / "count"));  // of no first state
+}
+
+}  // namespace rapid

@@ -10,6 +10,7 @@
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/mesh_surface.h"
 #include "runtime/solver/constraints/energy_bound.h"
+#include "runtime/solver/constraints/holding.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/twin.h"
@@ -147,10 +148,16 @@ private:
     Vec3d c0_, c1_, c2_, c3_;
 };
 
-class PinCoupling : public Coupling {
+class PinCoupling : public Coupling, public Holding {
 public:
-    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, std::optional<PlaceCurve> curve, bool rigid, double h)
-        : pins_(std::move(pins)), body_(std::move(body)), curve_(std::move(curve)), rigid_(rigid), h_(h)
+    // compliance: m/N, 0 where pins are rigid; h: s, the frame's length.
+    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, std::optional<PlaceCurve> curve, double compliance, double h)
+        : pins_(std::move(pins)),
+          body_(std::move(body)),
+          curve_(std::move(curve)),
+          compliance_(compliance),
+          rigid_(compliance == 0),
+          h_(h)
     {
     }
 
@@ -189,12 +196,71 @@ public:
         }
     }
     void advance(Substep& step) override { pins_->springs.advance(step); }
-    void warm_start(Substep& step) override { pins_->springs.warm_start(step); }
-    void project(Substep& step) override { pins_->springs.project(step); }
-    void solve_velocities(Substep& step) override { pins_->springs.solve_velocities(step); }
+    void hold(Substep& step) override
+    {
+        loads_.clear();
+        hold_moving(step);
+    }
+    void warm_start(Substep& step) override
+    {
+        with_own_masses(step, [&] { pins_->springs.warm_start(step); });
+        hold_moving(step);  // sleepers that a shock has woken, too
+        for (Load& load : loads_) load.v = step.v[load.i];
+    }
+    void project(Substep&) override {}  // by the masses of the points
+    // Impulses of contacts give velocities the half of them that moves no position by itself, too: by the points' own
+    // mass where springs are resolved, as what these do against it is in their forces.
+    void settle(Substep& step) override
+    {
+        for (const Load& load : loads_)
+            if (load.is_resolved) step.v[load.i] += (load.own / load.held - 1) * (step.v[load.i] - load.v);
+        with_own_masses(step, [&] { pins_->springs.settle(step); });
+    }
+    void solve_velocities(Substep& step) override
+    {
+        with_own_masses(step, [&] { pins_->springs.solve_velocities(step); });
+    }
+    void release(Substep& step) override
+    {
+        for (const Load& load : loads_) step.points[load.i].w = load.own;
+    }
     Residual close(Substep& step) override { return pins_->springs.close(step); }
 
 private:
+    // A point on springs, with its inverse masses: its own, and while it is held.
+    struct Load {
+        std::uint32_t i;
+        double own, held;
+        bool is_resolved;  // by the sub-step
+        Vec3d v;           // m/s, where the projection begins
+    };
+
+    void hold_moving(Substep& step)
+    {
+        if (rigid_) return;
+        const std::size_t known = loads_.size();  // in the order of held_
+        std::size_t next = 0;
+        for (const auto& [index, pin] : held_) {
+            const auto i = static_cast<std::uint32_t>(index);
+            if (next < known && loads_[next].i == i) {
+                ++next;
+                continue;
+            }
+            const double own = step.points[i].w;
+            if (!(own > 0) || !step.lives(i)) continue;
+            const bool is_resolved = compliance_ >= own * step.dt * step.dt;
+            const double held = 1 / (1 / own + 1 / softness_of(compliance_, is_resolved, step.dt));
+            loads_.push_back({i, own, held, is_resolved, step.v[i]});
+            step.points[i].w = held;
+        }
+    }
+    template <class F>
+    void with_own_masses(Substep& step, const F& f)
+    {
+        for (const Load& load : loads_) step.points[load.i].w = load.own;
+        f();
+        for (const Load& load : loads_) step.points[load.i].w = load.held;
+    }
     void aim(double since)
     {
         driven_.clear();
@@ -218,8 +284,10 @@ private:
     std::shared_ptr<Pins> pins_;
     PinBody body_;
     std::optional<PlaceCurve> curve_;
+    double compliance_;  // m/N
     bool rigid_;
     double h_;  // s, the frame's length
+    std::vector<Load> loads_;
     std::vector<std::pair<std::size_t, Pin*>> held_;
     std::vector<std::uint32_t> awake_;
     std::vector<std::uint32_t> driven_;  // by springs whose ends have moved in the sub-step
@@ -248,7 +316,7 @@ public:
 
     std::shared_ptr<Coupling> begin(const PointSet& points, double h) const override
     {
-        auto coupling = std::make_shared<PinCoupling>(memory, body, curve, compliance == 0, h);
+        auto coupling = std::make_shared<PinCoupling>(memory, body, curve, compliance, h);
         const Strided<std::uint8_t> members = members_of(points, group);
         const Strided<Vec3f> P = points.P().read();
         const Strided<std::int64_t> id = points.id().read();

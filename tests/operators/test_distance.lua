@@ -36,6 +36,47 @@ return rapid.create { fps = 24, points = pin }
     end
   end)
 
+  it("stretches a compliant pin by what lies on it, however heavy, few the sub-steps, or first the contact", function()
+    local give, light = 1e-3, 0.1
+    for _, case in ipairs { {1, 1, 0.02}, {10, 1, 0.03}, {100, 1, 0.04}, {100, 2, 0.02}, {100, 12, 0.002} } do
+      local ratio, substeps, allowed = unpack(case)
+      local heavy = light * ratio
+      for _, nodes in ipairs { ":pin { group = 'floor', compliance = %g } :contact {}",
+                               ":contact {} :pin { group = 'floor', compliance = %g }" } do
+        local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0, 0.2, 0}}, pscale = {0.1, 0.1},
+    mass = {%g, %g} } }
+  :group { name = "floor", where = function(p) return p.id == 0 end }
+  :gravity {} :drag { linear = 5 } %s :solve { substeps = %d, iterations = 1, sleep = math.huge }]]):format(light,
+          heavy, nodes:format(give / heavy), substeps), { frames = {1, 120} })
+        local sag, count = 0, 0
+        for f = 73, 120 do
+          local held, lying = result[f][1].P, result[f][2].P
+          sag, count = sag - held.y, count + 1
+          assert.near(0.2, lying.y - held.y, 1e-3)
+        end
+        assert.near(1, sag / count / (give / heavy * (light + heavy) * 9.81), allowed)
+      end
+    end
+  end)
+
+  it("does what a rod and a contact do, whichever comes first", function()
+    local function last(nodes)
+      local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, -1, 0}, {0, 0, 0}, {0.05, 0.2, 0}},
+    pscale = {0.1, 0.1, 0.1}, mass = {1, 0.1, 1} } }
+  :group { name = "foot", where = function(p) return p.id == 0 end }
+  :group { name = "grains", where = function(p) return p.id > 0 end }
+  :gravity {} :pin { group = "foot" } %s :solve { substeps = 4 }]]):format(nodes), { frames = {1, 12} })
+      return result[12][2].P, result[12][3].P
+    end
+    local contact, rod = ":contact { group = 'grains' }", ":distance { pairs = {{1, 2}}, compliance = 1e-4 }"
+    local a, b = last(contact .. rod)
+    local c, d = last(rod .. contact)
+    assert.near(a, c, 0)
+    assert.near(b, d, 0)
+  end)
+
   it("holds a chain of 1,000 links that swings to a strain of a thousandth by 4 sub-steps", function()
     local result = scene.run([[
 local places, links = {}, {}

@@ -23,6 +23,9 @@ namespace {
 // point between them neither gives way, and it would be pushed to and fro.
 constexpr double overlap_recovery = 0.8, overlap_recovery_asleep = 0.1;
 
+// Of their distance: as far as impulses that are carried over part points of one island of rods.
+constexpr double most_parted = 0.25;
+
 // Points in one place are parted in some direction, each pair in another.
 Vec3d arbitrary_direction(std::uint32_t i, std::uint32_t j)
 {
@@ -267,12 +270,31 @@ void Contacts::warm_start(Substep& step)
             for (std::size_t i = begin; i < end; ++i) f(i);
         });
     };
+    if (!rods_.empty()) sweep([&](ContactPack& pack) { limit_carried(pack, step); });
     before_.resize(step.size());
     each_point([&](std::size_t i) { before_[i] = step.points[i].P; });
     scaling_.with_weights(
         [&](const auto& weights) { sweep([&](const ContactPack& pack) { apply_warm_start(pack, step, weights); }); });
     each_point([&](std::size_t i) { step.v[i] += per_dt_ * (step.points[i].P - before_[i]); });
     if (material_.turns()) sweep([&](const ContactPack& pack) { start_spins(pack, step, impulses_.rolling); });
+}
+
+// Contacts that contradict rods are held by these in each sub-step, and never satisfied: their impulses would add up,
+// and throw the points farther than rods can find back from.
+void Contacts::limit_carried(ContactPack& pack, const Substep& step) const
+{
+    for (std::uint32_t l = 0; l < pack.count; ++l) {
+        const std::uint32_t i = pack.i[l], j = pack.j[l];
+        if (!(pack.normal_impulse[l] > 0) || rods_[i] != rods_[j]) continue;
+        const double distance = (step.points[i].P - step.points[j].P).norm();
+        const double most = most_parted * distance * per_dt_ * pack.effective_mass[l];
+        if (!(pack.normal_impulse[l] > most)) continue;
+        const auto part = static_cast<float>(most / pack.normal_impulse[l]);
+        pack.normal_impulse[l] *= part;
+        pack.carried_impulse[l] *= part;
+        for (Floats* x : {&pack.tangential_impulse.x, &pack.tangential_impulse.y, &pack.tangential_impulse.z})
+            (*x)[l] *= part;
+    }
 }
 
 void Contacts::project(Substep& step)

@@ -15,6 +15,7 @@
 #include <memory>
 #include <vector>
 
+#include "runtime/solver/constraints/carried_impulses.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contact_material.h"
 #include "runtime/solver/constraints/contact_pack.h"
@@ -27,7 +28,7 @@
 
 namespace rapid {
 
-class Contacts : public Coupling {
+class Contacts : public Coupling, public CarriedImpulses {
 public:
     // Before a frame; impulses are kept by the ids of points. Error: see ContactMaterial.
     void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
@@ -41,6 +42,7 @@ public:
     void link(EnergyIslands& islands) const override;
     void detect(Substep& step) override;
     bool solve_impacts(Substep& step, std::uint32_t sweep) override;
+    void follow_rods(std::span<const std::uint32_t> islands) override { rods_ = islands; }
     void warm_start(Substep& step) override;
     void project(Substep& step) override;
     void solve_velocities(Substep& step) override;
@@ -64,6 +66,7 @@ private:
     std::size_t find_near(std::size_t block, const Substep& step, std::vector<std::uint32_t>& near) const;
     bool may_touch(std::uint32_t pair, const Substep& step) const;
     void begin(ContactPack& pack, const Substep& step) const;
+    void limit_carried(ContactPack& pack, const Substep& step) const;
     void store(const ContactPack& pack);
     static void add_forces(const ContactPack& pack, const Substep& step);
     template <class F>
@@ -93,6 +96,7 @@ private:
     double per_dt_ = 0;                     // 1/s, of the last sub-step
     double search_seconds_ = 0;             // in this frame
     std::vector<Vec3d> before_;             // positions before the warm start
+    std::span<const std::uint32_t> rods_;   // by point, the island that rods link it to; empty where there are none
     std::vector<std::uint32_t> disturbed_;  // points that are changed, or have lost a neighbour that pressed them
 };
 

@@ -17,7 +17,7 @@ constexpr std::uint32_t most_impact_sweeps = 32;
 
 Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
                        const Substep& step, Sleep* sleep, const ShapeLoads* loads, const PointErrors& errors)
-    : constraints_(constraints),
+    : constraints_(constraints.begin(), constraints.end()),
       sleep_(sleep),
       errors_(errors),
       has_forces_(!step.displacement.empty()),
@@ -28,9 +28,16 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
                              [](const LocalConstraint& local) { return local.coupling->is_driven(); })),
       free_(step.size())
 {
+    // Rods and springs keep what they have come to before contacts push their points, whichever node comes first.
+    std::stable_partition(constraints_.begin(), constraints_.end(),
+                          [](const LocalConstraint& local) { return local.coupling->has_forces(); });
     if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sleep);
     if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, errors_.ids(), step.dt);
-    for (const LocalConstraint& local : constraints_) local.coupling->join(sleep);
+    for (const LocalConstraint& local : constraints_) {
+        local.coupling->join(sleep);
+        if (auto* holding = dynamic_cast<Holding*>(local.coupling.get())) holdings_.push_back(holding);
+        if (auto* carrying = dynamic_cast<CarriedImpulses*>(local.coupling.get())) carrying_.push_back(carrying);
+    }
 }
 
 template <class F>
@@ -70,6 +77,7 @@ void Projection::advance(Substep& step)
         each_point([&](std::size_t i) { free_[i] += step.start[i]; });
         keep_positions(linked_);
     }
+    for (Holding* holding : holdings_) holding->hold(step);
     begin_support(step);
     if (step.forces) step.forces->begin(step, sleep_);
     each([&](Coupling& coupling) { coupling.detect(step); });
@@ -88,18 +96,21 @@ void Projection::advance(Substep& step)
     const bool moved = has_forces_ || !step.paths.empty();  // since the free motion
     if (moved) keep_positions(linked_);
     const std::vector<Vec3d>& before = moved ? linked_ : free_;
+    follow_rods(step);
     each([&](Coupling& coupling) { coupling.warm_start(step); });
     if (shapes_) shapes_->warm_start(step);
     for (int k = 0; k < step.iterations; ++k) {
         each([&](Coupling& coupling) { coupling.project(step); });
         if (shapes_) shapes_->project(step);
     }
+    for (Holding* holding : holdings_) holding->settle(step);
     each_point([&](std::size_t i) { step.v[i] += (step.points[i].P - before[i]) / step.dt; });
     // Rods carry what shapes do to one point on to others, and back.
     for (int k = has_forces_ && shapes_ ? 0 : step.iterations - 1; k < step.iterations; ++k) {
         each([&](Coupling& coupling) { coupling.solve_velocities(step); });
         if (shapes_) shapes_->solve_velocities(step);
     }
+    for (Holding* holding : holdings_) holding->release(step);
     if (shapes_ && step.forces) shapes_->add_forces(step);
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
     const ContactEnergy change = close_bound(step, false);
@@ -261,6 +272,20 @@ void Projection::begin_support(Substep& step)
     }
     step.support = support_;
     step.next_support = next_support_;
+}
+
+void Projection::follow_rods(const Substep& step)
+{
+    if (carrying_.empty()) return;
+    rods_.clear();
+    if (has_forces_) {
+        EnergyIslands islands(step);
+        for (const LocalConstraint& local : constraints_)
+            if (local.coupling->has_forces()) local.coupling->link(islands);
+        rods_.resize(step.size());
+        for (std::uint32_t i = 0; i < rods_.size(); ++i) rods_[i] = islands.root(i);
+    }
+    for (CarriedImpulses* carrying : carrying_) carrying->follow_rods(rods_);
 }
 
 Residual Projection::close(Substep& step, ShapeLoads* loads)

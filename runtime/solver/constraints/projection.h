@@ -6,8 +6,10 @@
 #include <optional>
 #include <vector>
 
+#include "runtime/solver/constraints/carried_impulses.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
+#include "runtime/solver/constraints/holding.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/ledger.h"
 #include "runtime/solver/point_errors.h"
@@ -53,9 +55,12 @@ private:
     double energy_of_places(const Substep& step) const;
     void require_finite(const Substep& step) const;
     void begin_support(Substep& step);
+    void follow_rods(const Substep& step);
     void solve_impacts(Substep& step);
 
-    std::span<const LocalConstraint> constraints_;
+    std::vector<LocalConstraint> constraints_;
+    std::vector<Holding*> holdings_;          // of the constraints
+    std::vector<CarriedImpulses*> carrying_;  // of the constraints
     Sleep* sleep_;
     const PointErrors& errors_;
     bool has_forces_;  // some constraint (Coupling::has_forces)
@@ -70,6 +75,7 @@ private:
     std::vector<Vec3d> linked_;                         // where the projection begins, if elsewhere
     std::vector<double> stored_;                        // J, in rows, where the sub-step begins
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
+    std::vector<std::uint32_t> rods_;                   // by point, the island that rods and springs link it to
 };
 
 }  // namespace rapid

@@ -34,6 +34,12 @@ struct FunctionTraits {
     }();
 };
 
+// 1/kg: what C of a spring gives way by, times dt, for each N s that others move its points by.
+inline double softness_of(double compliance, bool is_resolved, double dt)
+{
+    return (is_resolved ? 4 : 2) * compliance / (dt * dt);
+}
+
 template <class Function>
 struct Row {
     static constexpr int arity = Function::points;
@@ -109,7 +115,16 @@ struct Row {
         reference = residual(step, gradient);
         added = 0;
         is_resolved = !is_stiff(inverse_mass(step, gradient), step.dt);
-        softness = (is_resolved ? 4 : 2) * compliance / (step.dt * step.dt);
+        softness = softness_of(compliance, is_resolved, step.dt);
+    }
+    // Of the points that have been held against others by their mass (holding.h): what the force has come to.
+    void settle(Substep& step)
+    {
+        Vectors gradient;
+        const double change = (reference - residual(step, gradient)) / (softness * step.dt);
+        take(change);
+        if (!is_resolved) return;
+        for (int k = 0; k < arity; ++k) step.v[points[k]] += step.points[points[k]].w * change * gradient[k];
     }
 
     // The rate of the residual, 1/s.

@@ -214,6 +214,13 @@ public:
         schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].project(step); });
     }
 
+    // Of rows that hold points (holding.h).
+    void settle(Substep& step)
+    {
+        for (Row& row : rows_)
+            if (row.active && !row.asleep) row.settle(step);
+    }
+
     void solve_velocities(Substep& step) override
     {
         if (step.is_shared || Traits::one_sided) {

@@ -7,6 +7,7 @@
 -- Run:    rapid run graphs/mill.lua -f 1-96 -o /tmp/mill.####.png
 local rapid = require "rapid"
 
+local rate = rapid.param("rate", 5000, "grains born per second")
 local speed = rapid.param("speed", 120, "degrees a second")
 
 local paddles = rapid.levelset.box { size = {1.6, 0.15, 0.8}, voxel = 0.025 }
@@ -17,7 +18,7 @@ local function turning(frame)
 end
 
 return rapid.create { fps = 24, seed = 5 }
-  :emit    { source = rapid.mesh.box { size = {0.7, 0.05, 0.5}, center = {0.25, 2.4, 0} }, rate = 5000, life = 3,
+  :emit    { source = rapid.mesh.box { size = {0.7, 0.05, 0.5}, center = {0.25, 2.4, 0} }, rate = rate, life = 3,
              velocity = {0, -1, 0}, spread = 8, attributes = { Cd = {0.95, 0.8, 0.35} } }
   -- Inside Solve, at every sub-step: grain that is thrown high is lit up by its speed.
   :action  ("glow", function(p, step)

@@ -14,7 +14,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -23,6 +25,8 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "runtime/io/format.h"
 
 namespace {
 
@@ -80,6 +84,43 @@ Ended run(const Words& words, const fs::path& output = "/dev/null")
             1024.0 * static_cast<double>(usage.ru_maxrss)};
 }
 
+// How many points there are and where: what two runs of one scene with other random numbers have in common.
+struct Moments {
+    double points;
+    std::array<double, 3> mean, deviation;  // m, of P along each axis
+};
+
+Moments moments_of(const rapid::PointSet& points)
+{
+    const auto n = static_cast<double>(points.size());
+    Moments m{n, {}, {}};
+    const auto P = points.P().read();
+    for (std::size_t i = 0; i < points.size(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) m.mean[k] += P[i][k] / n;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) m.deviation[k] += std::pow(P[i][k] - m.mean[k], 2) / n;
+    for (double& d : m.deviation) d = std::sqrt(d);
+    return m;
+}
+
+// Error: the two differ by more than chance has it, five standard errors of all that is compared, and a thousandth of
+// the points' extent, for what a table of distances and a level set differ by.
+void require_alike(const std::string& scene, const Moments& a, const Moments& b)
+{
+    const double n = std::min(a.points, b.points), shape = 1e-3;
+    bool alike = std::abs(a.points - b.points) <= 5 * std::sqrt(2 * n);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const double most = a.deviation[k] * (5 * std::sqrt(2 / n) + shape);
+        alike = alike && std::abs(a.mean[k] - b.mean[k]) <= most && std::abs(a.deviation[k] - b.deviation[k]) <= most;
+    }
+    if (alike) return;
+    const auto text = [](const Moments& m) {
+        return fmt::format("{} points, mean {:.5f}, deviation {:.5f}", m.points, fmt::join(m.mean, " "),
+                           fmt::join(m.deviation, " "));
+    };
+    throw std::runtime_error(fmt::format("{} and the program by hand differ:\n  {}\n  {}", scene, text(a), text(b)));
+}
+
 class Table {
 public:
     Table(fs::path bin, fs::path graphs, int repeat, std::string only)
@@ -102,6 +143,7 @@ public:
         static_level_set();
         scripts();
         main_job();
+        by_hand();
         output();
         examples();
     }
@@ -313,6 +355,37 @@ private:
         const double seconds =
             in_turn({command(graphs_ / "first.lua", {"--set", "rate=500000", "-f", "1-48"})})[0].seconds;
         add({name, 10.7 / seconds, 25, "", true, fmt::format("{:.3f} s", seconds)});
+    }
+
+    // Against programs that are written for the one scene (by_hand/by_hand.h), by the time of all threads.
+    void by_hand()
+    {
+        struct Scene {
+            const char *name, *points, *rate;
+            double limit;
+        };
+        for (const Scene& each :
+             {Scene{"first", "a million", "500000", 1}, Scene{"sparks", "800,000", "800000", 1.2},
+              Scene{"spray", "a million", "975000", 1.2}, Scene{"embers", "a million", "500000", 1.2},
+              Scene{"magic", "a million", "300000", 1.2}, Scene{"mill", "40,000", "20000", 1.2}}) {
+            const std::string name =
+                fmt::format("{}.lua, {} points / a program by hand, processor time", each.name, each.points);
+            if (!asked(name)) continue;
+            const Words program = {(bin_ / fmt::format("by_hand_{}", each.name)).string(), each.rate, "48"};
+            const fs::path graph = graphs_ / fmt::format("{}.lua", each.name);
+            const std::string rate = fmt::format("rate={}", each.rate);
+            const fs::path last = scratch_ / fmt::format("{}.npz", each.name), answer = scratch_ / "moments.json";
+            run(command(graph, {"--set", rate, "-f", "48", "-o", last.string()}));
+            run(program, answer);
+            std::ifstream file(answer);
+            const json told = json::parse(file);
+            require_alike(graph.filename().string(), moments_of(rapid::read_points(last)),
+                          {told.at("points"), told.at("mean"), told.at("deviation")});
+            fs::remove(last);
+            const std::vector<Ended> ended = in_turn({command(graph, {"--set", rate, "-f", "1-48"}), program});
+            add({name, ended[0].processor / ended[1].processor, each.limit, "", false,
+                 fmt::format("{:.3f} s, {:.3f} s", ended[0].processor, ended[1].processor)});
+        }
     }
 
     // As many points in each frame, so that one frame's files are hidden behind the next one's computation. The writing

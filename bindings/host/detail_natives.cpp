@@ -87,14 +87,14 @@ int neighbours(State& state)
     const auto place = static_cast<std::uint32_t>(lua_tonumber(L, 1));
     const double radius = lua_tonumber(L, 2);
     const Strided<Vec3f> P = std::as_const(detail.points).P().read();
-    auto& grid = detail.neighbours[radius];
-    if (!grid) {
+    auto grid = detail.neighbours.find(radius);
+    if (grid == detail.neighbours.end()) {
         std::vector<Vec3f> places(detail.points.size());
         for (std::size_t i = 0; i < places.size(); ++i) places[i] = P[i];
-        grid = index_neighbours(places, radius);
+        grid = detail.neighbours.try_emplace(radius, places, radius).first;
     }
     std::vector<std::uint32_t> found;
-    grid->find(P[place].cast<double>(), found);
+    grid->second.find(P[place].cast<double>(), found);
     lua_createtable(L, static_cast<int>(found.size()), 0);
     int n = 0;
     for (const std::uint32_t i : found) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <map>
-#include <memory>
 
 #include "runtime/graph/step_record.h"
 #include "runtime/points/neighbours.h"
@@ -25,7 +24,7 @@ public:
     PointSet& points;
     const StepRecord* const record;
     // By radius, of the positions at the first search.
-    std::map<double, std::unique_ptr<const Neighbours>> neighbours;
+    std::map<double, Neighbours> neighbours;
 
     void changed() { neighbours.clear(); }
 

@@ -1,58 +1,29 @@
 #include "runtime/points/neighbours.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/PointIndexGrid.h>
 
-#include <algorithm>
+#include <numeric>
 
 #include "runtime/error.h"
 
 namespace rapid {
 namespace {
 
-// A list of points, as OpenVDB takes it. Its maps refuse voxels below 1e-5 m: positions are in radii.
-struct PointList {
-    using PosType = openvdb::Vec3d;
-
-    std::vector<Vec3f> P;
-    double radius;
-
-    std::size_t size() const { return P.size(); }
-    void getPos(std::size_t i, PosType& x) const { x = PosType(P[i].x(), P[i].y(), P[i].z()) / radius; }
-};
-
-using openvdb::tools::PointIndexGrid;
-
-class IndexedNeighbours final : public Neighbours {
-public:
-    explicit IndexedNeighbours(PointList points)
-        : points_(std::move(points)),
-          index_(openvdb::tools::createPointIndexGrid<PointIndexGrid>(points_, /*voxel=*/1.0))
-    {
+// Lists are short, mostly: std::sort would take longer to start.
+void sort_few(std::vector<std::uint32_t>& list)
+{
+    if (list.size() > 32) return std::sort(list.begin(), list.end());
+    for (std::size_t next = 1; next < list.size(); ++next) {
+        const std::uint32_t value = list[next];
+        std::size_t hole = next;
+        for (; hole > 0 && list[hole - 1] > value; --hole) list[hole] = list[hole - 1];
+        list[hole] = value;
     }
+}
 
-    void find(const Vec3d& X, std::vector<std::uint32_t>& indices) const override
-    {
-        indices.clear();
-        auto accessor = index_->getConstAccessor();
-        const double radius = points_.radius;
-        const openvdb::Vec3d at = openvdb::Vec3d(X.x(), X.y(), X.z()) / radius;
-        const auto& transform = index_->transform();
-        const openvdb::Vec3d reach(1 + 0x1p-20);
-        openvdb::tools::PointIndexIterator<> near(openvdb::CoordBBox(transform.worldToIndexCellCentered(at - reach),
-                                                                     transform.worldToIndexCellCentered(at + reach)),
-                                                  accessor);
-        for (; near; ++near)
-            if ((points_.P[*near].cast<double>() - X).squaredNorm() <= radius * radius) indices.push_back(*near);
-        std::sort(indices.begin(), indices.end());
-    }
+}  // namespace
 
-private:
-    PointList points_;
-    PointIndexGrid::Ptr index_;
-};
-
-std::unique_ptr<const Neighbours> make(std::span<const Vec3f> P, double radius)
+Neighbours::Neighbours(std::span<const Vec3f> P, double radius) : P_(P.size()), radius_(radius)
 {
     float largest = 0;
     for (const Vec3f& x : P) largest = std::max(largest, x.cwiseAbs().maxCoeff());
@@ -61,10 +32,59 @@ std::unique_ptr<const Neighbours> make(std::span<const Vec3f> P, double radius)
             fmt::format("neighbours within {:g} m of points up to {:g} m from the origin; the radius must be "
                         "above 0, and above {:g} m there",
                         radius, largest, largest * 0x1p-30));
-    return std::make_unique<IndexedNeighbours>(PointList{{P.begin(), P.end()}, radius});
+    for (std::size_t i = 0; i < P.size(); ++i) P_[i] = P[i].cast<double>();
+    if (P.empty()) return;
+    // The grid is in radii, so that no radius is too small for single precision.
+    std::vector<Vec3d> scaled(P.size());
+    for (std::size_t i = 0; i < P.size(); ++i) middle_ += scaled[i] = P_[i] / radius;
+    middle_ /= static_cast<double>(P.size());
+    double extent = 0;
+    for (const Vec3d& x : scaled) extent = std::max(extent, (x - middle_).cwiseAbs().maxCoeff());
+    blur_ = near_blur(extent);
+    // With room for the rounding of cells' bounds; and no point so far that it would be put into the last cell.
+    grid_.width = std::max(1 + 0x1p-20, extent * 0x1p-19);
+    std::vector<std::uint32_t> all(P.size());
+    std::iota(all.begin(), all.end(), 0u);
+    const float reach = 0.5f;
+    CellSorter().fill(grid_, {scaled, {&reach, 0}, middle_}, all);
 }
 
-const bool defined = index_neighbours.define(make);
+void Neighbours::find(const Vec3d& X, std::vector<std::uint32_t>& indices) const
+{
+    indices.clear();
+    if (P_.empty()) return;
+    std::int64_t c[3];
+    for (int k = 0; k < 3; ++k) c[k] = cell_coordinate(X[k] / radius_ - middle_[k], grid_.width);
+    for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k)
+        for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j) {
+            const CellGrid::Run run = grid_.row(c[0] - 1, c[0] + 1, j, k);
+            for (std::uint32_t o = run.begin; o < run.end; ++o)
+                if (is_near(grid_.place[o], X)) indices.push_back(grid_.place[o]);
+        }
+    sort_few(indices);
+}
 
-}  // namespace
+Neighbours::Runs Neighbours::around(std::uint64_t key) const
+{
+    Runs runs;
+    for (int k = -1; k <= 1; ++k)
+        for (int j = -1; j <= 1; ++j) {
+            const std::uint64_t middle = key + static_cast<std::uint64_t>(k) * grid_.layer_step() +
+                                         static_cast<std::uint64_t>(j) * grid_.row_step();
+            runs.add(grid_.run(middle - 1, middle + 1));
+        }
+    return runs;
+}
+
+void Neighbours::list(std::size_t sphere, const Runs& runs, std::vector<std::uint32_t>& near) const
+{
+    near.clear();
+    const Vec3d& X = P_[grid_.place[sphere]];
+    for_near_spheres(grid_, sphere, runs, blur_, [&](std::uint32_t o, bool certain) {
+        const std::uint32_t point = grid_.place[o];
+        if (certain || is_near(point, X)) near.push_back(point);
+    });
+    sort_few(near);
+}
+
 }  // namespace rapid

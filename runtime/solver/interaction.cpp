@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "runtime/parallel.h"
@@ -59,7 +60,7 @@ public:
             places.push_back(P_[i].template cast<float>());
         }
         if (members_.empty()) return;
-        grid_ = index_neighbours(places, interaction.radius);
+        grid_.emplace(places, interaction.radius);
         require_affordable(at.steps, kicks);
         if (!interaction.sees_all())
             for (const std::uint32_t i : members_) headings_.push_back(v_[i]);
@@ -71,6 +72,7 @@ public:
     std::vector<Vec3d> kicks() const
     {
         std::vector<Vec3d> kicks(members_.size(), Vec3d::Zero());
+        if (members_.empty()) return kicks;
         for_all([&](std::size_t m, std::size_t other) { kicks[m] += kick(m, other); });
         return kicks;
     }
@@ -104,15 +106,10 @@ private:
     template <class F>
     void for_all(const F& f) const
     {
-        for_each_chunk(members_.size(), [&](std::size_t begin, std::size_t end) {
-            std::vector<std::uint32_t> near;
-            for (std::size_t m = begin; m < end; ++m) {
-                // Rounded as the grid has it: of two points each finds the other.
-                grid_->find(P_[members_[m]].template cast<float>().template cast<double>(), near);
-                if (interaction_.is_selective()) select(m, near);
-                for (const std::uint32_t other : near)
-                    if (other != m) f(m, other);
-            }
+        grid_->for_each([&](std::uint32_t m, std::vector<std::uint32_t>& near) {
+            if (interaction_.is_selective()) select(m, near);
+            for (const std::uint32_t other : near)
+                if (other != m) f(m, other);
         });
     }
 
@@ -210,9 +207,9 @@ private:
     Strided<float> separation_, cohesion_, alignment_, drag_, avoidance_;
     bool avoids_;
     Strided<float> mass_{&unit_mass, 0}, own_dt_{nullptr, 0};
-    std::vector<std::uint32_t> members_;      // their places in the set
-    std::unique_ptr<const Neighbours> grid_;  // of the members
-    std::vector<double> weights_;             // Σ w, of each member
+    std::vector<std::uint32_t> members_;  // their places in the set
+    std::optional<Neighbours> grid_;      // of the members
+    std::vector<double> weights_;         // Σ w, of each member
     double cos_view_ = std::cos(0.5 * interaction_.view);
     std::vector<Vec3d> headings_;  // velocities at first; empty where all see all around
 };

@@ -135,13 +135,12 @@ TEST_CASE("what programs include is what is installed", "[layers]")
     }
 }
 
-TEST_CASE("only shapes, formats and the search for neighbours know OpenVDB", "[layers]")
+TEST_CASE("only shapes and formats know OpenVDB", "[layers]")
 {
     for (const Include& include : includes_below("runtime")) {
         if (include.included.rfind("openvdb/", 0) != 0) continue;
         CAPTURE(include.file, include.included);
-        CHECK((include.folder.rfind("runtime/shapes/", 0) == 0 || include.folder == "runtime/io" ||
-               include.file == "runtime/points/neighbours.cpp"));
+        CHECK((include.folder.rfind("runtime/shapes/", 0) == 0 || include.folder == "runtime/io"));
     }
 }
 

@@ -3,22 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
 
 #include "runtime/error.h"
 #include "runtime/memory_budget.h"
 #include "runtime/parallel.h"
+#include "runtime/points/near_spheres.h"
 #include "runtime/solver/constraints/pair_estimate.h"
 
 namespace rapid {
 namespace {
-
-// A sum of radii in single precision, with room for the rounding of what it is compared with.
-constexpr float rounding = 1 + 0x1p-20f;
 
 // Spheres whose neighbours are looked for together: a fraction of a millisecond's work, so that a few thousand are
 // enough for several threads.
@@ -38,49 +34,6 @@ void sort_few(std::uint32_t* first, std::uint32_t* last)
         for (; hole > first && hole[-1] > value; --hole) *hole = hole[-1];
         *hole = value;
     }
-}
-
-typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
-
-// Calls f(sphere, certain) for the spheres of some runs that are near the sphere m, in single precision. All are tested
-// before any is reported: the number of hits in a run can't be predicted.
-template <class Ranges, class F>
-inline void for_near(const CellGrid& grid, std::size_t m, const Ranges& runs, float blur, const F& f)
-{
-    const float x = grid.x[m], y = grid.y[m], z = grid.z[m];
-    const float most = rounding * grid.r[m] + blur, least = (2 - rounding) * grid.r[m] - blur;
-    // Of each group of eight a bit in every byte, which is the lane's.
-    constexpr std::uint64_t first_bits = 0x0101010101010101;
-    std::uint64_t near = 0, certain = 0;
-    std::uint32_t start[8];
-    std::uint32_t groups = 0;
-    const auto report = [&] {
-        for (; near != 0; near &= near - 1) {
-            const auto at = static_cast<std::uint32_t>(std::countr_zero(near));
-            f(start[at % 8] + at / 8, (certain >> at & 1) != 0);
-        }
-        certain = 0;
-        groups = 0;
-    };
-    for (const auto& run : runs) {
-        std::uint32_t o = run.begin;
-        do {
-            const Floats dx = load_pack(&grid.x[o]) - x, dy = load_pack(&grid.y[o]) - y, dz = load_pack(&grid.z[o]) - z;
-            const Floats r = load_pack(&grid.r[o]), d2 = dx * dx + dy * dy + dz * dz;
-            const Floats reach = rounding * r + most, within = (2 - rounding) * r + least;
-            const FloatFlags flags = ((d2 < reach * reach) & 1) | ((d2 < within * within) & (within > 0) & 2);
-            const auto bytes = std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, Bytes));
-            const std::uint32_t count = std::min<std::uint32_t>(lanes, run.end - o);
-            const std::uint64_t there =
-                first_bits & (count == lanes ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * count) - 1);
-            near |= (bytes & there) << groups;
-            certain |= (bytes >> 1 & there) << groups;
-            start[groups++] = o;
-            if (groups == 8) report();
-            o += lanes;
-        } while (o < run.end);
-    }
-    report();
 }
 
 // What single precision can't decide.
@@ -130,7 +83,7 @@ void ContactSearch::measure(std::span<const Vec3d> P, Strided<float> reach)
     double extent = 0;
     for (const Vec3d& x : P) extent = std::max(extent, (x - middle).cwiseAbs().maxCoeff());
     spheres_ = {P, reach, middle};
-    blur_ = static_cast<float>(2 * (0x1p-22 * extent));
+    blur_ = near_blur(extent);
 }
 
 // A cell is as wide as two spheres of the farthest reach, in its grid or a finer one.
@@ -189,7 +142,7 @@ void ContactSearch::find_within(const CellGrid& grid)
             for (; m < end; ++m) {
                 runs[0].begin = static_cast<std::uint32_t>(m + 1);
                 const std::uint32_t a = grid.place[m];
-                for_near(grid, m, runs, blur_, [&](std::uint32_t o, bool certain) {
+                for_near_spheres(grid, m, runs, blur_, [&](std::uint32_t o, bool certain) {
                     const std::uint32_t b = grid.place[o];
                     if (!certain && !touch(spheres_, a, b)) return;
                     pairs.emplace_back(std::min(a, b), std::max(a, b));
@@ -211,13 +164,13 @@ void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
             const std::uint32_t a = fine.place[m];
             std::int64_t c[3];
             for (int k = 0; k < 3; ++k) c[k] = cell_coordinate(spheres_.P[a][k] - spheres_.middle[k], coarse.width);
-            const float x = fine.x[m], y = fine.y[m], z = fine.z[m], r = rounding * fine.r[m] + blur_;
+            const float x = fine.x[m], y = fine.y[m], z = fine.z[m], r = near_rounding * fine.r[m] + blur_;
             for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k)
                 for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j) {
                     const CellGrid::Run run = coarse.row(c[0] - 1, c[0] + 1, j, k);
                     for (std::uint32_t o = run.begin; o < run.end; ++o) {
                         const float dx = coarse.x[o] - x, dy = coarse.y[o] - y, dz = coarse.z[o] - z;
-                        const float sum = rounding * coarse.r[o] + r;
+                        const float sum = near_rounding * coarse.r[o] + r;
                         if (dx * dx + dy * dy + dz * dz >= sum * sum) continue;
                         const std::uint32_t b = coarse.place[o];
                         if (touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));

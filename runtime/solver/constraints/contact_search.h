@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/solver/constraints/cell_grid.h"
+#include "runtime/points/cell_grid.h"
 #include "runtime/solver/constraints/radius_grids.h"
 
 namespace rapid {

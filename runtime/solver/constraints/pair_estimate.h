@@ -8,7 +8,7 @@
 
 #include <span>
 
-#include "runtime/solver/constraints/cell_grid.h"
+#include "runtime/points/cell_grid.h"
 
 namespace rapid {
 

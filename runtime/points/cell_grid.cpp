@@ -1,4 +1,4 @@
-#include "runtime/solver/constraints/cell_grid.h"
+#include "runtime/points/cell_grid.h"
 
 #include <tbb/parallel_sort.h>
 

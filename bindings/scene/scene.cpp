@@ -16,14 +16,13 @@
 #include "bindings/scene/host_object.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_error.h"
+#include "runtime/cancellation.h"
 #include "runtime/memory_budget.h"
 #include "runtime/picture/frame_picture.h"
 #include "runtime/picture/png_file.h"
 
 namespace rapid {
 namespace {
-
-constexpr char cancelled_text[] = "the run was cancelled";
 
 // As --set takes it.
 std::string text_of(const SceneValue& value)
@@ -80,7 +79,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::atomic<bool> is_late = false;  // a script has been stopped in this call
 
     // What cancel() may do while another thread is in a call.
-    std::atomic<bool> is_cancelled = false;
+    Cancellation cancellation;
     std::mutex scripts_mutex;
     Session* scripts = nullptr;  // that an advance runs now
 
@@ -105,9 +104,9 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             return std::move(*value);
         } catch (...) {
             SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
-            if (error.message.find(cancelled_text) != std::string::npos) {
+            if (error.message.find(Cancellation::text) != std::string::npos) {
                 error.kind = SceneError::Cancelled;
-                is_cancelled = false;
+                cancellation.forget();
             }
             return error;
         }
@@ -219,9 +218,6 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         picture_scene.reset();
         plan = std::move(fresh);
         evaluator = std::make_unique<Evaluator>(*plan);
-        evaluator->ask_between_nodes([this] {
-            if (is_cancelled) throw Error(cancelled_text);
-        });
         if (!options.estimate_errors) evaluator->leave_out_errors();
         next = plan->first_frame();
         has_advanced = false;
@@ -230,7 +226,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     // Scripts that were stopped do not run again.
     void start_again()
     {
-        is_cancelled = false;
+        cancellation.forget();
         if (session->interrupted() != Interruption::None) return load(settings);
         start(std::make_unique<Plan>(session->graph(), plan_options()));
     }
@@ -238,7 +234,8 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     SceneFrame advance()
     {
         const Scripts running(*this);
-        if (is_cancelled) throw Error(cancelled_text);
+        const Cancellation::Scope scope(&cancellation);
+        cancellation.check();
         auto data = std::make_shared<SceneFrame::Data>();
         try {
             data->result = evaluator->advance();
@@ -357,7 +354,7 @@ Result<Done> Scene::set(const std::vector<std::pair<std::string, SceneValue>>& v
         auto set = impl_->settings;
         for (const auto& [name, value] : values) set[name] = text_of(value);
         impl_->load(std::move(set));
-        impl_->is_cancelled = false;
+        impl_->cancellation.forget();
         return Done();
     });
 }
@@ -390,8 +387,8 @@ Result<SceneFrame> Scene::advance_to(std::int64_t frame)
             const bool last = impl_->next == frame;
             SceneFrame result = impl_->advance();
             const auto& progress = impl_->options.progress;
-            if (progress && !call_program("progress", progress, result.number(), frame)) impl_->is_cancelled = true;
-            if (impl_->is_cancelled) throw Error(cancelled_text);
+            if (progress && !call_program("progress", progress, result.number(), frame)) impl_->cancellation.request();
+            impl_->cancellation.check();
             if (last) return result;
         }
     });
@@ -434,9 +431,9 @@ Result<Done> Scene::restore(const SceneSnapshot& snapshot)
 
 void Scene::cancel()
 {
-    impl_->is_cancelled = true;
+    impl_->cancellation.request();
     const std::lock_guard lock(impl_->scripts_mutex);
-    if (impl_->scripts) impl_->scripts->interrupt(cancelled_text);
+    if (impl_->scripts) impl_->scripts->interrupt(Cancellation::text);
 }
 
 Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)

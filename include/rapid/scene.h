@@ -297,8 +297,9 @@ public:
     Result<SceneSnapshot> save();
     Result<Done> restore(const SceneSnapshot& snapshot);
 
-    // Ends the advance that is running, or else the next one, with the error Cancelled: at the next node of the graph,
-    // or at once in a script. From any thread. restart(), restore() and set() forget it.
+    // Ends the advance that is running, or else the next one, with the error Cancelled: in a
+    // frame at the next chunk of points or sub-step, and at once in a script. From any thread. restart(), restore() and
+    // set() forget it.
     void cancel();
 
     // The bytes of a .png of a frame of this scene, with its shapes; the camera is fitted to the frame unless the scene

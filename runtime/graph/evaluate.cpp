@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "runtime/at_node.h"
+#include "runtime/cancellation.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/changing_node.h"
 #include "runtime/graph/point_edit.h"
@@ -98,7 +99,7 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     for (std::size_t first = 0, last = 0; first < plan_.nodes.size(); first = last + 1) {
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
-        if (ask_) ask_();
+        Cancellation::check_current();
         // The hooks and checked declarations take one node after the other.
         if (!result_ && !input_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);

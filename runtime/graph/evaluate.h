@@ -70,14 +70,13 @@ public:
 
     // From now on `input` is told what enters each node. Nodes are then evaluated one by one.
     void watch_inputs(InputHook input) { input_ = std::move(input); }
-    // From now on asked before each node of a frame; what it throws ends advance().
-    void ask_between_nodes(std::function<void()> ask) { ask_ = std::move(ask); }
 
     // The frame that advance() will compute.
     std::int64_t next_frame() const { return next_; }
 
     // Computes the next frame. The result shares its columns with the state: release it before the next call to avoid a
-    // copy. Error: of a node, with its name and location; the evaluator can't be used afterwards.
+    // copy. Error: of a node, with its name and location; what runs is cancelled (Cancellation). The evaluator can't be
+    // used afterwards.
     FrameResult advance();
 
     // Stiffness and resolution in the first frame after the start, of a few newborn and the initial points, which Solve
@@ -115,8 +114,7 @@ private:
     WriteHook write_;
     ResultHook result_;
     InputHook input_;
-    Stopwatch frame_clock_;      // since advance() began
-    std::function<void()> ask_;  // may be empty
+    Stopwatch frame_clock_;  // since advance() began
     std::int64_t next_;
     int subframes_ = 1;  // of all simulations
     bool checks_declarations_ = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "runtime/cancellation.h"
 #include "runtime/solver/timed_force.h"
 
 namespace rapid {
@@ -25,6 +26,7 @@ bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
 
 void BlockStep::advance(Collisions& collisions, int substep)
 {
+    Cancellation::check_current();
     add_forces(substep);
     if (context_.scene.kills) stop_dead();
     const double halves_after = 2.0 * (block.substeps - substep - 1);

@@ -335,6 +335,31 @@ TEST_CASE("another thread cancels an advance", "[scene]")
     good(scene.advance());
 }
 
+// A frame that takes minutes, without a script: the test ends because it is cancelled.
+TEST_CASE("another thread cancels a frame that is long in itself", "[scene]")
+{
+    const std::string chain =
+        GENERATE(":turbulence { amplitude = 1 } :solve { substeps = 1000000 }",
+                 ":gravity {} :collide { shape = rapid.shape.sphere { radius = 2 } } :solve { substeps = 1000000 }",
+                 ":gravity {} :collide { shape = rapid.shape.plane {} } :contact { radius = 0.05 }"
+                 ":solve { substeps = 100, iterations = 10000 }",
+                 ":interact { radius = 0.3, separation = 1 } :solve { substeps = 20000 }");
+    CAPTURE(chain);
+    Scene scene = opened(
+        "local rapid = require 'rapid'\nlocal points = rapid.points.grid { size = {3, 3, 3}, spacing = 0.1 }\n"
+        "return rapid.create { points = points }" +
+        chain);
+    good(scene.advance());
+    std::thread other([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        scene.cancel();
+    });
+    CHECK(scene.advance().error().kind == SceneError::Cancelled);
+    other.join();
+    good(scene.restart());
+    good(scene.advance());
+}
+
 TEST_CASE("the progress callback is told of each frame, and ends the run", "[scene]")
 {
     std::vector<std::int64_t> told;

@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "runtime/cancellation.h"
 #include "runtime/solver/constraints/neighbour_list.h"
 #include "runtime/solver/constraints/pair_impulses.h"
 
@@ -36,6 +37,7 @@ public:
     {
         const std::size_t colours = colours_.empty() ? 0 : colours_.size() - 1;
         for (std::size_t k = 0; k < colours; ++k) {
+            Cancellation::check_current();
             const std::size_t c = backwards ? colours - 1 - k : k;
             run(colours_[c], colours_[c + 1], f);
         }

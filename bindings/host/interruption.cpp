@@ -136,6 +136,16 @@ void Interruption::Call::has_left() const
     pthread_sigmask(SIG_UNBLOCK, &ours, nullptr);
 }
 
+void Interruption::Call::try_to_leave(const Slot& slot)
+{
+    if (innermost && innermost->natives_.load(std::memory_order_relaxed) == 0) leave(slot);
+}
+
+void Interruption::Call::leave(const Slot& slot)
+{
+    if (innermost && &innermost->slot_ == &slot) siglongjmp(innermost->place, 1);
+}
+
 Interruption::InNative::InNative() : call_(innermost)
 {
     if (call_) call_->natives_.fetch_add(1, std::memory_order_relaxed);

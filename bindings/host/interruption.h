@@ -62,6 +62,10 @@ public:
 
         // After the jump.
         void has_left() const;
+        // Jumps out of the innermost call of this thread, if it is one of the slot and nothing of C++ is in between.
+        static void try_to_leave(const Slot& slot);
+        // The same, from a function of C++ whose objects are gone by now, if the call is one of the slot.
+        static void leave(const Slot& slot);
 
         sigjmp_buf place;
 

@@ -166,15 +166,16 @@ void set_engine_errors(lua_State* L) { lua_setfield(L, LUA_REGISTRYINDEX, engine
 int guarded(lua_State* L, int (*f)(State& state))
 {
     State& state = State::of(L);
-    const State::InCoroutine running(state, L);
     std::string message;
     try {
+        const State::InCoroutine running(state, L);
         return f(state);
     } catch (const std::bad_alloc&) {
         message = "out of memory";
     } catch (const std::exception& error) {  // an Error's text has the place and the node that it knows
         message = error.what();
     }
+    state.leave_if_broken();
     lua_pushlstring(L, message.data(), message.size());
     return lua_error(L);
 }

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "bindings/host/compiled_code.h"
 #include "bindings/host/lua_text.h"
 #include "bindings/host/modules.h"
 #include "bindings/host/natives.h"
@@ -80,8 +81,10 @@ std::exception_ptr State::set_up()
     struct SetUp {
         State& state;
         std::exception_ptr error;
-    } now{*this, nullptr};
+        sigjmp_buf place;
+    } now{*this, nullptr, {}};
     const Protected inside(*this);
+    if (sigsetjmp(now.place, 0) != 0) return now.error;
     const int status = lua_cpcall(
         L_,
         [](lua_State* L) {
@@ -95,6 +98,7 @@ std::exception_ptr State::set_up()
             } catch (const std::exception&) {
                 here.error = std::current_exception();
             }
+            if (here.state.is_broken_) siglongjmp(here.place, 1);
             return 0;
         },
         &now);
@@ -122,7 +126,8 @@ State& State::of(lua_State* L)
 // host's own requests between them are not limited.
 //
 // Outside of a protected call Lua's error would end the process without a word. Memory that runs out there is a C++
-// exception, which leaves Lua at the place where its own would.
+// exception, which leaves Lua at the place where its own would. Within compiled code LuaJIT raises it from the wrong
+// place: the call is left by a jump.
 void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t new_size)
 {
     State& state = *static_cast<State*>(self);
@@ -131,10 +136,9 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         state.memory_ -= old_size;
         return nullptr;
     }
-    if (state.limited_ && new_size > old_size &&
-        state.memory_ + (new_size - old_size) > state.host_.options().script_memory)
-        return nullptr;
-    void* moved = std::realloc(block, new_size);
+    state.is_beyond_limit_ = state.limited_ && new_size > old_size &&
+                             state.memory_ + (new_size - old_size) > state.host_.options().script_memory;
+    void* moved = state.is_beyond_limit_ ? nullptr : std::realloc(block, new_size);
     if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
     if (moved)
         state.memory_ += new_size - old_size;
@@ -142,6 +146,8 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         std::longjmp(*state.making_, 1);
     else if (state.L_ && !state.protected_)
         throw std::bad_alloc();
+    else if (state.protected_ && is_asked_by_compiled_code())
+        Interruption::Call::try_to_leave(state.slot_);
     return moved;
 }
 
@@ -197,11 +203,24 @@ void State::call(int arguments, int results)
 // The status of lua_pcall.
 int State::protected_call(int arguments, int results, int handler)
 {
+    if (is_broken_) fail_broken();
     Interruption::Call call(slot_, L_);
     if (sigsetjmp(call.place, 0) == 0) return lua_pcall(L_, arguments, results, handler);
     call.has_left();
     is_broken_ = true;
-    host_.interruption.fail();
+    fail_broken();
+}
+
+void State::fail_broken() const
+{
+    host_.interruption.check();
+    if (is_beyond_limit_) throw Error(memory_limit_text(host_.options().script_memory));
+    throw std::bad_alloc();
+}
+
+void State::leave_if_broken() const
+{
+    if (is_broken_) Interruption::Call::leave(slot_);
 }
 
 void State::push_entry(const char* name)

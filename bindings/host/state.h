@@ -42,6 +42,10 @@ public:
     // graph code; the stack is then as before the function was pushed.
     void call(int arguments, int results);
 
+    // Where a call within another one was left by a jump: leaves the other one, too, as Lua can't return into it. To be
+    // called by functions that Lua has called, behind their objects of C++.
+    void leave_if_broken() const;
+
     // Pushes an entry point of lua/host.lua.
     void push_entry(const char* name);
     // Pushes the function of a kernel, by its number.
@@ -114,6 +118,7 @@ private:
 
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     int protected_call(int arguments, int results, int handler);
+    [[noreturn]] void fail_broken() const;
     // Has LuaJIT make the state; none where there is no memory.
     void make();
     // Fills a new state; the error, where there is one.
@@ -126,6 +131,7 @@ private:
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;            // to options().script_memory, now
+    bool is_beyond_limit_ = false;    // the last request
     bool is_broken_ = false;          // compiled code was left by a jump
     bool protected_ = false;          // now
     std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory

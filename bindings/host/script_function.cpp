@@ -10,11 +10,12 @@
 #include "bindings/host/script_place.h"
 #include "bindings/host/state.h"
 #include "bindings/host/values.h"
+#include "runtime/graph/located.h"
 
 namespace rapid {
 namespace {
 
-class ScriptFunction : public FrameFunction {
+class ScriptFunction : public FrameFunction, public Located {
 public:
     ScriptFunction(State& state, int index) : state_(state), location_(place_of_function(state.lua(), index))
     {
@@ -44,6 +45,8 @@ public:
         lua_pop(L, 1);
         return result;
     }
+
+    Location location() const override { return location_; }
 
     void refuse_memory() const
     {

@@ -1,6 +1,7 @@
 // Reads a motion from a graph's value: an object, a function of the frame, or keys.
 #include <fmt/format.h>
 
+#include "runtime/graph/located.h"
 #include "runtime/graph/param.h"
 
 namespace rapid {
@@ -25,6 +26,7 @@ public:
         } catch (const Error& error) {
             Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
             placed.at(error.location()).with_trace(error.trace());
+            if (const auto* written = dynamic_cast<const Located*>(function_.get())) placed.at(written->location());
             throw placed;
         }
     }

@@ -58,6 +58,19 @@ describe("a motion", function()
     assert.truthy(message:find("(frame ", 1, true), message)
   end)
 
+  it("that a function does not return is told with the line of the function, and the node", function()
+    local text = [[
+local body = rapid.mesh.box {}:transform(
+  function(frame)
+    return frame.number > 3 and 3 or rapid.translate(0, 0, 0)
+  end)
+return rapid.create {}
+  :emit { source = body, rate = 100 } :solve {}]]
+    local run = scene.command("run", text, "-f 1-10 --quiet")
+    assert.equal(1, run.status)
+    assert.truthy(run.stderr:find(':2: node "emit1": motion is a function that returned 3', 1, true), run.stderr)
+  end)
+
   it("by keys takes constants alone", function()
     assert.truthy(error_of("rapid.mesh.box {}:transform { [1] = rapid.scale(1), [9] = 'up' }"):find(
       'motion[9] = "up" is no place to be at a frame; keys are constant motions', 1, true))

@@ -5,16 +5,10 @@
 // Works on one coordinate at a time, as a double or as a pack of eight.
 #pragma once
 
-#include <cmath>
-
 #include "runtime/simd.h"
 #include "runtime/vec.h"
 
 namespace rapid {
-
-inline double least(double a, double b) { return a < b ? a : b; }
-inline double most(double a, double b) { return a > b ? a : b; }
-inline double magnitude(double x) { return std::abs(x); }
 
 // Relative: a point that lies flush on a box may be off it by rounding to single precision.
 constexpr double flush_tolerance = 0x1p-21;
@@ -27,8 +21,9 @@ struct PathExtent {
     // sagging: how far the path may be off its chord, m.
     [[gnu::always_inline]] static PathExtent of(const T& from, const T& to, const T& sagging)
     {
-        const T margin = sagging + flush_tolerance * magnitude(from);
-        return {least(to, from) - margin, most(to, from) + margin};
+        const T magnitude = from > -from ? from : -from;
+        const T margin = sagging + flush_tolerance * magnitude;
+        return {(to < from ? to : from) - margin, (to > from ? to : from) + margin};
     }
 
     // Whether it is off the interval [min, max] of a box: by one coordinate, a path misses it.

@@ -45,6 +45,14 @@ void read_block(int descriptor, unsigned char* to, std::size_t begin, std::size_
 
 }  // namespace
 
+std::string_view InputFile::text() const
+{
+    constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
+    std::string_view all(reinterpret_cast<const char*>(bytes_.get()), size_);
+    if (all.starts_with(byte_order_mark)) all.remove_prefix(byte_order_mark.size());
+    return all;
+}
+
 InputFile::InputFile(const std::filesystem::path& path)
 {
     const OpenFile file = open_regular(path);

@@ -15,7 +15,8 @@ public:
     explicit InputFile(const std::filesystem::path& path);
 
     std::span<const unsigned char> bytes() const { return {bytes_.get(), size_}; }
-    std::string_view text() const { return {reinterpret_cast<const char*>(bytes_.get()), size_}; }
+    // Without the mark of UTF-8's byte order that editors and spreadsheets may begin a file with.
+    std::string_view text() const;
 
 private:
     std::unique_ptr<unsigned char[]> bytes_;

@@ -283,6 +283,9 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
             throw Error(fmt::format("attribute \"{}\" has the unknown type {}", name, type));
         }
     }
+    std::vector<std::string> names;
+    for (const RecordAttribute& attribute : dictionary.attributes) names.push_back(attribute.name);
+    check_column_names(names, "");
     return dictionary;
 }
 

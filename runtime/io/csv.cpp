@@ -24,7 +24,6 @@ namespace rapid {
 namespace {
 
 constexpr std::string_view group_prefix = "group:";
-constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // spreadsheets write it
 constexpr std::size_t number_chars = 24;  // the longest is an int64 of 20; a float of 9 digits has 15
 
 char* put(char* to, float value)
@@ -238,7 +237,6 @@ PointSet read_csv(const std::filesystem::path& path)
 {
     const InputFile file(path);
     std::string_view text = file.text();
-    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     const std::size_t header_end = std::min(text.find('\n'), text.size());
     std::string_view header = text.substr(0, header_end);
     if (header.ends_with('\r')) header.remove_suffix(1);

@@ -14,6 +14,7 @@
 #include "runtime/files/input_file.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
+#include "runtime/memory_budget.h"
 #include "runtime/points/trail.h"
 
 namespace rapid {
@@ -74,6 +75,14 @@ private:
     std::string_view line_;
 };
 
+// A line names a place by two bytes. A list that grows has three times its bytes for a moment; then come the columns.
+void check_memory(std::size_t places)
+{
+    constexpr double bytes_a_place = 3 * (sizeof(Vec3f) + sizeof(std::int32_t)) + sizeof(std::int64_t);
+    if (const double bytes = bytes_a_place * static_cast<double>(places); !fits_in_memory(bytes))
+        throw beyond_memory(fmt::format("lines of at least {} places", places), bytes, "split the file");
+}
+
 // The whole of a word, or Error.
 template <class T>
 T number_of(std::string_view word, std::size_t line)
@@ -101,6 +110,7 @@ PointSet read_obj(const std::filesystem::path& path)
 {
     const InputFile file(path);
     std::string_view text = file.text();
+    const bool ends = text.ends_with('\n');
     std::vector<Vec3f> vertices, places;
     std::vector<std::int32_t> curves;
     std::int32_t curve = 0;
@@ -109,6 +119,11 @@ PointSet read_obj(const std::filesystem::path& path)
         text.remove_prefix(std::min(text.size(), line.size() + 1));
         Words words(line);
         const std::string_view kind = words.next();
+        if (text.empty() && !ends && (kind == "v" || kind == "l"))
+            throw Error(
+                fmt::format("line {}: there is no newline at its end, so that its last number may be cut short; if the "
+                            "file is whole, append a newline (echo >> FILE)",
+                            number));
         if (kind == "v") {
             Vec3f P;
             for (int axis = 0; axis < 3; ++axis) P[axis] = number_of<float>(words.next(), number);
@@ -116,6 +131,7 @@ PointSet read_obj(const std::filesystem::path& path)
             vertices.push_back(P);
         } else if (kind == "l") {
             for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+                if (places.size() == places.capacity()) check_memory(places.size());
                 places.push_back(vertices[vertex_of(word, vertices.size(), number)]);
                 curves.push_back(curve);
             }

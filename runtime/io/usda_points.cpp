@@ -7,10 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "runtime/error.h"
 #include "runtime/files/left_out.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -27,10 +29,20 @@ std::optional<UsdArray> array_of(std::string_view type)
 {
     if (!type.ends_with("[]")) return {};
     type.remove_suffix(2);
-    UsdArray array{"", ScalarType::Double, 1, type.starts_with("quat"), {}};
-    if (type == "bool") return UsdArray{"", ScalarType::UInt8, 1, false, {}};
-    if (type == "uint" || type == "int64" || type == "uint64") return UsdArray{"", ScalarType::Int64, 1, false, {}};
-    static constexpr std::string_view integers[] = {"uchar", "int", "int2", "int3", "int4"};
+    const auto integers_of = [](ScalarType scalar, auto like) {
+        using Limits = std::numeric_limits<decltype(like)>;
+        constexpr std::uint64_t held = std::numeric_limits<std::int64_t>::max();
+        return UsdArray{"", scalar, 1, false, Limits::min(), std::int64_t(std::min<std::uint64_t>(Limits::max(), held)),
+                        {}};
+    };
+    if (type == "bool") return integers_of(ScalarType::UInt8, std::int32_t{});
+    if (type == "uchar") return integers_of(ScalarType::Int32, std::uint8_t{});
+    if (type == "uint") return integers_of(ScalarType::Int64, std::uint32_t{});
+    if (type == "int64") return integers_of(ScalarType::Int64, std::int64_t{});
+    if (type == "uint64") return integers_of(ScalarType::Int64, std::uint64_t{});
+    UsdArray array = integers_of(ScalarType::Double, std::int32_t{});
+    array.quaternion = type.starts_with("quat");
+    static constexpr std::string_view integers[] = {"int", "int2", "int3", "int4"};
     static constexpr std::string_view floats[] = {
         "half", "float", "double", "point3", "vector3", "normal3", "color3", "color4",  "texCoord2", "texCoord3",
         "quat", "half2", "half3",  "half4",  "float2",  "float3",  "float4", "double2", "double3",   "double4"};
@@ -191,6 +203,7 @@ private:
             if (type.ends_with("[]")) LeftOut::add(fmt::format("{} of the type {}", name, type));
             return skip_value();
         }
+        if (!names_.insert(name).second) throw wrong(fmt::format("{} is there twice", name));
         if (!name.ends_with(samples)) {
             if (!is_at('[')) return skip_value();  // None
             array->name = std::string(name);
@@ -239,7 +252,7 @@ private:
                 read_number(array);
             }
             if (tuple) expect(')');
-            if (skip_space(), is_at(',')) ++at_;
+            if (skip_space(), !is_at(']')) expect(',');
         }
         ++at_;
     }
@@ -250,16 +263,27 @@ private:
         ++at_;
     }
 
+    // A number is two bytes of text, and more while it grows with others and becomes a column.
+    void check_memory(const UsdArray& array) const
+    {
+        if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))
+            throw beyond_memory(fmt::format("an array of at least {} rows", array.rows()), bytes,
+                                "write .bgeo in its place");
+    }
+
     void read_number(UsdArray& array)
     {
         const char *from = text_.data() + at_, *end = text_.data() + text_.size();
         const auto put = [&](auto number) {
+            if (array.bytes.size() == array.bytes.capacity()) check_memory(array);
             const auto* bytes = reinterpret_cast<const unsigned char*>(&number);
             array.bytes.insert(array.bytes.end(), bytes, bytes + sizeof number);
         };
         const auto parse = [&](auto number) {
             const auto parsed = std::from_chars(from, end, number);
-            if (parsed.ec != std::errc()) throw wrong("there is no number of its type where there should be one");
+            bool fits = parsed.ec == std::errc();
+            if constexpr (std::is_integral_v<decltype(number)>) fits &= number >= array.least && number <= array.most;
+            if (!fits) throw wrong("there is no number of its type where there should be one");
             at_ = static_cast<std::size_t>(parsed.ptr - text_.data());
             return number;
         };
@@ -280,6 +304,7 @@ private:
     std::string_view text_;
     std::size_t at_ = 0;
     std::vector<UsdArray> arrays_;
+    std::set<std::string_view> names_;  // of arrays so far
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 // Nothing in a file is trusted. Errors say what is wrong, with the line; who calls adds the file's name.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,9 +14,10 @@ namespace rapid {
 
 struct UsdArray {
     std::string name;
-    ScalarType type;    // in memory: UInt8 (of truth values), Int32, Int64 or Double
-    std::size_t tuple;  // numbers of a row
-    bool quaternion;    // the real part first
+    ScalarType type;           // in memory: UInt8 (of truth values), Int32, Int64 or Double
+    std::size_t tuple;         // numbers of a row
+    bool quaternion;           // the real part first
+    std::int64_t least, most;  // of integers
     std::vector<unsigned char> bytes;
 
     std::size_t rows() const { return bytes.size() / (tuple * scalar_bytes(type)); }

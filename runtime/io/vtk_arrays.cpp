@@ -62,6 +62,12 @@ std::vector<unsigned char> from_base64(std::string_view text, std::size_t bytes,
     return result;
 }
 
+std::string_view without_space(std::string_view text)
+{
+    text.remove_prefix(std::min(text.find_first_not_of(white_space), text.size()));
+    return text;
+}
+
 // Numbers as text, in memory as the machine has them.
 std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type, std::size_t count)
 {
@@ -70,22 +76,17 @@ std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type
     with_scalar(type, [&](auto like) {
         using Number = std::conditional_t<std::is_same_v<decltype(like), Half>, float, decltype(like)>;
         for (std::size_t i = 0; i < count; ++i) {
-            text.remove_prefix(std::min(text.find_first_not_of(white_space), text.size()));
+            text = without_space(text);
             Number number = 0;
             const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
-            if (parsed.ec != std::errc())
-                throw Error(fmt::format("the array has no number where it should have its {}", i));
             text.remove_prefix(static_cast<std::size_t>(parsed.ptr - text.data()));
+            if (parsed.ec != std::errc() || (!text.empty() && white_space.find(text[0]) == std::string_view::npos))
+                throw Error(fmt::format("the array has no number of its type where it should have its {}", i));
             std::memcpy(bytes.data() + i * sizeof number, &number, sizeof number);
         }
+        if (!without_space(text).empty()) throw Error(fmt::format("the array has more than its {} numbers", count));
     });
     return bytes;
-}
-
-std::string_view without_space(std::string_view text)
-{
-    text.remove_prefix(std::min(text.find_first_not_of(white_space), text.size()));
-    return text;
 }
 
 }  // namespace

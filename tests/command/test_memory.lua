@@ -79,6 +79,14 @@ describe("a file that is larger than the memory that a run may take", function()
     assert.match("big%.prt: %d+ points, decompressed, would take about 7%d MiB", read "big.prt".stderr)
     assert.match("big%.csv: %d+ lines of 7 numbers would take about 127 MiB", read "big.csv".stderr)
   end)
+
+  it("is refused while text grows in memory", function()
+    scene.folder:write("big.obj", "v 0 0 0\nl" .. (" 1"):rep(2200000) .. "\n")
+    assert.match("big%.obj: lines of at least 2097152 places would take about 112 MiB", read "big.obj".stderr)
+    scene.folder:write("big.usda",
+      '#usda 1.0\ndef Points "a" { point3f[] points = [' .. ("(0,0,0),"):rep(1500000) .. "] }")
+    assert.match("big%.usda: an array of at least %d+ rows would take about %d+ MiB", read "big.usda".stderr)
+  end)
 end)
 
 describe("a number of steps", function()

@@ -20,8 +20,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (::ftruncate(file, 0) != 0 || ::pwrite(file, data + 1, size - 1, 0) != static_cast<ssize_t>(size - 1))
         std::abort();
     try {
-        const char* formats[] = {"a.csv", "a.bgeo", "a.ply", "", "a.npz", "a.prt", "a.usda", "a.vtp"};
-        if (const char* format = formats[data[0] % 8]; *format)
+        const char* formats[] = {"a.csv", "a.bgeo", "a.ply", "", "a.npz", "a.prt", "a.usda", "a.vtp", "a.obj"};
+        if (const char* format = formats[data[0] % 9]; *format)
             rapid::format_of(format).read(path);
         else
             rapid::read_ply_mesh(path);

@@ -167,7 +167,7 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4")),
                Catch::EndsWith("the array \"\" of 2 rows: the array ends early"));
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4 five")),
-               Catch::EndsWith("the array has no number where it should have its 5"));
+               Catch::EndsWith("the array has no number of its type where it should have its 5"));
     CHECK_THAT(error(file_of("", three + base64(bytes_of<std::uint32_t>({20}) + std::string(20, '\0')))),
                Catch::EndsWith("the array ends early"));
     CHECK_THAT(error(file_of("", three + base64(bytes_of<std::uint32_t>({24}) + std::string(20, '\0')))),

@@ -27,6 +27,8 @@ struct TaskState {
 
 std::optional<int> ended_with(const fs::path& status)
 {
+    std::error_code none;
+    if (!fs::is_regular_file(status, none)) return {};  // reading a pipe would wait
     std::ifstream file(status);
     int code = 0;
     if (!(file >> code)) return {};

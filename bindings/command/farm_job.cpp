@@ -30,10 +30,26 @@ bool limits_memory(const std::vector<std::string>& words)
                        [](const std::string& word) { return word.starts_with("--memory="); });
 }
 
+// A line of a script that begins with # ends at a newline, and what follows would be run.
+std::string one_line(std::string text)
+{
+    std::replace_if(
+        text.begin(), text.end(), [](unsigned char c) { return c < ' '; }, ' ');
+    return text;
+}
+
+void check_one_line(const std::string& what, const std::string& text)
+{
+    if (one_line(text) != text) throw Error(fmt::format("--farm: {} \"{}\" has a control character", what, text));
+}
+
 // A job that is preempted or whose node is lost begins again. On SIGTERM, which all its processes get, this program
 // ends by itself; the shell waits for it.
 std::string head(const FarmJob& job, const std::string& log)
 {
+    check_one_line("the name of the job", job.name);
+    check_one_line("the folder of the outputs", job.outputs.string());
+    check_one_line("the current folder", job.folder.string());
     return fmt::format(
         "#!/bin/bash\n"
         "#SBATCH --job-name={}\n"
@@ -80,7 +96,8 @@ std::string script_of_tasks(const FarmJob& job, const std::string& program)
 {
     std::string text = head(job, "%a.log") + "case $SLURM_ARRAY_TASK_ID in\n";
     for (std::size_t k = 0; k < job.tasks.size(); ++k)
-        text += fmt::format("{}) set -- {} ;;  # {}\n", k + 1, shell_words(job.tasks[k].words), job.tasks[k].name);
+        text += fmt::format("{}) set -- {} ;;  # {}\n", k + 1, shell_words(job.tasks[k].words),
+                            one_line(job.tasks[k].name));
     text += "esac\n";
     const std::string status = shell_word(job.scripts().string() + '/') + "$SLURM_ARRAY_TASK_ID.status";
     std::string words = shell_words(job.words) + " \"$@\"";
@@ -101,8 +118,8 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
 {
     try {
         const ordered_json json = ordered_json::parse(InputFile(file).text());
-        if (json.at("rapid_farm") != format_version)
-            throw Error(fmt::format("is of version {}; it must be {}", json.at("rapid_farm").dump(), format_version));
+        if (const int version = json.at("rapid_farm").get<int>(); version != format_version)
+            throw Error(fmt::format("is of version {}; it must be {}", version, format_version));
         SubmittedJob submitted;
         FarmJob& job = submitted.job;
         job.name = json.at("name");
@@ -121,6 +138,8 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
         return submitted;
     } catch (Error& error) {
         throw error.at({file.string(), 0});
+    } catch (const nlohmann::json::parse_error& error) {  // its text holds what can't be parsed, all of it
+        throw Error(fmt::format("is no FARM.json: byte {} is none of JSON", error.byte)).at({file.string(), 0});
     } catch (const nlohmann::json::exception& error) {
         throw Error(fmt::format("is no FARM.json: {}", error.what())).at({file.string(), 0});
     }

@@ -25,6 +25,9 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t most_in_memory = 24 << 20;
 constexpr std::size_t resident = 64 << 20;
 
+// Parts or frames that are said to be missing; a record of others may promise any number.
+constexpr std::size_t most_missing = 1000;
+
 // One part: its sequence, and what is known of it.
 struct PartFiles {
     std::string text;  // the pattern
@@ -162,7 +165,8 @@ private:
     {
         std::vector<std::string> missing;
         for (int number = 1; number <= count; ++number)
-            if (!parts.count(number)) missing.push_back(name_of({number, count}));
+            if (!parts.count(number) && missing.size() <= most_missing) missing.push_back(name_of({number, count}));
+        if (missing.size() > most_missing) missing.back() = "and more";
         if (!missing.empty())
             problems.push_back(
                 fmt::format("missing {} {}", missing.size() == 1 ? "is part" : "are parts", fmt::join(missing, ", ")));
@@ -181,11 +185,12 @@ private:
                 part.frames.emplace(number, path);
             else
                 missing.push_back(number);
+            if (missing.size() == most_missing) break;
         }
         if (!missing.empty())
-            problems.push_back(fmt::format("of {} {} missing: {}", part.text,
-                                           missing.size() == 1 ? "a frame is" : "frames are",
-                                           list_of_frames(missing, wanted.step)));
+            problems.push_back(fmt::format(
+                "of {} {} missing: {}{}", part.text, missing.size() == 1 ? "a frame is" : "frames are",
+                list_of_frames(missing, wanted.step), missing.size() == most_missing ? ", and maybe more" : ""));
     }
 
     void check_output(const std::vector<PartFiles>& parts) const

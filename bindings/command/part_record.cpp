@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "bindings/command/part_options.h"
 #include "bindings/command/whole_file.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/frame_pattern.h"
@@ -29,22 +31,28 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
     PartRecord record;
     try {
         const ordered_json json = ordered_json::parse(InputFile(file).text());
-        if (json.at("rapid_part") != format_version)
-            throw Error(
-                fmt::format("is a record of version {}; it must be {}", json.at("rapid_part").dump(), format_version));
-        record.part = {json.at("part").get<int>(), json.at("parts").get<int>()};
-        if (record.part.number < 1 || record.part.number > record.part.count) throw Error("is no record of a part");
+        if (const int version = json.at("rapid_part").get<int>(); version != format_version)
+            throw Error(fmt::format("is a record of version {}; it must be {}", version, format_version));
+        const auto number = json.at("part").get<std::int64_t>(), count = json.at("parts").get<std::int64_t>();
+        if (number < 1 || number > count || count > most_parts) throw Error("is no record of a part");
+        record.part = {static_cast<int>(number), static_cast<int>(count)};
         if (!json.at("sample").is_null()) record.sample = json.at("sample").get<double>();
         record.frames.first = json.at("frames").at("first");
         record.frames.last = json.at("frames").at("last");
         record.frames.step = json.at("frames").at("step");
-        if (record.frames.step < 1 || record.frames.last < record.frames.first) throw Error("has no frames");
+        constexpr std::int64_t least = std::numeric_limits<std::int32_t>::min();
+        constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
+        const auto [first, last, step] = record.frames;
+        if (first < least || last < first || last > most || step < 1 || step > most) throw Error("has no frames");
         record.fps = json.at("fps");
+        if (!(record.fps > 0)) throw Error("has no frames a second");
         record.start = json.at("start");
         record.identity = json.at("identity").get<std::map<std::string, std::string>>();
         return record;
     } catch (Error& error) {
         throw error.at({file.string(), 0});
+    } catch (const nlohmann::json::parse_error& error) {  // its text holds what can't be parsed, all of it
+        throw Error(fmt::format("is no record of a part: byte {} is none of JSON", error.byte)).at({file.string(), 0});
     } catch (const nlohmann::json::exception& error) {
         throw Error(fmt::format("is no record of a part: {}", error.what())).at({file.string(), 0});
     }

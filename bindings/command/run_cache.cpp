@@ -96,7 +96,10 @@ void RunCache::lock()
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
-    lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    // A link would make a file elsewhere.
+    lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
+    if (!lock_ && errno == ELOOP)
+        throw Error(fmt::format("--cache {}: its .lock is a link; give another folder", folder_.string()));
     // One that was killed keeps it until the system has taken its memory back.
     const Stopwatch waited;
     while (lock_ && ::flock(lock_.number(), LOCK_EX | LOCK_NB) != 0) {
@@ -121,7 +124,11 @@ void RunCache::read_journal()
 {
     const std::string hash = hash_of(fingerprint_);
     bool is_there = false;
-    known_ = RunJournal::read(folder_ / "journal", hash, is_there);
+    try {
+        known_ = RunJournal::read(folder_ / "journal", hash, is_there);
+    } catch (Error& error) {
+        throw error.at({(folder_ / "journal").string(), 0});
+    }
     if (!is_there && !snapshots().empty())
         failures_.push_back((folder_ / "journal").string() + ": it is missing; the cache begins anew");
     else if (is_there && known_.fingerprint.empty())

@@ -149,8 +149,11 @@ private:
     {
         for (std::size_t row = 0; row < rows.size(); ++row) {
             EndedProcess ended{"it did not run to its end", status_failed};
-            std::ifstream file(fs::path(collect_) / fmt::format("{}.status", row + 1));
-            if (int status = 0; file >> status) {
+            const fs::path path = fs::path(collect_) / fmt::format("{}.status", row + 1);
+            std::error_code none;
+            std::ifstream file;
+            if (fs::is_regular_file(path, none)) file.open(path);  // reading a pipe would wait
+            if (int status = 0; file.is_open() && file >> status) {
                 ended = {"", status};
                 if (status != status_done)
                     ended.failure = fmt::format("ended with status {}; see {}", status,

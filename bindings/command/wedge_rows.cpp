@@ -27,8 +27,12 @@ void check(const std::vector<SweptSetting>& settings, bool zip)
 
 std::vector<Settings> combinations(const std::vector<SweptSetting>& settings, bool zip)
 {
+    constexpr std::size_t most = 100000;
     std::size_t count = 1;
-    for (const SweptSetting& setting : settings) count = zip ? setting.values.size() : count * setting.values.size();
+    for (const SweptSetting& setting : settings) {
+        count = zip ? setting.values.size() : count * setting.values.size();
+        if (count > most) throw Error(fmt::format("--vary: there are more than {} rows; vary less at a time", most));
+    }
     std::vector<Settings> rows(count);
     for (std::size_t row = 0; row < count; ++row) {
         std::size_t rest = row;

@@ -138,8 +138,8 @@ void find_sources(const std::vector<PointSet>& parts, const Bucket& bucket,
     if (sources.empty()) return;
     const auto [least, most] = std::minmax_element(sources.begin(), sources.end(),
                                                    [](const auto& a, const auto& b) { return a.first < b.first; });
-    const auto range = static_cast<std::uint64_t>(most->first - least->first) + 1;
-    if (range > 8 * sources.size()) {
+    const std::uint64_t range = static_cast<std::uint64_t>(most->first) - static_cast<std::uint64_t>(least->first);
+    if (range >= 8 * sources.size()) {
         std::sort(sources.begin(), sources.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
         return;
     }
@@ -147,7 +147,7 @@ void find_sources(const std::vector<PointSet>& parts, const Bucket& bucket,
     constexpr std::uint32_t none = UINT32_MAX;
     thread_local std::vector<std::uint32_t> by_id;
     thread_local std::vector<std::pair<std::int64_t, Source>> sorted;
-    by_id.assign(range, none);
+    by_id.assign(range + 1, none);
     const std::int64_t first = least->first;
     for (std::size_t i = 0; i < sources.size(); ++i)
         by_id[static_cast<std::size_t>(sources[i].first - first)] = static_cast<std::uint32_t>(i);

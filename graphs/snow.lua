@@ -1,4 +1,4 @@
--- snow: it settles on a fir until the fir is shaken, and comes down in a cloud.
+-- snow: it settles on a fir until the fir is shaken, and comes down in a cloud. It begins two seconds before frame 1.
 --
 -- Shows:  response = "stick" with an adhesion on a body that moves; meshes made in the scene.
 -- Proves: flakes stay where they have come to lie, until the fir's motion takes more than their adhesion
@@ -6,8 +6,8 @@
 -- Run:    rapid run graphs/snow.lua -f 1-132 -o /tmp/snow.mp4
 local rapid = require "rapid"
 
-local rate = rapid.param("rate", 12000, "flakes per second, for 1.6 s")
-local adhesion = rapid.param("adhesion", 14, "m/s² that take a flake off")
+local rate = rapid.param("rate", 7000, "flakes per second, until frame 39")
+local adhesion = rapid.param("adhesion", 22, "m/s² that take a flake off")
 
 -- A cone whose edge is cut into branches.
 local function tier(radius, low, high)
@@ -24,17 +24,17 @@ end
 local fir = rapid.levelset.box { size = {0.14, 0.5, 0.14}, center = {0, 0.22, 0}, voxel = 0.025 }
 for k = 0, 4 do fir = fir:union(tier(0.85 - 0.15 * k, 0.35 + 0.36 * k, 0.95 + 0.37 * k)) end
 
--- Still for 3.4 s; then it is shaken for a second.
+-- Still until frame 82; then it is shaken for a second.
 local function shaken(frame)
-  local t = frame.time - 3.4
-  if t <= 0 or t >= 1 then return rapid.translate(0, 0, 0) end
+  local t = rapid.math.clamp(frame.time - 5.4, 0, 1)
   return rapid.rotate({0.3, 0, 1}, 5 * math.sin(math.pi * t) * math.sin(2 * math.pi * 5 * t))
 end
 
-return rapid.create { fps = 24, seed = 12 }
-  :emit       { source = rapid.mesh.grid { size = {2, 2}, center = {-0.15, 2.9, 0} },
-                rate = function(frame) return frame.time < 1.6 and rate or rate / 30 end, velocity = {0, -1.2, 0},
-                spread = 20, attributes = { pscale = {0.006, 0.013}, Cd = {0.95, 0.97, 1} } }
+return rapid.create { fps = 24, seed = 12, start = -47 }
+  :emit       { source = rapid.mesh.grid { size = {5, 3.6}, center = {0, 2.9, 0} },
+                rate = function(frame) return frame.time < 3.6 and rate or rate / 30 end,
+                birth = function(p) p.P = vec3(p.P.x * p:rand(1) ^ 0.5 - 0.15, p.P.y, p.P.z * p:rand(2) ^ 0.5) end,
+                velocity = {0, -1.2, 0}, spread = 20, attributes = { pscale = {0.006, 0.013}, Cd = {0.95, 0.97, 1} } }
   :gravity    {}
   :wind       { velocity = {0.15, 0, 0}, drag = 7 }
   :turbulence { amplitude = 3, size = 0.5, speed = 0.4 }

@@ -25,7 +25,7 @@ describe("graphs/snow.lua", function()
   end)
 
   it("is shaken off by more than the adhesion", function()
-    -- At a height h the fir is accelerated by up to 5° (10 π)² h sin(π t) = 86 h m/s²: above 0.8 m by three times 22 m/s².
+    -- At a height h the fir is accelerated by up to 5° (10 π)² h sin(π t) = 86 h m/s²: above 0.8 m by 3 x 22 m/s².
     local before, after = lying(result[82]), result[112]
     local high, fallen = 0, 0
     for id, P in pairs(before) do

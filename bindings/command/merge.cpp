@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 // Bytes of a frame's files beyond which its points are not all held in memory, and of them that then are.
 constexpr std::uintmax_t most_in_memory = 24 << 20;
-constexpr std::size_t resident = 64 << 20;
+constexpr std::size_t resident = 32 << 20;
 
 // Parts or frames that are said to be missing; a record of others may promise any number.
 constexpr std::size_t most_missing = 1000;
@@ -226,6 +226,15 @@ private:
         return status_done;
     }
 
+    static PointSet read_part(const std::string& file, bool into_files)
+    {
+        if (!into_files) return read_points(file);
+        std::optional<ColumnFiles::Pause> pause(std::in_place);
+        PointSet part = read_points(file);
+        pause.reset();
+        return ColumnFiles::moved(std::move(part));
+    }
+
     std::uint64_t merge_frame(const std::vector<PartFiles>& parts, int frame) const
     {
         const std::string path = FramePattern(output_).expand(frame);
@@ -240,7 +249,7 @@ private:
         std::vector<std::string> names;
         for (const PartFiles& part : parts) {
             names.push_back(part.frames.at(frame).string());
-            read.push_back(read_points(names.back()));
+            read.push_back(read_part(names.back(), columns.has_value()));
         }
         const PointSet whole = merge_parts(read, names);
         read.clear();

@@ -1,23 +1,40 @@
 #include "runtime/io/id_order.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
 #include <numeric>
+#include <utility>
 
 #include "runtime/parallel.h"
 
 namespace rapid {
 
+// By digits of eleven bits, the last one first; as many as the ids span.
 std::vector<std::size_t> id_order(const Column<std::int64_t>& id)
 {
+    constexpr int bits = 11;
+    constexpr std::size_t values = std::size_t{1} << bits;
     const Strided<std::int64_t> ids = id.read();
     if (id.is_uniform() || std::is_sorted(ids.data, ids.data + id.size())) return {};
-    std::vector<std::size_t> order(id.size());
+    const auto [least, most] = std::minmax_element(ids.data, ids.data + id.size());
+    const auto first = static_cast<std::uint64_t>(*least);
+    const int width = std::bit_width(static_cast<std::uint64_t>(*most) - first);
+
+    std::vector<std::size_t> order(id.size()), sorted(id.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    // With the place as the second key the order is total, so that a parallel sort has one result.
-    tbb::parallel_sort(order.begin(), order.end(),
-                       [&](std::size_t a, std::size_t b) { return ids[a] != ids[b] ? ids[a] < ids[b] : a < b; });
+    for (int shift = 0; shift < width; shift += bits) {
+        const auto digit = [&](std::size_t i) {
+            return (static_cast<std::uint64_t>(ids[i]) - first) >> shift & (values - 1);
+        };
+        std::array<std::size_t, values> next{};
+        for (const std::size_t i : order) ++next[digit(i)];
+        std::size_t begin = 0;
+        for (std::size_t& count : next) begin += std::exchange(count, begin);
+        for (const std::size_t i : order) sorted[next[digit(i)]++] = i;
+        order.swap(sorted);
+    }
     return order;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "runtime/parallel.h"
+#include "runtime/points/column_files.h"
 #include "runtime/points/subset.h"
 
 namespace rapid {
@@ -263,6 +264,7 @@ PointSet merge_parts(const std::vector<PointSet>& given, const std::vector<std::
         thread_local std::vector<std::pair<std::int64_t, Source>> sources;
         find_sources(parts, buckets[b], sources);
         for (const Gather& gather : gathers) gather(buckets[b], sources);
+        trim_columns();
     });
     return result;
 }

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/points/column_files.h"
+
 namespace rapid {
 namespace {
 
@@ -32,6 +34,7 @@ double largest_coordinate(const PointSet& points)
                             "remove the point",
                             points.id()[i], P[i].x(), P[i].y(), P[i].z()));
         largest = std::max(largest, here);
+        if (i % 65536 == 0) trim_columns();
     }
     return largest;
 }
@@ -68,7 +71,10 @@ int voxel_exponent(const PointSet& points)
     constexpr double sampled_in_cell = 8;
     const std::size_t step = (points.size() + sample_size - 1) / sample_size;
     std::vector<Vec3f> sample;
-    for (std::size_t i = 0; i < points.size(); i += step) sample.push_back(points.P()[i]);
+    for (std::size_t i = 0; i < points.size(); i += step) {
+        sample.push_back(points.P()[i]);
+        trim_columns();
+    }
 
     // From the coarsest, one cell for all, to finer ones.
     int cell = std::ilogb(largest) + 2;

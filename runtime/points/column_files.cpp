@@ -27,7 +27,8 @@ struct Block {
     int descriptor;
 };
 
-std::atomic<bool> in_use{false};
+std::atomic<bool> in_use{false}, paused{false};
+std::atomic<std::size_t> most_resident{0};
 std::mutex blocks_mutex;
 std::map<void*, Block> blocks;
 std::filesystem::path blocks_folder;
@@ -66,11 +67,19 @@ std::size_t resident_of_files()
     return read == 3 ? shared * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) : 0;
 }
 
+// Takes pages away from this process, which the system keeps or writes out as it likes.
+void trim()
+{
+    if (resident_of_files() <= most_resident) return;
+    const std::lock_guard lock(blocks_mutex);
+    for (const auto& [begin, block] : blocks) madvise(begin, block.bytes, MADV_DONTNEED);
+}
+
 }  // namespace
 
-// Takes pages away from this process, which the system keeps or writes out as it likes.
+// For what goes over columns and does not say how far it is.
 struct ColumnFiles::Trimmer {
-    explicit Trimmer(std::size_t most) : limit(resident_of_files() + most), thread([this] { run(); }) {}
+    Trimmer() : thread([this] { run(); }) {}
     ~Trimmer()
     {
         {
@@ -84,14 +93,9 @@ struct ColumnFiles::Trimmer {
     void run()
     {
         std::unique_lock lock(mutex);
-        while (!changed.wait_for(lock, 2ms, [this] { return ends; })) {
-            if (resident_of_files() <= limit) continue;
-            const std::lock_guard of_blocks(blocks_mutex);
-            for (const auto& [begin, block] : blocks) madvise(begin, block.bytes, MADV_DONTNEED);
-        }
+        while (!changed.wait_for(lock, 2ms, [this] { return ends; })) trim();
     }
 
-    const std::size_t limit;
     std::mutex mutex;
     std::condition_variable changed;
     bool ends = false;
@@ -102,7 +106,8 @@ ColumnFiles::ColumnFiles(const std::filesystem::path& folder, std::size_t reside
 {
     RAPID_ASSERT(!in_use);
     blocks_folder = folder.empty() ? "." : folder;
-    trimmer_ = std::make_unique<Trimmer>(resident);
+    most_resident = resident_of_files() + resident;
+    trimmer_ = std::make_unique<Trimmer>();
     in_use = true;
 }
 
@@ -112,9 +117,36 @@ ColumnFiles::~ColumnFiles()
     in_use = false;
 }
 
+PointSet ColumnFiles::moved(PointSet points)
+{
+    PointSet in_memory = points;  // columns that are shared are copied when they are written
+    const auto copy = [](auto& column) {
+        if (!column.is_uniform()) column.write();
+    };
+    for (const std::string& name : points.column_names()) {
+        std::visit(copy, *points.find(name));
+        in_memory.set(name, *points.find(name));
+    }
+    for (const std::string& name : points.group_names()) {
+        copy(points.group(name));
+        in_memory.group(name) = points.group(name);
+    }
+    return points;
+}
+
+ColumnFiles::Pause::Pause() { paused = true; }
+ColumnFiles::Pause::~Pause() { paused = false; }
+
+bool columns_lie_in_files() { return in_use; }
+
+void trim_columns()
+{
+    if (in_use) trim();
+}
+
 void* map_in_file(std::size_t bytes)
 {
-    if (!in_use) return nullptr;
+    if (!in_use || paused) return nullptr;
     const int descriptor = open_unnamed(blocks_folder);
     try {
         reserve(descriptor, bytes);

@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "runtime/points/point_set.h"
+
 namespace rapid {
 
 class ColumnFiles {
@@ -20,10 +22,29 @@ public:
     ColumnFiles(const ColumnFiles&) = delete;
     ColumnFiles& operator=(const ColumnFiles&) = delete;
 
+    // The same points, with their large columns in files.
+    static PointSet moved(PointSet points);
+    // While one of these lives, new columns are in memory all the same: those that are soon gone.
+    class Pause;
+
 private:
     struct Trimmer;
     std::unique_ptr<Trimmer> trimmer_;
 };
+
+class ColumnFiles::Pause {
+public:
+    Pause();
+    ~Pause();
+    Pause(const Pause&) = delete;
+    Pause& operator=(const Pause&) = delete;
+};
+
+// Whether a ColumnFiles lives: large columns are then best read and written in their order.
+bool columns_lie_in_files();
+// Between two stretches of columns that are gone over in their order: what is in memory of them is taken back at once
+// if it is too much. From any thread; nothing where no ColumnFiles lives.
+void trim_columns();
 
 // For Buffer: whole pages in a file; null where no ColumnFiles lives. Error: no room.
 void* map_in_file(std::size_t bytes);

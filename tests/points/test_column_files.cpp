@@ -61,6 +61,39 @@ TEST_CASE("columns made before and after are in memory as ever", "[column_files]
     CHECK(before[1] == 1);
 }
 
+// Blocks that lie in unnamed files of this folder.
+std::size_t blocks_in(const std::filesystem::path& folder)
+{
+    std::size_t count = 0;
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);) count += line.find(folder.string() + '/') != std::string::npos;
+    return count;
+}
+
+TEST_CASE("a pause keeps columns in memory, and points are moved into files with their values", "[column_files]")
+{
+    const test::TemporaryFolder folder;
+    const ColumnFiles files(folder.path(), 1 << 20);
+    PointSet points;
+    {
+        const ColumnFiles::Pause pause;
+        points.append(1 << 18);
+        std::span<std::int64_t> ids = points.id().write();
+        std::iota(ids.begin(), ids.end(), std::int64_t{5});
+        points.group("late").write()[7] = 1;
+    }
+    CHECK(blocks_in(folder.path()) == 0);
+    points = ColumnFiles::moved(std::move(points));
+    CHECK(blocks_in(folder.path()) == 2);
+    CHECK(points.P().is_uniform());
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        wrong += points.id()[i] != static_cast<std::int64_t>(i + 5) || (*points.find_group("late"))[i] != (i == 7);
+    CHECK(wrong == 0);
+    points = PointSet();
+    CHECK(blocks_in(folder.path()) == 0);
+}
+
 TEST_CASE("a folder that takes no files is refused", "[column_files]")
 {
     const ColumnFiles files("/proc/self/nowhere", 1 << 20);

@@ -1,0 +1,335 @@
+#include "runtime/io/vdb_order.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <span>
+#include <utility>
+
+#include "runtime/points/column_files.h"
+
+namespace rapid {
+namespace {
+
+using openvdb::Coord;
+
+// Points that are looked up together: at most 64 parts, each with a list of its leaves.
+constexpr std::size_t least_block = 65536, most_blocks = 64;
+// Points of columns in files that are sorted together, in memory.
+constexpr std::size_t cell_points = 131072;
+// Points that are put into cells between two looks at the memory that this takes.
+constexpr std::size_t stretch = 16384;
+
+constexpr std::int32_t leaf_edge = 8;
+
+// Voxels that contain positions; the nearest centre, as in OpenVDB.
+class Voxels {
+public:
+    explicit Voxels(double edge) : per_metre_(1 / edge) {}
+
+    Coord of(const Vec3f& P) const { return {along(P.x()), along(P.y()), along(P.z())}; }
+
+private:
+    std::int32_t along(float x) const { return static_cast<std::int32_t>(std::floor(x * per_metre_ + 0.5)); }
+
+    double per_metre_;
+};
+
+Coord leaf_of(const Coord& voxel) { return voxel & ~(leaf_edge - 1); }
+
+std::uint32_t place_in_leaf(const Coord& voxel)
+{
+    constexpr std::int32_t mask = leaf_edge - 1;
+    return static_cast<std::uint32_t>((voxel.x() & mask) << 6 | (voxel.y() & mask) << 3 | (voxel.z() & mask));
+}
+
+// The order of OpenVDB's tree: nodes of the root, of 4096³ voxels, then of 128³, then leaves.
+bool before_in_tree(const Coord& a, const Coord& b)
+{
+    for (const std::int32_t edge : {4096, 128, leaf_edge}) {
+        const Coord of_a = a & ~(edge - 1), of_b = b & ~(edge - 1);
+        if (of_a != of_b) return of_a < of_b;
+    }
+    return false;
+}
+
+// Numbers leaves as they come.
+class LeafNumbers {
+public:
+    LeafNumbers() : slots_(1024) {}
+
+    std::uint32_t add(const Coord& leaf)
+    {
+        if (2 * leaves_.size() >= slots_.size()) grow();
+        Slot& slot = slot_of(leaf);
+        if (slot.number == none) {
+            slot = {leaf, static_cast<std::uint32_t>(leaves_.size())};
+            leaves_.push_back(leaf);
+        }
+        return slot.number;
+    }
+    // Of one that has been added.
+    std::uint32_t operator[](const Coord& leaf) const { return const_cast<LeafNumbers*>(this)->slot_of(leaf).number; }
+    const std::vector<Coord>& leaves() const { return leaves_; }
+
+private:
+    static constexpr std::uint32_t none = UINT32_MAX;
+    struct Slot {
+        Coord leaf;
+        std::uint32_t number = none;
+    };
+
+    Slot& slot_of(const Coord& leaf)
+    {
+        std::uint64_t hash = 0;
+        for (const std::int32_t x : {leaf.x(), leaf.y(), leaf.z()})
+            hash = (hash ^ static_cast<std::uint32_t>(x)) * 0x9e3779b97f4a7c15ull, hash ^= hash >> 29;
+        for (std::size_t k = hash & (slots_.size() - 1);; k = (k + 1) & (slots_.size() - 1))
+            if (slots_[k].number == none || slots_[k].leaf == leaf) return slots_[k];
+    }
+
+    void grow()
+    {
+        slots_.assign(2 * slots_.size(), {});
+        for (std::uint32_t k = 0; k < leaves_.size(); ++k) slot_of(leaves_[k]) = {leaves_[k], k};
+    }
+
+    std::vector<Slot> slots_;  // a power of two
+    std::vector<Coord> leaves_;
+};
+
+// A stretch of the points, and the leaves that it touches.
+struct Block {
+    std::size_t begin, end;
+    std::vector<std::uint32_t> leaves;  // by the number that a leaf has in this block
+    std::vector<std::size_t> counts;    // of its points in them
+};
+
+// What is known of a point: its place in the set, and the voxel within its leaf.
+std::int64_t entry(std::uint32_t voxel, std::size_t place)
+{
+    return static_cast<std::int64_t>(std::uint64_t{voxel} << 32 | place);
+}
+
+// Entries of one leaf, in order of their places, by voxel.
+void sort_leaf(std::span<std::int64_t> entries, VdbLeaf& leaf)
+{
+    thread_local std::vector<std::int64_t> sorted;
+    std::array<std::uint32_t, 512> at{};
+    for (const std::int64_t e : entries) ++at[static_cast<std::size_t>(e >> 32)];
+    std::uint32_t first = 0;
+    for (std::uint32_t voxel = 0; voxel < at.size(); ++voxel) {
+        if (at[voxel] == 0) continue;
+        leaf.voxels.setOn(voxel);
+        leaf.counts.push_back(at[voxel]);
+        first += std::exchange(at[voxel], first);
+    }
+    sorted.resize(entries.size());
+    for (const std::int64_t e : entries) sorted[at[static_cast<std::size_t>(e >> 32)]++] = e;
+    std::copy(sorted.begin(), sorted.end(), entries.begin());
+}
+
+// The blocks of a set, the leaves in the order of the tree, and for each point the number of its leaf in its block.
+struct Lookup {
+    std::vector<Block> blocks;
+    Column<std::int32_t> numbers;
+    std::vector<VdbLeaf> leaves;
+};
+
+Lookup look_up(const Strided<Vec3f>& P, std::size_t size, const Voxels& voxels)
+{
+    Lookup result{{}, Column<std::int32_t>(size), {}};
+    const std::size_t of_block = std::max(least_block, (size + most_blocks - 1) / most_blocks);
+    for (std::size_t begin = 0; begin < size; begin += of_block)
+        result.blocks.push_back({begin, std::min(size, begin + of_block), {}, {}});
+    const std::span<std::int32_t> numbers = result.numbers.overwrite();
+    std::vector<std::vector<Coord>> found(result.blocks.size());
+    tbb::parallel_for(std::size_t{0}, result.blocks.size(), [&](std::size_t b) {
+        Block& block = result.blocks[b];
+        LeafNumbers own;
+        for (std::size_t i = block.begin; i < block.end; ++i) {
+            const std::uint32_t number = own.add(leaf_of(voxels.of(P[i])));
+            if (number == block.counts.size()) block.counts.push_back(0);
+            ++block.counts[number];
+            numbers[i] = static_cast<std::int32_t>(number);
+        }
+        found[b] = own.leaves();
+        trim_columns();
+    });
+
+    LeafNumbers all;
+    for (std::size_t b = 0; b < found.size(); ++b)
+        for (const Coord& leaf : found[b]) result.blocks[b].leaves.push_back(all.add(leaf));
+    std::vector<std::uint32_t> order(all.leaves().size()), rank(order.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return before_in_tree(all.leaves()[a], all.leaves()[b]); });
+    for (std::uint32_t k = 0; k < order.size(); ++k) {
+        rank[order[k]] = k;
+        result.leaves.push_back({all.leaves()[order[k]]});
+    }
+    for (Block& block : result.blocks)
+        for (std::size_t k = 0; k < block.leaves.size(); ++k) {
+            block.leaves[k] = rank[block.leaves[k]];
+            result.leaves[block.leaves[k]].size += static_cast<std::uint32_t>(block.counts[k]);
+        }
+    std::size_t first = 0;
+    for (VdbLeaf& leaf : result.leaves) first += leaf.size, leaf.first = first - leaf.size;
+    return result;
+}
+
+// The entries of all points, in order.
+Column<std::int64_t> sorted_entries(const Strided<Vec3f>& P, const Voxels& voxels, Lookup& lookup)
+{
+    Column<std::int64_t> result(0);
+    const std::span<std::int64_t> entries = result.append_for_writing(lookup.numbers.size());
+    // Where a block's points of each of its leaves go.
+    std::vector<std::size_t> next(lookup.leaves.size());
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] = lookup.leaves[k].first;
+    for (Block& block : lookup.blocks)
+        for (std::size_t k = 0; k < block.leaves.size(); ++k)
+            block.counts[k] = std::exchange(next[block.leaves[k]], next[block.leaves[k]] + block.counts[k]);
+    const Strided<std::int32_t> numbers = std::as_const(lookup.numbers).read();
+    tbb::parallel_for(std::size_t{0}, lookup.blocks.size(), [&](std::size_t b) {
+        Block& block = lookup.blocks[b];
+        for (std::size_t i = block.begin; i < block.end; ++i)
+            entries[block.counts[static_cast<std::size_t>(numbers[i])]++] = entry(place_in_leaf(voxels.of(P[i])), i);
+    });
+    tbb::parallel_for(std::size_t{0}, lookup.leaves.size(), [&](std::size_t k) {
+        VdbLeaf& leaf = lookup.leaves[k];
+        sort_leaf(entries.subspan(leaf.first, leaf.size), leaf);
+    });
+    return result;
+}
+
+// Leaves that are sorted together.
+struct Cell {
+    std::size_t first_leaf, end_leaf, first, end;  // leaves and points
+};
+
+std::vector<Cell> cells_of(const std::vector<VdbLeaf>& leaves)
+{
+    std::vector<Cell> cells;
+    for (std::size_t k = 0; k < leaves.size(); ++k) {
+        const std::size_t end = leaves[k].first + leaves[k].size;
+        if (!cells.empty() && end - cells.back().first <= cell_points)
+            cells.back().end_leaf = k + 1, cells.back().end = end;
+        else
+            cells.push_back({k, k + 1, leaves[k].first, end});
+    }
+    return cells;
+}
+
+// A column on its way into another order.
+struct MovedColumn {
+    // Points from `begin` on, to these places.
+    std::function<void(std::size_t begin, std::span<const std::size_t> places)> scatter;
+    // The points from `first` on are to be these, by their places from `first` on.
+    std::function<void(std::size_t first, std::span<const std::int64_t> entries)> sort;
+};
+
+template <class T>
+MovedColumn moved(const Column<T>& column, Column<T>& into)
+{
+    const std::span<T> to = into.append_for_writing(column.size());
+    return {[from = column.read(), to](std::size_t begin, std::span<const std::size_t> places) {
+                for (std::size_t i = 0; i < places.size(); ++i) to[places[i]] = from[begin + i];
+            },
+            [to](std::size_t first, std::span<const std::int64_t> entries) {
+                thread_local std::vector<T> sorted;
+                sorted.clear();
+                for (const std::int64_t e : entries) sorted.push_back(to[first + static_cast<std::uint32_t>(e)]);
+                std::copy(sorted.begin(), sorted.end(), to.begin() + static_cast<std::ptrdiff_t>(first));
+            }};
+}
+
+// The points themselves in order: first each into its cell, then cell by cell.
+PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& lookup)
+{
+    PointSet result;
+    result.append(points.size());
+    std::vector<MovedColumn> columns;
+    for (const auto& [name, column] : points.columns())
+        std::visit(
+            [&, &key = name]<class T>(const Column<T>& c) {
+                if (c.is_uniform()) return result.set(key, c);
+                Column<T> into(0, c.fallback());
+                columns.push_back(moved(c, into));
+                result.set(key, std::move(into));
+            },
+            column);
+    for (const auto& [name, members] : points.groups()) {
+        if (members.is_uniform()) {
+            result.group(name) = members;
+            continue;
+        }
+        Column<std::uint8_t> into(0);
+        columns.push_back(moved(members, into));
+        result.group(name) = std::move(into);
+    }
+
+    const std::vector<Cell> cells = cells_of(lookup.leaves);
+    std::vector<std::uint32_t> cell_of(lookup.leaves.size());
+    std::vector<std::size_t> next;
+    for (const Cell& cell : cells) {
+        std::fill(cell_of.begin() + static_cast<std::ptrdiff_t>(cell.first_leaf),
+                  cell_of.begin() + static_cast<std::ptrdiff_t>(cell.end_leaf), next.size());
+        next.push_back(cell.first);
+    }
+    const Strided<std::int32_t> numbers = std::as_const(lookup.numbers).read();
+    std::vector<std::size_t> places;
+    for (const Block& block : lookup.blocks)
+        for (std::size_t begin = block.begin; begin < block.end; begin += stretch) {
+            places.clear();
+            for (std::size_t i = begin; i < std::min(block.end, begin + stretch); ++i)
+                places.push_back(next[cell_of[block.leaves[static_cast<std::size_t>(numbers[i])]]]++);
+            tbb::parallel_for(std::size_t{0}, columns.size(),
+                              [&](std::size_t c) { columns[c].scatter(begin, places); });
+            trim_columns();
+        }
+
+    const Strided<Vec3f> P = std::as_const(result).P().read();
+    tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t c) {
+        const Cell& cell = cells[c];
+        LeafNumbers numbers_of;
+        std::vector<std::size_t> at;
+        for (std::size_t k = cell.first_leaf; k < cell.end_leaf; ++k) {
+            numbers_of.add(lookup.leaves[k].origin);
+            at.push_back(lookup.leaves[k].first - cell.first);
+        }
+        std::vector<std::int64_t> entries(cell.end - cell.first);
+        for (std::size_t i = 0; i < entries.size(); ++i) {
+            const Coord voxel = voxels.of(P[cell.first + i]);
+            entries[at[numbers_of[leaf_of(voxel)]]++] = entry(place_in_leaf(voxel), i);
+        }
+        for (std::size_t k = cell.first_leaf; k < cell.end_leaf; ++k) {
+            VdbLeaf& leaf = lookup.leaves[k];
+            sort_leaf(std::span(entries).subspan(leaf.first - cell.first, leaf.size), leaf);
+        }
+        for (const MovedColumn& column : columns) column.sort(cell.first, entries);
+        trim_columns();
+    });
+    return result;
+}
+
+}  // namespace
+
+VdbOrder::VdbOrder(const PointSet& points, double voxel) : is_sorted_(columns_lie_in_files())
+{
+    const Voxels voxels(voxel);
+    const Strided<Vec3f> P = points.P().read();
+    Lookup lookup = look_up(P, points.size(), voxels);
+    if (is_sorted_) {
+        points_ = sorted_points(points, voxels, lookup);
+    } else {
+        entries_ = sorted_entries(P, voxels, lookup);
+        points_ = points;
+    }
+    leaves_ = std::move(lookup.leaves);
+}
+
+}  // namespace rapid

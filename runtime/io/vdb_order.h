@@ -1,0 +1,41 @@
+// Points in the order of OpenVDB's tree: leaf by leaf (8³ voxels), in a leaf by voxel, in a voxel by their place in the
+// set. It is the order of openvdb::tools::PointIndexGrid, in a quarter of its memory. Columns that lie in files
+// (column_files.h) are sorted there, a few leaves at a time.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/points/point_set.h"
+
+namespace rapid {
+
+struct VdbLeaf {
+    openvdb::Coord origin;                   // in voxels
+    std::size_t first = 0;                   // of its points, in the order
+    std::uint32_t size = 0;                  // of its points
+    openvdb::util::NodeMask<3> voxels = {};  // those that have points
+    std::vector<std::uint32_t> counts = {};  // points of these, in their order
+};
+
+class VdbOrder {
+public:
+    // voxel: the length of an edge, m, a power of two. P is finite, and fits into 2^30 voxels.
+    VdbOrder(const PointSet& points, double voxel);
+
+    // Those with points, in the order of the tree.
+    const std::vector<VdbLeaf>& leaves() const { return leaves_; }
+    // The k-th point in order is points() at place(k).
+    const PointSet& points() const { return points_; }
+    std::size_t place(std::size_t k) const { return is_sorted_ ? k : static_cast<std::uint32_t>(entries_[k]); }
+
+private:
+    PointSet points_;
+    bool is_sorted_;  // points_ are in order
+    Column<std::int64_t> entries_;
+    std::vector<VdbLeaf> leaves_;
+};
+
+}  // namespace rapid

@@ -41,7 +41,7 @@ install(DIRECTORY bindings/view/page/ DESTINATION ${CMAKE_INSTALL_DATADIR}/rapid
 install(EXPORT rapidTargets NAMESPACE rapid:: DESTINATION ${package_dir})
 install(EXPORT rapidHostTargets NAMESPACE rapid:: DESTINATION ${package_dir})
 configure_package_config_file(cmake/rapidConfig.cmake.in rapidConfig.cmake INSTALL_DESTINATION ${package_dir})
-write_basic_package_version_file(rapidConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file(rapidConfigVersion.cmake COMPATIBILITY SameMajorVersion)
 install(FILES
   ${PROJECT_BINARY_DIR}/rapidConfig.cmake ${PROJECT_BINARY_DIR}/rapidConfigVersion.cmake cmake/FindRandom123.cmake
   DESTINATION ${package_dir})

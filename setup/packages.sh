@@ -13,6 +13,6 @@ build_packages=(
 
 # What its tests need besides.
 test_packages=(
-    catch2 clang-14 clang-format-14 ffmpeg libbenchmark-dev libclang-rt-14-dev librapidcheck-dev lua-check munge python3
-    python3-numpy slurm-wlm universal-ctags
+    abigail-tools binutils catch2 clang-14 clang-format-14 doxygen dpkg-dev ffmpeg help2man libbenchmark-dev
+    libclang-rt-14-dev librapidcheck-dev lua-check munge python3 python3-numpy slurm-wlm universal-ctags
 )

@@ -19,6 +19,7 @@
 
 namespace rapid {
 
+// Of the values of an attribute; a UInt8 is a member of a group.
 enum class ColumnType { Float = 0, Vec3 = 1, Int32 = 2, Int64 = 3, Quat = 4, UInt8 = 5 };
 
 // A triangle mesh, as rapid.mesh.read gives it.
@@ -29,15 +30,16 @@ struct HostMesh {
 
 // Points, as rapid.points.from gives them; they are copied.
 struct HostPoints {
+    // One attribute of all points.
     struct Column {
-        std::string name;  // "P" is required, of Vec3; an "id" is not taken: ids count from 0
-        ColumnType type = ColumnType::Float;
+        std::string name;                        // "P" is required, of Vec3; an "id" is not taken: ids count from 0
+        ColumnType type = ColumnType::Float;     // of the data
         const void* data = nullptr;              // shape [count][1, 3 or 4]
         std::size_t stride = 0;                  // bytes from point to point; 0: packed
         std::shared_ptr<const void> owner = {};  // of the data; may be null
     };
-    std::size_t count = 0;
-    std::vector<Column> columns;
+    std::size_t count = 0;        // of points
+    std::vector<Column> columns;  // each of another name
 };
 
 // A shape by its signed distance, for :collide, :attract, :spring and kernels.
@@ -53,15 +55,16 @@ struct HostShape {
     double smallest_feature = 0;
 };
 
+// What is offered by a name.
 using HostObject = std::variant<HostMesh, HostPoints, HostShape>;
 
 // A parameter of a node: a number or a vector.
 struct HostParameter {
-    std::string name, doc;
-    std::variant<double, std::array<double, 3>> fallback = 0.0;
-    std::string unit = {};
-    double least = -std::numeric_limits<double>::infinity();  // of a number
-    double most = std::numeric_limits<double>::infinity();
+    std::string name, doc;                                       // the doc is shown by `rapid nodes`
+    std::variant<double, std::array<double, 3>> fallback = 0.0;  // the default
+    std::string unit = {};                                       // "m/s"; empty: none
+    double least = -std::numeric_limits<double>::infinity();     // of a number
+    double most = std::numeric_limits<double>::infinity();       // of a number
 };
 
 // Two points that a constraint keeps at a distance.
@@ -99,13 +102,14 @@ struct HostCall {
 
 // A node of the program's, as good in Lua as any other: `:magnet { strength = 3 }`.
 struct HostNode {
+    // When it is called, and what it may do.
     enum Kind {
         Force,       // called for chunks of points, in each sub-step
         Edit,        // called once a frame, for all points of its group, on the scene's thread
         Constraint,  // gives rods between points, once a frame, for all points, on the scene's thread
     };
-    std::string name, doc;
-    Kind kind = Force;
+    std::string name, doc;                  // name: of an identifier in Lua
+    Kind kind = Force;                      // of the callback
     std::vector<HostParameter> parameters;  // besides `group`
     // Attributes: of known ones (age, mass, pscale, ...) the type is known, others are made with these types (Float or
     // Vec3) and zeros. An edit reads and writes P and v by these names.

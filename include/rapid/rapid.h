@@ -28,9 +28,10 @@
 extern "C" {
 #endif
 
-#define RAPID_VERSION_MAJOR 0
-#define RAPID_VERSION_MINOR 1
+#define RAPID_VERSION_MAJOR 1 /* of this header */
+#define RAPID_VERSION_MINOR 0 /* of this header */
 
+/* What a function returns. */
 enum {
     RAPID_OK = 0,
     RAPID_WRONG_CALL = 1,   /* an argument, or a call at the wrong time; nothing has changed */
@@ -43,13 +44,14 @@ enum {
     RAPID_UNEXPECTED = 8 /* of a library or a callback; the text is all that is known */
 };
 
+/* Handles. */
 typedef struct rapid_error rapid_error;
 typedef struct rapid_scene rapid_scene;
 typedef struct rapid_frame rapid_frame;
 typedef struct rapid_snapshot rapid_snapshot;
 typedef struct rapid_offers rapid_offers;
 
-/* "0.1.0", of the library. */
+/* "1.0.0", of the library. */
 const char* rapid_version(void);
 
 /* ---- Errors. All take NULL, for which they return "" and 0. */
@@ -64,51 +66,57 @@ void rapid_error_free(rapid_error* error);
 
 /* ---- Values. */
 
+/* Types of a value. */
 enum { RAPID_NUMBER = 0, RAPID_BOOLEAN = 1, RAPID_TEXT = 2, RAPID_VEC3 = 3 };
 
+/* A number, a boolean, a text or a vector. */
 typedef struct rapid_value {
-    int type;
+    int type;         /* RAPID_NUMBER, ... */
     double number[3]; /* RAPID_NUMBER: [0]; RAPID_BOOLEAN: [0] is 0 or 1; RAPID_VEC3: x y z */
     const char* text; /* RAPID_TEXT */
 } rapid_value;
 
+/* Types of a column. */
 enum { RAPID_FLOAT = 0, RAPID_FLOAT_VEC3 = 1, RAPID_INT32 = 2, RAPID_INT64 = 3, RAPID_QUAT = 4, RAPID_UINT8 = 5 };
 
 /* Values of one attribute, or members of a group (RAPID_UINT8, 0 or 1): shape [count][components], packed within a
  * point; the value of point i is at (const char*)data + i * stride. stride is 0 where all points share one value. */
 typedef struct rapid_column {
-    size_t size; /* sizeof(rapid_column), set by the caller */
-    const char* name;
-    int type;
-    size_t count;
-    size_t components;
-    size_t stride; /* bytes */
-    const void* data;
+    size_t size;       /* sizeof(rapid_column), set by the caller */
+    const char* name;  /* of the attribute or group; belongs to the frame */
+    int type;          /* RAPID_FLOAT, ... */
+    size_t count;      /* of points */
+    size_t components; /* 3 of RAPID_FLOAT_VEC3 (x y z), 4 of RAPID_QUAT (x y z w), else 1 */
+    size_t stride;     /* bytes */
+    const void* data;  /* of float, int32_t, int64_t or uint8_t */
 } rapid_column;
 
 /* ---- Scenes. */
 
+/* Levels of a text for `log`. */
 enum { RAPID_LOG_PRINT = 0, RAPID_LOG_WARNING = 1 };
 
+/* A value for a parameter. */
 typedef struct rapid_setting {
-    const char* name; /* of a rapid.param, or NODE.PARAM: "solve.substeps" */
-    rapid_value value;
+    const char* name;  /* of a rapid.param, or NODE.PARAM: "solve.substeps" */
+    rapid_value value; /* of the parameter's type */
 } rapid_setting;
 
+/* How a scene is opened and run. */
 typedef struct rapid_options {
     size_t size;                   /* sizeof(rapid_options) */
     const rapid_setting* settings; /* as --set gives them */
-    size_t setting_count;
-    const uint64_t* seed;     /* replaces the seed of each create; NULL: theirs */
-    const char* const* paths; /* folders where modules and nodes in Lua are looked for */
-    size_t path_count;
-    int threads;            /* 0: those of the caller's TBB arena; n: n of its own */
-    double script_seconds;  /* that scripts may take for each frame and for opening; 0: 600 */
-    uint64_t script_memory; /* bytes of Lua memory for each thread; 0: 1 GiB */
-    uint64_t memory;        /* bytes that the process may have in all; 0: what is free */
-    int no_errors;          /* 1: no errors are estimated */
-    int keep_all;           /* 1: no attribute is left out */
-    void* user;             /* is handed to the callbacks */
+    size_t setting_count;          /* of `settings` */
+    const uint64_t* seed;          /* replaces the seed of each create; NULL: theirs */
+    const char* const* paths;      /* folders where modules and nodes in Lua are looked for */
+    size_t path_count;             /* of `paths` */
+    int threads;                   /* 0: those of the caller's TBB arena; n: n of its own */
+    double script_seconds;         /* that scripts may take for each frame and for opening; 0: 600 */
+    uint64_t script_memory;        /* bytes of Lua memory for each thread; 0: 1 GiB */
+    uint64_t memory;               /* bytes that the process may have in all; 0: what is free */
+    int no_errors;                 /* 1: no errors are estimated */
+    int keep_all;                  /* 1: no attribute is left out */
+    void* user;                    /* is handed to the callbacks */
     /* What scripts print, and what Rapid warns of. */
     void (*log)(void* user, int level, const char* text);
     /* Of each frame that rapid_scene_advance_to() has done; 0 ends it with RAPID_CANCELLED. */
@@ -134,14 +142,16 @@ int rapid_scene_open_text(const char* name, const char* text, const rapid_option
 /* Frames and snapshots of the scene stay. A call that is running goes on to its end. */
 int rapid_scene_close(rapid_scene* scene, rapid_error** error);
 
+/* A rapid.param of the scene. */
 typedef struct rapid_parameter {
-    size_t size; /* sizeof(rapid_parameter), set by the caller */
-    const char* name;
-    const char* doc;
+    size_t size;          /* sizeof(rapid_parameter), set by the caller */
+    const char* name;     /* by which it is set */
+    const char* doc;      /* as the scene gives it */
     rapid_value value;    /* that the scene was run with */
     rapid_value fallback; /* its default, of the same type */
 } rapid_parameter;
 
+/* In the order in which the scene declares them. */
 int rapid_scene_parameter_count(rapid_scene* scene, size_t* count, rapid_error** error);
 /* Its texts stay valid until the scene is set or closed. */
 int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error);
@@ -149,14 +159,16 @@ int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* par
  */
 int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t count, rapid_error** error);
 
+/* A node of the scene. */
 typedef struct rapid_node {
-    size_t size; /* sizeof(rapid_node), set by the caller */
-    const char* name;
-    const char* type;
+    size_t size;      /* sizeof(rapid_node), set by the caller */
+    const char* name; /* the type's with a number, unless the scene gives one */
+    const char* type; /* `:TYPE { ... }` */
     const char* file; /* where the scene makes it */
-    int line;
+    int line;         /* of the file, from 1 */
 } rapid_node;
 
+/* In the order in which the scene makes them; their texts stay valid until the scene is set or closed. */
 int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error);
 int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error);
 /* All types that a scene of this program may use, as JSON: [{"name", "doc", "parameters": [{"name", "type", "unit",
@@ -165,6 +177,7 @@ int rapid_scene_node_types(rapid_scene* scene, const char** json, rapid_error** 
 /* Of opening, a line each. Belongs to the scene, until the next call of this function. */
 int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** error);
 
+/* The number of the scene's first frame, and of the one that rapid_scene_advance() computes. */
 int rapid_scene_first_frame(rapid_scene* scene, int64_t* frame, rapid_error** error);
 int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** error);
 /* Computes the next frame, or all up to one. *frame is to be released; frame == NULL: nobody reads it. After an error
@@ -199,18 +212,21 @@ int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* posit
 int rapid_offers_points(rapid_offers* offers, const char* name, size_t count, const rapid_column* columns,
                         size_t column_count, rapid_error** error);
 
+/* A shape by its signed distance, for :collide, :attract, :spring and kernels. */
 typedef struct rapid_shape {
     size_t size;               /* sizeof(rapid_shape) */
     double lower[3], upper[3]; /* bounds, m, which may be infinite: outside of them the distance is above 0 */
     /* phi, shape [n]: the distance of each place of P, shape [n][3], negative inside. gradient, shape [n][3] or NULL:
      * that of the distance, out of the shape; zero where there is none. */
     int (*distance)(void* user, size_t n, const double* P, double* phi, double* gradient);
-    void* user;
+    void* user;              /* is handed to `distance` */
     double slope_bound;      /* the largest slope of the distance; 0: 1, it is exact */
     double smallest_feature; /* m: a wall thinner than this may be missed; 0: the shape is convex */
 } rapid_shape;
+/* The struct is copied; the callback is called as long as a scene has the shape. */
 int rapid_offers_shape(rapid_offers* offers, const char* name, const rapid_shape* shape, rapid_error** error);
 
+/* The points that the callback of a node works on. */
 typedef struct rapid_call {
     size_t count;              /* of points */
     double frame, time, dt;    /* number; s since the start; s, of a frame */
@@ -229,41 +245,47 @@ typedef struct rapid_call {
 int rapid_call_add_rod(const rapid_call* call, int64_t a, int64_t b, double length, double compliance,
                        rapid_error** error);
 
+/* A parameter of a node of the program's. */
 typedef struct rapid_node_parameter {
-    const char* name;
-    const char* doc;
+    const char* name;     /* in the table of arguments */
+    const char* doc;      /* a sentence */
     const char* unit;     /* may be NULL */
     rapid_value fallback; /* RAPID_NUMBER or RAPID_VEC3 */
 } rapid_node_parameter;
 
+/* A column that a node reads or writes. */
 typedef struct rapid_node_column {
-    const char* name;
-    int type; /* RAPID_FLOAT or RAPID_FLOAT_VEC3 */
+    const char* name; /* of the attribute */
+    int type;         /* RAPID_FLOAT or RAPID_FLOAT_VEC3 */
 } rapid_node_column;
 
+/* Kinds of nodes. */
 enum { RAPID_FORCE = 0, RAPID_EDIT = 1, RAPID_CONSTRAINT = 2 };
 
+/* A node of the program's, as good in Lua as any other: `:magnet { strength = 3 }`. */
 typedef struct rapid_node_type {
-    size_t size; /* sizeof(rapid_node_type) */
-    const char* name;
-    const char* doc;
+    size_t size;      /* sizeof(rapid_node_type) */
+    const char* name; /* an identifier in Lua */
+    const char* doc;  /* a sentence */
     /* RAPID_FORCE: called for chunks of points, in each sub-step; RAPID_EDIT, RAPID_CONSTRAINT: once a frame, for all
      * points, on the scene's thread */
     int kind;
-    const rapid_node_parameter* parameters;
-    size_t parameter_count;
-    const rapid_node_column* reads;
-    size_t read_count;
-    const rapid_node_column* writes; /* of an edit; P and v by these names */
-    size_t write_count;
-    int (*call)(void* user, const rapid_call* call);
-    void* user;
+    const rapid_node_parameter* parameters;          /* besides `group` */
+    size_t parameter_count;                          /* of `parameters` */
+    const rapid_node_column* reads;                  /* which each call is handed */
+    size_t read_count;                               /* of `reads` */
+    const rapid_node_column* writes;                 /* of an edit; P and v by these names */
+    size_t write_count;                              /* of `writes` */
+    int (*call)(void* user, const rapid_call* call); /* returns 0, or else the frame fails */
+    void* user;                                      /* is handed to `call` */
 } rapid_node_type;
+/* Texts and arrays are copied. */
 int rapid_offers_node(rapid_offers* offers, const rapid_node_type* type, rapid_error** error);
 
 /* Replaces or adds the objects of `offers`: functions of the frame that say rapid.host "NAME" get them from the next
  * frame on, all else when the scene's file is run again (rapid_scene_set()). */
 int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** error);
+/* Scenes keep what they have been offered. */
 int rapid_offers_release(rapid_offers* offers, rapid_error** error);
 
 /* ---- Frames. What they point to stays valid and unchanged until the frame is released, whatever becomes of the scene.
@@ -271,28 +293,32 @@ int rapid_offers_release(rapid_offers* offers, rapid_error** error);
 
 /* The other outputs of the frame are frames of their own, which share its memory. *frame is to be released. */
 int rapid_frame_output(rapid_frame* of, const char* name, rapid_frame** frame, rapid_error** error);
-/* Names, a line each: what = RAPID_OUTPUTS, RAPID_COLUMNS, RAPID_GROUPS, RAPID_WARNINGS. */
+/* Lists of a frame. */
 enum { RAPID_OUTPUTS = 0, RAPID_COLUMNS = 1, RAPID_GROUPS = 2, RAPID_WARNINGS = 3 };
+/* Names, a line each: what = RAPID_OUTPUTS, ... *lines belongs to the frame. */
 int rapid_frame_names(rapid_frame* frame, int what, const char** lines, rapid_error** error);
 
+/* The figures of a frame that are asked for most; rapid_frame_statistics() has all. */
 typedef struct rapid_frame_info {
-    size_t size; /* sizeof(rapid_frame_info), set by the caller */
-    int64_t number;
-    double time; /* s since the start */
-    double fps;
-    size_t points;
-    uint64_t born, died, collisions;
-    int substeps;
-    int has_errors;                         /* whether the next three were estimated */
-    double error_p50, error_p95, error_max; /* m, of positions, accumulated since birth */
-    double penetration_max;                 /* m */
-    double constraint_residual_max;         /* m */
-    double seconds, script_seconds, solve_seconds;
+    size_t size;                                   /* sizeof(rapid_frame_info), set by the caller */
+    int64_t number;                                /* of the frame */
+    double time;                                   /* s since the start */
+    double fps;                                    /* of the output's simulation */
+    size_t points;                                 /* of this output */
+    uint64_t born, died, collisions;               /* in this frame */
+    int substeps;                                  /* the most that a Solve took */
+    int has_errors;                                /* whether the next three were estimated */
+    double error_p50, error_p95, error_max;        /* m, of positions, accumulated since birth */
+    double penetration_max;                        /* m */
+    double constraint_residual_max;                /* m */
+    double seconds, script_seconds, solve_seconds; /* wall time: in all, and of parts */
 } rapid_frame_info;
+/* Of this output; times and errors are those of the whole frame. */
 int rapid_frame_get_info(rapid_frame* frame, rapid_frame_info* info, rapid_error** error);
 /* The frame's object in the file of `rapid run --stats`. */
 int rapid_frame_statistics(rapid_frame* frame, const char** json, rapid_error** error);
 
+/* An attribute, or a group; its memory belongs to the frame. Takes some nanoseconds, however many points there are. */
 int rapid_frame_column(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
 int rapid_frame_group(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
 /* As rapid_frame_column(); values that all points share are written out once, so that stride is never 0. */

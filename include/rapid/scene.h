@@ -36,6 +36,7 @@ namespace rapid {
 
 // What went wrong. The numbers are those of the statuses of rapid.h.
 struct SceneError {
+    // What is to be done about it.
     enum Kind {
         WrongCall = 1,    // an argument, or a call at the wrong time; nothing has changed
         WrongScene = 2,   // found before the first frame: Lua, a node's argument, a missing file
@@ -46,11 +47,11 @@ struct SceneError {
         Busy = 7,         // the scene is in another call
         Unexpected = 8,   // of a library or a callback; the text is all that is known
     };
-    Kind kind = Unexpected;
-    std::string message;  // what is wrong; what would be right
-    std::string file;     // of the scene or module, as it was named; empty where there is none
-    int line = 0;         // from 1; 0 where there is none
-    std::string node;     // of the scene; empty where there is none
+    Kind kind = Unexpected;  // of the fault
+    std::string message;     // what is wrong; what would be right
+    std::string file;        // of the scene or module, as it was named; empty where there is none
+    int line = 0;            // from 1; 0 where there is none
+    std::string node;        // of the scene; empty where there is none
 
     // FILE:LINE: node "NAME": MESSAGE, of what is known.
     std::string text() const;
@@ -60,9 +61,11 @@ struct SceneError {
 template <class T>
 class [[nodiscard]] Result {
 public:
+    // Of a value, or of an error.
     Result(T value) : held_(std::move(value)) {}
     Result(SceneError error) : held_(std::move(error)) {}
 
+    // Whether there is a value.
     explicit operator bool() const { return held_.index() == 0; }
     // Only where there is a value.
     T& operator*() { return std::get<0>(held_); }
@@ -91,32 +94,32 @@ using SceneValue = std::variant<double, bool, std::string, std::array<double, 3>
 
 // A rapid.param of the scene.
 struct SceneParameter {
-    std::string name, doc;
-    SceneValue value;     // that the scene was run with
-    SceneValue fallback;  // its default, of the same type
+    std::string name, doc;  // as the scene gives them
+    SceneValue value;       // that the scene was run with
+    SceneValue fallback;    // its default, of the same type
 };
 
 // A parameter of a node type.
 struct NodeParameter {
-    std::string name;
-    std::string type;  // as `rapid nodes` shows it: "number", "vec3", "shape"
-    std::string unit;  // "m/s", "deg"; empty: none
-    std::string doc;
-    std::string fallback;  // the default as Lua text; empty: none
-    bool required = false;
+    std::string name;       // in the table of arguments
+    std::string type;       // as `rapid nodes` shows it: "number", "vec3", "shape"
+    std::string unit;       // "m/s", "deg"; empty: none
+    std::string doc;        // a sentence
+    std::string fallback;   // the default as Lua text; empty: none
+    bool required = false;  // whether a scene must give it
 };
 
 // A type of node that scenes may use.
 struct SceneNodeType {
-    std::string name, doc;
-    std::vector<NodeParameter> parameters;
+    std::string name, doc;                  // `:NAME { ... }`, and a sentence
+    std::vector<NodeParameter> parameters;  // in the order of the declaration
 };
 
 // A node of the scene.
 struct SceneNode {
-    std::string name, type;
-    std::string file;  // where the scene makes it
-    int line = 0;
+    std::string name, type;  // the name is the type's with a number, unless the scene gives one
+    std::string file;        // where the scene makes it
+    int line = 0;            // of the file, from 1
 };
 
 // The values of one attribute, or the members of a group (UInt8, 0 or 1 a point). The memory belongs to the frame: it
@@ -125,12 +128,12 @@ struct SceneNode {
 // Layout: shape [count, components], packed within a point; the points are `stride` bytes apart. stride is 0 where all
 // points share one value, which is held once; SceneFrame::expanded() gives those an array, too.
 struct SceneColumn {
-    std::string_view name;  // belongs to the frame
-    ColumnType type = ColumnType::Float;
-    std::size_t count = 0;       // of points
-    std::size_t components = 1;  // 3 of Vec3 (x y z), 4 of Quat (x y z w)
-    std::size_t stride = 0;      // bytes
-    const void* data = nullptr;  // of float, std::int32_t, std::int64_t or std::uint8_t
+    std::string_view name;                // belongs to the frame
+    ColumnType type = ColumnType::Float;  // of a value
+    std::size_t count = 0;                // of points
+    std::size_t components = 1;           // 3 of Vec3 (x y z), 4 of Quat (x y z w)
+    std::size_t stride = 0;               // bytes
+    const void* data = nullptr;           // of float, std::int32_t, std::int64_t or std::uint8_t
 
     // The values of point i. T: the type of a component, which must agree with `type`.
     template <class T>
@@ -142,9 +145,9 @@ struct SceneColumn {
 
 // The figures of a frame, those of `rapid run --stats` that are asked for most; statistics_json() has all of them.
 struct FrameStatisticsSummary {
-    std::uint64_t points = 0;  // of all outputs
-    std::uint64_t born = 0, died = 0, collisions = 0;
-    int substeps = 0;
+    std::uint64_t points = 0;                                   // of all outputs
+    std::uint64_t born = 0, died = 0, collisions = 0;           // in this frame
+    int substeps = 0;                                           // the most that a Solve took
     bool has_errors = false;                                    // whether the next three were estimated
     double error_p50 = 0, error_p95 = 0, error_max = 0;         // m, of positions, accumulated since birth
     double penetration_max = 0;                                 // m
@@ -157,9 +160,9 @@ struct FrameStatisticsSummary {
 // changes.
 class SceneFrame {
 public:
-    std::int64_t number() const;
-    double time() const;  // s since the start of the output's simulation
-    double fps() const;
+    std::int64_t number() const;  // of the frame
+    double time() const;          // s since the start of the output's simulation
+    double fps() const;           // of the output's simulation
 
     // The names of the scene's outputs, in order; a scene that returns one node has "main". All functions below speak
     // of the output that is chosen: at first "main", or the first one where there is no "main".
@@ -169,7 +172,7 @@ public:
 
     std::size_t size() const;                  // of points
     std::vector<std::string> columns() const;  // names, in order
-    std::vector<std::string> groups() const;
+    std::vector<std::string> groups() const;   // names, in order
     // Takes some nanoseconds, however many points there are. Error: no such column, with the nearest name.
     Result<SceneColumn> column(std::string_view name) const;
     Result<SceneColumn> group(std::string_view name) const;
@@ -179,6 +182,7 @@ public:
     // Values of the whole set by name (:detail): a number or three.
     std::map<std::string, SceneValue> details() const;
 
+    // The figures that are asked for most.
     FrameStatisticsSummary statistics() const;
     // The frame's object in the file of `rapid run --stats` (docs/cli.md), as one line of JSON.
     std::string statistics_json() const;
@@ -211,8 +215,10 @@ private:
     std::shared_ptr<const Data> data_;
 };
 
-enum class LogLevel { Print = 0, Warning = 1 };  // what scripts print, and what Rapid warns of
+// Of a text for SceneOptions::log: what scripts print, and what Rapid warns of.
+enum class LogLevel { Print = 0, Warning = 1 };
 
+// How a scene is opened and run.
 struct SceneOptions {
     // Values of the scene's parameters by name, and of its nodes' by NODE.PARAM ("solve.substeps"), as --set gives
     // them.
@@ -249,10 +255,12 @@ struct SceneOptions {
     bool keep_all = false;                             // leaves no attribute out, to the same bits
 };
 
+// Of Scene::picture().
 struct PictureSize {
     int width = 640, height = 360;  // pixels, from 1 to 16384
 };
 
+// A scene in Lua that is run frame by frame.
 class Scene {
 public:
     // Opens the scene of a file, or of a text with a name for messages; modules are looked for beside the file, or in
@@ -261,6 +269,7 @@ public:
     static Result<Scene> open(const std::string& file, SceneOptions options = {});
     static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
 
+    // What is moved from may only be assigned to, or end.
     Scene(Scene&&) noexcept;
     Scene& operator=(Scene&&) noexcept;
     ~Scene();  // not while a call of another thread is running
@@ -282,8 +291,8 @@ public:
     // else when the scene's file is run again (set()). Error: WrongCall, with the array that is missing or wrong.
     Result<Done> offer(const std::string& name, const HostObject& object);
 
-    std::int64_t first_frame() const;
-    std::int64_t next_frame() const;  // that advance() computes
+    std::int64_t first_frame() const;  // of the scene
+    std::int64_t next_frame() const;   // that advance() computes
 
     // Computes the next frame. After an error the scene has no next frame until restart(), restore() or set().
     Result<SceneFrame> advance();

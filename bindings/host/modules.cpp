@@ -1,6 +1,7 @@
 #include "bindings/host/modules.h"
 
 #include <dlfcn.h>
+#include <fmt/format.h>
 #include <link.h>
 
 #include <algorithm>
@@ -56,13 +57,16 @@ std::filesystem::path lua_folder()
 {
     static const std::filesystem::path folder = [] {
         std::error_code ignored;
-        // bin/rapid, or lib/x86_64-linux-gnu/librapid_host.so: share is beside one of the folders above.
+        // bin/rapid, or lib/x86_64-linux-gnu/librapid_host.so: share is beside one of the folders above. In a build
+        // folder it has links to the sources.
         for (auto above = own_file().parent_path(); above.has_relative_path(); above = above.parent_path()) {
             const auto installed = above.parent_path() / "share/rapid/lua";
-            if (std::filesystem::exists(installed / "host.lua", ignored)) return installed;
+            if (std::filesystem::exists(installed / "host.lua", ignored)) return std::filesystem::canonical(installed);
             if (above.filename() == "bin" || above.filename().string().starts_with("lib")) break;
         }
-        return std::filesystem::path(RAPID_SOURCE_LUA_DIR);
+        throw Error(
+            fmt::format("{}: Rapid's Lua files are missing; they belong into share/rapid/lua, beside its folder",
+                        shown(own_file())));
     }();
     return folder;
 }

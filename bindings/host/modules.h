@@ -10,7 +10,8 @@
 
 namespace rapid {
 
-// Where Rapid's Lua files are: beside the installed program, else in the source tree.
+// Where Rapid's Lua files are: in share/rapid/lua beside the folder of the program, or of the library. Error: they are
+// not there.
 std::filesystem::path lua_folder();
 
 // The text of a file; none where it can't be read.

@@ -13,15 +13,28 @@
 namespace rapid {
 namespace {
 
+// The key of the numbers of a frame.
+RandomKey key_in_frame(RandomKey key, double frame)
+{
+    const auto mixed = uniform4(key, std::bit_cast<std::uint64_t>(frame), ~std::uint64_t{0});
+    key.value ^= static_cast<std::uint64_t>(mixed[0] * 0x1p32) << 32 | static_cast<std::uint64_t>(mixed[1] * 0x1p32);
+    return key;
+}
+
 // frame: 0, or the frame's number where the numbers differ from frame to frame.
 double draw(std::uint64_t random, std::int64_t id, double use, double frame)
 {
+    // The points of a pass share the key: it takes as long as a number.
+    thread_local struct {
+        std::uint64_t random = 0;
+        double frame = 0;
+        RandomKey key;
+    } last;
     RandomKey key;
     key.value = random;
     if (frame != 0) {
-        const auto mixed = uniform4(key, std::bit_cast<std::uint64_t>(frame), ~std::uint64_t{0});
-        key.value ^=
-            static_cast<std::uint64_t>(mixed[0] * 0x1p32) << 32 | static_cast<std::uint64_t>(mixed[1] * 0x1p32);
+        if (last.random != random || last.frame != frame) last = {random, frame, key_in_frame(key, frame)};
+        key = last.key;
     }
     const auto numbers = uniform4(key, static_cast<std::uint64_t>(id), std::bit_cast<std::uint64_t>(use + 0.0));
     return numbers[0] + numbers[1] * 0x1p-32 < 1 ? numbers[0] + numbers[1] * 0x1p-32 : numbers[0];

@@ -66,6 +66,12 @@ describe("p:rand", function()
     assert.same(numbers, (drawn "p:rand(2) and p:rand(1)"))
   end)
 
+  it("is the same whatever was drawn before it", function()
+    local numbers, of_frame = drawn "p:rand(1)", drawn "p:rand(1, frame)"
+    assert.same(numbers, (drawn "p:rand(1, frame) * 0 + p:rand(1)"))
+    assert.same(of_frame, (drawn "p:rand(1, 5) * 0 + p:rand(1) * 0 + p:rand(1, frame)"))
+  end)
+
   it("is another for another use, seed, node or point", function()
     local numbers = drawn "p:rand(1)"
     -- Five standard errors of a correlation of nothing, 1/sqrt(n).

@@ -145,6 +145,13 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
           :transfer { source = sheet:transform(function(frame) return rapid.rotate({0, 1, 0}, 20 * frame.number) end) }
           :points ("rise", function(p) p.v = p.v + vec3(0, p.heat * p.dt, 0) end)
           :solve {})"},
+    {"births along a curve that deforms, and a force to another that moves", R"(
+        local wave = rapid.curve.from { points = function(frame)
+          return {{-1, math.sin(9 * frame.time), 0}, {0, 0.3, frame.time}, {1, 0, 0}} end }
+        return rapid.create { seed = 4 }
+          :emit { source = wave, rate = 50, speed = 0.2 }
+          :curve_force { curve = wave:transform(function(frame) return rapid.rotate({0, 1, 0}, 9 * frame.number) end) }
+          :solve {})"},
     {"a vector grid, and files on the way", R"(
         local up = rapid.grid.from { size = {4, 4, 4}, voxel = 1, at = function() return vec3(0, 1, 0) end }
         return rapid.create { seed = 4 }
@@ -152,6 +159,7 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
           :field { grid = up }
           :curve_force { curve = function(frame) return {{-1, frame.time, 0}, {1, 0.5, frame.time}} end, radius = 1 }
           :write { file = "/nowhere/points.####.csv" }
+          :rasterize { file = "/nowhere/points.####.vdb" }
           :group { name = "high", where = function(p) return p.P.y > 0 end }
           :solve {})"},
 };

@@ -96,7 +96,7 @@ for _, node in ipairs(json.decode(command.rapid("nodes --json").stdout)) do type
 -- What is drawn here apart: which of several parameters is given, and how much a scene may cost.
 local apart = {
   action = true, attribute = true, create = true, detail = true, merge = true, points = true, solve = true,
-  write = true,
+  rasterize = true, write = true,
 }
 local special = { name = true, reads = true, writes = true, kernel = true }
 

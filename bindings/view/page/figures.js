@@ -1,5 +1,5 @@
 // Figures over frames: a curve each; a click goes to a frame.
-import { element, prepare, colour, brief } from "./dom.js";
+import { element, prepare, colour, brief, unit } from "./dom.js";
 
 const energy = (f) => (f.ledger ? f.ledger.kinetic + f.ledger.potential + f.ledger.elastic : undefined);
 const curves = [
@@ -20,6 +20,7 @@ export class Figures {
     this.root = element("div", { id: "figures" });
     root.append(this.root);
     this.known = [];
+    this.byFrame = new Map();
     this.charts = curves.map(([name, unit, read]) => {
       const canvas = element("canvas", { title: `${name}: a click goes to the frame` }), value = element("span", { class: "number" });
       const chart = { name, unit, read, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, name, value), canvas) };
@@ -33,33 +34,58 @@ export class Figures {
     new ResizeObserver(() => this.draw()).observe(this.root);
   }
 
-  of(frame) { return this.known.find((f) => f.frame === frame); }
+  of(frame) { return this.byFrame.get(frame); }
 
-  // statistics: of all frames, in order.
+  // statistics: of all frames, in order; the list grows, or is another one.
+  know(statistics) {
+    if (statistics !== this.known) { this.known = statistics; this.byFrame.clear(); }
+    for (let k = this.byFrame.size; k < statistics.length; ++k) this.byFrame.set(statistics[k].frame, statistics[k]);
+  }
+
   show(statistics, first, last, frame) {
-    Object.assign(this, { known: statistics, first, last, frame });
+    this.know(statistics);
+    Object.assign(this, { first, last, frame });
     this.draw();
   }
 
   draw() {
     if (this.root.offsetParent === null) return;
+    const shown = [];
     for (const chart of this.charts) {
       const values = this.known.map((f) => [f.frame, chart.read(f)]).filter(([, v]) => typeof v === "number");
-      chart.box.hidden = values.length === 0 || values.every(([, v]) => v === 0);
-      if (chart.box.hidden) continue;
-      const { context, width, height } = prepare(chart.canvas), most = Math.max(...values.map(([, v]) => v)), least = Math.min(0, ...values.map(([, v]) => v));
-      const x = (f) => ((f - this.first) / Math.max(1, this.last - this.first)) * width, y = (v) => height - 2 - ((v - least) / (most - least || 1)) * (height - 6);
+      chart.box.hidden = values.every(([, v]) => v === 0);
+      if (!chart.box.hidden) shown.push([chart, values]);
+    }
+    // Rows that are full: no empty place at the end.
+    const most = Math.max(1, Math.floor(this.root.clientWidth / (22 * 12 * unit()))), rows = Math.ceil(shown.length / most);
+    const columns = Math.max(1, Math.ceil(shown.length / Math.max(1, rows)));
+    this.root.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
+    shown.forEach(([{ box }], k) => { box.style.gridColumn = k === shown.length - 1 ? `span ${1 + columns * rows - shown.length}` : ""; });
+    for (const [chart, values] of shown) {
+      let high = -Infinity, least = 0;
+      for (const [, v] of values) { high = Math.max(high, v); least = Math.min(least, v); }
+      const { context, width, height } = prepare(chart.canvas);
+      const x = (f) => ((f - this.first) / Math.max(1, this.last - this.first)) * width, y = (v) => height - 2 - ((v - least) / (high - least || 1)) * (height - 6);
       context.strokeStyle = colour("line");
       context.strokeRect(0, y(0), width, 0);
       context.strokeStyle = colour("accent");
       context.lineWidth = 1.3;
       context.beginPath();
-      values.forEach(([f, v], i) => (i ? context.lineTo(x(f), y(v)) : context.moveTo(x(f), y(v))));
+      // Of frames that share a column of pixels the least and the largest value.
+      for (let i = 0; i < values.length;) {
+        const column = Math.floor(x(values[i][0]));
+        let low = values[i][1], top = low;
+        const from = low;
+        for (++i; i < values.length && Math.floor(x(values[i][0])) === column; ++i) { low = Math.min(low, values[i][1]); top = Math.max(top, values[i][1]); }
+        const at = x(values[i - 1][0]);
+        context.lineTo(at, y(from));
+        if (low !== top) { context.lineTo(at, y(low)); context.lineTo(at, y(top)); context.lineTo(at, y(values[i - 1][1])); }
+      }
       context.stroke();
       context.fillStyle = colour("quiet");
       context.fillRect(x(this.frame), 0, 1, height);
-      const here = values.find(([f]) => f === this.frame);
-      chart.value.textContent = `${here ? brief(here[1]) : "–"} of ${brief(most)} ${chart.unit}`;
+      const now = this.of(this.frame), here = now && chart.read(now);
+      chart.value.textContent = `${typeof here === "number" ? brief(here) : "–"} of ${brief(high)} ${chart.unit}`;
     }
   }
 }

@@ -1,15 +1,31 @@
-// The graph: nodes as Graphviz has laid them out, with points and time in this frame; a click shows the points after a
-// node.
+// The graph: nodes as Graphviz or layout.js have laid them out, with points and time in this frame; a click shows the
+// points after a node; a search finds nodes by name or type.
 import { svg, element, brief, seconds, unit } from "./dom.js";
+import { layOut } from "./layout.js";
+
+const legible = 0.85; // of the size of other texts
 
 export class Graph {
-  constructor(root, { choose }) {
+  // choose(name): the points after a node, or "" for the output; tools: where the search goes.
+  constructor(root, tools, { choose }) {
     this.root = root;
     this.choose = choose;
     this.chosen = "";
     this.picture = null;
     this.scale = 1;
-    root.append(element("div", { class: "quiet" }, ""));
+    this.found = element("span", { class: "quiet number" });
+    this.search = element("input", { type: "search", id: "search", placeholder: "find a node", "aria-label": "find a node",
+      title: "nodes by name or type (/); Enter goes to the next one", oninput: () => this.find(0),
+      onkeydown: (event) => {
+        if (event.key === "Enter") this.find(event.shiftKey ? -1 : 1);
+        if (event.key !== "Escape") return;
+        this.search.value = "";
+        this.find(0);
+        this.search.blur();
+        event.stopPropagation();
+      } });
+    tools.append(this.found, this.search);
+    new ResizeObserver(() => this.size()).observe(root);
     root.addEventListener("wheel", (event) => {
       if (!event.ctrlKey) return;
       event.preventDefault();
@@ -22,36 +38,48 @@ export class Graph {
     this.size();
   }
 
+  // Pixels of a unit of the drawing, with which all of it is seen.
+  fit([width, height]) {
+    return Math.min((this.root.clientHeight - 12) / (height + 16), (this.root.clientWidth - 20) / (width + 16)) / unit();
+  }
+
   size() {
-    const drawing = this.root.querySelector("svg");
-    if (!drawing || !this.picture?.size) return;
-    const [width, height] = this.picture.size;
-    // As large as the dock is high, but legible.
-    const fits = unit() * Math.min(1.2, Math.max(0.72,
-      Math.min((this.root.clientHeight - 12) / (height + 16), (this.root.clientWidth - 4) / (width + 16)) / unit()));
-    drawing.setAttribute("width", (width + 16) * fits * this.scale);
-    drawing.setAttribute("height", (height + 16) * fits * this.scale);
+    if (!this.extent || this.root.clientWidth === 0) return;
+    // Another width of the dock, another layout.
+    if (this.laidOut !== this.layout()) return this.draw();
+    const drawing = this.root.querySelector("svg"), [width, height] = this.extent;
+    const scale = unit() * this.scale * Math.min(1.2, Math.max(legible, this.fit(this.extent)));
+    drawing.setAttribute("width", (width + 16) * scale);
+    drawing.setAttribute("height", (height + 16) * scale);
+  }
+
+  // How wide the lines of a layout of our own are; 0: Graphviz's, where all of it is legible.
+  layout() {
+    if (this.picture.size && (this.root.clientWidth === 0 || this.fit(this.picture.size) >= legible)) return 0;
+    return Math.max(300, Math.floor((this.root.clientWidth || 1200) / unit() - 36));
   }
 
   show(picture, why) {
+    this.picture = picture;
     if (!picture) {
+      this.facts = null;
+      this.extent = null;
       this.root.replaceChildren(element("p", { class: "quiet" }, why || "The graph is drawn after the first frame."));
       return;
     }
-    this.picture = picture;
-    if (!picture.size) return this.showList(why);
-    const [width, height] = picture.size;
-    const drawing = svg("svg", { id: "graph", viewBox: `-8 -8 ${width + 16} ${height + 16}` });
-    for (const edge of picture.edges) {
-      if (!edge.path) continue;
-      const [first, ...rest] = edge.path, head = rest[rest.length - 1], before = rest[rest.length - 2];
-      drawing.append(svg("path", { class: edge.kind, d: `M${first} C${rest.slice(0, -1).join(" ")} L${head}` }));
-      const angle = Math.atan2(head[1] - before[1], head[0] - before[0]);
-      const corner = (turn, far) => [head[0] - far * Math.cos(angle + turn), head[1] - far * Math.sin(angle + turn)];
-      drawing.append(svg("path", { class: "tip", d: `M${head} L${corner(0.4, 7)} L${corner(-0.4, 7)} Z` }));
-    }
+    this.draw();
+  }
+
+  draw() {
+    const { picture } = this, drawing = svg("svg", { id: "graph" }), wide = this.layout();
+    this.laidOut = wide;
+    const nodes = picture.nodes.map((node) => ({ ...node })); // a layout of our own gives them other places
+    if (wide === 0) this.drawPaths(drawing);
+    else this.layOut(drawing, nodes, wide);
+    const [width, height] = this.extent;
+    drawing.setAttribute("viewBox", `-8 -8 ${width + 16} ${height + 16}`);
     this.facts = new Map();
-    for (const node of picture.nodes) {
+    for (const node of nodes) {
       if (node.x === undefined) continue;
       const fact = svg("text", { x: node.x, y: node.y + 11, class: "fact" }, node.type);
       const group = svg("g", {
@@ -68,20 +96,30 @@ export class Graph {
     this.root.replaceChildren(drawing);
     this.size();
     this.mark();
+    this.find(0);
+    this.figures(this.statistics);
   }
 
-  // Without Graphviz: the nodes in their order.
-  showList(why) {
-    this.facts = new Map();
-    const rows = this.picture.nodes.map((node) => {
-      const fact = element("td", { class: "quiet" }, node.type);
-      const row = element("tr", { title: tip(node), "data-node": node.name, onclick: () => node.kept && this.toggle(node.name) },
-        element("td", {}, node.name), fact);
-      this.facts.set(node.name, { fact, group: row, node });
-      return row;
+  // As Graphviz has it: Bézier curves, with their heads.
+  drawPaths(drawing) {
+    this.extent = this.picture.size;
+    for (const edge of this.picture.edges) {
+      if (!edge.path) continue;
+      const [first, ...rest] = edge.path, head = rest[rest.length - 1], before = rest[rest.length - 2];
+      drawing.append(svg("path", { class: edge.kind, d: `M${first} C${rest.slice(0, -1).join(" ")} L${head}` }));
+      const angle = Math.atan2(head[1] - before[1], head[0] - before[0]);
+      const corner = (turn, far) => [head[0] - far * Math.cos(angle + turn), head[1] - far * Math.sin(angle + turn)];
+      drawing.append(svg("path", { class: "tip", d: `M${head} L${corner(0.4, 7)} L${corner(-0.4, 7)} Z` }));
+    }
+  }
+
+  layOut(drawing, nodes, wide) {
+    const { edges } = this.picture, { size, paths } = layOut(nodes, edges, wide);
+    this.extent = size;
+    edges.forEach((edge, k) => {
+      const to = nodes[edge.to], x = to.x - to.width / 2;
+      drawing.append(svg("path", { class: edge.kind, d: paths[k] }), svg("path", { class: "tip", d: `M${x},${to.y} l-6,-2.6 l0,5.2 Z` }));
     });
-    this.root.replaceChildren(element("p", { class: "quiet" }, why), element("table", {}, ...rows));
-    this.mark();
   }
 
   toggle(name) {
@@ -94,10 +132,28 @@ export class Graph {
     for (const [name, { group }] of this.facts ?? []) group.classList.toggle("chosen", name === this.chosen);
   }
 
+  // Marks the nodes that the search finds, and goes to the next one, or the one before.
+  find(step) {
+    const words = this.search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+    const found = [];
+    for (const { group, node } of this.facts?.values() ?? []) {
+      const is = words.length > 0 && words.every((word) => `${node.name} ${node.type}`.toLowerCase().includes(word));
+      group.classList.toggle("found", is);
+      if (is) found.push(group);
+    }
+    this.at = found.length ? (((this.at ?? 0) + step) % found.length + found.length) % found.length : 0;
+    if (step === 0) this.at = 0;
+    this.found.textContent = words.length ? (found.length ? `${this.at + 1} of ${found.length}` : "none") : "";
+    if (!found.length) return;
+    found[this.at].scrollIntoView({ block: "nearest", inline: "nearest" });
+    if (step) found[this.at].dispatchEvent(new Event("click"));
+  }
+
   // Points and seconds of each node in a frame.
   figures(statistics) {
+    this.statistics = statistics;
     if (!this.facts || !statistics?.nodes) return;
-    for (const { fact, node } of this.facts.values()) fact.textContent = node.type;
+    for (const { fact, node } of this.facts.values()) if (fact.textContent !== node.type) fact.textContent = node.type;
     for (const work of statistics.nodes)
       work.nodes.forEach((name, k) => {
         const known = this.facts.get(name);

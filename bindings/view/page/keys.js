@@ -20,10 +20,12 @@ export function bindKeys(does) {
     ["D", "spheres, dots, streaks", ["d"], () => does.next("style")],
     ["S", "colliders and emitters", ["s"], () => does.press("shapes")],
     ["G", "grid and axes", ["g"], () => does.press("ground")],
-    ["T", "trails", ["t"], () => does.press("trails")],
+    ["T", "longer trails", ["t"], () => does.next("trails")],
     ["B", "the life of the chosen point", ["b"], does.trace],
-    ["K", "copy the camera", ["k"], () => does.press("camera")],
-    ["P", "this frame as .png", ["p"], () => does.press("save")],
+    ["K", "the camera, to copy or to set", ["k"], () => does.press("camera")],
+    ["P", "this frame as .png", ["p"], does.save],
+    ["O", "pictures and films", ["o"], () => does.press("save")],
+    ["/", "find a node", ["/"], does.find],
     ["L", "dark, light", ["l"], () => does.press("theme")],
     ["Alt G, F, S", "graph, figures, spreadsheet", ["Alt+g"], () => !by("graph-tab").hidden && does.openTab("graph")],
     [null, "", ["Alt+f"], () => !by("figures-tab").hidden && does.openTab("figures")],
@@ -33,7 +35,7 @@ export function bindKeys(does) {
   ];
   const actions = new Map(keys.flatMap(([, , names, action]) => names.map((name) => [name, action])));
   window.addEventListener("keydown", (event) => {
-    if (by("keys").open || event.ctrlKey || event.metaKey) return;
+    if (document.querySelector("dialog[open]") || event.ctrlKey || event.metaKey) return;
     const typing = event.target.matches?.("input:not([type=range]):not([type=checkbox]), select");
     if (typing && event.key !== "Escape") return;
     if (event.target.matches?.("input[type=range]") && event.key.startsWith("Arrow")) return;

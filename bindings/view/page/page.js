@@ -7,6 +7,7 @@ import { Graph } from "./graph.js";
 import { Inspector } from "./point.js";
 import { Figures } from "./figures.js";
 import { Sheet } from "./sheet.js";
+import { Out } from "./out.js";
 import { ramp } from "./ramp.js";
 import { bindKeys, showKeys } from "./keys.js";
 import { element, by, brief, bytes, colour } from "./dom.js";
@@ -36,6 +37,12 @@ const timeline = new Timeline(by("timeline"), { go: (frame) => go(frame), play: 
 const parameterPart = element("section", { id: "parameters" });
 by("side").append(parameterPart);
 const parameters = new Parameters(parameterPart, { change: (values) => ask("set", { values }).catch(tell), copy });
+const out = new Out(by("side"), {
+  ask, tell: flash, close: () => openOut(false),
+  shown: () => ({ ...shown(), camera: picture.cameraText().split(",").map(Number) }),
+  size: () => [by("canvas").width, by("canvas").height],
+  title: () => state.status.title.replace(/^.*\//, "").replace(/\.\w+$/, "").replace(/[#.]+$/, ""),
+});
 const inspector = new Inspector(by("side"), {
   go: (frame) => go(frame),
   trace: (id) => trace(id),
@@ -56,8 +63,9 @@ for (const [name, title] of [["graph", "Graph"], ["figures", "Figures"], ["sheet
   by("dock").append(panel);
   tabs[name] = { panel, button };
 }
-nav.append(element("span", { class: "gap" }), element("span", { class: "quiet", id: "dock-note" }));
-const graph = new Graph(tabs.graph.panel, { choose: (node) => chooseNode(node) });
+const tools = element("span", { class: "tools", id: "graph-tools" });
+nav.append(element("span", { class: "gap" }), element("span", { class: "quiet", id: "dock-note", role: "status" }), tools);
+const graph = new Graph(tabs.graph.panel, tools, { choose: (node) => chooseNode(node) });
 const figures = new Figures(tabs.figures.panel, { go: (frame) => go(frame) });
 const sheet = new Sheet(tabs.sheet.panel, {
   rows: (from, count, sort, descending) => ask("sheet", { ...shown(), from, count, sort, descending }),
@@ -69,6 +77,7 @@ function openTab(name) {
     panel.hidden = other !== name;
     button.setAttribute("aria-selected", other === name);
   }
+  tools.hidden = name !== "graph";
   graph.size();
   figures.draw();
   if (name === "sheet") sheet.refresh();
@@ -87,14 +96,15 @@ const bar = {
     ...choices([["discs", "spheres"], ["dots", "dots"], ["streaks", "streaks"]])),
   shapes: element("button", { id: "shapes", title: "colliders and emitters (S)", "aria-pressed": true, onclick: () => toggle("shapes") }, "shapes"),
   ground: element("button", { id: "ground", title: "grid and axes (G)", "aria-pressed": true, onclick: () => toggle("ground") }, "grid"),
-  trails: element("button", { id: "trails", title: "where points were in the last 12 frames (T)", "aria-pressed": false, onclick: () => { state.trails = state.trails ? 0 : 12; press(bar.trails, state.trails); showTrails(); } }, "trails"),
+  trails: element("select", { id: "trails", title: "where points were in the frames before (T)", onchange: () => { state.trails = Number(bar.trails.value); showTrails(); } },
+    ...choices([["0", "no trails"], ["6", "6 frames"], ["12", "12 frames"], ["24", "24 frames"], ["48", "48 frames"], ["1000", "all frames"]])),
 };
 by("bar").append(bar.title, bar.state, element("span", { class: "gap" }), bar.output,
   element("label", { for: "colour" }, "colour"), bar.colour, element("label", { for: "group" }, "group"), bar.group,
   element("label", { for: "style" }, "as"), bar.style, bar.shapes, bar.ground, bar.trails,
   element("button", { id: "fit", title: "show everything (F)", onclick: () => picture.fit() }, "fit"),
-  element("button", { id: "camera", title: "copy the camera, for --camera of pictures (K)", onclick: () => copy(`--camera=${picture.cameraText()}`) }, "camera"),
-  element("button", { id: "save", title: "this frame as .png, by the renderer of rapid run (P)", onclick: () => save() }, ".png"),
+  element("button", { id: "camera", title: "the camera as --camera of pictures has it: to copy, or to be put here (K)", onclick: () => openCamera() }, "camera"),
+  element("button", { id: "save", title: "pictures and films (O)", "aria-pressed": false, onclick: () => openOut(!out.root.hidden ? false : true) }, "save"),
   element("button", { id: "theme", title: "dark or light (L)", onclick: () => theme(document.documentElement.dataset.theme === "light" ? "dark" : "light") }, "◐"),
   element("button", { id: "help", title: "all keys (?)", onclick: () => showKeys() }, "?"));
 
@@ -301,7 +311,7 @@ async function showPoint() {
     const row = await ask("point", { ...shown(), id });
     const { path } = await ask("path", { id, output: state.output || undefined });
     if (id !== state.point) return;
-    inspector.point(id, row, state.status.sequence ? "" : state.life);
+    inspector.point(id, row, state.status.sequence ? "" : state.life, path, state.frame);
     picture.mark(row.values.P, path.map(([, ...place]) => place.slice(0, 3)));
   } catch (error) {
     if (id !== state.point) return;
@@ -335,7 +345,8 @@ async function trace(id) {
 
 function chooseNode(name) {
   state.after = name;
-  if (!name) inspector.hide("node");
+  if (name) showNode();
+  else inspector.hide("node");
   change();
 }
 
@@ -374,16 +385,30 @@ async function showTrails() {
 
 // ---- out ----
 
-async function save() {
-  try {
-    const { data } = await ask("picture", { ...shown(), camera: picture.cameraText().split(",").map(Number), width: 1920, height: 1080 });
-    const link = element("a", { href: URL.createObjectURL(new Blob([data], { type: "image/png" })), download: `${state.status.title.replace(/^.*\//, "").replace(/\.\w+$/, "")}.${String(state.frame).padStart(4, "0")}.png` });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-    flash(`${link.download}, 1920 × 1080`);
-  } catch (error) {
-    tell(error);
-  }
+function openOut(on) {
+  out.open(on);
+  press(by("save"), on);
+}
+
+// A line of seven numbers: copied for the command line, or typed in.
+function openCamera() {
+  const dialog = by("camera-dialog"), field = element("input", { type: "text", id: "camera-text", value: picture.cameraText(), "aria-label": "the camera", size: 64,
+    title: "position, target, metres; vertical angle, degrees" });
+  const numbers = () => field.value.replace(/^\s*--camera[= ]/, "").split(",").map(Number);
+  const say = element("span", { class: "quiet" });
+  const use = () => {
+    const all = numbers();
+    if (![6, 7].includes(all.length) || all.some((x) => !Number.isFinite(x))) { say.textContent = "six or seven numbers, with commas between"; return; }
+    picture.setCamera(all);
+    dialog.close();
+  };
+  field.addEventListener("keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); use(); } });
+  dialog.replaceChildren(element("h2", {}, "Camera"), field, element("p", { class: "quiet" }, "Position x,y,z, target x,y,z and the vertical angle, as --camera of pictures takes them."),
+    element("div", { class: "fields" }, element("button", { id: "camera-use", title: "look from there (Enter)", onclick: use }, "look from there"),
+      element("button", { id: "camera-copy", title: "for rapid run", onclick: () => { copy(`--camera=${field.value}`); dialog.close(); } }, "copy --camera"),
+      element("button", { title: "close (Esc)", onclick: () => dialog.close() }, "close"), say));
+  dialog.showModal();
+  field.select();
 }
 
 // ---- what is told about the scene ----
@@ -395,7 +420,8 @@ function showLegend(message) {
   const bar_ = element("canvas", { width: 128, height: 1 }), context = bar_.getContext("2d");
   for (let x = 0; x < 128; ++x) { context.fillStyle = `rgb(${ramp(x / 127)})`; context.fillRect(x, 0, 1, 1); }
   const [low, high] = message.ranges.value;
-  legend.replaceChildren(bar_, element("div", {}, element("span", {}, brief(low)), element("span", {}, message.colour), element("span", {}, brief(high))));
+  legend.replaceChildren(bar_, element("div", {}, element("span", {}, brief(low)), element("span", {}, message.colour), element("span", {}, brief(high))),
+    message.unknown?.value > 0 ? element("div", {}, `known of ${brief(message.shown - message.unknown.value)} of ${brief(message.shown)} points`) : "");
 }
 
 const words = { starting: "starting", computing: "computing", done: "done", full: "memory is full", failed: "error" };
@@ -427,16 +453,33 @@ function showError(error) {
     element("div", { class: "quiet" }, "The last good frames stay. Save the scene, or change a parameter, to run it again."));
 }
 
+let figuresDue = 0;
+function drawFigures() {
+  figuresDue ||= setTimeout(() => {
+    figuresDue = 0;
+    figures.show(state.statistics, state.status.first, state.status.last, state.frame);
+  }, 250);
+}
+
+// One request at a time, of some hundred frames each.
+let askingFigures = false;
 async function showFigures(status) {
-  if (status.sequence) return;
-  if (state.statisticsRun !== status.run) { state.statistics = []; state.statisticsRun = status.run; }
-  const after = state.statistics.length ? state.statistics[state.statistics.length - 1].frame : undefined;
-  const answer = await ask("figures", after === undefined ? {} : { after });
-  if (answer.run === state.statisticsRun) {
-    const last = state.statistics.length ? state.statistics[state.statistics.length - 1].frame : -Infinity;
-    state.statistics.push(...answer.figures.filter((f) => f.frame > last));
+  if (status.sequence || askingFigures) return;
+  askingFigures = true;
+  try {
+    for (let more = true; more;) {
+      if (state.statisticsRun !== state.status.run) { state.statistics = []; state.statisticsRun = state.status.run; }
+      const after = state.statistics.length ? state.statistics[state.statistics.length - 1].frame : undefined;
+      const answer = await ask("figures", after === undefined ? {} : { after });
+      if (answer.run !== state.statisticsRun) break;
+      state.statistics.push(...answer.figures);
+      more = answer.more;
+    }
+  } finally {
+    askingFigures = false;
   }
-  figures.show(state.statistics, status.first, status.last, state.frame);
+  figures.know(state.statistics);
+  drawFigures();
   tellFrame();
 }
 
@@ -468,6 +511,7 @@ async function follow() {
       openTab("sheet");
     }
     parameters.show(status);
+    out.show(status);
     inspector.messages(status);
     timeline.show(status);
     if (status.graph_number !== graphNumber) {
@@ -489,7 +533,7 @@ async function follow() {
 bindKeys({
   play, step: (n) => go(state.frame + n), first: () => go(state.status.first), last: () => go(newest()),
   fit: () => picture.fit(), look: (turn, tilt) => picture.look(turn, tilt), openTab,
-  press: (id) => by(id).click(), next: (id) => { const s = by(id); s.selectedIndex = (s.selectedIndex + 1) % s.options.length; s.dispatchEvent(new Event("change")); },
+  press: (id) => by(id).click(), save: () => out.picture(), find: () => { if (!by("graph-tab").hidden) { openTab("graph"); graph.search.focus(); } }, next: (id) => { const s = by(id); s.selectedIndex = (s.selectedIndex + 1) % s.options.length; s.dispatchEvent(new Event("change")); },
   trace: () => { if (state.point !== null) trace(state.point); },
   escape: () => { if (state.after) graph.toggle(graph.chosen); choosePoint(null); inspector.hide("region"); },
 });
@@ -497,5 +541,5 @@ let saved = null;
 try { saved = localStorage.getItem("theme"); } catch { /* none */ }
 theme(saved ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 openTab("graph");
-window.rapidView = { state, picture, go, ask, choosePoint, connection }; // for the browser's console, and tests
+window.rapidView = { state, picture, go, ask, choosePoint, connection, out, graph }; // for the browser's console, and tests
 follow();

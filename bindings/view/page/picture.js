@@ -5,7 +5,7 @@ import { rampBytes } from "./ramp.js";
 const pointVertex = `
   uniform vec3 low, size;
   uniform vec2 radii;
-  uniform float pixels, least, dots;
+  uniform float pixels, least, dots, gaps;
   uniform sampler2D ramp;
   attribute float value, radius;
   attribute vec3 rgb;
@@ -19,6 +19,11 @@ const pointVertex = `
       tint = rgb;
     #else
       tint = texture2D(ramp, vec2(value * 0.998 + 0.001, 0.5)).rgb;
+      // Where some have no value, 0 says so: they recede behind those that have one.
+      if (gaps > 0.0) {
+        if (value < 0.5 / 65535.0) { tint = vec3(0.45); gl_PointSize = min(gl_PointSize, least); }
+        else gl_PointSize = max(gl_PointSize, 2.0 * least);
+      }
     #endif
   }`;
 const pointFragment = `
@@ -64,15 +69,23 @@ export class Picture {
     texture.needsUpdate = true;
     this.uniforms = {
       low: { value: new THREE.Vector3() }, size: { value: new THREE.Vector3(1, 1, 1) },
-      radii: { value: new THREE.Vector2(0, 0) }, pixels: { value: 1 }, least: { value: 3 }, dots: { value: 0 },
+      radii: { value: new THREE.Vector2(0, 0) }, pixels: { value: 1 }, least: { value: 3 }, dots: { value: 0 }, gaps: { value: 0 },
       shutter: { value: 1 / 48 }, ramp: { value: texture },
     };
+    const surface = (colour, given) => new THREE.MeshLambertMaterial({ color: colour, side: THREE.DoubleSide, ...given });
+    this.materials = {
+      collider: surface(0x9aa3b2), emitter: surface(0x7fae8a, { transparent: true, opacity: 0.35, depthWrite: false }),
+      plane: new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.25, side: THREE.DoubleSide, depthWrite: false,
+        polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }),
+    };
+    this.flat = new THREE.PlaneBufferGeometry(1, 1);
     this.style = "discs";
     this.message = null;
     this.marker = this.line(0xffffff);
     this.path = this.line(0xffb454);
     this.drawn = 0; // pictures so far
     this.control();
+    canvas.addEventListener("webglcontextrestored", () => { this.kind = ""; if (this.message) this.show(this.message); });
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
@@ -87,7 +100,7 @@ export class Picture {
   theme(background, grid) {
     this.scene.background = new THREE.Color(background);
     this.grid = grid;
-    for (const shape of this.shapes.children) if (shape.userData.plane) shape.material.color.set(grid);
+    this.materials.plane.color.set(grid);
     this.lay();
     this.draw();
   }
@@ -109,18 +122,19 @@ export class Picture {
   show(message) {
     this.message = message;
     const { arrays, box } = message, streaks = this.style === "streaks" && arrays.v;
-    const geometry = new THREE.BufferGeometry(), copies = streaks ? 2 : 1;
-    const add = (name, array, items) =>
-      geometry.setAttribute(name, new THREE.BufferAttribute(streaks ? twice(array, items) : array, items, true));
-    add("position", arrays.P, 3);
-    if (arrays.colour) add("rgb", arrays.colour, 3);
-    else add("value", arrays.value, 1);
-    if (arrays.radius) add("radius", arrays.radius, 1);
+    const copies = streaks ? 2 : 1, kind = `${this.style}${Boolean(arrays.colour)}${Boolean(streaks)}${Boolean(arrays.radius)}`;
+    if (!this.points || this.kind !== kind) this.begin(kind, Boolean(arrays.colour), streaks);
+    const geometry = this.points.geometry;
+    const put = (name, array, items) => fill(geometry, name, streaks ? twice(array, items) : array, items);
+    put("position", arrays.P, 3);
+    if (arrays.colour) put("rgb", arrays.colour, 3);
+    else put("value", arrays.value, 1);
+    if (arrays.radius) put("radius", arrays.radius, 1);
     if (streaks) {
-      add("velocity", arrays.v, 3);
+      put("velocity", arrays.v, 3);
       const tail = new Uint8Array(2 * message.shown);
       for (let i = 1; i < tail.length; i += 2) tail[i] = 1;
-      geometry.setAttribute("tail", new THREE.BufferAttribute(tail, 1));
+      fill(geometry, "tail", tail, 1, false);
     }
     geometry.setDrawRange(0, copies * message.shown);
     this.uniforms.low.value.fromArray(box[0]);
@@ -128,24 +142,22 @@ export class Picture {
     if (arrays.radius) this.uniforms.radii.value.fromArray(message.ranges.radius);
     else this.uniforms.radii.value.set(message.radius ?? 0, message.radius ?? 0);
     this.uniforms.dots.value = this.style === "dots" ? 2 * this.renderer.getPixelRatio() : 0;
+    this.uniforms.gaps.value = message.unknown?.value > 0 ? 1 : 0;
     this.uniforms.shutter.value = (message.fastest ?? 0) * this.shutter;
-    const kind = `${this.style}${Boolean(arrays.colour)}${Boolean(streaks)}`;
-    if (!this.points || this.kind !== kind) {
-      if (this.points) { this.scene.remove(this.points); this.points.geometry.dispose(); this.points.material.dispose(); }
-      const material = new THREE.ShaderMaterial({
-        uniforms: this.uniforms, defines: arrays.colour ? { RGB: 1 } : {},
-        vertexShader: streaks ? streakVertex : pointVertex,
-        fragmentShader: streaks ? "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }" : pointFragment,
-      });
-      this.points = streaks ? new THREE.LineSegments(geometry, material) : new THREE.Points(geometry, material);
-      this.points.frustumCulled = false;
-      this.kind = kind;
-      this.scene.add(this.points);
-    } else {
-      this.points.geometry.dispose();
-      this.points.geometry = geometry;
-    }
     this.draw();
+  }
+
+  begin(kind, coloured, streaks) {
+    if (this.points) { this.scene.remove(this.points); this.points.geometry.dispose(); this.points.material.dispose(); }
+    const geometry = new THREE.BufferGeometry(), material = new THREE.ShaderMaterial({
+      uniforms: this.uniforms, defines: coloured ? { RGB: 1 } : {},
+      vertexShader: streaks ? streakVertex : pointVertex,
+      fragmentShader: streaks ? "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }" : pointFragment,
+    });
+    this.points = streaks ? new THREE.LineSegments(geometry, material) : new THREE.Points(geometry, material);
+    this.points.frustumCulled = false;
+    this.kind = kind;
+    this.scene.add(this.points);
   }
 
   shutter = 1 / 48;
@@ -162,20 +174,12 @@ export class Picture {
         geometry.computeVertexNormals();
         this.meshes.set(mesh, geometry);
       }
-      const emitter = role === "emitter";
-      this.shapes.add(new THREE.Mesh(this.meshes.get(mesh), new THREE.MeshLambertMaterial({
-        color: emitter ? 0x7fae8a : 0x9aa3b2, side: THREE.DoubleSide, transparent: emitter, opacity: emitter ? 0.35 : 1,
-        depthWrite: !emitter,
-      })));
+      this.shapes.add(new THREE.Mesh(this.meshes.get(mesh), this.materials[role]));
     }
     for (const [number, geometry] of this.meshes)
       if (!used.has(number)) { geometry.dispose(); this.meshes.delete(number); }
     for (const { normal, offset } of message.planes) {
-      const plane = new THREE.Mesh(new THREE.PlaneBufferGeometry(1, 1), new THREE.MeshBasicMaterial({
-        color: this.grid, transparent: true, opacity: 0.25, side: THREE.DoubleSide, depthWrite: false,
-        polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2,
-      }));
-      const n = new THREE.Vector3(...normal);
+      const plane = new THREE.Mesh(this.flat, this.materials.plane), n = new THREE.Vector3(...normal);
       plane.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
       plane.position.copy(n.multiplyScalar(offset));
       plane.scale.setScalar(this.groundSize ?? 10);
@@ -357,6 +361,25 @@ export class Picture {
       ++this.drawn;
     });
   }
+}
+
+// Gives an attribute these values, in a buffer of the GPU that is written in place while it is large enough: the arrays
+// of messages go there as they are.
+function fill(geometry, name, array, items, normalized = true) {
+  const known = geometry.getAttribute(name);
+  if (known && known.room >= array.length && known.array.constructor === array.constructor) {
+    known.array = array;
+    known.count = array.length / items;
+    known.needsUpdate = true;
+    return;
+  }
+  const room = items * Math.ceil((1.25 * array.length) / items), larger = new array.constructor(room);
+  larger.set(array);
+  const made = new THREE.BufferAttribute(larger, items, normalized);
+  made.room = room;
+  made.usage = THREE.DynamicDrawUsage;
+  made.count = array.length / items;
+  geometry.setAttribute(name, made);
 }
 
 // Every item twice, one after the other.

@@ -1,5 +1,5 @@
 // The chosen point, its life; the chosen node; the chosen region.
-import { element, exact, brief, bytes, seconds } from "./dom.js";
+import { element, exact, brief, bytes, seconds, prepare, colour } from "./dom.js";
 
 export class Inspector {
   // go(frame); trace(id): asks for a life; close(what).
@@ -17,22 +17,49 @@ export class Inspector {
     const part = this.parts[name];
     part.hidden = false;
     part.replaceChildren(element("h2", {}, title, element("span", { class: "gap" }),
-      ["messages", "frame-figures"].includes(name) ? null : element("button", { title: "close (Esc)", onclick: () => this.actions.close(name) }, "×")), ...children);
+      ["messages", "frame-figures"].includes(name) ? null : element("button", { title: "close (Esc)", onclick: () => this.actions.close(name) }, "×")), ...children.filter(Boolean));
   }
 
   hide(name) { this.parts[name].hidden = true; this.parts[name].replaceChildren(); }
 
-  point(id, row, life) {
+  // path: [frame, x, y, z, speed, error, sub-steps] of each frame that has the point.
+  point(id, row, life, path = [], frame = NaN) {
     if (!row) return this.hide("point");
     const rows = Object.entries(row.values).map(([name, value]) =>
       element("tr", { "data-attribute": name }, element("th", {}, name), element("td", { class: "number" }, exact(value))));
     if (row.groups.length) rows.push(element("tr", {}, element("th", {}, "groups"), element("td", { class: "number" }, row.groups.join(", "))));
     const table = element("table", { id: "attributes" }, ...rows);
-    if (life === "") return this.put("point", `Point ${id}`, table); // files tell none
-    this.put("point", `Point ${id}`, table,
+    const curves = [[4, "speed", "m/s"], [5, "estimated error", "m"], [6, "sub-steps", ""]]
+      .map(([k, name, of]) => this.curve(name, of, path.filter((place) => typeof place[k] === "number").map((place) => [place[0], place[k]]), frame));
+    if (life === "") this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box)); // files tell no life
+    else this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box),
       element("h2", { class: "life-head" }, "Life", element("span", { class: "gap" }),
         life ? null : element("button", { id: "trace", title: "computes what happened to the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
       life ? this.life(life) : element("div", { class: "quiet" }, "Birth, edits by nodes, contacts and death: computed when asked for."));
+    for (const curve of curves) curve?.draw();
+  }
+
+  // Values of the point over its frames; none where they are all 0.
+  curve(name, of, values, frame) {
+    if (values.length < 2 || values.every(([, v]) => v === 0)) return null;
+    const most = Math.max(...values.map(([, v]) => v)), first = values[0][0], last = values[values.length - 1][0];
+    const here = values.find(([f]) => f === frame);
+    const canvas = element("canvas", { title: `${name} of the point over its frames: a click goes to the frame`, onclick: (event) => {
+      const box = canvas.getBoundingClientRect();
+      this.actions.go(Math.round(first + ((event.clientX - box.left) / box.width) * (last - first)));
+    } });
+    const box = element("figure", { class: "curve", "data-curve": name }, element("figcaption", {}, name, element("span", { class: "number" }, `${here ? brief(here[1]) : "–"} of ${brief(most)} ${of}`)), canvas);
+    return { box, draw() {
+      const { context, width, height } = prepare(canvas);
+      const x = (f) => ((f - first) / (last - first)) * width, y = (v) => height - 1 - (v / (most || 1)) * (height - 3);
+      context.fillStyle = colour("line");
+      if (here) context.fillRect(x(frame) - 0.5, 0, 1, height);
+      context.strokeStyle = colour("accent");
+      context.lineWidth = 1.2;
+      context.beginPath();
+      for (const [f, v] of values) context.lineTo(x(f), y(v));
+      context.stroke();
+    } };
   }
 
   // life: as rapid trace --json has it, or a text.
@@ -91,7 +118,7 @@ export class Inspector {
     } else if (figure) {
       add("points", brief(figure.points));
     }
-    add("frames kept", `${bytes(status.bytes)} of ${bytes(status.most_bytes)}`);
+    add("in memory", `${bytes(status.bytes)} of ${bytes(status.most_bytes)}`);
     const kept = Object.entries(status.names).filter(([, size]) => size >= 0);
     add("attributes", kept.map(([name]) => name).filter((name) => name !== "dt").join(", "), `at most ${kept.reduce((sum, [, size]) => sum + size, 0)} bytes a point`);
     this.put("frame-figures", `Frame ${number}`, element("table", {}, ...rows));

@@ -5,7 +5,7 @@ export class Timeline {
   // go(frame): the user wants a frame; play(on).
   constructor(root, { go, play, step }) {
     this.go = go;
-    this.canvas = element("canvas", { title: "click or drag: go to a frame", "aria-label": "frames" });
+    this.canvas = element("canvas", { title: "click or drag: go to a frame. Green: computed; ochre: of the run before; blue: being computed; marks: warnings", "aria-label": "frames" });
     this.playing = element("button", { id: "play", title: "play, pause (Space)", onclick: () => play() }, "▶");
     this.field = element("input", { type: "number", id: "frame", title: "the frame shown", onchange: () => go(Number(this.field.value)) });
     this.text = element("span", { class: "number quiet", id: "rate" });
@@ -33,7 +33,7 @@ export class Timeline {
 
   show(status) {
     Object.assign(this, { first: status.first, last: status.last, ready: status.ready, stale: status.stale,
-      warned: status.warnings.map((warning) => warning.frame).filter((frame) => frame > 0) });
+      computing: ["starting", "computing"].includes(status.state), warned: status.warnings.map((warning) => warning.frame).filter((frame) => frame > 0) });
     this.field.min = status.first;
     this.field.max = status.last;
     this.draw();
@@ -57,6 +57,11 @@ export class Timeline {
     for (const [list, name] of [[this.stale, "stale"], [this.ready, "good"]]) {
       context.fillStyle = colour(name);
       for (const [a, b] of list) context.fillRect(x(a) - half, top, x(b) - x(a) + 2 * half, thick);
+    }
+    if (this.computing) { // the frame that is being computed
+      const next = this.ready.length ? this.ready[this.ready.length - 1][1] + 1 : this.first;
+      context.fillStyle = colour("accent");
+      if (next <= this.last) context.fillRect(x(next) - half, top, Math.max(2 * half, 4 * u), thick);
     }
     context.fillStyle = colour("warn");
     for (const frame of this.warned) context.fillRect(x(frame) - 1, top - 4, 2, 4);

@@ -1,0 +1,42 @@
+"""The picture of the graph, and the points after its nodes."""
+from bench import go, test
+
+
+@test
+def a_click_on_a_node_shows_the_points_as_they_leave_it(bench):
+    browser = bench.ready()
+    go(browser, 2)
+    assert browser.run("return document.querySelectorAll('#graph .node').length") == 11
+    browser.run("document.querySelector('#graph [data-node=lift]').dispatchEvent(new Event('click'))")
+    browser.wait("rapidView.picture.message.after === 'lift'")
+    top = browser.run("return rapidView.picture.message.box[1][1]")
+    # Solve has not moved the points yet: bead 3 is five metres above the row.
+    assert abs(top - 7) < 1e-4, top
+    assert "line 12" in browser.run("return document.getElementById('node').innerText")
+    browser.type("\ue00c")
+    browser.wait("rapidView.picture.message.after === ''")
+    assert browser.run("return rapidView.picture.message.box[1][1]") < 7
+
+
+@test
+def the_graph_tells_points_and_what_is_left_out(bench):
+    browser = bench.ready()
+    go(browser, 5)
+    browser.wait("/^40 · /.test(document.querySelector('#graph [data-node=solve1] .fact').textContent)")
+    assert browser.run("return document.querySelectorAll('#graph .left-out').length") == 2
+    tip = browser.run("return document.querySelector('#graph .left-out title').textContent")
+    assert "left out: no output comes from it" in tip, tip
+    assert browser.run("return document.querySelectorAll('#graph path.feedback').length") == 1
+
+
+@test
+def arguments_are_those_of_the_frame(bench):
+    browser = bench.ready("""local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
+  :wind { name = "gusts", velocity = function(frame) return {frame.number, 0, 0} end, drag = 1 } :solve {}""")
+    for frame in (3, 8):
+        go(browser, frame)
+        if frame == 3:
+            browser.run("document.querySelector('#graph [data-node=gusts]').dispatchEvent(new Event('click'))")
+        browser.wait("[...document.querySelectorAll('#node tr')].some((row) => row.textContent.startsWith('velocity')"
+                     f" && row.textContent.includes('{frame}, 0, 0'))")

@@ -160,6 +160,9 @@ private:
         std::vector<Vec3d> at(points.size());
         cast(std::span(P.data, P.stride ? points.size() : 0), at);
         if (P.stride == 0) std::fill(at.begin(), at.end(), P[0].cast<double>());
+        for (std::size_t i = 0; i < at.size(); ++i)
+            if (!at[i].allFinite())
+                throw Error(fmt::format("point {} has no finite P; a node before this one made it so", points.id()[i]));
         const float reach = static_cast<float>(*within / 2);
         const Strided<std::uint8_t> members = members_of(points, group);
         Pairs near;

@@ -83,8 +83,6 @@ bool CoupledStep::is_isolated(const Projection& projection) const
 
 void CoupledStep::read_points(std::size_t begin, std::size_t end)
 {
-    context_.errors.require_finite(begin, context_.P.subspan(begin, end - begin),
-                                   context_.v.subspan(begin, end - begin), PointErrors::before_step);
     for (std::size_t i = begin; i < end; ++i) {
         inverse_mass_[i] = at_[i].w = inverse_mass(i);
         at_[i].P = context_.P[i].cast<double>();

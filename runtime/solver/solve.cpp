@@ -3,16 +3,29 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/parallel.h"
 #include "runtime/solver/coupled_step.h"
+#include "runtime/solver/point_errors.h"
 #include "runtime/solver/step_context.h"
 #include "runtime/solver/uncoupled_step.h"
 
 namespace rapid {
 namespace {
 
+// Of points that look at one another, before the first that does: their constraints, when these begin.
+void require_finite(const PointSet& points, const SolveOptions& options)
+{
+    const PointErrors errors(points, options.frame);
+    const Strided<Vec3f> P = points.P().read(), v = points.v().read();
+    for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) errors.require_finite(i, P[i], v[i], PointErrors::before_step);
+    });
+}
+
 SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement* refinement)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
+    if (!dynamics.constraints().empty() || options.interacts) require_finite(points, options);
     StepContext context(points, dynamics, options);
     if (context.scene.constraints.empty() && !options.interacts)
         UncoupledStep(context, refinement).run();

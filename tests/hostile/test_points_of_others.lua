@@ -1,0 +1,33 @@
+-- Files of points with numbers that no scene can use: nodes go on with them, or say which point it is.
+local command = require "testing.command"
+
+local nodes = { ":clump {}", ":contact {}", ":interact { radius = 0.5 }", ":distance { within = 0.5 }", ":gravity {}",
+  ":collide { shape = rapid.shape.plane { offset = -1 } }" }
+
+-- Px, Py, Pz, pscale, vx of the first point.
+local rows = { "inf,0,0,0.1,0", "nan,0,0,0.1,0", "0,0,0,inf,0", "0,0,0,nan,0", "0,0,0,-1,0", "0,0,0,0.1,nan",
+  "0,0,0,0.1,inf" }
+local uses_no_radius = { [":interact { radius = 0.5 }"] = true, [":distance { within = 0.5 }"] = true,
+  [":gravity {}"] = true }
+
+describe("a point with a number that is none", function()
+  it("is an error with its node and id, where the node asks for that number", function()
+    local folder = command.folder()
+    for _, row in ipairs(rows) do
+      folder:write("points.csv", "id,Px,Py,Pz,pscale,vx,vy,vz\n5," .. row ..
+        ",0,0\n6,0,0.1,0,0.1,0,0,0\n7,0.1,0.1,0,0.1,0,0,0\n")
+      for _, node in ipairs(nodes) do
+        folder:write("scene.lua", 'local rapid = require "rapid"\n' ..
+          'return rapid.create { points = rapid.points.read "points.csv" } ' .. node .. " :solve {}\n")
+        local result = command.shell('ulimit -t 20; exec "$RAPID" run scene.lua -f 1-3 --quiet', { cwd = folder.path })
+        local what = row .. " " .. node .. ": " .. result.stderr
+        if row:find "^0,0,0,[^,]*,0$" and uses_no_radius[node] then
+          assert.equal(0, result.status, what)
+        else
+          assert.equal(1, result.status, what)
+          assert.match('^scene%.lua:2: node "%w+": ', result.stderr, what)
+        end
+      end
+    end
+  end)
+end)

@@ -1,8 +1,9 @@
 #include "bindings/host/compiled_code.h"
 
-#include <catch2/catch_test_macros.hpp>
 #include <cstdlib>
 #include <lua.hpp>
+
+#include "tests/test.h"
 
 using namespace rapid;
 

@@ -50,6 +50,11 @@ void Evaluator::leave_out_errors()
     for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->estimates_errors = false;
 }
 
+void Evaluator::tell_points()
+{
+    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->tells_points = true;
+}
+
 FrameResult Evaluator::advance()
 {
     frame_clock_ = Stopwatch();

@@ -67,6 +67,9 @@ public:
     // From now on no errors are estimated, which takes up to twice the time of Solve: for runs that nobody asks for
     // them. With a tolerance they are all the same.
     void leave_out_errors();
+    // From now on the points behind a Solve have the attributes of PointFigures: of each point the estimated error, the
+    // sub-steps, whether it sleeps. For those who look at them; nodes behind a Solve see them, too.
+    void tell_points();
 
     // From now on `input` is told what enters each node. Nodes are then evaluated one by one.
     void watch_inputs(InputHook input) { input_ = std::move(input); }

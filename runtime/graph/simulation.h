@@ -33,6 +33,7 @@ struct Simulation {
     bool trial = false;  // only stiffness is examined: emitters emit a sample, and Solve does not move points
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
     bool estimates_errors = true;                             // where false, Solve tells none
+    bool tells_points = false;  // Solve tells of each point, as attributes of its result (solve/point_figures.h)
 
     FrameClock clock() const { return {fps, start, subframes}; }
     Frame frame(std::int64_t step) const { return clock().at_step(step); }

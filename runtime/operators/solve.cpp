@@ -13,6 +13,7 @@
 #include "runtime/operators/solve/air_resistance.h"
 #include "runtime/operators/solve/changing_dynamics.h"
 #include "runtime/operators/solve/collider_shapes.h"
+#include "runtime/operators/solve/point_figures.h"
 #include "runtime/operators/solve/step_recorder.h"
 #include "runtime/points/members.h"
 #include "runtime/solver/collision/stuck_columns.h"
@@ -92,6 +93,7 @@ struct Solve {
         coupled_errors_ = CoupledErrors();
         drift_ = EnergyDrift();
         tolerance_check_ = ToleranceCheck();
+        if (flow.simulation->tells_points) PointFigures().put(flow.points);
         return flow;
     }
 
@@ -117,18 +119,24 @@ struct Solve {
         if (estimates && !moves_alone(flow)) coupled_errors_.begin(flow.points, changing_.finer(), options);
         if (!options.interacts) interact(flow.points, changing_.run(), options, begin_time);
         if (estimates) begin_estimates(flow, options);
+        PointFigures figures;
+        if (flow.simulation->tells_points) figures.begin(flow.points, options, tolerance.has_value());
         const bool newborn = are_newborn(flow.points, options.h);
         const Tolerated done = advance(flow, options);
         if (newborn && flow.points.empty()) warn_of_deaths_at_birth(flow, now);
         const std::uint64_t beyond = check_tolerance(flow, options);
         if (!flow.dynamics.actions().empty()) require_in_range(flow, now);  // they write attributes
-        if (estimates) estimate(flow, options, now);
+        if (estimates) estimate(flow, options, now, figures);
         if (!options.interacts) interact(flow.points, changing_.run(), options, options.time);
-        if (estimates && !moves_alone(flow)) estimate_coupled(flow, now);
+        if (estimates && !moves_alone(flow)) estimate_coupled(flow, now, figures);
         report(done, beyond, flow, now);
         recorder.end();
         now.figures.died += age_points(flow.points, group, now.frame.dt, &recorder);
         feed_back(flow);
+        if (flow.simulation->tells_points) {
+            figures.note_sleepers(sleep_records_);
+            figures.put(flow.points);
+        }
         return flow;
     }
 
@@ -244,7 +252,7 @@ private:
         drift_.begin(flow.points, shadows_, changing_.run(), options);
     }
 
-    void estimate(const Flow& flow, const SolveOptions& options, const Evaluation& now)
+    void estimate(const Flow& flow, const SolveOptions& options, const Evaluation& now, PointFigures& figures)
     {
         std::optional<std::vector<double>> drift;
         if (!moves_alone(flow)) {
@@ -254,6 +262,7 @@ private:
                 SolveOptions finer = options;
                 finer.substeps *= 2;
                 finer.met = nullptr;
+                finer.taken = nullptr;
                 finer.log = nullptr;
                 if (tolerance)
                     solve_within(shadows, changing_.finer(), finer, allowed_error(flow) / 4, 2 * max_substeps);
@@ -261,6 +270,8 @@ private:
                     solve(shadows, changing_.finer(), finer);
             });
             now.figures.errors.insert(now.figures.errors.end(), errors.begin(), errors.end());
+            if (flow.simulation->tells_points)
+                shadows_.idle() ? figures.note_no_errors() : figures.note_errors(shadows_.ids(), errors);
             drift = drift_.end(flow.points, shadows_, changing_.run());
         }
         const double rounding = shadows_.rounding(!flow.dynamics.colliders().empty());
@@ -272,12 +283,14 @@ private:
     }
 
     // After interactions at the frame's end.
-    void estimate_coupled(const Flow& flow, const Evaluation& now)
+    void estimate_coupled(const Flow& flow, const Evaluation& now, PointFigures& of_points)
     {
         const CoupledErrors::Errors errors = coupled_errors_.end(flow.points);
         FrameFigures& figures = now.figures;
         figures.errors.insert(figures.errors.end(), errors.since_birth.begin(), errors.since_birth.end());
         figures.frame_errors.insert(figures.frame_errors.end(), errors.of_frame.begin(), errors.of_frame.end());
+        if (flow.simulation->tells_points)
+            of_points.note_errors(errors.ids, errors.since_birth.empty() ? errors.of_frame : errors.since_birth);
         if (!errors.unknown.empty()) figures.left_out_of_errors.push_back(errors.unknown);
     }
 

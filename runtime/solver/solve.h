@@ -32,6 +32,9 @@ struct SolveOptions {
     std::string group;       // only these points are advanced; all when empty
     // Set to 1 for points that touch a shape, by their place before the step; null where nobody asks.
     std::uint8_t* met = nullptr;
+    // With a tolerance: set to the sub-steps of each point's result, by its place before the step; null where nobody
+    // asks.
+    std::int32_t* taken = nullptr;
     StepLog* log = nullptr;    // receives contacts and deaths; null where nobody asks
     bool begins_frame = true;  // the first step of the frame: contacts are counted from 0
 

@@ -61,7 +61,7 @@ CoupledErrors::Errors CoupledErrors::end(const PointSet& solved)
     Errors errors;
     if (runs_) try {
             solve(set_, dynamics_, options_);
-            (unknown_.empty() ? errors.since_birth : errors.of_frame) = compare(solved);
+            (unknown_.empty() ? errors.since_birth : errors.of_frame) = compare(solved, errors.ids);
         } catch (const Error& error) {
             unknown_ = fmt::format("the sum since birth, as twice the sub-steps end in an error: {}", error.message());
             stop();
@@ -178,7 +178,8 @@ std::map<std::string, SavedState> CoupledErrors::memories_of_twins() const
     return memories;
 }
 
-std::vector<double> CoupledErrors::compare(const PointSet& solved)
+// ids: of the points that are compared.
+std::vector<double> CoupledErrors::compare(const PointSet& solved, std::vector<std::int64_t>& ids)
 {
     const PointSet& shadows = set_;
     const IdIndex before(ids_), found(shadows.id());
@@ -196,6 +197,7 @@ std::vector<double> CoupledErrors::compare(const PointSet& solved)
         difference.P = shadow_P[k].cast<double>() - P[i].cast<double>();
         difference.v = shadow_v[k].cast<double>() - v[i].cast<double>();
         errors.push_back(2 * difference.P.norm());
+        ids.push_back(id[i]);
     }
     differences_ = std::move(differences);
     solved_ = solved;

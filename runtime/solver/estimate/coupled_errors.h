@@ -31,6 +31,7 @@ public:
 
     struct Errors {
         std::vector<double> since_birth, of_frame;  // m, in the order of the points; empty where not estimated
+        std::vector<std::int64_t> ids;              // of those points
         std::string unknown;                        // why there are none since birth; else empty
     };
 
@@ -68,7 +69,7 @@ private:
     void take_attributes(const PointSet& points);
     bool make_twins(const Dynamics& dynamics);
     std::map<std::string, SavedState> memories_of_twins() const;
-    std::vector<double> compare(const PointSet& solved);
+    std::vector<double> compare(const PointSet& solved, std::vector<std::int64_t>& ids);
 
     std::string unknown_;      // why there are no shadows since birth any more; empty while there are
     std::int64_t frames_ = 0;  // since that

@@ -16,9 +16,13 @@ class ToleranceSolver {
 public:
     ToleranceSolver(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
                     int max_substeps)
-        : points_(points), dynamics_(dynamics), options_(options), limits_{tolerance,    options.substeps,
-                                                                           max_substeps, options.h,
-                                                                           options.met,  !writes_more(dynamics)}
+        : points_(points), dynamics_(dynamics), options_(options), limits_{tolerance,
+                                                                           options.substeps,
+                                                                           max_substeps,
+                                                                           options.h,
+                                                                           options.met,
+                                                                           options.taken,
+                                                                           !writes_more(dynamics)}
     {
         done_.substeps = options.substeps;
         if (StuckColumns::are_needed(dynamics)) StuckColumns::add_to(points);
@@ -96,6 +100,8 @@ private:
         std::vector<std::uint8_t> met(options_.met ? size : 0);
         StepDoublingLimits limits = limits_;
         limits.met = options_.met ? met.data() : nullptr;
+        std::vector<std::int32_t> taken(options_.taken ? size : 0);
+        limits.taken = options_.taken ? taken.data() : nullptr;
         StepDoubling run(limits, substeps, end.P().write(), end.v().write(), &part);
         solve_once(end, substeps, run);
 
@@ -109,6 +115,7 @@ private:
         for (std::uint32_t i = 0; i < size; ++i) {
             if (is_done[i]) from.push_back(i), to.push_back(indices[i]);
             if (options_.met && met[i]) options_.met[indices[i]] = 1;
+            if (options_.taken && taken[i] > 0) options_.taken[indices[i]] = taken[i];
         }
         points_.put(to, end.select(from));
 
@@ -123,6 +130,7 @@ private:
         SolveOptions options = options_;
         options.substeps = substeps;
         options.met = nullptr;  // the kinds of the paths tell
+        options.taken = nullptr;
         const SolveResult result = solve(set, dynamics_, options, run);
         SolveResult& all = done_.result;
         all.penetration_max = std::max(all.penetration_max, result.penetration_max);

@@ -92,6 +92,7 @@ private:
             if (may_be_result && (within || is_result_of_all)) {
                 P_[i] = extrapolated_[i] ? best_P_[i].cast<float>() : end.rounded[i];
                 v_[i] = (extrapolated_[i] ? best_v_[i] : end.v[i]).cast<float>();
+                if (limits_.taken) limits_.taken[indices_[i]] = substeps_;
                 result_[i] = !end.dead.empty() && end.dead[i] ? Result::Dead : Result::Known;
             }
             if (!within) open_[open++] = i;

@@ -20,9 +20,10 @@ struct StepDoublingLimits {
     double tolerance;    // m
     int first_substeps;  // of a point's first run
     int max_substeps;
-    double h;           // s, frame length
-    std::uint8_t* met;  // set to 1 for points that meet a shape, by index in the set; may be null
-    bool repeats;       // a block may run through the frame more than once
+    double h;             // s, frame length
+    std::uint8_t* met;    // set to 1 for points that meet a shape, by index in the set; may be null
+    std::int32_t* taken;  // set to the sub-steps of a point's result, likewise
+    bool repeats;         // a block may run through the frame more than once
 
     bool is_first(int substeps) const { return substeps == first_substeps; }
     // One run has no estimate, so that there is a second even beyond max_substeps, but only for the error.

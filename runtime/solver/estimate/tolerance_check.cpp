@@ -15,6 +15,7 @@ double part_beyond(PointSet finer, const PointSet& solved, const Dynamics& dynam
 {
     options.substeps *= 3;
     options.met = nullptr;
+    options.taken = nullptr;
     solve_within(finer, dynamics, options, tolerance / 4, max_substeps);
     const IdIndex places(solved.id());
     std::size_t compared = 0, beyond = 0;

@@ -1,0 +1,111 @@
+#include "runtime/operators/solve/point_figures.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "tests/operators/node_test.h"
+
+namespace rapid {
+namespace {
+
+using test::NodeTest;
+
+// Points at these distances from an attractor, on their way into a Solve that tells of each.
+struct Orbit {
+    std::shared_ptr<Simulation> simulation = test::simulation();
+    NodeTest pull{"attract", {{"strength", Value(20.0)}}};
+    NodeTest solve;
+
+    explicit Orbit(test::Arguments arguments) : solve("solve", std::move(arguments), simulation)
+    {
+        simulation->tells_points = true;
+    }
+    PointSet step(const PointSet& points, std::int64_t frame = 2)
+    {
+        return solve.evaluate(frame, {pull.evaluate(frame, {Flow{points, {}, simulation}})}).points;
+    }
+};
+
+PointSet at_distances(const std::vector<float>& distances)
+{
+    std::vector<Vec3f> places;
+    for (const float distance : distances) places.emplace_back(distance, 0, 0);
+    return test::points_at(places);
+}
+
+TEST_CASE("a point's error is twice what twice the sub-steps move it by", "[solve][error]")
+{
+    const PointSet points = at_distances({0.5f, 0.7f, 1, 2, 5});
+    Orbit coarse({{"substeps", Value(2.0)}}), fine({{"substeps", Value(4.0)}});
+    const PointSet a = coarse.step(points), b = fine.step(points);
+    const std::vector<float> error = test::values_of<float>(a, "error");
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double apart = (a.P()[i].cast<double>() - b.P()[i].cast<double>()).norm();
+        CHECK(error[i] == Approx(2 * apart).margin(1e-12));
+    }
+    CHECK(error[0] > 10 * error[4]);
+    CHECK(test::values_of<std::int32_t>(a, "substeps") == std::vector<std::int32_t>(5, 2));
+    CHECK(test::values_of<std::int32_t>(a, "asleep") == std::vector<std::int32_t>(5, 0));
+}
+
+TEST_CASE("of paths in closed form the error is 0", "[solve][error]")
+{
+    const auto simulation = test::simulation();
+    simulation->tells_points = true;
+    NodeTest gravity("gravity", {});
+    NodeTest solve("solve", {}, simulation);
+    const Flow flow = gravity.evaluate(2, {Flow{at_distances({1, 2}), {}, simulation}});
+    CHECK(test::values_of<float>(solve.evaluate(2, {flow}).points, "error") == std::vector<float>{0, 0});
+}
+
+TEST_CASE("with a tolerance each point tells the sub-steps that it took, in order of id", "[solve][tolerance]")
+{
+    // Every second point is far away.
+    std::vector<float> distances;
+    for (int i = 0; i < 600; ++i) distances.push_back(i % 2 == 0 ? 0.3f : 50.0f);
+    Orbit orbit({{"tolerance", Value(1e-5)}});
+    const std::vector<std::int32_t> taken =
+        test::values_of<std::int32_t>(orbit.step(at_distances(distances)), "substeps");
+    int near = 0, far = 0;
+    for (std::size_t i = 0; i < taken.size(); ++i) {
+        CHECK(std::has_single_bit(static_cast<unsigned>(taken[i])));
+        (i % 2 == 0 ? near : far) = std::max(i % 2 == 0 ? near : far, taken[i]);
+    }
+    CHECK(near >= 4 * far);
+    CHECK(orbit.solve.figures.substeps == near);
+
+    // The same alone: what others take says nothing of a point.
+    Orbit alone({{"tolerance", Value(1e-5)}});
+    CHECK(test::values_of<std::int32_t>(alone.step(at_distances({50.0f})), "substeps").front() == taken[1]);
+}
+
+TEST_CASE("points without a shadow have no error", "[solve][error]")
+{
+    Orbit orbit({{"substeps", Value(2.0)}});
+    std::vector<float> distances(5000, 1.0f);
+    const std::vector<float> error = test::values_of<float>(orbit.step(at_distances(distances)), "error");
+    const auto known = std::count_if(error.begin(), error.end(), [](float e) { return !std::isnan(e); });
+    CHECK(known >= 1000);
+    CHECK(known <= 1250);
+    CHECK(static_cast<std::size_t>(known) == orbit.solve.figures.errors.size());
+}
+
+TEST_CASE("the state does not keep the figures, and a scene's own attributes stay", "[solve]")
+{
+    PointSet points = at_distances({1, 2});
+    points.add({"error", 7.0f});
+    Orbit orbit({});
+    const PointSet after = orbit.step(points);
+    CHECK(test::values_of<float>(after, "error") == std::vector<float>{7, 7});
+    CHECK(after.has("substeps"));
+    CHECK_FALSE(orbit.simulation->state.has("substeps"));
+    CHECK_FALSE(orbit.simulation->state.has("asleep"));
+
+    Orbit untold({});
+    untold.simulation->tells_points = false;
+    CHECK_FALSE(untold.step(at_distances({1})).has("error"));
+}
+
+}  // namespace
+}  // namespace rapid

@@ -34,7 +34,9 @@ Watchdog::Late ScriptHost::when_late(const SessionOptions& options)
 }
 
 ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options)
-    : watchdog(options.script_timeout, when_late(options)),
+    : shared_interruption(options.interruption ? options.interruption : std::make_shared<Interruption>()),
+      interruption(*shared_interruption),
+      watchdog(options.script_timeout, when_late(options)),
       modules({file, options.on_read, options.paths, options.find_module}),
       file_(file),
       options_(std::move(options)),

@@ -30,7 +30,8 @@ public:
     Registry registry;
     std::vector<Session::Parameter> parameters;
     std::vector<std::string> warnings;
-    Interruption interruption;
+    const std::shared_ptr<Interruption> shared_interruption;
+    Interruption& interruption;
     std::map<std::string, std::vector<Session::FunctionCode>> code;
     Watchdog watchdog;
     const Modules modules;

@@ -61,6 +61,9 @@ struct SessionOptions {
     std::function<void(const std::string& text)> on_print;
     // A script that overruns, or that interrupt() stops, is an Error; else on_timeout ends the process.
     bool interruptible = false;
+    // With it, what stops its scripts, from the first line of the file on; null: one of its own, which interrupt()
+    // asks.
+    std::shared_ptr<Interruption> interruption;
     // If set, told of each trace that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
     std::function<void(const std::string& message)> on_trace_abort;
 };

@@ -110,9 +110,9 @@ void restrict_files(const SandboxAccess& access)
     if (syscall(SYS_landlock_restrict_self, int(ruleset), 0) != 0) throw refused("Landlock refuses", errno);
 }
 
-void restrict_system_calls(Processes processes)
+void restrict_system_calls(Processes processes, Connections connections = Connections::None)
 {
-    const int status = load_system_call_filter(processes);
+    const int status = load_system_call_filter(processes, connections);
     if (status == -ENOSYS) throw refused("this system has no seccomp", ENOSYS);
     if (status != 0) throw refused("seccomp refuses the filter", -status);
 }
@@ -153,7 +153,7 @@ void enter_sandbox(const SandboxAccess& access)
     throw refused("can't restart in the sandbox", errno);
 }
 
-void complete_sandbox(Processes processes)
+void complete_sandbox(Processes processes, Connections connections)
 {
     const File root(open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; nothing was run");
@@ -162,7 +162,7 @@ void complete_sandbox(Processes processes)
     // What a hostile file may take over has no rights but to read: whoever forks such a copy, it forks none.
     confine_copies([] { restrict_system_calls(Processes::None); });
     if (processes == Processes::None) start_reader_process([] { restrict_system_calls(Processes::Copies); });
-    restrict_system_calls(processes);
+    restrict_system_calls(processes, connections);
 }
 
 }  // namespace rapid

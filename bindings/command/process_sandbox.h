@@ -9,7 +9,7 @@
 //   seccomp     it makes the system calls that Rapid needs (system_call_filter.h): it opens no socket, starts no
 //               process, reaches no other process, and changes no mode, owner, time or attribute of a file
 //   limits      no core file; no more memory of its own than the machine has, and none that is shared
-//   descriptors those that it inherited are closed, but for standard output and standard error
+//   descriptors those that it inherited are closed, but for standard output and standard error, and a viewer's socket
 //   files       of formats whose libraries trust them are read by a process that is started before (reader_process.h),
 //               in the same sandbox: each in a copy of it, which may start nothing
 //
@@ -37,6 +37,6 @@ inline constexpr const char* sandboxed_option = "--sandboxed";
 
 // In the restarted process: the other limits, for all threads. Error: the process is not inside of Landlock, or the
 // kernel has no seccomp; then nothing may be run.
-void complete_sandbox(Processes processes);
+void complete_sandbox(Processes processes, Connections connections = Connections::None);
 
 }  // namespace rapid

@@ -113,12 +113,24 @@ void add_by_arguments(Filter& filter, Processes processes)
     }
 }
 
+// What a server does with connections that it has accepted. Of sockets themselves none is made.
+constexpr int allowed_of_accepted[] = {
+    SCMP_SYS(accept),      SCMP_SYS(accept4),       SCMP_SYS(recvfrom),       SCMP_SYS(recvmsg),
+    SCMP_SYS(sendto),      SCMP_SYS(sendmsg),       SCMP_SYS(shutdown),       SCMP_SYS(getsockname),
+    SCMP_SYS(getpeername), SCMP_SYS(getsockopt),    SCMP_SYS(setsockopt),     SCMP_SYS(epoll_wait),
+    SCMP_SYS(epoll_pwait), SCMP_SYS(epoll_create1), SCMP_SYS(epoll_ctl),      SCMP_SYS(timerfd_create),
+    SCMP_SYS(eventfd2),    SCMP_SYS(eventfd),       SCMP_SYS(timerfd_settime)};
+
 }  // namespace
 
-int load_system_call_filter(Processes processes)
+int load_system_call_filter(Processes processes, Connections connections)
 {
     Filter filter;
     for (const int call : allowed) filter.allow(call);
+    if (connections == Connections::Accepted) {
+        for (const int call : allowed_of_accepted) filter.allow(call);
+        filter.allow_commands(SCMP_SYS(ioctl), {FIONBIO});
+    }
     add_by_arguments(filter, processes);
     return filter.load();
 }

@@ -33,7 +33,7 @@ void UntrustedOptions::declare(CLI::App& app, const std::string& whose)
 }
 
 void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,
-                               Processes processes) const
+                               Processes processes, Connections connections) const
 {
     if (!allowed_.empty() && !untrusted_) throw Error("--allow-read is for --untrusted; a graph reads what it names");
     if (!untrusted_) return;
@@ -44,7 +44,7 @@ void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, con
         enter_sandbox(all);
     }
     load_deferred();  // the limits of memory forbid it
-    complete_sandbox(processes);
+    complete_sandbox(processes, connections);
 }
 
 std::vector<std::string> UntrustedOptions::words() const

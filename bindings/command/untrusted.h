@@ -30,7 +30,7 @@ public:
     // Sandboxes the process, if that is asked for. access: what the command itself reads and writes, besides
     // --allow-read and plugins. Before plugins are loaded: their first code runs in the sandbox, too.
     void confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,
-                 Processes processes = Processes::None) const;
+                 Processes processes = Processes::None, Connections connections = Connections::None) const;
 
     // These options again, for a process of its own.
     std::vector<std::string> words() const;

@@ -1,9 +1,12 @@
 // rapid view: a scene, or the files of a sequence, in a web page of this machine.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 
 #include "bindings/command/cache_files.h"
@@ -11,6 +14,7 @@
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/signals.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/host/modules.h"
 #include "bindings/host/threads.h"
 #include "bindings/view/requests.h"
@@ -32,7 +36,7 @@ std::filesystem::path page_folder()
     return std::filesystem::exists(root / "view/index.html", none) ? root / "view" : root / "bindings/view/page";
 }
 
-class View : public Command {
+class View : public Command, public Confined {
 public:
     std::string name() const override { return "view"; }
     std::string doc() const override { return "shows a scene, or files, in the browser while it is computed"; }
@@ -53,6 +57,31 @@ public:
                "the port of the page; 0, the default, takes a free one")
             ->type_name("N");
         app.add_flag("--no-open", no_open_, "does not open the page in a browser");
+        app.add_option("--cache", cache_,
+                       "keeps frames in this folder, too: those that memory has no room for, and for the next view of "
+                       "the same scene")
+            ->type_name("DIR");
+        untrusted_.declare(app, "graph");
+    }
+
+    // The sandbox makes no sockets: the one that listens is there before.
+    void confine(const CommonOptions& common) override
+    {
+        untrusted_.confine(
+            [&] {
+                const int socket = ViewServer::listen(port_);
+                if (socket != inherited_socket && dup2(socket, inherited_socket) < 0)
+                    throw Error(fmt::format("--untrusted: no socket for the page ({})", std::strerror(errno)));
+                fcntl(inherited_socket, F_SETFD, 0);
+                SandboxAccess access{ViewServer::files(page_folder()), {}, inherited_socket + 1};
+                access.readable.push_back(folder_of(graph_.file()));
+                if (!cache_.empty()) {
+                    std::filesystem::create_directories(cache_);
+                    access.writable.push_back(cache_);
+                }
+                return access;
+            },
+            common, Processes::None, Connections::Accepted);
     }
 
     int run(const CommonOptions& common) override
@@ -70,19 +99,16 @@ public:
                             {},
                             {},
                             threads.count(),
-                            static_cast<std::size_t>(memory_budget() / 2)};
-        options.session.on_timeout = [&](const std::string& message) {
-            print_error(Error(message), common.verbose);
-            remove_unfinished_files();
-            _exit(status_failed);
-        };
+                            static_cast<std::size_t>(memory_budget() / 2),
+                            cache_,
+                            untrusted_.asked()};
         options.session.quiet = true;
         if (frames_) options.frames = {frames_->first, frames_->last};
         if (std::filesystem::path(graph_.file()).extension() != ".lua")
             options.files = find_cache(graph_.file()).frames;
 
         std::unique_ptr<ViewRequests> requests;
-        ViewServer server(port_, page_folder(),
+        ViewServer server(untrusted_.asked() ? inherited_socket : ViewServer::listen(port_), page_folder(),
                           [&](const std::string& message, const Answer& answer) { requests->handle(message, answer); });
         ViewSimulation simulation(std::move(options), [&] {
             server.post([&] {
@@ -96,7 +122,7 @@ public:
         server.repeat(watch_interval, [&] { simulation.check_files(); });
         print(server.address() + '\n');
         std::fflush(stdout);
-        if (!no_open_) open(server.address());
+        if (!no_open_ && !untrusted_.asked()) open(server.address());  // which starts a program
         server.run();
         return status_done;
     }
@@ -112,8 +138,12 @@ private:
         _exit(status_failed);  // without one the line that was printed has to do
     }
 
+    static constexpr int inherited_socket = 3;  // of the process that restarts in the sandbox
+
     GraphOptions graph_;
+    UntrustedOptions untrusted_;
     std::optional<FrameSelection> frames_;
+    std::string cache_;
     int port_ = 0;
     bool no_open_ = false;
 };

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -16,21 +18,23 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Puts arrays behind one another, and their places into the header.
+// Puts arrays behind one another, and their places into the header. They are written where they are sent from: a frame
+// of a million points has eight megabytes, and each copy of them takes milliseconds.
 class Message {
 public:
     explicit Message(ordered_json header) : header_(std::move(header)) { header_["arrays"] = ordered_json::object(); }
 
     ordered_json& header() { return header_; }
 
-    // An array to be filled; valid until the next one is added.
-    template <class T>
-    std::span<T> add(const char* name, const char* type, std::size_t count)
+    // An array that fill(std::span<T>) writes, in finish().
+    template <class T, class F>
+    void add(const std::string& name, const char* type, std::size_t count, F fill)
     {
-        const std::size_t begin = data_.size();
-        header_["arrays"][name] = {{"type", type}, {"begin", begin}, {"count", count}};
-        data_.resize(begin + (count * sizeof(T) + 3) / 4 * 4);
-        return {reinterpret_cast<T*>(data_.data() + begin), count};
+        header_["arrays"][name] = {{"type", type}, {"begin", size_}, {"count", count}};
+        arrays_.push_back([begin = size_, count, fill = std::move(fill)](char* data) {
+            fill(std::span<T>(reinterpret_cast<T*>(data + begin), count));
+        });
+        size_ += (count * sizeof(T) + 3) / 4 * 4;
     }
 
     std::string finish(std::uint32_t request) const
@@ -38,94 +42,155 @@ public:
         std::string head = header_.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
         head.resize((head.size() + 3) / 4 * 4, ' ');
         const std::uint32_t words[2] = {request, static_cast<std::uint32_t>(head.size())};
-        std::string all(sizeof words + head.size() + data_.size(), '\0');
-        std::memcpy(all.data(), words, sizeof words);
-        std::memcpy(all.data() + sizeof words, head.data(), head.size());
-        std::memcpy(all.data() + sizeof words + head.size(), data_.data(), data_.size());
+        std::string all;
+        all.reserve(sizeof words + head.size() + size_);
+        all.append(reinterpret_cast<const char*>(words), sizeof words);
+        all += head;
+        all.resize(all.size() + size_);
+        for (const auto& fill : arrays_) fill(all.data() + sizeof words + head.size());
         return all;
     }
 
 private:
     ordered_json header_;
-    std::vector<char> data_;
+    std::vector<std::function<void(char* data)>> arrays_;
+    std::size_t size_ = 0;
+};
+
+// Whole numbers for values between low and high: from `first` to the largest of 16 bits. What is not a number, or
+// below, gets the least.
+struct Scale {
+    float low, factor, first = 0;
+
+    Scale(float from, float to, float least = 0)
+        : low(from), factor(to > from ? (65535 - least) / (to - from) : 0), first(least)
+    {
+    }
+    std::uint16_t operator()(float value) const
+    {
+        const float place = (value - low) * factor;
+        return static_cast<std::uint16_t>(first + (place > 0 ? std::min(place + 0.5f, 65535 - first) : 0.0f));
+    }
 };
 
 // The finite values' least and largest; 0 and 0 where there are none.
 std::pair<float, float> range_of(std::span<const float> values)
 {
-    float low = std::numeric_limits<float>::infinity(), high = -low;
-    for (const float value : values) {
-        if (!std::isfinite(value)) continue;
-        low = std::min(low, value);
-        high = std::max(high, value);
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    float low = infinity, high = -infinity;
+    for (const float value : values) {  // without branches: the loop is vectorised
+        const bool is_finite = std::abs(value) < infinity;
+        low = is_finite && value < low ? value : low;
+        high = is_finite && value > high ? value : high;
     }
     return low <= high ? std::pair(low, high) : std::pair(0.0f, 0.0f);
 }
 
-std::uint16_t quantised(float value, float low, float scale)
+// The points that are shown, where these are not all with what is shown of them.
+PointSet shown_of(const PointSet& points, const ShownPoints& shown, const FrameWish& wish)
 {
-    const float part = (value - low) * scale;
-    return static_cast<std::uint16_t>(part > 0 ? std::min(part + 0.5f, 65535.0f) : 0.0f);  // NaN: 0
+    if (!shown.places) return points;
+    PointSet needed = points;  // shares the columns
+    for (const std::string& name : points.column_names())
+        if (name != "P" && name != "v" && name != "id" && name != "Cd" && name != "pscale" && name != wish.colour)
+            needed.remove(name);
+    for (const std::string& name : points.group_names())
+        if (group_prefix + name != wish.colour) needed.remove_group(name);
+    return needed.select(*shown.places);
 }
 
-void add_positions(Message& message, const PointSet& points, const ShownPoints& shown)
+// Triples of floats that lie behind one another, a period of which has a whole number of vectors.
+constexpr std::size_t period = 48;
+
+void add_positions(Message& message, const PointSet& points)
 {
     const Strided<Vec3f> P = points.P().read();
-    Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
-    for (std::size_t k = 0; k < shown.count; ++k) {
-        const Vec3f& p = P[shown[k]];
-        low = low.cwiseMin(p);
-        high = high.cwiseMax(p);
-    }
-    if (shown.count == 0) low = high = Vec3f::Zero();
+    const std::size_t count = points.size();
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    Vec3f low = Vec3f::Constant(infinity), high = -low;
+    for (std::size_t k = 0; k < (P.stride == 0 ? std::min<std::size_t>(count, 1) : count); ++k)
+        for (int axis = 0; axis < 3; ++axis) {
+            const float x = P[k][axis];
+            const bool is_finite = std::abs(x) < infinity;  // files may have others
+            low[axis] = is_finite && x < low[axis] ? x : low[axis];
+            high[axis] = is_finite && x > high[axis] ? x : high[axis];
+        }
+    for (int axis = 0; axis < 3; ++axis)
+        if (low[axis] > high[axis]) low[axis] = high[axis] = 0;
     message.header()["box"] = {{low.x(), low.y(), low.z()}, {high.x(), high.y(), high.z()}};
-    Vec3f scale;
-    for (int axis = 0; axis < 3; ++axis) scale[axis] = high[axis] > low[axis] ? 65535 / (high[axis] - low[axis]) : 0;
-    const std::span<std::uint16_t> to = message.add<std::uint16_t>("P", "u16", 3 * shown.count);
-    for (std::size_t k = 0; k < shown.count; ++k) {
-        const Vec3f& p = P[shown[k]];
-        for (int axis = 0; axis < 3; ++axis) to[3 * k + axis] = quantised(p[axis], low[axis], scale[axis]);
-    }
+    message.add<std::uint16_t>("P", "u16", 3 * count, [=](std::span<std::uint16_t> to) {
+        std::array<float, period> from{}, factor{};
+        for (std::size_t j = 0; j < period; ++j) {
+            const auto axis = static_cast<Eigen::Index>(j % 3);
+            from[j] = low[axis];
+            factor[j] = Scale(low[axis], high[axis]).factor;
+        }
+        const auto quantise = [&](const float* values, std::size_t begin, std::size_t n) {
+            for (std::size_t j = 0; j < n; ++j) {
+                const float place = (values[j] - from[j]) * factor[j] + 0.5f;
+                const float bounded = place > 0 ? std::min(place, 65535.0f) : 0;  // not a number: 0
+                to[begin + j] = static_cast<std::uint16_t>(static_cast<std::int32_t>(bounded));
+            }
+        };
+        if (P.stride == 0) {
+            for (std::size_t k = 0; k < count; ++k) quantise(P.data->data(), 3 * k, 3);
+            return;
+        }
+        const auto* values = reinterpret_cast<const float*>(P.data);
+        std::size_t begin = 0;
+        for (; begin + period <= to.size(); begin += period) quantise(values + begin, begin, period);
+        quantise(values + begin, begin, to.size() - begin);
+    });
 }
 
-void add_velocities(Message& message, const PointSet& points, const ShownPoints& shown)
+void add_velocities(Message& message, const PointSet& points)
 {
     const Strided<Vec3f> v = points.v().read();
     float most = 0;
-    for (std::size_t k = 0; k < shown.count; ++k) most = std::max(most, v[shown[k]].cwiseAbs().maxCoeff());
+    for (std::size_t k = 0; k < points.size(); ++k) most = std::max(most, v[k].cwiseAbs().maxCoeff());
     message.header()["fastest"] = most;
     const float scale = most > 0 ? 32767 / most : 0;
-    const std::span<std::int16_t> to = message.add<std::int16_t>("v", "i16", 3 * shown.count);
-    for (std::size_t k = 0; k < shown.count; ++k)
-        for (int axis = 0; axis < 3; ++axis)
-            to[3 * k + axis] = static_cast<std::int16_t>(std::lround(v[shown[k]][axis] * scale));
+    message.add<std::int16_t>("v", "i16", 3 * points.size(), [=, count = points.size()](std::span<std::int16_t> to) {
+        for (std::size_t k = 0; k < count; ++k)
+            for (int axis = 0; axis < 3; ++axis)
+                to[3 * k + axis] = static_cast<std::int16_t>(std::lround(v[k][axis] * scale));
+    });
 }
 
-void add_values(Message& message, const char* name, std::span<const float> values, const ShownPoints& shown)
+void add_values(Message& message, const char* name, std::vector<float> values)
 {
     const auto [low, high] = range_of(values);
     message.header()["ranges"][name] = {low, high};
-    const float scale = high > low ? 65535 / (high - low) : 0;
-    const std::span<std::uint16_t> to = message.add<std::uint16_t>(name, "u16", shown.count);
-    for (std::size_t k = 0; k < shown.count; ++k) to[k] = quantised(values[shown[k]], low, scale);
+    std::size_t unknown = 0;
+    for (const float value : values) unknown += std::isnan(value);
+    message.header()["unknown"][name] = unknown;
+    // 0 is kept for those without a value, where there are some.
+    const Scale scale(low, high, unknown > 0 ? 1 : 0);
+    const std::size_t count = values.size();
+    message.add<std::uint16_t>(name, "u16", count, [=, values = std::move(values)](std::span<std::uint16_t> to) {
+        for (std::size_t k = 0; k < count; ++k) to[k] = scale(values[k]);
+        for (std::size_t k = 0; unknown > 0 && k < count; ++k)
+            if (std::isnan(values[k])) to[k] = 0;
+    });
 }
 
-void add_colours(Message& message, const PointSet& points, const FrameWish& wish, const ShownPoints& shown)
+void add_colours(Message& message, const PointSet& points, const FrameWish& wish)
 {
     const auto* Cd = points.find<Vec3f>("Cd");
     if (Cd && (wish.colour.empty() || wish.colour == "Cd")) {
         message.header()["colour"] = "Cd";
-        const std::span<std::uint8_t> to = message.add<std::uint8_t>("colour", "u8", 3 * shown.count);
-        const Strided<Vec3f> from = Cd->read();
-        for (std::size_t k = 0; k < shown.count; ++k)
-            for (int axis = 0; axis < 3; ++axis)
-                to[3 * k + axis] =
-                    static_cast<std::uint8_t>(std::lround(255 * std::clamp(from[shown[k]][axis], 0.0f, 1.0f)));
+        message.add<std::uint8_t>(
+            "colour", "u8", 3 * points.size(), [from = Cd->read(), count = points.size()](std::span<std::uint8_t> to) {
+                for (std::size_t k = 0; k < count; ++k)
+                    for (int axis = 0; axis < 3; ++axis)
+                        to[3 * k + axis] =
+                            static_cast<std::uint8_t>(255 * std::clamp(from[k][axis], 0.0f, 1.0f) + 0.5f);
+            });
         return;
     }
     const std::string name = wish.colour.empty() ? "speed" : wish.colour;
     message.header()["colour"] = name;
-    add_values(message, "value", numbers_of(points, name), shown);
+    add_values(message, "value", numbers_of(points, name));
 }
 
 }  // namespace
@@ -192,26 +257,27 @@ std::string frame_message(std::uint32_t request, const PointSet& points, const F
 {
     Message message(ordered_json::parse(head));
     const ShownPoints shown = shown_points(points, wish);
+    const PointSet some = shown_of(points, shown, wish);
     message.header()["total"] = points.size();
     message.header()["shown"] = shown.count;
     message.header()["every"] = shown.every;
-    add_positions(message, points, shown);
-    add_colours(message, points, wish, shown);
-    if (const auto* pscale = points.find<float>("pscale")) {
+    add_positions(message, some);
+    add_colours(message, some, wish);
+    if (const auto* pscale = some.find<float>("pscale")) {
         if (pscale->is_uniform())
             message.header()["radius"] = points.empty() ? 0.0f : (*pscale)[0];
         else
-            add_values(message, "radius", numbers_of(points, "pscale"), shown);
+            add_values(message, "radius", numbers_of(some, "pscale"));
     }
-    if (wish.velocities) add_velocities(message, points, shown);
+    if (wish.velocities) add_velocities(message, some);
     return message.finish(request);
 }
 
 std::string trails_message(std::uint32_t request, const std::vector<float>& ends, std::uint64_t every)
 {
     Message message(ordered_json({{"every", every}}));
-    const std::span<float> to = message.add<float>("ends", "f32", ends.size());
-    std::copy(ends.begin(), ends.end(), to.begin());
+    message.add<float>("ends", "f32", ends.size(),
+                       [&](std::span<float> to) { std::copy(ends.begin(), ends.end(), to.begin()); });
     return message.finish(request);
 }
 
@@ -230,11 +296,12 @@ std::string shapes_message(std::uint32_t request, const PictureScene& scene, con
         if (known.contains(numbers[b])) continue;
         const Mesh& mesh = *body.mesh;
         const std::string name = std::to_string(numbers[b]);
-        const std::span<float> places = message.add<float>(("P" + name).c_str(), "f32", 3 * mesh.positions.size());
-        std::memcpy(places.data(), mesh.positions.data(), places.size_bytes());
-        const std::span<std::uint32_t> corners =
-            message.add<std::uint32_t>(("T" + name).c_str(), "u32", 3 * mesh.triangles.size());
-        std::memcpy(corners.data(), mesh.triangles.data(), corners.size_bytes());
+        message.add<float>("P" + name, "f32", 3 * mesh.positions.size(), [&](std::span<float> to) {
+            std::memcpy(to.data(), mesh.positions.data(), to.size_bytes());
+        });
+        message.add<std::uint32_t>("T" + name, "u32", 3 * mesh.triangles.size(), [&](std::span<std::uint32_t> to) {
+            std::memcpy(to.data(), mesh.triangles.data(), to.size_bytes());
+        });
     }
     message.header()["bodies"] = std::move(bodies);
     message.header()["planes"] = std::move(planes);

@@ -18,7 +18,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t most_rows = 500;  // of the spreadsheet, at a time
+constexpr std::size_t most_rows = 500;          // of the spreadsheet, at a time
+constexpr std::size_t most_figures = 500;       // frames, at a time
+constexpr std::size_t most_segments = 480'000;  // of trails
 
 Json json_of(const Value& value)
 {
@@ -91,6 +93,21 @@ Json row_of(const PointSet& points, std::size_t i)
     return {{"values", row}, {"groups", groups}};
 }
 
+// width and height, pixels; camera: position, target, vertical angle in degrees.
+std::shared_ptr<const PictureOptions> picture_options(const Json& json)
+{
+    auto options = std::make_shared<PictureOptions>();
+    options->width = std::clamp(json.value("width", 1280), 16, 16384);
+    options->height = std::clamp(json.value("height", 720), 16, 16384);
+    const auto camera = json.value("camera", std::vector<double>());
+    if (camera.size() == 7) {
+        options->position = Vec3d(camera[0], camera[1], camera[2]);
+        options->target = Vec3d(camera[3], camera[4], camera[5]);
+        options->fov = camera[6] * 3.14159265358979323846 / 180;
+    }
+    return options;
+}
+
 FrameWish wish_of(const Json& json)
 {
     FrameWish wish;
@@ -107,6 +124,14 @@ void ViewRequests::Ask::tell(Json json) const
 {
     json["re"] = re;
     answer(json.dump(-1, ' ', false, Json::error_handler_t::replace), false);
+}
+
+void ViewRequests::Ask::send(const std::string& data) const
+{
+    std::string message(8, '\0');
+    const std::uint32_t words[2] = {re, 0};
+    std::memcpy(message.data(), words, sizeof words);
+    answer(message + data, true);
 }
 
 void ViewRequests::Ask::fail(const std::string& why) const { tell({{"error", why}}); }
@@ -151,6 +176,15 @@ void ViewRequests::handle(const std::string& message, const Answer& answer)
             tell_arguments(json, ask);
         } else if (what == "picture") {
             tell_picture(json, ask);
+        } else if (what == "film") {
+            begin_film(json, ask);
+        } else if (what == "film_progress") {
+            tell_film(ask);
+        } else if (what == "film_data") {
+            send_film(ask);
+        } else if (what == "film_cancel") {
+            film_.reset();
+            ask.tell(Json::object());
         } else if (what == "set") {
             set_parameters(json, ask);
         } else {
@@ -203,9 +237,11 @@ void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
                  {"more_warnings", status.more_warnings},
                  {"outputs", status.outputs},
                  {"names", status.names},
+                 {"ending", status.ending},
+                 {"films", !simulation_.options().is_confined},
                  {"no_graph", status.no_graph}};
     json["graph_number"] = status.graph_number;
-    if (status.graph_number != graph) json["graph"] = Json::parse(status.graph);
+    if (status.graph_number != graph && status.graph) json["graph"] = Json::parse(*status.graph);
     json["error"] = status.error ? json_of(*status.error) : Json();
     if (simulation_.is_sequence()) json["ready"] = {{status.first, status.last}};
     ask.tell(std::move(json));
@@ -292,7 +328,7 @@ void ViewRequests::tell_point(const Json& json, const Ask& ask)
     });
 }
 
-// Where a point is in all frames that are there, for its path; and its speed.
+// Where a point is in all frames that are in memory, for its path; its speed, error and sub-steps.
 void ViewRequests::tell_path(const Json& json, const Ask& ask) const
 {
     const auto id = json.at("id").get<std::int64_t>();
@@ -302,9 +338,12 @@ void ViewRequests::tell_path(const Json& json, const Ask& ask) const
         if (output == frame->outputs.end()) continue;
         const std::uint32_t i = IdIndex(output->second.id())[id];
         if (i == IdIndex::none) continue;
-        const Vec3f P = output->second.P()[i];
-        path.push_back(
-            {frame->number, number(P.x()), number(P.y()), number(P.z()), number(output->second.v()[i].norm())});
+        const PointSet& points = output->second;
+        const Vec3f P = points.P()[i];
+        const auto* error = points.find<float>("error");
+        const auto* substeps = points.find<std::int32_t>("substeps");
+        path.push_back({frame->number, number(P.x()), number(P.y()), number(P.z()), number(points.v()[i].norm()),
+                        error ? number((*error)[i]) : Json(), substeps ? Json((*substeps)[i]) : Json()});
     }
     ask.tell({{"path", path}});
 }
@@ -315,7 +354,7 @@ void ViewRequests::tell_trails(const Json& json, const Ask& ask)
     const std::int64_t last = json.at("frame").get<std::int64_t>();
     const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", 12), 1, 1000);
     FrameWish wish = wish_of(json);
-    wish.most = 20000;
+    wish.most = std::min<std::size_t>(20000, most_segments / static_cast<std::size_t>(last - first));
     with_points(json, ask, [=, this](const PointSet& now) {
         const ShownPoints shown = shown_points(now, wish);
         std::vector<Vec3f> there(shown.count);
@@ -443,9 +482,9 @@ void ViewRequests::tell_figures(const Json& json, const Ask& ask) const
     const std::int64_t after = json.value("after", std::int64_t{INT64_MIN});
     const std::uint64_t run = simulation_.status().run;
     Json figures = Json::array();
-    for (const ViewFramePtr& frame : simulation_.store().of_run(run))
-        if (frame->number > after) figures.push_back(Json::parse(frame->statistics));
-    ask.tell({{"run", run}, {"figures", figures}});
+    const std::vector<std::string> all = simulation_.store().statistics(run, after, most_figures);
+    for (const std::string& statistics : all) figures.push_back(Json::parse(statistics));
+    ask.tell({{"run", run}, {"figures", figures}, {"more", all.size() == most_figures}});
 }
 
 void ViewRequests::tell_arguments(const Json& json, const Ask& ask)
@@ -464,24 +503,50 @@ void ViewRequests::tell_picture(const Json& json, const Ask& ask)
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
     if (!frame) return ask.fail("the frame is not computed");
     with_points(json, ask, [=](const PointSet& points) {
-        auto options = std::make_shared<PictureOptions>();
-        options->width = std::clamp(json.value("width", 1280), 16, 16384);
-        options->height = std::clamp(json.value("height", 720), 16, 16384);
-        const auto camera = json.value("camera", std::vector<double>());
-        if (camera.size() == 7) {
-            options->position = Vec3d(camera[0], camera[1], camera[2]);
-            options->target = Vec3d(camera[3], camera[4], camera[5]);
-            options->fov = camera[6] * 3.14159265358979323846 / 180;
-        }
         FrameInfo info;
-        info.picture = options;
+        info.picture = picture_options(json);
         info.scene = frame->scene;
-        const std::string png = encode_png(picture_of(points, info));
-        std::string message(8, '\0');
-        const std::uint32_t words[2] = {ask.re, 0};
-        std::memcpy(message.data(), words, sizeof words);
-        ask.answer(message + png, true);
+        ask.send(encode_png(picture_of(points, info)));
     });
+}
+
+void ViewRequests::begin_film(const Json& json, const Ask& ask)
+{
+    if (simulation_.options().is_confined)
+        return ask.fail(
+            "films are made by a program of its own, which --untrusted forbids; save pictures of frames (.png)");
+    const ViewStatus status = simulation_.status();
+    ViewFilm::Wish wish;
+    wish.extension = json.value("extension", "");
+    wish.first = json.at("first").get<std::int64_t>();
+    wish.last = json.at("last").get<std::int64_t>();
+    wish.fps = json.value("fps", status.fps);
+    if (!(wish.fps >= 1 && wish.fps <= 1000))
+        throw Error(fmt::format("{} frames a second; a film has from 1 to 1000", wish.fps));
+    wish.output = json.value("output", "main");
+    wish.picture = picture_options(json);
+    wish.threads = simulation_.options().threads;
+    film_.reset();  // one that has not ended is given up
+    film_ =
+        std::make_unique<ViewFilm>(std::move(wish), [this](std::int64_t number) { return simulation_.frame(number); });
+    tell_film(ask);
+}
+
+void ViewRequests::tell_film(const Ask& ask) const
+{
+    if (!film_) return ask.fail("no film is being made");
+    const ViewFilm::Progress progress = film_->progress();
+    if (!progress.error.empty()) return ask.fail(progress.error);
+    ask.tell({{"done", progress.done}, {"of", progress.of}, {"ended", progress.has_ended}});
+}
+
+void ViewRequests::send_film(const Ask& ask)
+{
+    if (!film_ || !film_->progress().has_ended) return ask.fail("no film is ready");
+    std::string film = film_->take();
+    if (film.empty()) return ask.fail("no film is ready");
+    film_.reset();
+    ask.send(film);
 }
 
 void ViewRequests::set_parameters(const Json& json, const Ask& ask)

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "bindings/view/film.h"
 #include "bindings/view/frame_message.h"
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
@@ -33,6 +34,7 @@ private:
         Answer answer;
 
         void tell(Json json) const;
+        void send(const std::string& data) const;  // a file
         void fail(const std::string& why) const;
     };
     // A set of points that requests name: of an output of a frame, or after a node.
@@ -52,6 +54,9 @@ private:
     void tell_figures(const Json& json, const Ask& ask) const;
     void tell_arguments(const Json& json, const Ask& ask);
     void tell_picture(const Json& json, const Ask& ask);
+    void begin_film(const Json& json, const Ask& ask);
+    void tell_film(const Ask& ask) const;  // how far it is
+    void send_film(const Ask& ask);
     void set_parameters(const Json& json, const Ask& ask);
 
     std::uint64_t number_of(const MeshPtr& mesh);
@@ -67,6 +72,7 @@ private:
     std::vector<Waiting> waiting_;
     std::map<const Mesh*, std::pair<std::uint64_t, std::weak_ptr<const Mesh>>> meshes_;
     std::uint64_t next_mesh_ = 1;
+    std::unique_ptr<ViewFilm> film_;  // one at a time
 };
 
 }  // namespace rapid

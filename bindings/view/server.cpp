@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -32,7 +33,8 @@ using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
 constexpr std::size_t most_header = 8192, most_body = 1024, most_message = 1 << 20;  // bytes
-constexpr std::size_t most_waiting = 64;  // answers that a page has not taken: it asks for few at a time
+// Answers that a page has not taken, and their bytes: it asks for few at a time.
+constexpr std::size_t most_waiting = 64, most_waiting_bytes = std::size_t{256} << 20;
 
 std::string random_token()
 {
@@ -86,7 +88,7 @@ std::filesystem::path three_file()
 
 class ViewServer::Impl {
 public:
-    Impl(int port, const std::filesystem::path& folder, Handler handler)
+    Impl(int socket, const std::filesystem::path& folder, Handler handler)
         : folder_(folder), handler_(std::move(handler)), acceptor_(net_), work_guard_(asio::make_work_guard(work_))
     {
         std::error_code none;
@@ -94,15 +96,7 @@ public:
             if (entry.is_regular_file()) files_["/" + entry.path().filename().string()] = entry.path();
         if (!files_.contains("/index.html")) throw Error("the files of the viewer's page are not here").at({folder, 0});
         files_["/three.module.js"] = three_file();
-        try {
-            const Tcp::endpoint here(asio::ip::address_v4::loopback(), static_cast<std::uint16_t>(port));
-            acceptor_.open(here.protocol());
-            acceptor_.set_option(asio::socket_base::reuse_address(true));
-            acceptor_.bind(here);
-            acceptor_.listen();
-        } catch (const std::exception& error) {
-            throw Error(fmt::format("--port {}: {}", port, error.what()));
-        }
+        acceptor_.assign(Tcp::v4(), socket);
         port_ = acceptor_.local_endpoint().port();
         worker_ = std::thread([this] { work_.run(); });
     }
@@ -242,6 +236,7 @@ private:
             std::string text = beast::buffers_to_string(self->buffer_.data());
             self->buffer_.consume(self->buffer_.size());
             asio::post(self->server_.work_, [self, text = std::move(text)] {
+                if (self->is_closed_) return;
                 self->server_.handler_(text, [self](std::string message, bool binary) {
                     asio::post(self->server_.net_, [self, message = std::move(message), binary]() mutable {
                         self->send(std::move(message), binary);
@@ -254,7 +249,12 @@ private:
 
     void send(std::string message, bool binary)
     {
-        if (waiting_.size() >= most_waiting) return beast::get_lowest_layer(stream_).close();
+        if (is_closed_) return;
+        bytes_ += message.size();
+        if (waiting_.size() >= most_waiting || (bytes_ > most_waiting_bytes && !waiting_.empty())) {
+            is_closed_ = true;
+            return beast::get_lowest_layer(stream_).close();
+        }
         waiting_.emplace_back(std::move(message), binary);
         if (waiting_.size() == 1) write();
     }
@@ -264,7 +264,11 @@ private:
         stream_.binary(waiting_.front().second);
         stream_.async_write(asio::buffer(waiting_.front().first),
                             [self = shared_from_this()](const beast::error_code& error, std::size_t) {
-                                if (error) return self->waiting_.clear();
+                                if (error) {
+                                    self->is_closed_ = true;
+                                    return self->waiting_.clear();
+                                }
+                                self->bytes_ -= self->waiting_.front().first.size();
                                 self->waiting_.pop_front();
                                 if (!self->waiting_.empty()) self->write();
                             });
@@ -274,6 +278,8 @@ private:
     websocket::stream<beast::tcp_stream> stream_;
     beast::flat_buffer buffer_;
     std::deque<std::pair<std::string, bool>> waiting_;
+    std::size_t bytes_ = 0;                // of what waits
+    std::atomic<bool> is_closed_ = false;  // what it has asked for is not answered any more
 };
 
 class ViewServer::Impl::Connection : public std::enable_shared_from_this<Connection> {
@@ -329,8 +335,29 @@ void ViewServer::Impl::accept()
     });
 }
 
-ViewServer::ViewServer(int port, const std::filesystem::path& folder, Handler handler)
-    : impl_(std::make_unique<Impl>(port, folder, std::move(handler)))
+int ViewServer::listen(int port)
+{
+    try {
+        asio::io_context none;
+        Tcp::acceptor acceptor(none);
+        const Tcp::endpoint here(asio::ip::address_v4::loopback(), static_cast<std::uint16_t>(port));
+        acceptor.open(here.protocol());
+        acceptor.set_option(asio::socket_base::reuse_address(true));
+        acceptor.bind(here);
+        acceptor.listen();
+        return acceptor.release();
+    } catch (const std::exception& error) {
+        throw Error(fmt::format("--port {}: {}", port, error.what()));
+    }
+}
+
+std::vector<std::filesystem::path> ViewServer::files(const std::filesystem::path& folder)
+{
+    return {folder, three_file()};
+}
+
+ViewServer::ViewServer(int socket, const std::filesystem::path& folder, Handler handler)
+    : impl_(std::make_unique<Impl>(socket, folder, std::move(handler)))
 {
 }
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace rapid {
 
@@ -20,8 +21,13 @@ public:
     // Called from a thread of its own with each message of a page, one after another.
     using Handler = std::function<void(const std::string& message, Answer answer)>;
 
-    // port 0: a free one. folder: of the page. Error: the port is taken; the page or three.js is missing.
-    ViewServer(int port, const std::filesystem::path& folder, Handler handler);
+    // A socket of the loopback device that listens, as a descriptor. port 0: a free one. Error: the port is taken.
+    static int listen(int port);
+    // The files that it serves: the page's, and three.js. Error: there is no three.js.
+    static std::vector<std::filesystem::path> files(const std::filesystem::path& folder);
+
+    // socket: of listen(). folder: of the page. Error: the page or three.js is missing.
+    ViewServer(int socket, const std::filesystem::path& folder, Handler handler);
     ~ViewServer();
 
     std::string address() const;  // with the token

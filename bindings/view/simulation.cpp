@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "bindings/command/graphviz.h"
 #include "bindings/host/picture_scene.h"
@@ -23,7 +24,9 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t most_warnings = 200;
 constexpr std::size_t most_ending = 2;
-constexpr double snapshot_seconds = 0.25;  // of computing: so much is computed again to inspect a frame
+constexpr std::size_t most_laid_out = 150;  // nodes, by Graphviz
+constexpr double snapshot_seconds = 0.25;   // of computing: so much is computed again to inspect a frame
+constexpr double cached_seconds = 5;        // likewise, to go on from the cache
 
 Error error_of(const std::exception& error)
 {
@@ -36,17 +39,6 @@ fs::file_time_type changed_at(const fs::path& file)
     std::error_code none;
     const auto time = fs::last_write_time(file, none);
     return none ? fs::file_time_type::min() : time;  // one that may come
-}
-
-std::size_t bytes_of(const ViewFrame& frame)
-{
-    std::size_t bytes = sizeof(ViewFrame) + frame.statistics.size();
-    for (const auto& [name, points] : frame.outputs) bytes += points.bytes();
-    if (frame.scene)
-        for (const PictureScene::Body& body : frame.scene->bodies)
-            bytes += body.mesh->positions.size() * sizeof(Vec3f) / 4 +  // meshes are mostly shared
-                     body.mesh->triangles.size() * sizeof(Mesh::Triangle) / 4;
-    return bytes;
 }
 
 // The newest snapshot of a run at or before a frame.
@@ -65,7 +57,10 @@ public:
     {
         thread_ = std::thread([this] {
             tbb::task_arena arena(view_.options_.threads);
-            arena.execute([this] { run(); });
+            arena.execute([this] {
+                const Cancellation::Scope scope(&stop_.cancellation);
+                run();
+            });
             ended_ = true;
         });
     }
@@ -77,8 +72,8 @@ public:
 
     void abandon()
     {
+        stop_.request();
         const std::lock_guard lock(mutex_);
-        stop_ = true;
         wake_.notify_all();
     }
     bool ended() const { return ended_; }
@@ -102,8 +97,11 @@ public:
         Evaluator evaluator(plan, {}, [&](const Node& node, std::int64_t at, const PointSet& points) {
             if (at == frame) (*results)[node.name] = points;
         });
-        evaluator.leave_out_errors();
-        if (const Snapshot* snapshot = latest(snapshots_, frame - 1)) evaluator.load(*snapshot);
+        evaluator.tell_points();
+        if (const Snapshot* snapshot = latest(snapshots_, frame - 1))
+            evaluator.load(*snapshot);
+        else if (const auto kept = cached_snapshot_before(frame))
+            evaluator.load(*kept);
         while (evaluator.next_frame() <= frame && !stopped()) evaluator.advance();
         inspected_ = results;
         inspected_frame_ = frame;
@@ -159,11 +157,7 @@ private:
         return options;
     }
 
-    bool stopped()
-    {
-        const std::lock_guard lock(mutex_);
-        return stop_;
-    }
+    bool stopped() const { return stop_.cancellation.is_requested(); }
 
     // Calls `change` with the status, unless this run has been abandoned.
     template <class F>
@@ -185,13 +179,16 @@ private:
             compute();
         } catch (const std::exception& error) {
             const Error known = error_of(error);
-            tell([&](ViewStatus& status) {
-                status.state = ViewState::Failed;
-                status.error = known;
-            });
+            if (!stopped())
+                tell([&](ViewStatus& status) {
+                    status.state = ViewState::Failed;
+                    status.error = known;
+                });
         }
         // A scene that has failed may still be asked about what it has.
         while (const Task task = next_task(true)) task(*this);
+        // Those that have not been answered end at once, and say so.
+        for (const Task& task : std::exchange(tasks_, {})) task(*this);
     }
 
     void begin()
@@ -199,6 +196,12 @@ private:
         SessionOptions options = view_.options_.session;
         for (const auto& [name, value] : view_.values()) options.set[name] = value;
         options.on_read = [this](const fs::path& file) { note_file(file); };
+        options.keeps_state = view_.cache_ != nullptr;
+        if (view_.cache_)
+            contents_ = std::make_unique<InputContents>(fs::path(view_.options_.graph).parent_path(),
+                                                        InputContents::Code::LeftOut);
+        options.interruptible = true;
+        options.interruption = stop_.scripts;
         note_file(view_.options_.graph);
         session_ = std::make_unique<Session>(view_.options_.graph, std::move(options));
         tell([&](ViewStatus& status) { status.parameters = session_->parameters(); });
@@ -208,6 +211,9 @@ private:
         if (last < start) throw Error(fmt::format("-f: frame {} is before the scene's first, {}", last, start));
         first_ = start;
         last_ = last;
+        if (view_.cache_)
+            cached_ = view_.cache_->open(fingerprint_of(*session_, *plan_, view_.options_.graph, contents_->take()),
+                                         *contents_);
         tell([&, last_frame = last](ViewStatus& status) {
             status.state = ViewState::Computing;
             status.first = start;
@@ -224,9 +230,31 @@ private:
                     int& bytes = status.names.try_emplace(attribute.name, -1).first->second;
                     if (attribute.kept) bytes = std::max(bytes, static_cast<int>(attribute.bytes_per_point()));
                 }
+            for (const PlannedSimulation& simulation : plan_->simulations)
+                if (simulation.solve)
+                    for (const char* name : {"error", "substeps", "asleep"})  // Evaluator::tell_points
+                        status.names[name] = std::max(status.names[name], static_cast<int>(sizeof(float)));
             for (const std::string& text : session_->take_warnings()) warn(status, 0, text);
             for (const std::string& text : plan_->warnings) warn(status, 0, text);
+            take_known(status);
         });
+    }
+
+    // The frames that the cache has.
+    void take_known(ViewStatus& status)
+    {
+        if (!cached_) return;
+        for (const auto& [number, known] : cached_->known()) {
+            if (number < first_ || number > last_) continue;
+            view_.store_.add(number, number_, known.statistics, cached_);
+            for (const std::string& text : known.warnings) warn(status, number, text);
+        }
+    }
+
+    bool is_known(std::int64_t frame) const { return cached_ && cached_->known().contains(frame); }
+    std::optional<Snapshot> cached_snapshot_before(std::int64_t frame) const
+    {
+        return cached_ && !cached_->known().empty() ? cached_->snapshot_before(frame) : std::nullopt;
     }
 
     static void warn(ViewStatus& status, std::int64_t frame, const std::string& text)
@@ -243,11 +271,22 @@ private:
     void compute()
     {
         Evaluator evaluator(*plan_);
+        evaluator.tell_points();
         SceneOfPlan scenes(*plan_);
-        Stopwatch since_snapshot;
-        while (!stopped() && evaluator.next_frame() <= last_) {
+        Stopwatch since_snapshot, since_cached;
+        std::int64_t due = first_;
+        while (due <= last_ && is_known(due)) ++due;
+        if (due > first_) {
+            draw_graph();
+            if (const auto snapshot = cached_snapshot_before(due)) evaluator.load(*snapshot);
+        }
+        while (!stopped() && due <= last_ && evaluator.next_frame() <= last_) {
             while (const Task task = next_task(false)) task(*this);
             if (stopped()) return;
+            if (is_known(evaluator.next_frame())) {  // it leads from a snapshot to what is due
+                evaluator.advance();
+                continue;
+            }
             auto frame = std::make_shared<ViewFrame>();
             FrameResult result = evaluator.advance();
             frame->number = result.frame;
@@ -262,11 +301,15 @@ private:
                 keep_snapshot(evaluator.save());
                 since_snapshot = Stopwatch();
             }
-            if (!publish(frame, result.warnings)) return;
+            if (cached_ && (since_cached.seconds() > cached_seconds || result.frame == last_)) {
+                cached_->keep(evaluator.save());
+                since_cached = Stopwatch();
+            }
+            if (!publish(frame, result.warnings, result.frame > first_)) return;
             if (result.frame == first_) {
                 auto with_shapes = std::make_shared<ViewFrame>(*frame);
                 with_shapes->scene = scenes.at(result.frame);
-                if (!publish(with_shapes, {})) return;
+                if (!publish(with_shapes, {}, true)) return;
                 draw_graph();
             }
         }
@@ -275,11 +318,19 @@ private:
         tell([](ViewStatus& status) { status.state = ViewState::Done; });
     }
 
-    bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings)
+    // is_whole: it has its shapes, and may go to the cache.
+    bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, bool is_whole)
     {
         if (stopped()) return false;
-        const bool kept = view_.store_.put(frame);
+        if (cached_ && is_whole) cached_->put(*frame, warnings, contents_->take());
+        bool kept = view_.store_.put(frame, is_whole ? cached_ : nullptr);
+        if (!kept && cached_ && is_whole) {
+            view_.store_.add(frame->number, number_, frame->statistics, cached_);
+            kept = true;
+        }
         tell([&](ViewStatus& status) {
+            if (cached_)
+                for (const std::string& text : cached_->take_failures()) warn(status, frame->number, text);
             for (const std::string& text : session_->take_warnings()) warn(status, frame->number, text);
             for (const std::string& text : warnings) warn(status, frame->number, text);
             if (!kept) status.state = ViewState::Full;
@@ -301,13 +352,15 @@ private:
     {
         const GraphPicture picture = picture_of(*plan_);
         std::string laid_out, why_not;
-        try {
-            laid_out = lay_out(to_dot(picture), "json");
-        } catch (const Error& error) {
-            why_not = error.what();
-        }
+        // The page lays out the others: dot would take seconds, and the sandbox starts no program.
+        if (picture.nodes.size() <= most_laid_out && !view_.options_.is_confined) try {
+                laid_out = lay_out(to_dot(picture), "json");
+            } catch (const Error& error) {
+                why_not = error.what();
+            }
+        const auto json = std::make_shared<const std::string>(to_json(picture, laid_out));
         tell([&](ViewStatus& status) {
-            status.graph = to_json(picture, laid_out);
+            status.graph = json;
             ++status.graph_number;
             status.no_graph = why_not;
         });
@@ -315,6 +368,7 @@ private:
 
     void note_file(const fs::path& file)
     {
+        if (contents_) contents_->add(file);
         const std::lock_guard lock(view_.mutex_);
         if (view_.status_.run == number_) view_.read_.try_emplace(fs::absolute(file), changed_at(file));
     }
@@ -323,8 +377,8 @@ private:
     Task next_task(bool wait)
     {
         std::unique_lock lock(mutex_);
-        if (wait) wake_.wait(lock, [&] { return stop_ || !tasks_.empty(); });
-        if (stop_ || tasks_.empty()) return {};
+        if (wait) wake_.wait(lock, [&] { return stopped() || !tasks_.empty(); });
+        if (stopped() || tasks_.empty()) return {};
         Task task = std::move(tasks_.front());
         tasks_.pop_front();
         return task;
@@ -334,6 +388,8 @@ private:
     const std::uint64_t number_;
     std::unique_ptr<Session> session_;
     std::unique_ptr<Plan> plan_;
+    std::unique_ptr<InputContents> contents_;  // of the files that it reads; null without a cache
+    std::shared_ptr<CachedRun> cached_;        // null without a cache
     std::int64_t first_ = 1, last_ = 1;
     std::map<std::int64_t, Snapshot> snapshots_;
     std::shared_ptr<const Results> inspected_;
@@ -342,7 +398,7 @@ private:
     std::mutex mutex_;
     std::condition_variable wake_;
     std::deque<Task> tasks_;
-    bool stop_ = false;
+    Stop stop_;
     std::atomic<bool> ended_{false};
     std::thread thread_;  // the last member: it starts when the others are initialised
 };
@@ -351,6 +407,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
     : options_(std::move(options)), changed_(std::move(changed)), store_(options_.memory)
 {
     status_.version = 1;
+    if (!options_.cache.empty()) cache_ = std::make_unique<FrameCache>(options_.cache);
     if (!is_sequence()) {
         begin();
         return;
@@ -363,7 +420,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
 
 ViewSimulation::~ViewSimulation()
 {
-    if (tracer_stop_) *tracer_stop_ = true;
+    if (tracer_stop_) tracer_stop_->request();
     if (tracer_.joinable()) tracer_.join();
     if (run_) run_->abandon();
     run_.reset();
@@ -372,10 +429,6 @@ ViewSimulation::~ViewSimulation()
 
 void ViewSimulation::begin()
 {
-    if (run_) {
-        run_->abandon();
-        ending_.push_back(std::move(run_));
-    }
     std::uint64_t number = 0;
     {
         const std::lock_guard lock(mutex_);
@@ -384,9 +437,19 @@ void ViewSimulation::begin()
         status_.state = ViewState::Starting;
         read_.clear();
     }
+    if (run_) {
+        run_->abandon();
+        ending_.push_back(std::move(run_));
+    }
     collect_ended();
     run_ = std::make_unique<Run>(*this, number);
     changed_();
+}
+
+void ViewSimulation::Stop::request()
+{
+    cancellation.request();
+    scripts->request(Cancellation::text, Interruption::Asked);
 }
 
 // Those that are at their end; of too many, waits for the first.
@@ -394,6 +457,8 @@ void ViewSimulation::collect_ended()
 {
     std::erase_if(ending_, [](const auto& run) { return run->ended(); });
     while (ending_.size() > most_ending) ending_.pop_front();
+    const std::lock_guard lock(mutex_);
+    status_.ending = ending_.size();
 }
 
 void ViewSimulation::set(std::map<std::string, std::string> values)
@@ -504,15 +569,17 @@ void ViewSimulation::trace(const Origin& point, std::int64_t last,
                            std::function<void(std::string json, std::string error)> told)
 {
     if (is_sequence()) return told("", "a sequence of files has no biographies");
-    if (tracer_stop_) *tracer_stop_ = true;
+    if (tracer_stop_) tracer_stop_->request();
     if (tracer_.joinable()) tracer_.join();
-    tracer_stop_ = std::make_shared<std::atomic<bool>>(false);
+    tracer_stop_ = std::make_shared<Stop>();
     SessionOptions session = options_.session;
     for (const auto& [name, value] : values()) session.set[name] = value;
-    session.quiet = true;
+    session.interruptible = true;
+    session.interruption = tracer_stop_->scripts;
     tracer_ = std::thread([=, this, stop = tracer_stop_, told = std::move(told)] {
         tbb::task_arena arena(options_.threads);
         arena.execute([&] {
+            const Cancellation::Scope scope(&stop->cancellation);
             try {
                 const Session scene(options_.graph, session);
                 PlanOptions options;
@@ -523,11 +590,11 @@ void ViewSimulation::trace(const Origin& point, std::int64_t last,
                 Evaluator evaluator(plan, {}, biographer.results());
                 evaluator.leave_out_errors();
                 biographer.watch(evaluator);
-                while (evaluator.next_frame() <= last && !*stop) biographer.add(evaluator.advance());
-                if (*stop) return told("", "another point was asked for");
+                while (evaluator.next_frame() <= last) biographer.add(evaluator.advance());
                 told(to_json(biographer.lives()), "");
             } catch (const std::exception& error) {
-                told("", error_of(error).what());
+                const bool is_stopped = stop->cancellation.is_requested();
+                told("", is_stopped ? "another point was asked for" : error_of(error).what());
             }
         });
     });

@@ -1,8 +1,9 @@
 // What a viewer shows: a scene that is run again whenever something changes, or the files of a sequence. The only place
 // where the viewer meets sessions and evaluators.
 //
-// Each run has a thread and a session of its own. A change abandons it: it ends after the frame that it is in, while
-// the next one has begun already. At most two are ending at a time; then the next one waits.
+// Each run has a thread and a session of its own. A change abandons it: its scripts, and the sub-steps of Solve, end
+// within the frame (Interruption, Cancellation), while the next run has begun already. At most two are ending at a
+// time; then the next one waits.
 #pragma once
 
 #include <atomic>
@@ -20,7 +21,9 @@
 #include <vector>
 
 #include "bindings/host/session.h"
+#include "bindings/view/frame_cache.h"
 #include "bindings/view/frame_store.h"
+#include "runtime/cancellation.h"
 #include "runtime/error.h"
 
 namespace rapid {
@@ -32,7 +35,9 @@ struct ViewOptions {
     std::optional<std::pair<std::int64_t, std::int64_t>> frames;
     std::map<int, std::filesystem::path> files;  // a sequence: there is no graph
     int threads = 1;
-    std::size_t memory = 0;  // bytes that frames may take
+    std::size_t memory = 0;       // bytes that frames may take
+    std::filesystem::path cache;  // where frames are kept, too; empty: nowhere
+    bool is_confined = false;     // --untrusted: no other programs
 };
 
 enum class ViewState { Starting, Computing, Done, Full, Failed };
@@ -49,15 +54,16 @@ struct ViewStatus {
     std::uint64_t more_warnings = 0;                             // that are not kept
     std::vector<Session::Parameter> parameters;
     std::vector<std::string> outputs;
-    std::string graph;                 // the picture as JSON; empty where there is none
-    std::uint64_t graph_number = 0;    // grows with every other picture
-    std::string no_graph;              // why
+    std::shared_ptr<const std::string> graph;  // the picture as JSON; null where there is none
+    std::uint64_t graph_number = 0;            // grows with every other picture
+    std::string no_graph;                      // why
     std::map<std::string, int> names;  // attributes and groups of the plan, with bytes a point; -1 where left out
+    std::size_t ending = 0;            // runs that have been abandoned, and have not ended yet
 };
 
 class ViewSimulation {
 public:
-    // changed: called from any thread, whenever version grows.
+    // changed: called from any thread, whenever version grows. Error: of the cache's folder.
     ViewSimulation(ViewOptions options, std::function<void()> changed);
     ~ViewSimulation();
 
@@ -70,8 +76,10 @@ public:
     ViewStatus status() const;
     // Null: it is not computed. Of a sequence the file is read. Error: it can't be.
     ViewFramePtr frame(std::int64_t number);
+    FrameStore& store() { return store_; }
     const FrameStore& store() const { return store_; }
     bool is_sequence() const { return !options_.files.empty(); }
+    const ViewOptions& options() const { return options_; }
 
     // Calls `told` from the run's thread with the points as they are after each node in a frame, by name, or with an
     // error. The run goes on afterwards.
@@ -100,15 +108,21 @@ private:
     const ViewOptions options_;
     const std::function<void()> changed_;
     FrameStore store_;
+    std::unique_ptr<FrameCache> cache_;  // null where there is none
     mutable std::mutex mutex_;
     ViewStatus status_;
     std::map<std::filesystem::path, std::filesystem::file_time_type> read_;  // files, and when they were changed
     std::map<std::string, std::string> values_;
     std::unique_ptr<Run> run_;
     std::deque<std::unique_ptr<Run>> ending_;
-    std::uint64_t file_uses_ = 0;  // of a sequence: counts the files that were read
+    std::atomic<std::uint64_t> file_uses_ = 0;  // of a sequence: counts the files that were read
     std::thread tracer_;
-    std::shared_ptr<std::atomic<bool>> tracer_stop_;
+    struct Stop {
+        Cancellation cancellation;
+        std::shared_ptr<Interruption> scripts = std::make_shared<Interruption>();
+        void request();
+    };
+    std::shared_ptr<Stop> tracer_stop_;
 };
 
 }  // namespace rapid

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <linux/keyctl.h>
 #include <linux/perf_event.h>
+#include <netinet/in.h>
 #include <sched.h>
 #include <sys/ioctl.h>
 #include <sys/ipc.h>
@@ -38,11 +39,13 @@ namespace {
 constexpr int not_loaded = 254;
 
 // The errno of a call that returns -1, in a process with the filter; 0 where it succeeds.
-int error_in_sandbox(Processes processes, const std::function<long()>& call)
+int error_in_sandbox(Processes processes, const std::function<long()>& call,
+                     Connections connections = Connections::None)
 {
     const pid_t child = fork();
     if (child == 0) {
-        if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 || load_system_call_filter(processes) != 0) _exit(not_loaded);
+        if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 || load_system_call_filter(processes, connections) != 0)
+            _exit(not_loaded);
         errno = 0;
         _exit(call() == -1 ? errno : 0);
     }
@@ -107,6 +110,47 @@ TEST_CASE("in the sandbox no other process is reached", "[untrusted]")
             CAPTURE(name);
             CHECK(error_in_sandbox(processes, call) == EPERM);
         }
+}
+
+TEST_CASE("a viewer's sandbox accepts connections, and makes none", "[untrusted]")
+{
+    const int listening = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0),
+              client = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in here{};
+    here.sin_family = AF_INET;
+    here.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof here;
+    const auto* address = reinterpret_cast<const sockaddr*>(&here);
+    REQUIRE(bind(listening, address, sizeof here) == 0);
+    REQUIRE(listen(listening, 1) == 0);
+    REQUIRE(getsockname(listening, reinterpret_cast<sockaddr*>(&here), &size) == 0);
+    REQUIRE(connect(client, address, sizeof here) == 0);
+    const auto converse = [&]() -> long {
+        const int page = accept4(listening, nullptr, nullptr, SOCK_CLOEXEC);
+        return page < 0 ? -1 : send(page, "x", 1, MSG_NOSIGNAL);
+    };
+    CHECK(error_in_sandbox(Processes::None, converse, Connections::Accepted) == 0);
+    char answer = 0;
+    CHECK(recv(client, &answer, 1, 0) == 1);
+    CHECK(error_in_sandbox(Processes::None, converse) == EPERM);
+    const std::map<std::string, std::function<long()>> calls = {
+        {"socket", [] { return socket(AF_INET, SOCK_STREAM, 0); }},
+        {"local socket", [] { return socket(AF_UNIX, SOCK_DGRAM, 0); }},
+        {"socketpair",
+         [] {
+             int ends[2];
+             return socketpair(AF_UNIX, SOCK_STREAM, 0, ends);
+         }},
+        {"connect", [&] { return connect(client, address, sizeof here); }},
+        {"bind", [&] { return bind(client, address, sizeof here); }},
+        {"listen", [&] { return listen(client, 1); }},
+    };
+    for (const auto& [name, call] : calls) {
+        CAPTURE(name);
+        CHECK(error_in_sandbox(Processes::None, call, Connections::Accepted) == EPERM);
+    }
+    close(listening);
+    close(client);
 }
 
 TEST_CASE("in the sandbox no file's mode, owner, time or attribute is changed", "[untrusted]")

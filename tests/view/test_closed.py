@@ -1,11 +1,13 @@
 """What the server refuses, hostile names, the sandbox."""
 import http.client
 import json
+import pathlib
 import socket
 import subprocess
+import tempfile
 
-from bench import choose, set_parameter, test, wait_for_run
-from browser import View
+from bench import choose, SCENE, go, set_parameter, test, wait_for_run
+from browser import View, wait_for
 
 
 def request(view, target, headers=None, method="GET"):
@@ -18,6 +20,44 @@ def request(view, target, headers=None, method="GET"):
     text = answer.read()
     connection.close()
     return answer.status, text, answer
+
+
+def confinement(view):
+    with open(f"/proc/{view.process.pid}/status", encoding="ascii") as file:
+        return dict(line.rstrip("\n").split(":\t", 1) for line in file if ":\t" in line)
+
+
+def open_socket(view):
+    """A WebSocket by hand; returns the socket behind the answer to the upgrade."""
+    raw = socket.create_connection(("127.0.0.1", view.port), timeout=20)
+    raw.sendall((f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nOrigin: http://127.0.0.1:{view.port}\r\n"
+                 f"Cookie: rapid_{view.port}={view.token}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n").encode())
+    head = b""
+    while b"\r\n\r\n" not in head:
+        head += raw.recv(1)
+    assert b" 101 " in head.split(b"\r\n")[0], head
+    return raw
+
+
+def frame_of(text, opcode=1):
+    data, mask = text.encode(), b"\0\0\0\0"
+    size = len(data)
+    length = bytes([0x80 | size]) if size < 126 else bytes([0xfe]) + size.to_bytes(2, "big") if size < 65536 else (
+        bytes([0xff]) + size.to_bytes(8, "big"))
+    return bytes([0x80 | opcode]) + length + mask + data
+
+
+def is_closed(raw):
+    """Whether the other end has closed, once what it has sent is read."""
+    try:
+        while raw.recv(1 << 20):
+            pass
+    except ConnectionResetError:
+        pass
+    except socket.timeout:
+        return False
+    return True
 
 
 @test
@@ -99,6 +139,83 @@ def refuses_strangers(bench):
     listening = subprocess.run(["grep", "-i", f":{view.port:04X} 00000000:0000 0A", "/proc/net/tcp"], check=True,
                                capture_output=True, text=True).stdout
     assert listening.split()[1].startswith("0100007F:"), listening
+
+
+@test
+def an_untrusted_scene_is_shown_in_the_sandbox(bench):
+    browser = bench.ready(SCENE, "-f", "1-12", "--untrusted")
+    assert confinement(bench.view)["Seccomp"] == "2" and confinement(bench.view)["NoNewPrivs"] == "1"
+    go(browser, 9)
+    row = bench.rows(9)[3]
+    point = browser.promise("rapidView.ask('point', {frame: 9, id: 3})")
+    assert abs(point["values"]["P"][1] - row["Py"]) < 1e-7
+    # The graph is laid out by the page; films would need another program.
+    assert browser.run("return document.querySelectorAll('#graph .node').length") == 11
+    browser.type("o")
+    assert browser.run("return document.getElementById('out-film').offsetParent === null")
+    refused = browser.promise("rapidView.ask('film', {extension: '.gif', first: 1, last: 2}).catch((e) => e.message)")
+    assert "--untrusted" in refused, refused
+    # It goes on with changes, and reads nothing outside of its folder.
+    run = browser.run("return rapidView.state.status.run")
+    with tempfile.TemporaryDirectory() as elsewhere:
+        stolen = pathlib.Path(elsewhere, "secret.obj")
+        stolen.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
+        (bench.path / "scene.lua").write_text(SCENE.replace(
+            'require "rapid"\n', f'require "rapid"\nlocal stolen = rapid.mesh.read "{stolen}"\n', 1), encoding="utf-8")
+        browser.wait(f"rapidView.state.status.run > {run} && rapidView.state.status.state === 'failed'")
+    assert "secret.obj" in browser.run("return document.getElementById('error').innerText")
+    (bench.path / "scene.lua").write_text(SCENE, encoding="utf-8")
+    wait_for_run(browser, run + 1)
+    assert request(bench.view, "/page.js")[0] == 403
+
+
+@test
+def oversized_messages_end_their_connection_alone(bench):
+    browser = bench.ready()
+    raw = open_socket(bench.view)
+    before = bench.view.memory()
+    raw.sendall(bytes([0x81, 0xff]) + (1 << 40).to_bytes(8, "big") + b"\0\0\0\0" + b"x" * 1000)
+    assert is_closed(raw)
+    with open_socket(bench.view) as raw:
+        try:
+            raw.sendall(frame_of("x" * (2 << 20)))
+        except (ConnectionResetError, BrokenPipeError):
+            pass
+        assert is_closed(raw)
+    assert bench.view.memory() - before < 8 << 20
+    for target, size in ((f"/?{'x' * 20000}", 0), ("/", 1 << 20)):
+        connection = http.client.HTTPConnection("127.0.0.1", bench.view.port, timeout=10)
+        try:
+            connection.putrequest("GET", target, skip_host=True)
+            connection.putheader("Host", f"127.0.0.1:{bench.view.port}")
+            if size:
+                connection.putheader("Content-Length", str(size))
+            connection.endheaders()
+            connection.send(b"x" * size)
+            assert connection.getresponse().status in (400, 403, 413, 431)
+        except (ConnectionError, http.client.HTTPException):
+            pass  # it is closed without an answer
+        finally:
+            connection.close()
+    assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
+
+
+@test
+def a_reader_that_does_not_read_slows_nobody(bench):
+    browser = bench.ready("""local rapid = require "rapid"
+local P = {}
+for i = 1, 200000 do P[i] = {i * 1e-5, 0, 0} end
+return rapid.create { points = rapid.points.from { P = P } } :gravity {} :solve {}""", "-f", "1-6")
+    before = bench.view.memory()
+    with open_socket(bench.view) as raw:
+        for k in range(400):  # of 1.6 MB each
+            raw.sendall(frame_of(json.dumps({"re": k, "do": "frame", "frame": 1 + k % 6})))
+        for frame in (2, 5, 3):
+            go(browser, frame)
+        assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
+        wait_for(lambda: bench.view.memory() - before < 256 << 20, 30)
+        assert is_closed(raw), "it waits for ever"
+    wait_for(lambda: bench.view.memory() - before < 64 << 20, 30)
 
 
 @test

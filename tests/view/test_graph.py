@@ -40,3 +40,29 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
             browser.run("document.querySelector('#graph [data-node=gusts]').dispatchEvent(new Event('click'))")
         browser.wait("[...document.querySelectorAll('#node tr')].some((row) => row.textContent.startsWith('velocity')"
                      f" && row.textContent.includes('{frame}, 0, 0'))")
+
+
+@test
+def a_graph_of_a_thousand_nodes_is_searched(bench):
+    browser = bench.ready("""local rapid = require "rapid"
+local chain = rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
+for i = 1, 1000 do chain = chain:drag { name = "brake" .. i, linear = 0.001 } end
+return chain:gravity {} :solve {}""", "-f", "1-5")
+    browser.wait("document.querySelectorAll('#graph .node').length === 1003")
+    inside = """return [...document.querySelectorAll('#graph .node rect')].every((r) => {
+      const [x, y, w, h] = ['x', 'y', 'width', 'height'].map((k) => Number(r.getAttribute(k)));
+      const [x0, y0, wide, tall] = document.getElementById('graph').getAttribute('viewBox').split(' ').map(Number);
+      return x >= x0 && y >= y0 && x + w <= x0 + wide && y + h <= y0 + tall; })"""
+    assert browser.run(inside)
+    wide = browser.run("return [document.getElementById('graph').getBoundingClientRect().width,"
+                       " document.getElementById('graph-panel').clientWidth]")
+    assert wide[0] <= wide[1], "the graph is wider than its panel"
+    browser.run("document.getElementById('canvas').focus()")
+    browser.type("/")
+    browser.type("brake777")
+    browser.wait("document.querySelectorAll('#graph .found').length === 1")
+    seen = """const a = document.querySelector('#graph .found').getBoundingClientRect(),
+      b = document.getElementById('graph-panel').getBoundingClientRect(); return a.top >= b.top - 1 && a.bottom <= b.bottom + 1"""
+    assert browser.run(seen)
+    browser.type("\ue007")
+    browser.wait("rapidView.picture.message.after === 'brake777'")

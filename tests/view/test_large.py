@@ -1,5 +1,27 @@
 """Graphs and runs of sizes that are used, for long."""
-from bench import test
+from bench import go, statistics, test
+
+
+@test
+def a_scene_of_ten_thousand_frames_is_walked_through(bench):
+    browser = bench.open("""local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} }, fps = 24 } :gravity {}
+  :collide { shape = rapid.shape.plane {}, bounce = 1 } :solve {}""", "-f", "1-10000")
+    browser.wait("window.rapidView?.state.statistics.length === 10000", 300)
+    browser.run("document.getElementById('figures-tab').click()")
+    for frame in (10000, 1, 7777):
+        go(browser, frame)
+    for k in range(20):
+        browser.run(f"rapidView.go({1 + k * 499})")
+    browser.wait("document.body.dataset.frame === '9482'")
+    # The curves go to the last frame, whichever is shown.
+    browser.wait("""(() => { const c = [...document.querySelectorAll('#figures canvas')].find((c) => c.offsetParent);
+      const data = c.getContext('2d').getImageData(c.width - 3, 0, 2, c.height).data;
+      return data.some((value, k) => k % 4 === 3 && value > 0); })()""")
+    box = browser.run("const b = document.querySelector('#timeline canvas').getBoundingClientRect();"
+                      "return [b.left, b.top, b.width, b.height]")
+    browser.click_at(box[0] + box[2] - 6, box[1] + box[3] / 2)
+    browser.wait("document.body.dataset.frame === '10000'")
 
 
 @test

@@ -1,7 +1,9 @@
 """What the picture shows: points, colours, shapes, trails, the camera."""
+import json
+import math
 import subprocess
 
-from bench import choose, go, test
+from bench import choose, go, statistics, test
 from browser import wait_for
 
 
@@ -17,6 +19,25 @@ COLOURED = """(() => {
     if (Math.max(data[i], data[i + 1], data[i + 2]) - Math.min(data[i], data[i + 1], data[i + 2]) > 60) ++count;
   return count;
 })()"""
+
+
+def column(browser, frame, name, **wish):
+    """The values of an attribute, as the picture has them: from 0 for the least to 1; None where there is none."""
+    given = json.dumps({"frame": frame, "colour": name, **wish})
+    values, gaps = browser.promise(f"rapidView.ask('frame', {given}).then((m) =>"
+                                   " [[...m.arrays.value], m.unknown.value])")
+    if not gaps:
+        return [value / 65535 for value in values]
+    return [None if value == 0 else (value - 1) / 65534 for value in values]
+
+
+# Points that an attractor draws in, the nearer the faster; a tolerance gives each the sub-steps that it needs.
+ORBITS = """local rapid = require "rapid"
+local P = {}
+for i = 1, 60 do P[i] = {0.3 + i * 0.05, 0, 0} end
+return rapid.create { points = rapid.points.from { P = P } } :attract { strength = 4 }
+  :solve { SOLVE }
+"""
 
 
 @test
@@ -59,6 +80,68 @@ def colours_by_an_attribute_with_its_range(bench):
     wanted = sum(row["group:warm"] for row in bench.rows(12))
     assert 0 < wanted < 40
     browser.wait(f"document.body.dataset.shown === '{int(wanted)}'")
+
+
+@test
+def colours_by_the_estimated_error(bench):
+    text = ORBITS.replace("SOLVE", "substeps = 2")
+    browser = bench.ready(text)
+    assert "error" in browser.run("return [...document.getElementById('colour').options].map((o) => o.value)")
+    choose(browser, "colour", "error")
+    browser.wait("rapidView.picture.message.colour === 'error' && !document.getElementById('legend').hidden")
+    go(browser, 12)
+    low, high = browser.run("return rapidView.picture.message.ranges.value")
+    # The largest is the one that the statistics tell.
+    wanted = statistics(bench, text, "1-12")[12]["error"]
+    assert abs(high - wanted["position_max"]) <= 1e-6 * wanted["position_max"], (high, wanted)
+    values = column(browser, 12, "error")
+    assert None not in values and values.index(max(values)) < 20 and low < high / 100
+    # In the first frame nothing has moved yet.
+    go(browser, 1)
+    assert browser.run("return rapidView.picture.message.ranges.value") == [0, 0]
+
+
+@test
+def points_without_an_estimate_are_told_apart(bench):
+    text = ORBITS.replace("60", "3000").replace("0.05", "0.001").replace("SOLVE", "substeps = 2")
+    browser = bench.ready(text, "-f", "1-6")
+    choose(browser, "colour", "error")
+    browser.wait("rapidView.picture.message.colour === 'error'")
+    go(browser, 6)
+    values = column(browser, 6, "error")
+    known = sum(value is not None for value in values)
+    assert 1000 <= known <= 1250, known
+    assert browser.run("return rapidView.picture.uniforms.gaps.value") == 1
+    assert f"{known:,}".replace(",", " ") in browser.run("return document.getElementById('legend').innerText")
+
+
+@test
+def colours_by_the_sub_steps_of_each_point(bench):
+    text = ORBITS.replace("SOLVE", "tolerance = 1e-5")
+    browser = bench.ready(text)
+    go(browser, 6)
+    table = browser.promise("rapidView.ask('sheet', {frame: 6, count: 60}).then((s) => s.rows.map((r) => r.values))")
+    taken = [row["substeps"] for row in table]
+    assert max(taken) == statistics(bench, text, "1-6")[6]["substeps"], taken
+    assert len(set(taken)) >= 3 and all(n & (n - 1) == 0 for n in taken)
+    choose(browser, "colour", "substeps")
+    browser.wait("rapidView.picture.message.colour === 'substeps'")
+    assert browser.run("return rapidView.picture.message.ranges.value") == [min(taken), max(taken)]
+
+
+@test
+def colours_by_sleep(bench):
+    text = """local rapid = require "rapid"
+local P = {}
+for i = 1, 60 do P[i] = {i % 8 * 0.5, 0.1 + (i > 30 and i * 0.5 or 0), math.floor(i / 8) * 0.5} end
+return rapid.create { points = rapid.points.from { P = P } } :attribute { pscale = 0.1 } :gravity {}
+  :collide { shape = rapid.shape.plane {} } :contact {} :solve { substeps = 4 }
+"""
+    browser = bench.ready(text, "-f", "1-36")
+    asleep = statistics(bench, text, "1-36")[36]["asleep"]
+    assert 0 < asleep < 60
+    values = column(browser, 36, "asleep")
+    assert sum(value == 1 for value in values) == asleep
 
 
 @test

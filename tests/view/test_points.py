@@ -2,7 +2,7 @@
 import math
 import time
 
-from bench import go, statistics, test
+from bench import SCENE, go, statistics, test
 
 
 @test
@@ -79,6 +79,19 @@ def the_path_of_a_point_is_drawn(bench):
                       "return [b.left, b.top, b.width, b.height]")
     browser.click_at(box[0] + box[2] * (8 - 1) / 29, box[1] + box[3] / 2)
     browser.wait("document.body.dataset.frame === '8'")
+
+
+@test
+def warnings_lead_to_their_first_frame(bench):
+    browser = bench.open("""local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.shape.sphere { radius = 0.1 }, rate = 240 }
+  :collide { shape = rapid.shape.sphere { radius = 1 }, response = "die" } :solve {}""")
+    browser.wait("window.rapidView?.state.status?.state === 'done'")
+    first = browser.run("return rapidView.state.status.warnings.filter((w) => w.frame > 0)[0]")
+    assert first and first["frame"] > 1, browser.run("return rapidView.state.status.warnings")
+    go(browser, 1)
+    browser.run("document.querySelector('#messages li button').click()")
+    browser.wait(f"document.body.dataset.frame === '{first['frame']}'")
 
 
 @test

@@ -4,7 +4,17 @@ import subprocess
 import time
 
 from bench import SCENE, go, set_parameter, test, wait_for_run
-from browser import View
+from browser import View, wait_for
+
+
+# The second frame would take hours: a million sub-steps of many points.
+SLOW = """local rapid = require "rapid"
+local slow = rapid.param("slow", true, "whether it takes hours")
+local P = {}
+for i = 1, 20000 do P[i] = {i * 1e-4 + 0.5, 1, 0} end
+return rapid.create { points = rapid.points.from { P = P } } :attract { strength = 0.1 }
+  :solve { substeps = slow and 1000000 or 1 }
+"""
 
 
 @test
@@ -109,6 +119,89 @@ return rapid.create { points = rapid.points.from { P = P } } :gravity {} :solve 
 
 
 @test
+def a_change_abandons_a_slow_frame_within_it(bench):
+    for text in (SLOW, SLOW.replace(":attract {", """:points("wait", function(p)
+      if slow and p.id == 7 then while true do end end end) :attract {""").replace("1000000", "1")):
+        browser = bench.open(text, "-f", "1-4")
+        browser.wait("window.rapidView?.state.status?.state === 'computing' && document.body.dataset.frame === '1'")
+        run = browser.run("return rapidView.state.status.run")
+        browser.run("document.querySelector('[data-name=slow] input').click()")
+        wait_for_run(browser, run)
+        wait_for(lambda: browser.promise("rapidView.ask('status', {since: 0, graph: 0}).then((s) => s.ending)") == 0)
+        assert browser.run("return rapidView.state.status.ready") == [[1, 4]]
+
+
+@test
+def the_timeline_shows_what_is_computed_and_what_is_stale(bench):
+    browser = bench.open(SLOW.replace("or 1 }", "or 2 }").replace('"slow", true', '"slow", false'), "-f", "1-10")
+    browser.wait("window.rapidView?.state.status?.state === 'done'")
+    run = browser.run("return rapidView.state.status.run")
+    browser.run("document.querySelector('[data-name=slow] input').click()")
+    browser.wait(f"rapidView.state.status.run > {run} && rapidView.state.status.ready.length")
+    pixel = """const c = document.querySelector('#timeline canvas'), r = devicePixelRatio, f = arguments[0];
+      const x = 6 + (f - 1) / 9 * (c.clientWidth - 12), y = c.clientHeight - 6;
+      return [...c.getContext('2d').getImageData(x * r, y * r, 1, 1).data].slice(0, 3);"""
+    named = """const d = document.createElement('canvas').getContext('2d');
+      d.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--' + arguments[0]);
+      d.fillRect(0, 0, 1, 1); return [...d.getImageData(0, 0, 1, 1).data].slice(0, 3);"""
+    go(browser, 6)
+    for frame, name in ((1, "good"), (2, "accent"), (9, "stale")):
+        wait_for(lambda: browser.run(pixel, frame) == browser.run(named, name))
+
+
+@test
+def a_cache_keeps_the_frames_for_the_next_view(bench):
+    computed = "rapidView.ask('figures').then((f) => f.figures.map((s) => s.seconds.total))"
+    bench.ready(SCENE, "-f", "1-20", "--cache", "kept")
+    first = bench.browser.promise(computed)
+    bench.end()
+    files = {file.name: file.stat().st_mtime_ns for file in bench.path.glob("kept/view/*/frame.*.rapid")}
+    assert len(files) == 20
+    browser = bench.ready(SCENE, "-f", "1-20", "--cache", "kept")
+    assert browser.promise(computed) == first, "frames were computed again"
+    go(browser, 12)
+    rows = bench.rows(12)
+    points = browser.promise("rapidView.ask('sheet', {frame: 12}).then((s) => s.rows.map((r) => r.values))")
+    for row, point in zip(rows, points):
+        assert all(abs(point["P"][k] - row[name]) <= 1e-8 * max(1, abs(row[name])) for k, name in enumerate(("Px", "Py", "Pz")))
+    assert browser.run("return rapidView.picture.shapes.children.length") == 1
+    # Further frames go on behind these; other parameters are another run, and back again the frames are there.
+    bench.ready(SCENE, "-f", "1-30", "--cache", "kept")
+    longer = bench.browser.promise(computed)
+    assert longer[:20] == first and len(longer) == 30
+    run = browser.run("return rapidView.state.status.run")
+    set_parameter(browser, "count", 7)
+    wait_for_run(browser, run)
+    assert browser.promise(computed) != longer
+    browser.run("document.querySelector('#parameters h2 button').click()")
+    wait_for_run(browser, run + 1)
+    assert browser.promise(computed) == longer
+    # A file that is not whole is computed again.
+    bench.end()
+    next(file for file in bench.path.glob("kept/view/*/frame.0012.rapid")).unlink()
+    browser = bench.ready(SCENE, "-f", "1-20", "--cache", "kept")
+    go(browser, 12)
+    again = browser.promise(computed)
+    assert again[:11] == first[:11] and again[12:] == first[12:20]
+
+
+@test
+def with_a_cache_memory_holds_what_was_seen_last(bench):
+    text = """local rapid = require "rapid"
+local P = {}
+for i = 1, 50000 do P[i] = {i * 1e-5, 0, 0} end
+return rapid.create { points = rapid.points.from { P = P } } :gravity {} :solve {}"""
+    browser = bench.ready(text, "-f", "1-60", "--memory", "100M", "--cache", "kept-small")
+    status = browser.run("return rapidView.state.status")
+    assert status["ready"] == [[1, 60]] and status["bytes"] <= status["most_bytes"] == 50 << 20
+    for frame in (3, 59, 17, 30):
+        go(browser, frame)
+        height = browser.run("return rapidView.picture.message.box[0][1]")
+        t = (frame - 1) / 24
+        assert abs(height + 9.81 * t * t / 2) < 1e-5 * max(1, -height), (frame, height)
+
+
+@test
 def the_set_options_are_those_of_the_command(bench):
     browser = bench.ready()
     run = browser.run("return rapidView.state.status.run")
@@ -135,6 +228,17 @@ def a_saved_module_runs_the_scene_again(bench):
     (bench.path / "sizes.lua").write_text("return { count = 12 }", encoding="utf-8")
     wait_for_run(browser, run)
     assert browser.run("return document.body.dataset.shown") == "12"
+
+
+@test
+def a_script_that_takes_too_long_is_an_error_of_the_page(bench):
+    browser = bench.open("""local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
+  :points("wait", function(p, frame) while frame.number > 2 do end end) :solve {}""", "-f", "1-9", "--script-timeout", "1")
+    browser.wait("window.rapidView?.state.status?.state === 'failed'")
+    assert "script" in browser.run("return document.getElementById('error').innerText")
+    go(browser, 2)
+    assert browser.run("return document.body.dataset.shown") == "1"
 
 
 @test

@@ -195,7 +195,7 @@ async function show(frame, fresh = false) {
     if (!state.fitted && (message.shown > 0 || shapes.bodies.length)) { state.fitted = message.shown > 0; picture.fit(); }
   }, () => {});
   if (first || fresh || !state.playing) refreshDetails();
-  figures.show(state.statistics, state.status.first, state.status.last, frame);
+  drawFigures();
   tellFrame();
 }
 
@@ -458,7 +458,7 @@ function drawFigures() {
   figuresDue ||= setTimeout(() => {
     figuresDue = 0;
     figures.show(state.statistics, state.status.first, state.status.last, state.frame);
-  }, 250);
+  }, state.statistics.length > 1000 ? 250 : 16);
 }
 
 // One request at a time, of some hundred frames each.

@@ -186,12 +186,12 @@ void push_point_names(lua_State* L)
     lua_setfield(L, -2, "read_only");
 }
 
-}  // namespace
-
 std::string memory_limit_text(std::size_t bytes)
 {
     return fmt::format("the script needs more than {} MiB of Lua memory; --script-memory sets the limit", bytes >> 20);
 }
+
+}  // namespace
 
 void push_natives(State& state, const std::string& chunk_header)
 {

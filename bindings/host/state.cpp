@@ -136,9 +136,10 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         state.memory_ -= old_size;
         return nullptr;
     }
-    state.is_beyond_limit_ = state.limited_ && new_size > old_size &&
-                             state.memory_ + (new_size - old_size) > state.host_.options().script_memory;
-    void* moved = state.is_beyond_limit_ ? nullptr : std::realloc(block, new_size);
+    if (state.limited_ && new_size > old_size &&
+        state.memory_ + (new_size - old_size) > state.host_.options().script_memory)
+        return nullptr;
+    void* moved = std::realloc(block, new_size);
     if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
     if (moved)
         state.memory_ += new_size - old_size;
@@ -214,7 +215,6 @@ int State::protected_call(int arguments, int results, int handler)
 void State::fail_broken() const
 {
     host_.interruption.check();
-    if (is_beyond_limit_) throw Error(memory_limit_text(host_.options().script_memory));
     throw std::bad_alloc();
 }
 

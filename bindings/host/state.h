@@ -131,7 +131,6 @@ private:
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;            // to options().script_memory, now
-    bool is_beyond_limit_ = false;    // the last request
     bool is_broken_ = false;          // compiled code was left by a jump
     bool protected_ = false;          // now
     std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory

@@ -19,15 +19,12 @@
 
 namespace rapid {
 namespace {
-
 namespace fs = std::filesystem;
-
 constexpr std::size_t most_warnings = 200;
 constexpr std::size_t most_ending = 2;
 constexpr std::size_t most_laid_out = 150;  // nodes, by Graphviz
 constexpr double snapshot_seconds = 0.25;   // of computing: so much is computed again to inspect a frame
 constexpr double cached_seconds = 5;        // likewise, to go on from the cache
-
 Error error_of(const std::exception& error)
 {
     if (const auto* known = dynamic_cast<const Error*>(&error)) return *known;

@@ -134,7 +134,7 @@ struct Solve {
         now.figures.died += age_points(flow.points, group, now.frame.dt, &recorder);
         feed_back(flow);
         if (flow.simulation->tells_points) {
-            figures.note_sleepers(sleep_records_);
+            for (const SleepRecords::Record& record : sleep_records_.records) figures.note_asleep(record.id);
             figures.put(flow.points);
         }
         return flow;

@@ -127,7 +127,7 @@ describe("rapid run --farm slurm", function()
 local rapid = require "rapid"
 local function rate(frame)
   local sum = 0
-  for k = 1, 2e7 do sum = sum + k % 7 end
+  for k = 1, 6e7 do sum = sum + k % 7 end
   return sum > 0 and 500 + frame.number or 0
 end
 return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = rate } :gravity {} :solve {}
@@ -144,10 +144,10 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
       if snapshots == 2 then break end
       shell "sleep 0.1"
     end
+    assert.equal(0, shell(("scancel --signal=KILL %d_2"):format(array)).status)
     assert.equal(0, shell(("scontrol requeue %d_1"):format(array)).status)
     shell "sleep 2"
     assert.equal(0, shell(("scontrol update JobId=%d_1 StartTime=now"):format(array)).status) -- not in two minutes
-    assert.equal(0, shell(("scancel --signal=KILL %d_2"):format(array)).status)
     assert.matches("^done %l+ waiting$", states(settled "slow/FARM.json"))
     assert.equal(1, rapid("farm status slow/FARM.json").status)
     assert.is_nil(folder:read "slow/a_part2of2.0040.ply") -- it was killed on the way

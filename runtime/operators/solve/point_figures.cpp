@@ -23,11 +23,6 @@ void PointFigures::note_errors(std::span<const std::int64_t> ids, std::span<cons
     errors_.assign(errors.begin(), errors.end());
 }
 
-void PointFigures::note_sleepers(const SleepRecords& records)
-{
-    for (const SleepRecords::Record& record : records.records) asleep_.push_back(record.id);
-}
-
 void PointFigures::put(PointSet& points) const
 {
     const bool tells_error = !points.has("error"), tells_substeps = !points.has("substeps");

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/constraints/sleep_records.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {
@@ -26,7 +25,7 @@ public:
     void note_errors(std::span<const std::int64_t> ids, std::span<const double> errors);
     // All points are where their equations take them.
     void note_no_errors() { are_exact_ = true; }
-    void note_sleepers(const SleepRecords& records);
+    void note_asleep(std::int64_t id) { asleep_.push_back(id); }
     // Gives the points the attributes. Without begin(): of the initial state, which nothing has moved yet.
     void put(PointSet& points) const;
 

@@ -41,6 +41,8 @@ public:
     // were read for it.
     void put(const ViewFrame& frame, const std::vector<std::string>& warnings, const Fingerprint& read);
     void keep(const Snapshot& snapshot);
+    // Waits until all is written.
+    void finish() { writer_.finish(); }
     // The latest one before a frame that is whole.
     std::optional<Snapshot> snapshot_before(std::int64_t frame) const;
 

@@ -237,7 +237,7 @@ void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
                  {"more_warnings", status.more_warnings},
                  {"outputs", status.outputs},
                  {"names", status.names},
-                 {"ending", status.ending},
+                 {"ending", simulation_.ending()},
                  {"films", !simulation_.options().is_confined},
                  {"no_graph", status.no_graph}};
     json["graph_number"] = status.graph_number;

@@ -58,7 +58,6 @@ struct ViewStatus {
     std::uint64_t graph_number = 0;            // grows with every other picture
     std::string no_graph;                      // why
     std::map<std::string, int> names;  // attributes and groups of the plan, with bytes a point; -1 where left out
-    std::size_t ending = 0;            // runs that have been abandoned, and have not ended yet
 };
 
 class ViewSimulation {
@@ -74,6 +73,8 @@ public:
     bool check_files();
 
     ViewStatus status() const;
+    // Runs that have been abandoned, and have not ended yet. From the thread that calls set().
+    std::size_t ending() const;
     // Null: it is not computed. Of a sequence the file is read. Error: it can't be.
     ViewFramePtr frame(std::int64_t number);
     FrameStore& store() { return store_; }
@@ -103,6 +104,10 @@ private:
     class Run;
     void begin();
     void collect_ended();
+    void note_file(std::uint64_t run, const std::filesystem::path& file);
+    // What Graphviz makes of a graph, as JSON; the last one is kept: most changes leave the graph as it is. Error: of
+    // dot.
+    std::string laid_out(const std::string& dot);
     ViewFramePtr read_file(std::int64_t number);
 
     const ViewOptions options_;
@@ -113,6 +118,10 @@ private:
     ViewStatus status_;
     std::map<std::filesystem::path, std::filesystem::file_time_type> read_;  // files, and when they were changed
     std::map<std::string, std::string> values_;
+    struct Layout {
+        std::string dot, json;
+    };
+    Layout layout_;
     std::unique_ptr<Run> run_;
     std::deque<std::unique_ptr<Run>> ending_;
     std::atomic<std::uint64_t> file_uses_ = 0;  // of a sequence: counts the files that were read

@@ -188,7 +188,7 @@ GraphPicture picture_of(const Plan& plan)
     return picture;
 }
 
-std::string to_dot(const GraphPicture& picture)
+std::string to_dot(const GraphPicture& picture, Tips tips)
 {
     std::string text =
         "digraph scene {\n"
@@ -199,9 +199,10 @@ std::string to_dot(const GraphPicture& picture)
         "  edge [color = \"#6b7078\", fontname = \"sans-serif\", fontsize = 9, arrowsize = 0.7];\n";
     for (std::size_t i = 0; i < picture.nodes.size(); ++i) {
         const GraphPicture::Node& node = picture.nodes[i];
-        text += fmt::format("  n{} [label = {}, tooltip = {}, fillcolor = \"{}\"{}];\n", i,
-                            quoted(node.name + '\n' + node.type), quoted(tip_of(node)), colour_of(node),
-                            node.kept ? "" : ", style = \"dashed,rounded\", fontcolor = \"#8a8f98\"");
+        text +=
+            fmt::format("  n{} [label = {}, tooltip = {}, fillcolor = \"{}\"{}];\n", i,
+                        quoted(node.name + '\n' + node.type), quoted(tips == Tips::Kept ? tip_of(node) : std::string()),
+                        colour_of(node), node.kept ? "" : ", style = \"dashed,rounded\", fontcolor = \"#8a8f98\"");
     }
     for (std::size_t i = 0; i < picture.edges.size(); ++i) {
         const Edge& edge = picture.edges[i];

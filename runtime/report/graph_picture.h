@@ -35,8 +35,10 @@ struct GraphPicture {
 
 GraphPicture picture_of(const Plan& plan);
 
-// For Graphviz: from left to right, with a dashed edge from each Solve to its Create.
-std::string to_dot(const GraphPicture& picture);
+// For Graphviz: from left to right, with a dashed edge from each Solve to its Create. Without tips the text is the same
+// for all values of parameters, as the layout is.
+enum class Tips { Kept, LeftOut };
+std::string to_dot(const GraphPicture& picture, Tips tips = Tips::Kept);
 
 // The picture as JSON; laid_out: what `dot -Tjson` makes of to_dot(), for the places of nodes and the paths of edges in
 // points (1/72 inch) from the upper left corner; empty: without places.

@@ -29,9 +29,21 @@ export function brief(x) {
   return size !== 0 && (size < 1e-3 || size >= 1e6) ? x.toExponential(2) : String(Number(x.toPrecision(4)));
 }
 
+// As few digits as tell the value, of 32 bits, from all others.
 export function exact(value) {
   if (Array.isArray(value)) return value.map(exact).join("  ");
-  return typeof value === "number" && !Number.isInteger(value) ? String(Number(value.toPrecision(9))) : String(value);
+  if (typeof value !== "number" || Number.isInteger(value)) return String(value);
+  for (let digits = 6; digits < 9; ++digits) {
+    const short = Number(value.toPrecision(digits));
+    if (Math.fround(short) === Math.fround(value)) return String(short);
+  }
+  return String(Number(value.toPrecision(9)));
+}
+
+// How many, in the room of a node.
+export function count(n) {
+  if (n < 1e5) return brief(n);
+  return n < 999500 ? `${Math.round(n / 1e3)} k` : `${(n / 1e6).toPrecision(3)} M`;
 }
 
 export function bytes(count) {

@@ -1,18 +1,20 @@
-// Figures over frames: a curve each; a click goes to a frame.
-import { element, prepare, colour, brief, unit } from "./dom.js";
+// Figures over frames: one or more curves each; a click goes to a frame.
+import { element, prepare, colour, brief, seconds, unit } from "./dom.js";
 
 const energy = (f) => (f.ledger ? f.ledger.kinetic + f.ledger.potential + f.ledger.elastic : undefined);
-const curves = [
-  ["points", "", (f) => f.points],
-  ["seconds a frame", "s", (f) => f.seconds?.total],
-  ["seconds in solve", "s", (f) => f.seconds?.solve],
-  ["estimated error, 95 %", "m", (f) => f.error?.position_p95],
-  ["deepest penetration", "m", (f) => f.penetration_max],
-  ["contacts", "", (f) => f.collisions],
-  ["sub-steps", "", (f) => f.substeps],
-  ["asleep", "", (f) => f.asleep],
-  ["energy of constrained points", "J", energy],
-  ["energy drift, largest", "J/kg", (f) => f.energy_drift?.max],
+const one = (read) => [["", "accent", read]];
+// name, unit, lines: of each its name, colour and value in a frame.
+const charts = [
+  ["points", "", one((f) => f.points)],
+  ["time of a frame", "s", one((f) => f.seconds?.total)],
+  ["", "s", [["solve", "accent", (f) => f.seconds?.solve], ["scripts", "good", (f) => f.seconds?.script], ["graph", "warn", (f) => f.seconds?.graph]]],
+  ["estimated error, 95 %", "m", one((f) => f.error?.position_p95)],
+  ["deepest penetration", "m", one((f) => f.penetration_max)],
+  ["contacts", "", one((f) => f.collisions)],
+  ["sub-steps", "", one((f) => f.substeps)],
+  ["asleep", "", one((f) => f.asleep)],
+  ["energy of constrained points", "J", one(energy)],
+  ["energy drift, largest", "J/kg", one((f) => f.energy_drift?.max)],
 ];
 
 export class Figures {
@@ -21,9 +23,10 @@ export class Figures {
     root.append(this.root);
     this.known = [];
     this.byFrame = new Map();
-    this.charts = curves.map(([name, unit, read]) => {
-      const canvas = element("canvas", { title: `${name}: a click goes to the frame` }), value = element("span", { class: "number" });
-      const chart = { name, unit, read, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, name, value), canvas) };
+    this.charts = charts.map(([name, of, lines]) => {
+      const canvas = element("canvas", { title: `${name || "seconds by stage"}: a click goes to the frame` }), value = element("span", { class: "number" });
+      const names = lines.map(([line, tint]) => element("span", { class: line ? `line ${tint}` : "" }, line || name));
+      const chart = { of, lines, names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
       canvas.addEventListener("click", (event) => {
         const box = canvas.getBoundingClientRect();
         go(Math.round(this.first + ((event.clientX - box.left) / box.width) * (this.last - this.first)));
@@ -52,24 +55,28 @@ export class Figures {
     if (this.root.offsetParent === null) return;
     const shown = [];
     for (const chart of this.charts) {
-      const values = this.known.map((f) => [f.frame, chart.read(f)]).filter(([, v]) => typeof v === "number");
-      chart.box.hidden = values.every(([, v]) => v === 0);
-      if (!chart.box.hidden) shown.push([chart, values]);
+      const lines = chart.lines.map(([, , read]) => this.known.map((f) => [f.frame, read(f)]).filter(([, v]) => typeof v === "number"));
+      chart.box.hidden = lines.every((values) => values.every(([, v]) => v === 0));
+      if (!chart.box.hidden) shown.push([chart, lines]);
     }
     // Rows that are full: no empty place at the end.
     const most = Math.max(1, Math.floor(this.root.clientWidth / (22 * 12 * unit()))), rows = Math.ceil(shown.length / most);
     const columns = Math.max(1, Math.ceil(shown.length / Math.max(1, rows)));
     this.root.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
     shown.forEach(([{ box }], k) => { box.style.gridColumn = k === shown.length - 1 ? `span ${1 + columns * rows - shown.length}` : ""; });
-    for (const [chart, values] of shown) {
-      let high = -Infinity, least = 0;
-      for (const [, v] of values) { high = Math.max(high, v); least = Math.min(least, v); }
-      const { context, width, height } = prepare(chart.canvas);
-      const x = (f) => ((f - this.first) / Math.max(1, this.last - this.first)) * width, y = (v) => height - 2 - ((v - least) / (high - least || 1)) * (height - 6);
-      context.strokeStyle = colour("line");
-      context.strokeRect(0, y(0), width, 0);
-      context.strokeStyle = colour("accent");
-      context.lineWidth = 1.3;
+    for (const [chart, lines] of shown) this.drawLines(chart, lines);
+  }
+
+  drawLines(chart, lines) {
+    let high = -Infinity, least = 0;
+    for (const values of lines) for (const [, v] of values) { high = Math.max(high, v); least = Math.min(least, v); }
+    const { context, width, height } = prepare(chart.canvas);
+    const x = (f) => ((f - this.first) / Math.max(1, this.last - this.first)) * width, y = (v) => height - 2 - ((v - least) / (high - least || 1)) * (height - 6);
+    context.strokeStyle = colour("line");
+    context.strokeRect(0, y(0), width, 0);
+    context.lineWidth = 1.3;
+    lines.forEach((values, k) => {
+      context.strokeStyle = colour(chart.lines[k][1]);
       context.beginPath();
       // Of frames that share a column of pixels the least and the largest value.
       for (let i = 0; i < values.length;) {
@@ -82,10 +89,17 @@ export class Figures {
         if (low !== top) { context.lineTo(at, y(low)); context.lineTo(at, y(top)); context.lineTo(at, y(values[i - 1][1])); }
       }
       context.stroke();
-      context.fillStyle = colour("quiet");
-      context.fillRect(x(this.frame), 0, 1, height);
-      const now = this.of(this.frame), here = now && chart.read(now);
-      chart.value.textContent = `${typeof here === "number" ? brief(here) : "–"} of ${brief(high)} ${chart.unit}`;
-    }
+    });
+    context.fillStyle = colour("quiet");
+    context.fillRect(x(this.frame), 0, 1, height);
+    const now = this.of(this.frame), text = (v) => (typeof v !== "number" ? "–" : chart.of === "s" ? seconds(v) : brief(v));
+    const here = chart.lines.map(([, , read]) => text(now && read(now))), most = chart.of === "s" ? seconds(high) : `${brief(high)} ${chart.of}`;
+    chart.value.textContent = here.length === 1 ? `${here[0]} of ${most}` : `of ${most}`;
+    // Of several lines each has its value behind its name; one that is always 0 has neither.
+    if (here.length > 1)
+      chart.lines.forEach(([line], k) => {
+        chart.names[k].hidden = lines[k].every(([, v]) => v === 0);
+        chart.names[k].textContent = `${line} ${here[k]}`;
+      });
   }
 }

@@ -1,6 +1,6 @@
 // The graph: nodes as Graphviz or layout.js have laid them out, with points and time in this frame; a click shows the
 // points after a node; a search finds nodes by name or type.
-import { svg, element, brief, seconds, unit } from "./dom.js";
+import { svg, element, count, seconds, unit } from "./dom.js";
 import { layOut } from "./layout.js";
 
 const legible = 0.85; // of the size of other texts
@@ -157,7 +157,7 @@ export class Graph {
     for (const work of statistics.nodes)
       work.nodes.forEach((name, k) => {
         const known = this.facts.get(name);
-        if (known) known.fact.textContent = k === 0 ? `${brief(work.points)} · ${seconds(work.seconds)}` : `${brief(work.points)} · fused`;
+        if (known) known.fact.textContent = `${count(work.points)} · ${k === 0 ? seconds(work.seconds) : "fused"}`;
       });
   }
 

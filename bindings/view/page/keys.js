@@ -13,6 +13,8 @@ export function bindKeys(does) {
     ["Home End", "first frame, newest frame", ["Home"], does.first],
     [null, "", ["End"], does.last],
     ["F", "show everything", ["f"], does.fit],
+    [".", "show the chosen point", ["."], does.centre],
+    ["M", "the picture alone, and with all panels", ["m"], does.alone],
     ["1 3 7", "look from the front, the right, above", ["1"], () => does.look(...turnFront)],
     [null, "", ["3"], () => does.look(...turnRight)],
     [null, "", ["7"], () => does.look(...turnTop)],
@@ -30,6 +32,7 @@ export function bindKeys(does) {
     ["Alt G, F, S", "graph, figures, spreadsheet", ["Alt+g"], () => !by("graph-tab").hidden && does.openTab("graph")],
     [null, "", ["Alt+f"], () => !by("figures-tab").hidden && does.openTab("figures")],
     [null, "", ["Alt+s"], () => does.openTab("sheet")],
+    ["↑ ↓", "in the spreadsheet: the point above, below", []],
     ["Esc", "let go of node, point and region", ["Escape"], does.escape],
     ["?", "this list", ["?"], () => showKeys()],
   ];
@@ -38,7 +41,7 @@ export function bindKeys(does) {
     if (document.querySelector("dialog[open]") || event.ctrlKey || event.metaKey) return;
     const typing = event.target.matches?.("input:not([type=range]):not([type=checkbox]), select");
     if (typing && event.key !== "Escape") return;
-    if (event.target.matches?.("input[type=range]") && event.key.startsWith("Arrow")) return;
+    if (event.target.matches?.("input[type=range], [role=separator]") && event.key.startsWith("Arrow")) return;
     if (event.target.matches?.("button, [role=button]") && event.key === " ") event.preventDefault();
     const name = event.key.length === 1 && event.key !== "?" ? event.key.toLowerCase() : event.key;
     const full = `${event.altKey ? "Alt+" : ""}${event.shiftKey && name.length > 1 ? "Shift+" : ""}${name}`;

@@ -9,6 +9,7 @@ import { Figures } from "./figures.js";
 import { Sheet } from "./sheet.js";
 import { Out } from "./out.js";
 import { ramp } from "./ramp.js";
+import { Panels } from "./panels.js";
 import { bindKeys, showKeys } from "./keys.js";
 import { element, by, brief, bytes, colour } from "./dom.js";
 
@@ -30,9 +31,19 @@ const ask = (what, given) => connection.ask(what, given);
 
 function note(text) { by("note").textContent = text; }
 
+function openPicture() {
+  try {
+    return new Picture(by("canvas"));
+  } catch (error) {
+    showProblem("This browser draws no WebGL, which the picture needs.", error.message,
+      "Another browser may, or this one with the driver of its graphics card. Over ssh the browser runs on your own machine.");
+    throw error;
+  }
+}
+
 // ---- the parts ----
 
-const picture = new Picture(by("canvas"));
+const picture = openPicture();
 const timeline = new Timeline(by("timeline"), { go: (frame) => go(frame), play: () => play(), step: (by_) => go(state.frame + by_) });
 const parameterPart = element("section", { id: "parameters" });
 by("side").append(parameterPart);
@@ -53,6 +64,7 @@ const inspector = new Inspector(by("side"), {
   },
 });
 
+const panels = new Panels(by("work"), by("side"), by("dock"));
 const tabs = {};
 const nav = element("nav", { role: "tablist" });
 by("dock").append(nav);
@@ -122,6 +134,7 @@ function theme(name) {
   picture.theme(colour("picture"), colour("line"));
   timeline.draw();
   figures.draw();
+  if (state.point !== null) showPoint(); // its curves
 }
 
 function copy(text) {
@@ -139,7 +152,7 @@ const wishes = (frame) => ({ frame, output: state.output || undefined, colour: s
 const isReady = (frame) => state.status.ready.some(([a, b]) => frame >= a && frame <= b);
 const isThere = (frame) => isReady(frame) || state.status.stale.some(([a, b]) => frame >= a && frame <= b);
 const newest = () => (state.status.ready.length ? state.status.ready[state.status.ready.length - 1][1] : NaN);
-const key = (frame) => JSON.stringify([wishes(frame), isReady(frame) ? state.status.run : 0]);
+const key = (frame) => JSON.stringify([wishes(frame), isReady(frame), state.status.run]);
 
 async function fetchFrame(frame) {
   const name = key(frame);
@@ -183,6 +196,7 @@ async function show(frame, fresh = false) {
   picture.shutter = 0.5 / state.status.fps;
   picture.show(message);
   state.shownRun = message.run;
+  state.shownFrame = frame;
   if (message.shown > 0) state.firstPoints ??= performance.now();
   document.body.dataset.frame = frame;
   document.body.dataset.run = message.run;
@@ -444,13 +458,17 @@ function showChoices(status) {
   bar.group.hidden = bar.group.previousElementSibling.hidden = groups.length === 0;
 }
 
+// where: in the scene, or the browser's own words; then: what helps.
+function showProblem(what, where, then) {
+  by("error").hidden = false;
+  by("error").replaceChildren(element("b", {}, what), element("div", { class: "where" }, where), element("div", { class: "quiet" }, then));
+}
+
 function showError(error) {
-  const box = by("error");
-  box.hidden = !error;
-  if (!error) return box.replaceChildren();
-  box.replaceChildren(element("b", {}, error.message),
-    element("div", { class: "where" }, `${error.file ? `${error.file}:${error.line}` : ""}${error.node ? `  node ${error.node}` : ""}`),
-    element("div", { class: "quiet" }, "The last good frames stay. Save the scene, or change a parameter, to run it again."));
+  by("error").hidden = !error;
+  if (error)
+    showProblem(error.message, `${error.file ? `${error.file}:${error.line}` : ""}${error.node ? `  node ${error.node}` : ""}`,
+      "The last good frames stay. Save the scene, or change a parameter, to run it again.");
 }
 
 let figuresDue = 0;
@@ -468,10 +486,11 @@ async function showFigures(status) {
   askingFigures = true;
   try {
     for (let more = true; more;) {
-      if (state.statisticsRun !== state.status.run) { state.statistics = []; state.statisticsRun = state.status.run; }
-      const after = state.statistics.length ? state.statistics[state.statistics.length - 1].frame : undefined;
-      const answer = await ask("figures", after === undefined ? {} : { after });
-      if (answer.run !== state.statisticsRun) break;
+      // Those of the run before stay until there are others.
+      const known = state.statisticsRun === state.status.run ? state.statistics : [];
+      const answer = await ask("figures", known.length ? { after: known[known.length - 1].frame } : {});
+      if (answer.run !== state.status.run || !answer.figures.length) break;
+      if (answer.run !== state.statisticsRun) { state.statistics = []; state.statisticsRun = answer.run; }
       state.statistics.push(...answer.figures);
       more = answer.more;
     }
@@ -486,53 +505,56 @@ async function showFigures(status) {
 async function follow() {
   let version = 0, graphNumber = 0;
   for (;;) {
-    let status;
     try {
-      status = await ask("status", { since: version, graph: graphNumber });
+      const status = await ask("status", { since: version, graph: graphNumber });
+      version = status.version;
+      const hasGraph = status.graph_number !== graphNumber;
+      graphNumber = status.graph_number;
+      await take(status, hasGraph).catch(tell); // what can't be shown keeps nothing else from being shown
+      await new Promise((resolve) => setTimeout(resolve, 30));
     } catch {
       version = graphNumber = 0; // another server, perhaps
       await new Promise((resolve) => setTimeout(resolve, 500));
-      continue;
     }
-    version = status.version;
-    const run = state.status?.run;
-    state.status = status;
-    document.title = `${status.title} – rapid view`;
-    bar.title.textContent = status.title;
-    bar.title.title = status.title;
-    bar.state.dataset.state = status.state;
-    bar.state.title = `frames take ${bytes(status.bytes)} of ${bytes(status.most_bytes)}`;
-    bar.state.textContent = status.state === "computing" ? `computing ${newest() || status.first} of ${status.last}` : words[status.state];
-    showChoices(status);
-    showError(status.error);
-    if (status.sequence && !parameterPart.hidden) {
-      // Files have no parameters, no graph and no figures of a run.
-      parameterPart.hidden = tabs.graph.button.hidden = tabs.figures.button.hidden = true;
-      openTab("sheet");
-    }
-    parameters.show(status);
-    out.show(status);
-    inspector.messages(status);
-    timeline.show(status);
-    if (status.graph_number !== graphNumber) {
-      graphNumber = status.graph_number;
-      graph.show(status.graph, status.no_graph);
-      if (state.after && !graph.node(state.after)) chooseNode("");
-    }
-    // The newest frame while nobody has chosen another; then the one chosen, as soon as this run has it.
-    const end = newest();
-    if (Number.isNaN(state.frame)) { if (!Number.isNaN(end)) await show(status.sequence ? status.first : end, true); }
-    else if (state.follow && !Number.isNaN(end) && end !== state.frame && !status.sequence) await show(end);
-    else if (run !== status.run || (state.shownRun !== status.run && isReady(state.frame))) await show(state.frame, true);
-    showFigures(status).catch(() => {});
-    if (status.state === "done" && state.follow && !status.sequence) refreshDetails();
-    await new Promise((resolve) => setTimeout(resolve, 30));
   }
+}
+
+async function take(status, hasGraph) {
+  const run = state.status?.run;
+  state.status = status;
+  document.title = `${status.title} – rapid view`;
+  bar.title.textContent = status.title;
+  bar.title.title = status.title;
+  bar.state.dataset.state = status.state;
+  bar.state.title = `frames take ${bytes(status.bytes)} of ${bytes(status.most_bytes)}`;
+  bar.state.textContent = status.state === "computing" ? `computing ${newest() || status.first} of ${status.last}` : words[status.state];
+  showChoices(status);
+  showError(status.error);
+  if (status.sequence && !parameterPart.hidden) {
+    // Files have no parameters, no graph and no figures of a run.
+    parameterPart.hidden = tabs.graph.button.hidden = tabs.figures.button.hidden = true;
+    openTab("sheet");
+  }
+  parameters.show(status);
+  out.show(status);
+  inspector.messages(status);
+  timeline.show(status);
+  if (hasGraph) {
+    graph.show(status.graph, status.no_graph);
+    if (state.after && !graph.node(state.after)) chooseNode("");
+  }
+  showFigures(status).catch(() => {});
+  // The newest frame while nobody has chosen another; then the one chosen, as soon as this run has it.
+  const end = newest(), isDue = state.shownRun !== status.run || state.shownFrame !== state.frame;
+  if (Number.isNaN(state.frame)) { if (!Number.isNaN(end)) await show(status.sequence ? status.first : end, true); }
+  else if (state.follow && !Number.isNaN(end) && end !== state.frame && !status.sequence) await show(end);
+  else if (run !== status.run || (isDue && isReady(state.frame))) await show(state.frame, true);
+  if (status.state === "done" && state.follow && !status.sequence) refreshDetails();
 }
 
 bindKeys({
   play, step: (n) => go(state.frame + n), first: () => go(state.status.first), last: () => go(newest()),
-  fit: () => picture.fit(), look: (turn, tilt) => picture.look(turn, tilt), openTab,
+  fit: () => picture.fit(), centre: () => picture.centre(), alone: () => panels.toggle(), look: (turn, tilt) => picture.look(turn, tilt), openTab,
   press: (id) => by(id).click(), save: () => out.picture(), find: () => { if (!by("graph-tab").hidden) { openTab("graph"); graph.search.focus(); } }, next: (id) => { const s = by(id); s.selectedIndex = (s.selectedIndex + 1) % s.options.length; s.dispatchEvent(new Event("change")); },
   trace: () => { if (state.point !== null) trace(state.point); },
   escape: () => { if (state.after) graph.toggle(graph.chosen); choosePoint(null); inspector.hide("region"); },

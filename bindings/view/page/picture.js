@@ -90,7 +90,8 @@ export class Picture {
   }
 
   line(colour) {
-    const made = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour }));
+    const made = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour, depthTest: false, transparent: true }));
+    made.renderOrder = 1; // seen through what is before it
     made.frustumCulled = false;
     made.visible = false;
     this.lines.add(made);
@@ -211,6 +212,7 @@ export class Picture {
 
   // The chosen point: a cross at its place, and its path; null: none.
   mark(place, path) {
+    this.marked = place;
     const set = (line, places) => {
       line.visible = places.length > 0;
       line.geometry.dispose();
@@ -236,10 +238,24 @@ export class Picture {
     if (this.shapes.visible) for (const shape of this.shapes.children) if (!shape.userData.plane) box.expandByObject(shape);
     if (box.isEmpty()) return;
     box.getCenter(this.target);
-    const radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 1e-3);
-    const half = Math.min(1, this.camera.aspect || 1) * Math.tan((this.camera.fov * Math.PI) / 360);
-    this.distance = (1.05 * radius) / Math.sin(Math.atan(half));
+    // So near that each corner is still in the picture, from where it is looked at now.
+    this.place();
+    this.camera.updateMatrixWorld();
+    const [right, above, behind] = [0, 1, 2].map((k) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, k));
+    const tall = Math.tan((this.camera.fov * Math.PI) / 360), wide = (tall * this.canvas.clientWidth) / (this.canvas.clientHeight || 1), half = box.getSize(new THREE.Vector3()).multiplyScalar(0.5);
+    this.distance = 1e-3;
+    for (const [x, y, z] of [[1, 1, 1], [1, 1, -1], [1, -1, 1], [1, -1, -1], [-1, 1, 1], [-1, 1, -1], [-1, -1, 1], [-1, -1, -1]]) {
+      const corner = new THREE.Vector3(x, y, z).multiply(half);
+      this.distance = Math.max(this.distance, corner.dot(behind) + 1.12 * Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(above)) / tall));
+    }
     this.lay();
+    this.draw();
+  }
+
+  // The marked point in the middle.
+  centre() {
+    if (!this.marked) return;
+    this.target.set(...this.marked);
     this.draw();
   }
 

@@ -11,16 +11,26 @@ export class Inspector {
       root.append(part);
       return [name, part];
     }));
+    this.hint = element("section", { id: "hint", class: "quiet" }, "Click a point for its values and its life, a node for the points as they leave it. Drag with Shift for the ranges in a region. ? has all keys.");
+    root.append(this.hint);
   }
 
   put(name, title, ...children) {
     const part = this.parts[name];
     part.hidden = false;
+    this.hinted();
     part.replaceChildren(element("h2", {}, title, element("span", { class: "gap" }),
       ["messages", "frame-figures"].includes(name) ? null : element("button", { title: "close (Esc)", onclick: () => this.actions.close(name) }, "×")), ...children.filter(Boolean));
   }
 
-  hide(name) { this.parts[name].hidden = true; this.parts[name].replaceChildren(); }
+  hide(name) {
+    this.parts[name].hidden = true;
+    this.parts[name].replaceChildren();
+    this.hinted();
+  }
+
+  // Only where nothing is chosen.
+  hinted() { this.hint.hidden = ["node", "point", "region"].some((name) => !this.parts[name].hidden); }
 
   // path: [frame, x, y, z, speed, error, sub-steps] of each frame that has the point.
   point(id, row, life, path = [], frame = NaN) {

@@ -68,12 +68,18 @@ export class Timeline {
     context.fillStyle = colour("quiet");
     context.font = `${10 * u}px system-ui, sans-serif`;
     const wish = span / Math.max(1, room / (70 * u)), step = [1, 2, 5, 10, 20, 24, 48, 50, 100, 200, 500, 1000, 2000, 5000].find((s) => s >= wish) ?? 10000;
+    // The frame that is shown, on its mark; texts keep clear of it, and of the ends.
     context.textAlign = "center";
+    const wideOf = (text) => context.measureText(text).width / 2, within = (text, at) => Math.min(Math.max(at, wideOf(text)), width - wideOf(text));
+    const shown = String(this.frame), middle = within(`  ${shown}`, x(this.frame)), reach = wideOf(`  ${shown}`);
     for (let frame = Math.ceil(this.first / step) * step; frame <= this.last; frame += step) {
       context.fillRect(x(frame), top - 3, 1, 3);
-      context.fillText(frame, x(frame), top - 6);
+      if (Math.abs(within(frame, x(frame)) - middle) > reach + wideOf(frame) + 2 * u) context.fillText(frame, within(frame, x(frame)), top - 6);
     }
     context.fillStyle = colour("accent");
-    context.fillRect(x(this.frame) - u, 0, 2 * u, height);
+    context.fillRect(x(this.frame) - u, top - 6, 2 * u, height - top + 6);
+    context.fillRect(middle - reach, top - 15 * u - 2, 2 * reach, 12 * u);
+    context.fillStyle = colour("panel");
+    context.fillText(shown, middle, top - 6);
   }
 }

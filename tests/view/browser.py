@@ -18,7 +18,11 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def wait_for(what, seconds=40, every=0.02):
+# Seconds after which nothing is waited for any more: far beyond what the busiest machine takes.
+PATIENCE = 240
+
+
+def wait_for(what, seconds=PATIENCE, every=0.02):
     """The first true value of what(); an error after so many seconds."""
     end = time.monotonic() + seconds
     while True:
@@ -38,14 +42,14 @@ class Browser:
         words = ["setpriv", "--pdeathsig", "TERM", "chromedriver", f"--port={self.port}"]
         self.driver = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                        start_new_session=True)
-        wait_for(lambda: self.is_up(), 30)
+        wait_for(self.is_up)
         options = {"args": ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
                             "--disable-dev-shm-usage", "--disable-background-timer-throttling",
                             "--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding",
                             f"--window-size={width},{height}"]}
         made = self.call("POST", "/session", {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}, "")
         self.session = f"/session/{made['sessionId']}"
-        self.call("POST", "/timeouts", {"script": 60000})
+        self.call("POST", "/timeouts", {"script": 1000 * PATIENCE})
 
     def is_up(self):
         try:
@@ -59,7 +63,7 @@ class Browser:
         request = urllib.request.Request(f"http://127.0.0.1:{self.port}{prefix}{path}", data, method=method,
                                          headers={"Content-Type": "application/json"})
         try:
-            with urllib.request.urlopen(request, timeout=90) as answer:
+            with urllib.request.urlopen(request, timeout=2 * PATIENCE) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as error:
             raise AssertionError(json.load(error)["value"]["message"]) from None
@@ -69,14 +73,21 @@ class Browser:
 
     def size(self, width, height):
         """Of the page itself, without the browser's frame."""
-        self.call("POST", "/window/rect", {"width": width, "height": height})
-        inner = self.run("return [innerWidth, innerHeight]")
-        self.call("POST", "/window/rect", {"width": 2 * width - inner[0], "height": 2 * height - inner[1]})
+        def is_so():
+            inner = self.run("return [innerWidth, innerHeight]")
+            if inner == [width, height]:
+                return True
+            rect = self.call("GET", "/window/rect")
+            self.call("POST", "/window/rect", {"width": rect["width"] + width - inner[0],
+                                               "height": rect["height"] + height - inner[1]})
+            return False
+
+        wait_for(is_so, every=0.2)
 
     def run(self, script, *arguments):
         return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
 
-    def wait(self, expression, seconds=40):
+    def wait(self, expression, seconds=PATIENCE):
         """Waits until an expression of the page is true, and returns it."""
         return wait_for(lambda: self.run(f"return {expression}"), seconds)
 
@@ -90,10 +101,9 @@ class Browser:
 
     def draw_nothing(self):
         """From the next page on WebGL gets its buffers, and draws nothing."""
-        self.call("POST", "/goog/cdp/execute", {"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {
-            "source": "WebGLRenderingContext.prototype.drawArrays = WebGL2RenderingContext.prototype.drawArrays = "
-                      "WebGLRenderingContext.prototype.drawElements = "
-                      "WebGL2RenderingContext.prototype.drawElements = () => {}"}})
+        self.before_pages("WebGLRenderingContext.prototype.drawArrays = WebGL2RenderingContext.prototype.drawArrays = "
+                          "WebGLRenderingContext.prototype.drawElements = "
+                          "WebGL2RenderingContext.prototype.drawElements = () => {}")
 
     def element(self, selector):
         return next(iter(self.call("POST", "/element", {"using": "css selector", "value": selector}).values()))
@@ -111,20 +121,42 @@ class Browser:
             {"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y)},
             {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]}]})
 
-    def drag(self, x0, y0, x1, y1, shift=False):
+    def drag(self, x0, y0, x1, y1, shift=False, button=0):
+        """button: 0 is the left, 1 the middle, 2 the right one."""
         keys = [{"type": "keyDown", "value": "\ue008"}, {"type": "pause"}, {"type": "pause"}, {"type": "pause"},
                 {"type": "keyUp", "value": "\ue008"}]
         actions = [{"type": "pointer", "id": "mouse", "actions": [
-            {"type": "pointerMove", "duration": 0, "x": round(x0), "y": round(y0)}, {"type": "pointerDown", "button": 0},
-            {"type": "pointerMove", "duration": 50, "x": round(x1), "y": round(y1)}, {"type": "pointerUp", "button": 0}]}]
+            {"type": "pointerMove", "duration": 0, "x": round(x0), "y": round(y0)},
+            {"type": "pointerDown", "button": button},
+            {"type": "pointerMove", "duration": 50, "x": round(x1), "y": round(y1)},
+            {"type": "pointerUp", "button": button}]}]
         if shift:
             actions[0]["actions"].insert(0, {"type": "pause"})
             actions.append({"type": "key", "id": "keys", "actions": keys})
         self.call("POST", "/actions", {"actions": actions})
 
+    def wheel(self, x, y, by):
+        self.call("POST", "/actions", {"actions": [{"type": "wheel", "id": "wheel", "actions": [
+            {"type": "scroll", "x": round(x), "y": round(y), "deltaX": 0, "deltaY": by}]}]})
+
+    def before_pages(self, source):
+        """Runs a script before those of each page from now on, until the function that it returns is called."""
+        made = self.call("POST", "/goog/cdp/execute", {"cmd": "Page.addScriptToEvaluateOnNewDocument",
+                                                       "params": {"source": source}})
+        return lambda: self.call("POST", "/goog/cdp/execute", {"cmd": "Page.removeScriptToEvaluateOnNewDocument",
+                                                               "params": made})
+
     def screenshot(self, file):
+        """The driver gives up after ten seconds; a page that draws by software may take more for the first one."""
+        for attempt in range(5):
+            try:
+                data = self.call("GET", "/screenshot")
+                break
+            except AssertionError as error:
+                if attempt == 4 or "timeout" not in str(error):
+                    raise
         with open(file, "wb") as out:
-            out.write(base64.b64decode(self.call("GET", "/screenshot")))
+            out.write(base64.b64decode(data))
 
     def close(self):
         try:
@@ -143,6 +175,8 @@ class View:
     """A `rapid view`, and its address."""
 
     def __init__(self, rapid, *arguments, cwd=None):
+        # A shell's background jobs ignore it, and so would a view that is to end by it.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         words = ["setpriv", "--pdeathsig", "KILL", rapid, "view", *arguments, "--no-open"]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd)
         self.address = self.process.stdout.readline().strip()
@@ -159,7 +193,7 @@ class View:
     def close(self):
         self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(20)
+            return self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             raise

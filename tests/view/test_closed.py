@@ -7,11 +7,11 @@ import subprocess
 import tempfile
 
 from bench import choose, SCENE, go, set_parameter, test, wait_for_run
-from browser import View, wait_for
+from browser import PATIENCE, View, wait_for
 
 
 def request(view, target, headers=None, method="GET"):
-    connection = http.client.HTTPConnection("127.0.0.1", view.port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", view.port, timeout=PATIENCE)
     connection.putrequest(method, target, skip_host=True)
     for name, value in {"Host": f"127.0.0.1:{view.port}", **(headers or {})}.items():
         connection.putheader(name, value)
@@ -29,7 +29,7 @@ def confinement(view):
 
 def open_socket(view):
     """A WebSocket by hand; returns the socket behind the answer to the upgrade."""
-    raw = socket.create_connection(("127.0.0.1", view.port), timeout=20)
+    raw = socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE)
     raw.sendall((f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nOrigin: http://127.0.0.1:{view.port}\r\n"
                  f"Cookie: rapid_{view.port}={view.token}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
                  "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n").encode())
@@ -109,6 +109,9 @@ def refuses_strangers(bench):
     assert request(view, f"/?token={view.token}")[0] == 200
     assert request(view, "/page.js", cookie)[0] == 200
     assert request(view, "/three.module.js", cookie)[0] == 200
+    # Among the cookies of as many views as a browser keeps.
+    others = "; ".join(f"rapid_{port}={'0' * 32}" for port in range(20000, 20179))
+    assert request(view, "/page.js", {"Cookie": f"{others}; {cookie['Cookie']}"})[0] == 200
     wrong = view.token[:-1] + ("0" if view.token[-1] != "0" else "1")
     upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
                "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
@@ -184,7 +187,7 @@ def oversized_messages_end_their_connection_alone(bench):
         assert is_closed(raw)
     assert bench.view.memory() - before < 8 << 20
     for target, size in ((f"/?{'x' * 20000}", 0), ("/", 1 << 20)):
-        connection = http.client.HTTPConnection("127.0.0.1", bench.view.port, timeout=10)
+        connection = http.client.HTTPConnection("127.0.0.1", bench.view.port, timeout=PATIENCE)
         try:
             connection.putrequest("GET", target, skip_host=True)
             connection.putheader("Host", f"127.0.0.1:{bench.view.port}")
@@ -213,9 +216,9 @@ return rapid.create { points = rapid.points.from { P = P } } :gravity {} :solve 
         for frame in (2, 5, 3):
             go(browser, frame)
         assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
-        wait_for(lambda: bench.view.memory() - before < 256 << 20, 30)
+        wait_for(lambda: bench.view.memory() - before < 256 << 20)
         assert is_closed(raw), "it waits for ever"
-    wait_for(lambda: bench.view.memory() - before < 64 << 20, 30)
+    wait_for(lambda: bench.view.memory() - before < 64 << 20)
 
 
 @test

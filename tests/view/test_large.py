@@ -7,7 +7,7 @@ def a_scene_of_ten_thousand_frames_is_walked_through(bench):
     browser = bench.open("""local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} }, fps = 24 } :gravity {}
   :collide { shape = rapid.shape.plane {}, bounce = 1 } :solve {}""", "-f", "1-10000")
-    browser.wait("window.rapidView?.state.statistics.length === 10000", 300)
+    browser.wait("window.rapidView?.state.statistics.length === 10000")
     browser.run("document.getElementById('figures-tab').click()")
     for frame in (10000, 1, 7777):
         go(browser, frame)

@@ -142,6 +142,9 @@ return rapid.create { points = rapid.points.from { P = P } } :attribute { pscale
     assert 0 < asleep < 60
     values = column(browser, 36, "asleep")
     assert sum(value == 1 for value in values) == asleep
+    # Where none sleeps, these are the colours of those that do not.
+    assert set(column(browser, 1, "asleep")) == {0}
+    assert browser.promise("rapidView.ask('frame', {frame: 1, colour: 'asleep'}).then((m) => m.ranges.value)") == [0, 1]
 
 
 @test
@@ -222,6 +225,133 @@ def keys_are_listed_and_themes_change(bench):
     listed = browser.run("return document.getElementById('keys').innerText")
     for word in ("Space", "orbit", "Esc"):
         assert word in listed
-    untold = browser.run("return [...document.querySelectorAll('button:not(dialog button), select')]"
-                         ".filter((c) => !c.title).map((c) => c.outerHTML)")
+    # Every control has a tip.
+    untold = browser.run("""return [...document.querySelectorAll(
+      'button:not(dialog button), select, input, [role=separator], [tabindex="0"]:not(#canvas), canvas:not(#canvas, #legend *)')]
+      .filter((c) => !c.title && !c.querySelector('title')).map((c) => c.outerHTML)""")
     assert untold == [], untold
+
+
+@test
+def the_mouse_orbits_pans_and_zooms(bench):
+    browser = bench.ready()
+    box = browser.run("const b = document.getElementById('canvas').getBoundingClientRect();"
+                      "return [b.left, b.top, b.right, b.bottom]")
+    x, y = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+
+    def camera():
+        numbers = [float(n) for n in browser.run("return rapidView.picture.cameraText()").split(",")]
+        return numbers[:3], numbers[3:6], [a - b for a, b in zip(numbers[:3], numbers[3:6])]
+
+    _, target, offset = camera()
+    browser.drag(x, y, x + 80, y + 30)
+    _, same, turned = camera()
+    assert math.dist(target, same) < 1e-5 and abs(math.hypot(*turned) / math.hypot(*offset) - 1) < 1e-4
+    assert turned[1] > offset[1] + 0.01, "dragged down, seen from higher up"
+    browser.drag(x, y, x + 80, y, button=1)
+    _, moved, kept = camera()
+    assert math.dist(kept, turned) < 1e-4 and math.dist(moved, same) > 0.01
+    browser.wheel(x, y, -120)
+    _, same, nearer = camera()
+    assert math.dist(moved, same) < 1e-5 and abs(math.dist(nearer, [0, 0, 0]) / math.hypot(*kept) - math.exp(-0.12)) < 1e-3
+    browser.drag(x, y, x, y + 50, button=2)
+    assert math.hypot(*camera()[2]) > math.hypot(*nearer) * 1.05
+
+
+@test
+def colours_by_speed_and_by_a_group(bench):
+    browser = bench.ready()
+    rows = bench.rows(24)
+    speeds = [math.hypot(row["vx"], row["vy"], row["vz"]) for row in rows]
+    low, high = min(speeds), max(speeds)
+    for value, speed in zip(column(browser, 24, "speed"), speeds):
+        assert abs(value - (speed - low) / (high - low)) < 1e-4, (value, speed)
+    assert column(browser, 24, "group:warm") == [row["group:warm"] for row in rows]
+    choose(browser, "colour", "group:warm")
+    browser.wait("rapidView.picture.message.colour === 'group:warm'")
+
+
+@test
+def deforming_bodies_and_emitters_are_those_of_the_frame(bench):
+    for frame in range(1, 6):  # a box that grows
+        corners = [(x, y, z) for x in (0, 1) for y in (0, frame) for z in (0, 1)]
+        faces = "1 2 4 3, 5 7 8 6, 1 5 6 2, 3 4 8 7, 1 3 7 5, 2 6 8 4"
+        (bench.path / f"grow.{frame:04d}.obj").write_text(
+            "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join(f"f {f}\n" for f in faces.split(", ")),
+            encoding="utf-8")
+    browser = bench.ready("""local rapid = require "rapid"
+local body = rapid.mesh.read "grow.####.obj"
+return rapid.create {} :emit { source = body, rate = 2400 } :gravity {}
+  :collide { shape = rapid.levelset.from_mesh(body, { voxel = 0.1 }) } :solve {}""", "-f", "1-5")
+    tops = """return Object.fromEntries(rapidView.picture.shapes.children.map((child) => { child.geometry.computeBoundingBox();
+      return [Object.entries(rapidView.picture.materials).find(([, m]) => m === child.material)[0],
+              child.geometry.boundingBox.max.y]; }))"""
+    for frame in (2, 5, 3):
+        go(browser, frame)
+        wait_for(lambda: set(browser.run(tops)) == {"collider", "emitter"}
+                 and all(abs(top - frame) < 0.11 for top in browser.run(tops).values()))
+
+
+@test
+def points_are_dots_where_dots_are_chosen(bench):
+    browser = bench.ready()
+    browser.click("#ground")
+    wait_for(lambda: browser.run(f"return {COLOURED}") > 9 * 40)
+    choose(browser, "style", "dots")
+    # Of two pixels' width each, which touch three where they lie between.
+    wait_for(lambda: 0 < browser.run(f"return {COLOURED}") <= 9 * 40)
+
+
+@test
+def says_what_it_needs_where_there_is_no_webgl(bench):
+    again = bench.browser.before_pages("HTMLCanvasElement.prototype.getContext = () => null")
+    try:
+        browser = bench.open()
+        browser.wait("!document.getElementById('error').hidden")
+        assert "WebGL" in browser.run("return document.getElementById('error').innerText")
+    finally:
+        again()
+
+
+@test
+def the_page_fits_widths_from_a_thousand_pixels_on(bench):
+    browser = bench.ready()
+    try:
+        for width in (1000, 1280, 1920):
+            browser.size(width, 700)
+            outside = browser.run("""return [...document.querySelectorAll('#bar > *, #timeline > *, #dock nav > *, #side > *')]
+              .filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth + 0.5).map((e) => e.outerHTML)""")
+            assert outside == [] and browser.run("return document.documentElement.scrollWidth") == width, (width, outside)
+    finally:
+        browser.size(1280, 800)
+
+
+@test
+def nothing_is_loaded_from_elsewhere(bench):
+    browser = bench.ready()
+    origins = browser.run("return [...new Set(performance.getEntriesByType('resource').map((e) => new URL(e.name).origin))]")
+    assert origins == [f"http://127.0.0.1:{bench.view.port}"], origins
+
+
+@test
+def panels_are_moved_and_kept(bench):
+    browser = bench.ready()
+    size = """const b = document.getElementById(arguments[0]).getBoundingClientRect(); return [b.width, b.height]"""
+    browser.run("localStorage.clear()")
+    wide, tall = browser.run(size, "side")[0], browser.run(size, "dock")[1]
+    browser.run("document.querySelector('.border.x').focus()")
+    browser.type("\ue012\ue012")
+    moved = browser.run(size, "side")[0]
+    assert abs(moved - wide - 48) <= 1
+    box = browser.run("const b = document.querySelector('.border.y').getBoundingClientRect(); return [b.left + 200, b.top + 3]")
+    browser.drag(*box, box[0], box[1] - 40)
+    assert abs(browser.run(size, "dock")[1] - tall - 40) <= 1
+    browser.run("location.reload()")
+    browser.wait("document.body.dataset.shown === '40'")
+    assert browser.run(size, "side")[0] == moved
+    browser.run("document.querySelectorAll('.border').forEach((b) => b.dispatchEvent(new Event('dblclick')))")
+    assert [browser.run(size, "side")[0], browser.run(size, "dock")[1]] == [wide, tall]
+    browser.type("m")
+    assert browser.run("return document.getElementById('canvas').clientWidth === innerWidth")
+    browser.type("m")
+    assert browser.run(size, "side")[0] == wide

@@ -1,8 +1,16 @@
 """Points, regions, the spreadsheet, figures and warnings."""
+import json
 import math
+import re
+import struct
 import time
 
-from bench import SCENE, go, statistics, test
+from bench import choose, go, test
+
+
+def bits(number):
+    """Of a value of 32 bits."""
+    return struct.pack("f", float(number))
 
 
 @test
@@ -21,9 +29,9 @@ def a_click_on_a_point_tells_its_values_as_run_writes_them(bench):
         browser.wait(f"rapidView.state.point === {int(row['id'])} && document.querySelector('#attributes')")
         shown = browser.run("""return Object.fromEntries([...document.querySelectorAll('#attributes tr')].map((row) =>
           [row.dataset.attribute, row.querySelector('td').textContent]))""")
-        for k, name in enumerate(("Px", "Py", "Pz")):
-            assert abs(float(shown["P"].split()[k]) - row[name]) <= 1e-8 * max(1, abs(row[name])), (shown, row)
-        assert abs(float(shown["heat"]) - row["heat"]) <= 1e-6 * abs(row["heat"])
+        for text, name in zip([*shown["P"].split(), shown["heat"], shown["pscale"]], ("Px", "Py", "Pz", "heat", "pscale")):
+            assert bits(text) == bits(row[name]), (shown, row)  # the same value, in as few digits as tell it
+        assert shown["pscale"] == "0.04"
 
 
 @test
@@ -106,6 +114,13 @@ def a_region_tells_counts_and_ranges(bench):
     browser.wait("!document.getElementById('region').hidden")
     text = browser.run("return document.getElementById('region').innerText")
     assert "40 POINTS" in text.upper(), text
+    speeds = [math.hypot(row["vx"], row["vy"], row["vz"]) for row in bench.rows(1)]
+    heats = [row["heat"] for row in bench.rows(1)]
+    for name, values in (("speed", speeds), ("heat", heats)):
+        line = next(line for line in text.splitlines() if line.startswith(name))
+        told = [float(number) for number in line.split()[1:]]
+        for number, value in zip(told, (min(values), sum(values) / len(values), max(values))):
+            assert abs(number - value) <= 1e-3 * abs(value), (line, value)
 
 
 @test
@@ -130,3 +145,41 @@ def figures_over_frames_lead_to_a_frame(bench):
                        "return [b.left, b.top, b.width, b.height]; })()")
     browser.click_at(box[0] + box[2] / 2, box[1] + box[3] / 2)
     browser.wait("Math.abs(Number(document.body.dataset.frame) - 15.5) < 1.5")
+
+
+@test
+def the_spreadsheet_shows_a_group_and_is_walked_by_keys(bench):
+    browser = bench.ready()
+    go(browser, 12)
+    warm = [int(row["id"]) for row in bench.rows(12) if row["group:warm"]]
+    assert 2 < len(warm) < 40
+    browser.run("document.getElementById('sheet-tab').click()")
+    choose(browser, "group", "warm")
+    listed = "[...document.querySelectorAll('#sheet [data-id]')].map((row) => Number(row.dataset.id))"
+    browser.wait(f"JSON.stringify({listed}) === '{json.dumps(warm, separators=(',', ':'))}'")
+    browser.run("document.getElementById('sheet').focus()")
+    for step, place in (("\ue015", 0), ("\ue015", 1), ("\ue013", 0)):  # down, down, up
+        browser.type(step)
+        browser.wait(f"rapidView.state.point === {warm[place]}")
+        browser.wait(f"document.querySelector('#sheet .chosen')?.dataset.id === '{warm[place]}'")
+    # The point in the middle of the picture.
+    browser.wait("Boolean(rapidView.picture.marked)")
+    browser.type(".")
+    row = bench.rows(12)[warm[0]]
+    target = browser.run("return rapidView.picture.target.toArray()")
+    assert max(abs(target[k] - row[name]) for k, name in enumerate(("Px", "Py", "Pz"))) < 1e-6
+
+
+@test
+def seconds_of_the_stages_are_those_of_the_frame(bench):
+    browser = bench.ready()
+    go(browser, 12)
+    browser.wait("rapidView.state.statistics.length === 30")
+    browser.run("document.getElementById('figures-tab').click()")
+    told = browser.wait("""[...document.querySelectorAll('#figures figure')].filter((f) => f.offsetParent)
+      .map((f) => f.querySelector('figcaption').innerText).find((t) => t.includes('scripts'))""")
+    wanted = browser.run("return rapidView.state.statistics[11].seconds")
+    units = {"µs": 1e-6, "ms": 1e-3, "s": 1.0}
+    numbers = [float(number) * units[of] for number, of in re.findall(r"([\d.]+(?:e-?\d+)?) (µs|ms|s)\b", told)]
+    for number, stage in zip(numbers, ("solve", "script", "graph")):
+        assert abs(number - wanted[stage]) <= 0.01 * wanted[stage] + 1e-6, (told, wanted)

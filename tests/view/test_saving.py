@@ -20,7 +20,7 @@ def makes_films_of_a_range(bench):
     for k, (kind, (at, head)) in enumerate(heads.items()):
         choose(browser, "out-kind", kind)
         browser.click("#out-film")
-        browser.wait(f"saved.length === {k + 1} && !document.getElementById('out-film').disabled", 60)
+        browser.wait(f"saved.length === {k + 1} && !document.getElementById('out-film').disabled")
         name, data = browser.run(f"return [saved[{k}][0], [...saved[{k}][1]]]")
         assert name == "scene" + kind and bytes(data)[at:at + 4] == head, (name, bytes(data[:12]))
         (bench.path / name).write_bytes(bytes(data))

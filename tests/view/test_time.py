@@ -15,6 +15,9 @@ for i = 1, 20000 do P[i] = {i * 1e-4 + 0.5, 1, 0} end
 return rapid.create { points = rapid.points.from { P = P } } :attract { strength = 0.1 }
   :solve { substeps = slow and 1000000 or 1 }
 """
+# Likewise in a script.
+SLOW_SCRIPT = SLOW.replace(":attract {", """:points("wait", function(p)
+      if slow and p.id == 7 then while true do end end end) :attract {""").replace("1000000", "1")
 
 
 @test
@@ -120,8 +123,7 @@ return rapid.create { points = rapid.points.from { P = P } } :gravity {} :solve 
 
 @test
 def a_change_abandons_a_slow_frame_within_it(bench):
-    for text in (SLOW, SLOW.replace(":attract {", """:points("wait", function(p)
-      if slow and p.id == 7 then while true do end end end) :attract {""").replace("1000000", "1")):
+    for text in (SLOW, SLOW_SCRIPT):
         browser = bench.open(text, "-f", "1-4")
         browser.wait("window.rapidView?.state.status?.state === 'computing' && document.body.dataset.frame === '1'")
         run = browser.run("return rapidView.state.status.run")
@@ -258,3 +260,51 @@ def plays_files_without_a_scene(bench):
     row = bench.rows(9)[3]
     point = browser.promise("rapidView.ask('point', {frame: 9, id: 3})")
     assert abs(point["values"]["P"][1] - row["Py"]) < 1e-6
+
+
+@test
+def a_chosen_frame_is_shown_once_it_is_computed(bench):
+    text = SLOW.replace('"slow", true', '"slow", false').replace("or 1 }", "or 50 }")
+    browser = bench.open(text, "-f", "1-10")
+    browser.wait("window.rapidView?.state.status?.ready.length && rapidView.state.status.last === 10")
+    browser.run("rapidView.go(10)")
+    browser.wait("document.body.dataset.frame === '10'")
+
+
+@test
+def plays_at_the_frames_a_second_of_the_scene(bench):
+    browser = bench.ready(SCENE.replace("fps = 24", "fps = 40"), "-f", "1-60")
+    go(browser, 5)
+    browser.run("window.clock = performance.now(); performance.now = () => clock")
+    browser.type(" ")
+    for milliseconds, frame in ((50, 7), (25, 8), (200, 16)):
+        browser.run("clock += arguments[0]", milliseconds)
+        browser.wait(f"document.body.dataset.frame === '{frame}'")
+    # A browser that has been busy for long skips a quarter of a second at most.
+    browser.run("clock += 5000")
+    browser.wait("document.body.dataset.frame === '26'")
+    browser.type(" ")
+
+
+@test
+def a_saved_mesh_runs_the_scene_again(bench):
+    corners = "v {0} 0 0\nv {0} 1 0\nv {0} 0 1\nf 1 2 3\n"
+    (bench.path / "place.obj").write_text(corners.format(2), encoding="utf-8")
+    browser = bench.ready("""local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.read "place.obj", rate = 480 } :solve {}""", "-f", "1-8")
+    go(browser, 8)
+    assert abs(browser.run("return rapidView.picture.message.box[1][0]") - 2) < 1e-4
+    run = browser.run("return rapidView.state.status.run")
+    (bench.path / "place.obj").write_text(corners.format(3), encoding="utf-8")
+    wait_for_run(browser, run)
+    assert abs(browser.run("return rapidView.picture.message.box[1][0]") - 3) < 1e-4
+
+
+@test
+def a_slider_runs_the_scene_while_it_is_dragged(bench):
+    browser = bench.ready()
+    run = browser.run("return rapidView.state.status.run")
+    browser.run("""const slider = document.querySelector('[data-name=count] input[type=range]');
+      slider.value = 25; slider.dispatchEvent(new Event('input'));""")
+    wait_for_run(browser, run)
+    assert browser.run("return document.body.dataset.shown") == "25"

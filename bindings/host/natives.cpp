@@ -186,11 +186,6 @@ void push_point_names(lua_State* L)
     lua_setfield(L, -2, "read_only");
 }
 
-std::string memory_limit_text(std::size_t bytes)
-{
-    return fmt::format("the script needs more than {} MiB of Lua memory; --script-memory sets the limit", bytes >> 20);
-}
-
 }  // namespace
 
 void push_natives(State& state, const std::string& chunk_header)
@@ -234,7 +229,7 @@ void push_natives(State& state, const std::string& chunk_header)
     lua_setfield(L, -2, "detail");
     push_text(L, chunk_header);
     lua_setfield(L, -2, "chunk_header");
-    push_text(L, memory_limit_text(state.host().options().script_memory));
+    push_text(L, state.memory_limit_text());
     lua_setfield(L, -2, "memory_limit_text");
     push_point_names(L);
     lua_setfield(L, -2, "point_names");

@@ -136,10 +136,9 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         state.memory_ -= old_size;
         return nullptr;
     }
-    if (state.limited_ && new_size > old_size &&
-        state.memory_ + (new_size - old_size) > state.host_.options().script_memory)
-        return nullptr;
-    void* moved = std::realloc(block, new_size);
+    const bool is_beyond_limit = state.limited_ && new_size > old_size &&
+                                 state.memory_ + (new_size - old_size) > state.host_.options().script_memory;
+    void* moved = is_beyond_limit ? nullptr : std::realloc(block, new_size);
     if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
     if (moved)
         state.memory_ += new_size - old_size;
@@ -147,8 +146,10 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         std::longjmp(*state.making_, 1);
     else if (state.L_ && !state.protected_)
         throw std::bad_alloc();
-    else if (state.protected_ && is_asked_by_compiled_code())
+    else if (state.protected_ && is_asked_by_compiled_code()) {
+        state.is_left_at_limit_ = is_beyond_limit;
         Interruption::Call::try_to_leave(state.slot_);
+    }
     return moved;
 }
 
@@ -191,12 +192,15 @@ void State::call(int arguments, int results)
     const int base = lua_gettop(L_) - arguments;  // of the function
     lua_pushcfunction(L_, describe_error);
     lua_insert(L_, base);
-    const bool limited = std::exchange(limited_, true);
     const int status = [&] {
         const Protected inside(*this);
+        const struct Limited {
+            bool& now;
+            const bool before;
+            ~Limited() { now = before; }
+        } limited{limited_, std::exchange(limited_, true)};
         return protected_call(arguments, results, base);
     }();
-    limited_ = limited;
     lua_remove(L_, base);
     if (status != 0) throw take_error(L_);
 }
@@ -215,7 +219,14 @@ int State::protected_call(int arguments, int results, int handler)
 void State::fail_broken() const
 {
     host_.interruption.check();
+    if (is_left_at_limit_) throw Error(memory_limit_text());
     throw std::bad_alloc();
+}
+
+std::string State::memory_limit_text() const
+{
+    return fmt::format("the script needs more than {} MiB of Lua memory; --script-memory sets the limit",
+                       host_.options().script_memory >> 20);
 }
 
 void State::leave_if_broken() const

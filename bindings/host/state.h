@@ -103,6 +103,8 @@ public:
 
     // Bytes of Lua memory in use.
     std::size_t memory() const { return memory_; }
+    // What a script is told that needs more than it may have.
+    std::string memory_limit_text() const;
 
 private:
     // While Lua runs in a protected call, its errors have somewhere to go.
@@ -132,6 +134,7 @@ private:
     bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;            // to options().script_memory, now
     bool is_broken_ = false;          // compiled code was left by a jump
+    bool is_left_at_limit_ = false;   // likewise, as it asked for more than it may have
     bool protected_ = false;          // now
     std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory
     Interruption::Slot slot_;

@@ -20,6 +20,7 @@ void serialize(Archive& keep, Stiffness& stiffness)
     auto& [node, kind, step, substeps, frame, cure, alone] = stiffness;
     int number = kind;
     keep(node, number, step, substeps, frame, cure, alone);
+    if constexpr (Archive::is_loading::value) StateReader::expect(0 <= number && number <= Stiffness::Oscillation);
     kind = static_cast<Stiffness::Kind>(number);
 }
 

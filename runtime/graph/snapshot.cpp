@@ -41,6 +41,7 @@ void Evaluator::load(const Snapshot& snapshot)
         if (found == states.end()) StateReader::fail();
         return found->second;
     };
+    StateReader::expect(plan_.first_frame() <= snapshot.frame && snapshot.frame <= INT32_MAX);
     evaluate_constants(snapshot);
     next_ = snapshot.frame + 1;
     // What functions of the frame gave last: nodes and caches compare it with what they give next.

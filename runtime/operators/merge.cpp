@@ -105,6 +105,9 @@ bool keeps_order(const Plan& plan, const PlannedNode& merge)
     return true;
 }
 
+// Ids in a snapshot: they are gone through one by one, some seconds at most.
+constexpr std::int64_t most_adopted = std::int64_t{1} << 31;
+
 // The ids of the points in the result.
 class IdSet {
 public:
@@ -169,8 +172,12 @@ struct Merge {
     }
     void resume(const NodeSimulations& simulations) const
     {
+        std::int64_t left = most_adopted;
         for (const Run& run : adopted_) {
-            if (run.input >= simulations.inputs.size()) StateReader::fail();
+            StateReader::expect(run.input < simulations.inputs.size() && run.first >= 0 && run.size >= 0 &&
+                                run.first <= INT64_MAX - run.size && run.adopted >= 0 && run.size <= left &&
+                                run.size <= simulations.own.next_id - run.adopted);
+            left -= run.size;
             AdoptedIds& ids = simulations.own.adopted[simulations.inputs[run.input]];
             for (std::int64_t k = 0; k < run.size; ++k) {
                 std::int64_t next = run.adopted + k;

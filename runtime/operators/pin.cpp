@@ -69,6 +69,7 @@ struct Along {
     void serialize(Archive& keep)
     {
         keep(axis);
+        if constexpr (Archive::is_loading::value) StateReader::expect(0 <= axis && axis < 3);
     }
 
     double residual(const std::array<Vec3d, 1>& P, std::array<Vec3d, 1>& gradient) const
@@ -92,7 +93,11 @@ struct Pins {
     }
     void attach_springs()
     {
-        springs.for_each([&](const auto& ids, Along& along) { along.pin = &by_id.at(ids[0]); });
+        springs.for_each([&](const auto& ids, Along& along) {
+            const auto pin = by_id.find(ids[0]);
+            StateReader::expect(pin != by_id.end());
+            along.pin = &pin->second;
+        });
     }
 
     std::map<std::int64_t, Pin> by_id;  // addresses of pins are stable
@@ -337,6 +342,7 @@ public:
             } else if (place) {
                 pin.from = pin.to;
             }
+            if (body.surface && !body.surface->has(pin.on)) StateReader::fail();  // it was of another mesh
             if (place) pin.to = to;
             coupling->hold_at(i, pin);
             if (moves || curve || pin.from != pin.to) coupling->keep_awake(static_cast<std::uint32_t>(i));

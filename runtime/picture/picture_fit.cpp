@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "runtime/points/members.h"
+#include "runtime/points/state_archive.h"
 
 namespace rapid {
 namespace {
@@ -146,6 +147,13 @@ Camera fitted(const Box3d& bounds, const PictureOptions& options, const SceneCam
     return camera;
 }
 
+// Whether there is one, which a snapshot may say otherwise.
+bool is_view(const std::optional<PictureView>& view)
+{
+    return view && !view->bounds.isEmpty() && view->bounds.sizes().allFinite() && view->line_spacing > 0 &&
+           view->full_speed > 0 && std::isfinite(view->line_spacing + view->full_speed);
+}
+
 }  // namespace
 
 // The part of the way to the goal; the last hundredth is not seen, and ends the motion.
@@ -166,6 +174,7 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     const PictureScene& scene = frame.scene ? *frame.scene : nothing;
 
     const bool first = !settled();
+    if (!first) StateReader::expect(is_view(view_) && goal_.sizes().allFinite() && seen_.sizes().allFinite());
     const std::string& group = scene.camera.group;
     const Box3d moving = trimmed_bounds(points, group, first ? look_ahead : 0, floor_of(scene));
     Box3d content = group.empty() ? shape_bounds(scene, moving) : moving;

@@ -1,11 +1,24 @@
 #include "runtime/points/saved_state.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "runtime/error.h"
 #include "runtime/points/state_archive.h"
 
 namespace rapid {
+namespace {
+
+constexpr std::size_t most_alike = std::size_t{1} << 20;  // points that no column tells apart
+
+bool are_memberships(const Column<std::uint8_t>& members)
+{
+    const Strided<std::uint8_t> values = members.read();
+    return std::all_of(values.data, values.data + (values.stride ? members.size() : 1),
+                       [](std::uint8_t member) { return member <= 1; });
+}
+
+}  // namespace
 
 std::size_t SavedState::size() const
 {
@@ -63,13 +76,18 @@ void load(StateReader& from, PointSet& points)
     PointSet::Groups groups;
     PointSet loaded;
     from(size, columns, groups, loaded.details);
+    const auto has_values = [&](const auto& entry) {
+        return std::visit([](const auto& column) { return !column.is_uniform(); }, entry.second);
+    };
+    // A set without a value of its own for any point says how large it is, and nothing bears it out.
+    StateReader::expect(size <= most_alike || std::any_of(columns.begin(), columns.end(), has_values));
     loaded.append(size);
     for (auto& [name, any] : columns) {
         if (std::visit([](const auto& column) { return column.size(); }, any) != size) StateReader::fail();
         loaded.set(name, std::move(any));
     }
     for (auto& [name, members] : groups) {
-        if (members.size() != size) StateReader::fail();
+        StateReader::expect(members.size() == size && are_memberships(members));
         loaded.group(name) = std::move(members);
     }
     points = std::move(loaded);

@@ -66,6 +66,11 @@ public:
     void require(std::uint64_t elements) const;
     // Error: the state holds something else, or more than was read.
     void finish() const;
+    // Of what was read: error where it can't be what a run has left. A file of others may hold anything.
+    static void expect(bool is_possible)
+    {
+        if (!is_possible) fail();
+    }
 
     template <class T>
     const Column<T>& column_at(std::uint32_t place) const

@@ -3,12 +3,11 @@
 #include <cstdlib>
 #include <set>
 
-#include "bindings/host/session.h"
-#include "runtime/graph/evaluate.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/io/state_file.h"
 #include "runtime/report/statistics.h"
 #include "tests/files/temporary_folder.h"
+#include "tests/host/run.h"
 #include "tests/host/scenes_with_state.h"
 #include "tests/test.h"
 
@@ -16,6 +15,7 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
+using test::Run;
 
 // A node that counts frames, and says so or not.
 template <bool says_so>
@@ -51,23 +51,6 @@ using CountingOpenly = Counting<true>;
 using CountingSecretly = Counting<false>;
 RAPID_NODE(CountingOpenly);
 RAPID_NODE(CountingSecretly);
-
-// A scene that is read anew.
-class Run {
-public:
-    explicit Run(const fs::path& file)
-        : session_(file, {}), plan_(session_.graph(), PlanOptions{}), evaluator_(plan_, [](auto&&...) {})
-    {
-    }
-
-    Evaluator& evaluator() { return evaluator_; }
-    const Plan& plan() const { return plan_; }
-
-private:
-    Session session_;
-    Plan plan_;
-    Evaluator evaluator_;
-};
 
 // What a frame is, without times and what each pass took: statistics as text, every estimated error, and the points.
 struct Seen {

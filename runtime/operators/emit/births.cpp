@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/points/state_checks.h"
+
 namespace rapid {
 namespace {
 
@@ -38,8 +40,9 @@ Births BirthClock::at_rate(double rate, std::int64_t frame, double fps)
         rate_ = rate;
     }
     const double at_end = due_by(frame, fps);
-    const double before = static_cast<double>(born_);
-    Births births = at_once(static_cast<std::size_t>(std::floor(at_end) - before), fps);
+    const double before = static_cast<double>(born_), count = std::floor(at_end) - before;
+    StateReader::expect(is_between(count, 0, most_births));
+    Births births = at_once(static_cast<std::size_t>(count), fps);
     births.due = at_end - before;
     births.per_second = rate;
     born_ += births.count;

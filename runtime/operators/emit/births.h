@@ -6,8 +6,12 @@
 // that frame.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+
+#include "runtime/points/state_archive.h"
 
 namespace rapid {
 
@@ -37,9 +41,14 @@ public:
     void serialize(Archive& keep)
     {
         keep(total_, rate_, anchor_, carry_, born_);
+        if constexpr (Archive::is_loading::value)
+            StateReader::expect(total_ <= most_births && born_ <= total_ && rate_ >= 0 && std::isfinite(rate_) &&
+                                std::isfinite(carry_) && std::abs(anchor_) <= most_births);
     }
 
 private:
+    static constexpr std::int64_t most_births = std::int64_t{1} << 53;  // and frames, as doubles count
+
     double due_by(std::int64_t frame, double fps) const;
 
     std::uint64_t total_ = 0;  // births so far

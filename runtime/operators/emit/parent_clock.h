@@ -13,6 +13,8 @@
 #include "runtime/operators/emit/amount.h"
 #include "runtime/operators/emit/birth_event.h"
 #include "runtime/operators/emit/parent_paths.h"
+#include "runtime/points/state_archive.h"
+#include "runtime/points/state_checks.h"
 #include "runtime/random.h"
 
 namespace rapid {
@@ -48,6 +50,7 @@ public:
     void serialize(Archive& keep)
     {
         keep(ids_, states_);
+        if constexpr (Archive::is_loading::value) StateReader::expect(states_.size() == ids_.size());
     }
 
 private:
@@ -61,6 +64,7 @@ private:
         void serialize(Archive& keep)
         {
             keep(due, born, is_known, held);
+            if constexpr (Archive::is_loading::value) StateReader::expect(is_between(due, 0, 1));
         }
     };
     class Tally;

@@ -5,10 +5,12 @@
 // not the grids: points would come to other bits among narrower ones.
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <string>
 
 #include "runtime/graph/node.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/motion/deforming.h"
 
@@ -26,7 +28,10 @@ public:
     {
         std::map<std::string, Band> bands = restored_.empty() ? bands_ : restored_;
         keep(bands, deformations_);
-        if constexpr (Archive::is_loading::value) widened_.clear(), bands_.clear(), restored_ = std::move(bands);
+        if constexpr (Archive::is_loading::value) {
+            for (const auto& [node, band] : bands) StateReader::expect(band.band >= 0 && std::isfinite(band.band));
+            widened_.clear(), bands_.clear(), restored_ = std::move(bands);
+        }
     }
 
 private:

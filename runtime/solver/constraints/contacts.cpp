@@ -9,6 +9,7 @@
 
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
+#include "runtime/points/state_checks.h"
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_solver.h"
 #include "runtime/solver/constraints/energy_bound.h"
@@ -43,6 +44,20 @@ Vectors<Doubles> directions(const Vectors<Doubles>& d, const ContactPack& pack)
     return n;
 }
 
+// Whether each of these points is in a grid whose radius is at least its own, or in none.
+bool are_of(const RadiusGrids& all, std::span<const float> radius)
+{
+    const auto& [grids, of, error, excess] = all;
+    if (of.empty() ? grids.size() > 1 : of.size() != radius.size()) return false;
+    for (std::size_t g = 0; g < grids.size(); ++g)
+        if (!std::isfinite(grids[g].radius) || (g > 0 && !(grids[g].radius < grids[g - 1].radius))) return false;
+    for (std::size_t i = 0; i < radius.size(); ++i) {
+        const std::size_t g = of.empty() ? 0 : of[i];
+        if (g < grids.size() ? !(0 < radius[i] && radius[i] <= grids[g].radius) : radius[i] > 0) return false;
+    }
+    return true;
+}
+
 }  // namespace
 
 void Contacts::follow(const PointSet& points, const ContactOptions& options, const std::string& group)
@@ -74,6 +89,24 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     }
     list_is_stale_ |= !same_points || !same_radii;
     if (!same_points) renumber(points.id(), index);
+}
+
+// A list that is stale is made anew before it is used, and its blocks with it.
+bool Contacts::is_consistent() const
+{
+    const std::size_t points = ids_.size(), pairs = impulses_.pairs.size();
+    const auto has = [](const auto& list, std::size_t size) { return list.size() == size; };
+    const auto has_or_empty = [&](const auto& list, std::size_t size) { return list.empty() || has(list, size); };
+    if (!has(material_.radius, points) || !has(material_.root_friction, points) ||
+        !has(material_.restitution, points) || !has_or_empty(material_.rolling, points) ||
+        !are_of(grids_, material_.radius))
+        return false;
+    if (!are_below(impulses_.pairs, points) || !has(impulses_.normal, pairs) || !has(impulses_.tangential, pairs) ||
+        !has_or_empty(impulses_.resting, pairs) || !has_or_empty(impulses_.rolling, pairs) ||
+        !is_between(per_dt_, 0, std::numeric_limits<double>::max()))
+        return false;
+    if (list_is_stale_) return blocks_.size() == 0 || blocks_.are_of(pairs);
+    return blocks_.are_of(pairs) && list_.is_of(points) && has(reach_, pairs + lanes);
 }
 
 void Contacts::renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index)

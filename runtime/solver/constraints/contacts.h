@@ -15,6 +15,7 @@
 #include <memory>
 #include <vector>
 
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/carried_impulses.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contact_material.h"
@@ -54,10 +55,15 @@ public:
     void serialize(Archive& keep)
     {
         keep(ids_, material_, grids_, list_, blocks_, impulses_, reach_, list_is_stale_, backwards_, per_dt_);
-        if constexpr (Archive::is_loading::value) packs_.resize(blocks_.size());
+        if constexpr (Archive::is_loading::value) {
+            StateReader::expect(is_consistent());
+            packs_.resize(blocks_.size());
+        }
     }
 
 private:
+    // Of a snapshot: whether all indices are of what is there.
+    bool is_consistent() const;
     void renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index);
     void search(const Substep& step);
     void update_contacts(Substep& step);

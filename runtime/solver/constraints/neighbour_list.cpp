@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/points/state_checks.h"
 
 namespace rapid {
 namespace {
@@ -32,6 +33,13 @@ void NeighbourList::build(const Substep& step, std::span<const float> radius, co
     const double largest = grids.grids.empty() ? 0 : grids.grids.front().radius;
     search_.find(at_, {reach_.data(), 1}, grids, pairs_,
                  {fmt::format("radius = {:g} m", largest), "give a smaller radius", bytes_a_pair});
+}
+
+bool NeighbourList::is_of(std::size_t points) const
+{
+    const std::size_t blocks = frames_.size();
+    return at_.size() == points && slack_.size() == points && are_below(points_, points) &&
+           are_offsets(begin_, blocks, points_.size()) && are_below(neighbouring_, blocks);
 }
 
 void NeighbourList::store_positions(const Substep& step, std::span<const float> radius)

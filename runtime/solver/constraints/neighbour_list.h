@@ -40,6 +40,8 @@ public:
         keep(pairs_, age_, short_lived_, edge_, far_, at_, reach_, slack_, coordinates_, block_of_, begin_, points_,
              neighbouring_, frames_);
     }
+    // Of a snapshot: whether it is a list of so many points.
+    bool is_of(std::size_t points) const;
 
 private:
     void store_positions(const Substep& step, std::span<const float> radius);

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/points/state_checks.h"
 
 namespace rapid {
 namespace {
@@ -19,6 +20,12 @@ void PairBlocks::clear()
 {
     begin_.assign(1, 0);
     colours_.clear();
+}
+
+bool PairBlocks::are_of(std::size_t pairs) const
+{
+    return are_offsets(begin_, size(), pairs) &&
+           (colours_.empty() ? size() == 0 : are_offsets(colours_, colours_.size() - 1, size()));
 }
 
 void PairBlocks::build(const NeighbourList& list, std::vector<ContactPair>& ordered)

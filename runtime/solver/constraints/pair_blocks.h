@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "runtime/cancellation.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/neighbour_list.h"
 #include "runtime/solver/constraints/pair_impulses.h"
 
@@ -47,7 +48,10 @@ public:
     void serialize(Archive& keep)
     {
         keep(begin_, colours_);
+        if constexpr (Archive::is_loading::value) StateReader::expect(!begin_.empty());
     }
+    // Of a snapshot: whether they are blocks of so many pairs, in colours.
+    bool are_of(std::size_t pairs) const;
 
 private:
     template <class F>

@@ -74,6 +74,14 @@ struct Row {
              direction, active, was_active, asleep, resting_residual, resting_residual_exact);
     }
 
+    // Of a snapshot: whether it is one between different points.
+    bool is_possible() const
+    {
+        for (int k = 1; k < arity; ++k)
+            if (std::find(ids.begin(), ids.begin() + k, ids[k]) != ids.begin() + k) return false;
+        return compliance >= 0 && std::isfinite(compliance);
+    }
+
     // Finds its points by id. It acts while all of them are in the group. True where it acts otherwise than before.
     bool find_points(const IdIndex& index, const Strided<std::uint8_t>& members)
     {

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "runtime/points/members.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/row.h"
 #include "runtime/solver/constraints/row_schedule.h"
@@ -121,7 +122,11 @@ public:
     void serialize(Archive& keep)
     {
         keep(rows_, known_, known_is_complete_, dt_);
-        if constexpr (Archive::is_loading::value) changed_ = true;
+        if constexpr (Archive::is_loading::value) {
+            StateReader::expect(
+                std::all_of(rows_.begin(), rows_.end(), [](const Row& row) { return row.is_possible(); }));
+            changed_ = true;
+        }
     }
 
     bool keeps_momentum() const override { return arity > 1; }

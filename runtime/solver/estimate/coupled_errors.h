@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "runtime/points/saved_state.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/solve.h"
 
@@ -47,7 +48,10 @@ public:
         std::map<std::string, SavedState> memories;
         if constexpr (Archive::is_saving::value) memories = memories_of_twins();
         keep(memories);
-        if constexpr (Archive::is_loading::value) twins_.clear(), memories_ = std::move(memories);
+        if constexpr (Archive::is_loading::value) {
+            StateReader::expect(frames_ >= 0 && differences_.size() == solved_.size());
+            twins_.clear(), memories_ = std::move(memories);
+        }
     }
 
 private:

@@ -28,6 +28,7 @@ public:
     void serialize(Archive& keep)
     {
         keep(ids_, drift_);
+        if constexpr (Archive::is_loading::value) StateReader::expect(ascend(ids_) && drift_.size() == ids_.size());
     }
 
 private:

@@ -19,6 +19,8 @@
 #include <span>
 #include <vector>
 
+#include "runtime/points/state_archive.h"
+#include "runtime/points/state_checks.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {
@@ -58,6 +60,11 @@ public:
     void serialize(Archive& keep)
     {
         keep(threshold_, next_id_, ids_, indices_, dP_, dv_, rounding_, off_);
+        if constexpr (Archive::is_loading::value) {
+            StateReader::expect(ascend(ids_));
+            for (const std::size_t size : {indices_.size(), dP_.size(), dv_.size(), rounding_.size()})
+                StateReader::expect(size == ids_.size());
+        }
     }
 
 private:

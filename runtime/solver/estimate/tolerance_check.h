@@ -8,6 +8,8 @@
 // In each of the first frames, then in every fourth: the part that was found last holds between.
 #pragma once
 
+#include "runtime/points/state_archive.h"
+#include "runtime/points/state_checks.h"
 #include "runtime/solver/estimate/error_control.h"
 
 namespace rapid {
@@ -23,6 +25,7 @@ public:
     void serialize(Archive& keep)
     {
         keep(frames_, part_);
+        if constexpr (Archive::is_loading::value) StateReader::expect(frames_ >= 0 && is_between(part_, 0, 1));
     }
 
 private:

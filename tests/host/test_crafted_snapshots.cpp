@@ -1,0 +1,142 @@
+// Snapshots that are made to do harm: those of runs with values that no run would leave, and a checksum that is right.
+// The run behind one goes on, or ends with an error; none ends the process by a signal, or takes more than ten seconds
+// of the processor.
+//
+//   RAPID_CRAFTED=10000 build/test/bin/test_host "[crafted]"        as many in all (300)
+//   RAPID_CRAFTED_FIRST=2000 build/test/bin/test_host "[crafted]"   from this one on (0), as far as RAPID_CRAFTED
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/time.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include "runtime/io/state_file.h"
+#include "runtime/points/state_archive.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/host/forger.h"
+#include "tests/host/run.h"
+#include "tests/host/scenes_with_state.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+int setting(const char* name, int usual)
+{
+    const char* text = std::getenv(name);
+    return text ? std::atoi(text) : usual;
+}
+
+std::vector<std::pair<std::string, fs::path>> scenes(const fs::path& folder)
+{
+    std::vector<std::pair<std::string, fs::path>> files;
+    for (const auto& [name, text] : test::scenes_with_state) {
+        const fs::path file = folder / ("scene" + std::to_string(files.size()) + ".lua");
+        std::ofstream(file) << "local rapid = require \"rapid\"\n" << text;
+        files.emplace_back(name, file);
+    }
+    return files;
+}
+
+// What the process that goes on behind them tells.
+struct Report {
+    int next, gone_on, refused;
+};
+
+void limit()
+{
+    constexpr std::size_t most = std::size_t{2} << 30;
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlim_t bytes = pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + most;
+    const rlimit value{bytes, bytes};
+    ::setrlimit(RLIMIT_AS, &value);
+}
+
+void limit_time()
+{
+    const itimerval processor{{0, 0}, {10, 0}};
+    ::setitimer(ITIMER_PROF, &processor, nullptr);
+    ::alarm(120);
+}
+
+void go_on_behind(const SavedState& state, const fs::path& scene)
+{
+    Snapshot snapshot;
+    restore(snapshot, state);
+    test::Run run(scene);
+    run.evaluator().load(snapshot);
+    for (int k = 0; k < 2; ++k) run.evaluator().advance();
+}
+
+}  // namespace
+
+// In a process of its own: see below. RAPID_TEST_SNAPSHOT: the folder.
+TEST_CASE("goes on behind crafted snapshots", "[.]")
+{
+    const fs::path folder = std::getenv("RAPID_TEST_SNAPSHOT");
+    const int file = ::open((folder / "report").c_str(), O_RDWR);
+    auto* const report =
+        static_cast<Report*>(::mmap(nullptr, sizeof(Report), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0));
+    const SavedState whole = StateFile(folder / "whole").state();
+    const int end = setting("RAPID_TEST_END", 0), step = setting("RAPID_TEST_STEP", 1);
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGILL, SIGBUS, SIGALRM, SIGPROF}) ::signal(signal, SIG_DFL);
+    limit();
+    for (; report->next < end; report->next += step) {
+        limit_time();
+        try {
+            go_on_behind(test::Forger(static_cast<std::uint64_t>(report->next))(whole),
+                         std::getenv("RAPID_TEST_SCENE"));
+            ++report->gone_on;
+        } catch (const std::exception&) {
+            ++report->refused;
+        }
+    }
+    ::_exit(0);
+}
+
+TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "[crafted][long]")
+{
+    const test::TemporaryFolder folder;
+    const auto all = scenes(folder.path());
+    const int step = static_cast<int>(all.size());
+    int gone_on = 0, refused = 0;
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        const auto& [name, scene] = all[k];
+        {
+            test::Run run(scene);
+            for (int frame = 0; frame < 6; ++frame) run.evaluator().advance();
+            OutputFile file(folder / "whole");
+            write_state(file, {{"frame", 6}}, state_of(run.evaluator().save()));
+            file.finish();
+        }
+        go_on_behind(StateFile(folder / "whole").state(), scene);
+
+        Report report{setting("RAPID_CRAFTED_FIRST", 0) / step * step + static_cast<int>(k), 0, 0};
+        std::ofstream(folder / "report", std::ios::binary).write(reinterpret_cast<char*>(&report), sizeof report);
+        ::setenv("RAPID_TEST_SNAPSHOT", folder.path().c_str(), 1);
+        ::setenv("RAPID_TEST_SCENE", scene.c_str(), 1);
+        ::setenv("RAPID_TEST_END", std::to_string(setting("RAPID_CRAFTED", 300)).c_str(), 1);
+        ::setenv("RAPID_TEST_STEP", std::to_string(step).c_str(), 1);
+        const std::string program = fs::read_symlink("/proc/self/exe").string();
+        const int status = std::system(("'" + program + "' 'goes on behind crafted snapshots' >/dev/null").c_str());
+        std::ifstream(folder / "report", std::ios::binary).read(reinterpret_cast<char*>(&report), sizeof report);
+        CAPTURE(name, report.next, report.gone_on, report.refused);
+        CHECK(status == 0);
+        gone_on += report.gone_on;
+        refused += report.refused;
+    }
+    if (std::getenv("RAPID_CRAFTED")) std::printf("%d gone on, %d refused\n", gone_on, refused);
+    CHECK(gone_on > 0);
+    CHECK(refused > 0);
+}
+
+}  // namespace rapid

@@ -84,6 +84,8 @@ private:
             return json;
         } catch (Error& error) {
             throw error.at({path.string(), 0});
+        } catch (const ordered_json::exception&) {
+            throw Error("its header is not that of a snapshot").at({path.string(), 0});
         }
     }
 

@@ -1,12 +1,14 @@
 #include "bindings/command/piece_log.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <string>
 
 #include "runtime/files/content_hash.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -63,12 +65,17 @@ void PieceLog::add(std::string_view piece)
 
 void PieceLog::read(std::uint64_t bytes, const std::function<void(std::string_view piece)>& f) const
 {
+    struct stat file;
+    if (::fstat(file_.number(), &file) != 0) throw file_error("can't be read", errno);
+    if (bytes > static_cast<std::uint64_t>(file.st_size)) throw Error("it is damaged");
     std::string piece;
     for (std::uint64_t at = 0; at < bytes; at += sizeof(Head) + piece.size()) {
         Head head;
         if (bytes - at < sizeof head || !read_at(file_.number(), at, &head, sizeof head) ||
             head.bytes > bytes - at - sizeof head)
             throw Error("it is damaged");
+        if (!fits_in_memory(static_cast<double>(head.bytes)))
+            throw beyond_memory("a piece of it", static_cast<double>(head.bytes), "give another folder");
         piece.resize(head.bytes);
         if (!read_at(file_.number(), at + sizeof head, piece.data(), piece.size()) || content_hash(piece) != head.hash)
             throw Error("it is damaged");

@@ -86,6 +86,7 @@ RunJournal::Contents RunJournal::read(const std::filesystem::path& file, const s
             } else if (kind == Kind::Frame) {
                 FrameRecord record;
                 reader(record);
+                for (const auto& [name, hash_then] : record.read) StateReader::expect(InputContents::is_content(name));
                 contents.frames[record.statistics.frame] = std::move(record);
             } else {
                 WrittenFile film;

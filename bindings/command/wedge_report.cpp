@@ -64,20 +64,26 @@ void WedgeReport::ended(std::size_t row, const EndedProcess& process, const fs::
 
 void WedgeReport::read(const fs::path& statistics, Result& result)
 {
+    std::error_code none;
+    if (!fs::is_regular_file(statistics, none)) return;  // reading a pipe would wait
     std::ifstream file(statistics);
     const json all = json::parse(file, nullptr, false);
     if (all.is_discarded()) return;
-    result.seconds = all.at("seconds");
-    result.peak_bytes = all.at("peak_bytes");
-    for (const json& frame : all.at("frames")) {
-        result.last_frame = frame.at("frame").get<std::int64_t>();
-        result.points = frame.at("points");
-        result.contacts += frame.at("collisions").get<std::uint64_t>();
-        if (!frame.contains("error")) continue;
-        const json& error = frame.at("error");
-        const double p95 = error.at("position_p95");
-        if (!result.error || p95 > result.error->p95)
-            result.error = {error.at("position_p50"), p95, error.at("position_max"), frame.at("frame")};
+    try {
+        result.seconds = all.at("seconds");
+        result.peak_bytes = all.at("peak_bytes");
+        for (const json& frame : all.at("frames")) {
+            result.last_frame = frame.at("frame").get<std::int64_t>();
+            result.points = frame.at("points");
+            result.contacts += frame.at("collisions").get<std::uint64_t>();
+            if (!frame.contains("error")) continue;
+            const json& error = frame.at("error");
+            const double p95 = error.at("position_p95");
+            if (!result.error || p95 > result.error->p95)
+                result.error = {error.at("position_p50"), p95, error.at("position_max"), frame.at("frame")};
+        }
+    } catch (const json::exception&) {
+        result.failure = fmt::format("{}: it does not hold the statistics of a run", statistics.string());
     }
 }
 

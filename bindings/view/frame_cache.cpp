@@ -9,10 +9,11 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <utility>
 
+#include "runtime/files/input_file.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
 
@@ -33,6 +34,7 @@ struct KeptFrame {
     void serialize(Archive& keep)
     {
         keep(outputs);
+        if constexpr (Archive::is_loading::value) StateReader::expect(!outputs.empty());
     }
 };
 
@@ -110,7 +112,9 @@ CachedRun::CachedRun(fs::path folder, const Fingerprint& fingerprint, const Inpu
     if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
     read_index(contents);
     const fs::path index = folder_ / "index";
-    index_ = Descriptor(::open(index.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+    // A link would have something appended elsewhere.
+    index_ =
+        Descriptor(::open(index.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666));
     if (!index_) throw Error(fmt::format("--cache {}: can't be written: {}", index.string(), std::strerror(errno)));
     fs::last_write_time(index, fs::file_time_type::clock::now(), error);  // used last
     for (const auto& [number, known] : known_) {
@@ -127,8 +131,17 @@ fs::path CachedRun::file(const char* what, std::int64_t number) const
 // A line that a killed process has left unfinished, and frames whose files are not there, are passed over.
 void CachedRun::read_index(const InputContents& contents)
 {
-    std::ifstream index(folder_ / "index");
     std::error_code none;
+    const fs::path path = folder_ / "index";
+    if (!fs::exists(fs::symlink_status(path, none))) return;
+    const auto text = [&] {
+        try {
+            return std::string(InputFile(path).text());
+        } catch (Error& error) {
+            throw error.at({path.string(), 0});
+        }
+    }();
+    std::istringstream index(text);
     for (std::string line; std::getline(index, line);) {
         const Json entry = Json::parse(line, nullptr, false);
         if (!entry.is_object()) continue;
@@ -140,7 +153,7 @@ void CachedRun::read_index(const InputContents& contents)
                                   (known.shapes == 0 || fs::exists(file(shapes_file, known.shapes), none));
             const auto read = entry.at("read").get<Fingerprint>();
             const bool is_same = std::all_of(read.begin(), read.end(), [&](const auto& one) {
-                return contents.content_of(one.first) == one.second;
+                return InputContents::is_content(one.first) && contents.content_of(one.first) == one.second;
             });
             if (is_whole && is_same) known_[number] = std::move(known);
         } catch (const nlohmann::json::exception&) {
@@ -187,7 +200,7 @@ void CachedRun::keep(const Snapshot& snapshot)
 
 std::optional<Snapshot> CachedRun::snapshot_before(std::int64_t frame) const
 {
-    for (std::int64_t number = frame - 1; number >= 0 && number >= known_.begin()->first; --number) {
+    for (std::int64_t number = frame - 1; number >= 0 && !known_.empty() && number >= known_.begin()->first; --number) {
         std::error_code none;
         if (!fs::exists(file(snapshot_file, number), none)) continue;
         try {
@@ -243,7 +256,9 @@ FrameCache::FrameCache(const fs::path& folder) : folder_(folder / "view")
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
-    lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
+    if (!lock_ && errno == ELOOP)
+        throw Error(fmt::format("--cache {}: its .lock is a link; give another folder", folder.string()));
     if (lock_ && ::flock(lock_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
         throw Error(
             fmt::format("--cache {}: another view has it; wait for its end, or give another folder", folder.string()));

@@ -22,6 +22,7 @@ using nlohmann::ordered_json;
 
 constexpr std::string_view magic = "\x89RAPID\r\n";
 constexpr int format = 2;
+constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
 constexpr std::array<std::string_view, 6> types = {"float", "vec3", "int32", "int64", "quat", "uint8"};  // KeptColumn's
 constexpr std::string_view type_of_bytes = "bytes";
 
@@ -159,7 +160,12 @@ StateFile::StateFile(const std::filesystem::path& path) : file_(path)
     if (length > body - begin) damaged("its header is longer than the file");
     blocks_at_ = begin + static_cast<std::size_t>(length);
     try {
-        header_ = ordered_json::parse(file_.text().substr(begin, static_cast<std::size_t>(length)));
+        header_ = ordered_json::parse(file_.text().substr(begin, static_cast<std::size_t>(length)),
+                                      [](int depth, ordered_json::parse_event_t, ordered_json&) {
+                                          if (depth > most_depth) damaged("its header is nested too deep");
+                                          return true;
+                                      });
+        if (!header_.is_object()) damaged("its header can't be read");
         if (header_.at("format").get<int>() != format)
             throw Error(fmt::format("it has the format {} of snapshots; this Rapid reads {}",
                                     header_.at("format").get<int>(), format));

@@ -150,6 +150,26 @@ describe("a wedge", function()
   end)
 end)
 
+describe("the statistics of a wedge's rows", function()
+  it("are neither waited for nor believed: the row has failed", function()
+    local folder = command.folder()
+    folder:write("scene.lua", 'local rapid = require "rapid" return rapid.create {} :solve {}')
+    command.shell("mkdir farm", { cwd = folder.path })
+    for _, text in ipairs(nonsense) do
+      folder:write("farm/2.json", text)
+      folder:write("farm/1.status", "0")
+      folder:write("farm/2.status", "0")
+      command.shell("rm -f farm/1.json; mkfifo farm/1.json", { cwd = folder.path })
+      local result = ended(folder, '"$RAPID" wedge scene.lua --vary solve.substeps=1,2 -f 1 --collect farm')
+      assert.is_nil(result.complaint, text:sub(1, 40) .. ": " .. (result.complaint or ""))
+    end
+    folder:write("farm/2.json", '{"seconds": 1, "peak_bytes": 1, "frames": [{"frame": "one"}]}')
+    local result = ended(folder, '"$RAPID" wedge scene.lua --vary solve.substeps=1,2 -f 1 --collect farm')
+    assert.equal(1, result.status)
+    assert.match("failed: farm/2.json: it does not hold the statistics of a run", result.stderr)
+  end)
+end)
+
 describe("the folder of a cache", function()
   local scene = 'local rapid = require "rapid" ' ..
     "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } } :gravity {} :solve {}"
@@ -179,5 +199,25 @@ describe("the folder of a cache", function()
     assert.match("^%-%-cache cache: its .lock is a link", go_on("rm .lock; ln -s ../seen .lock").stderr)
     assert.match("^cache/journal: can't be read: it is not a regular file", go_on("rm journal; mkfifo journal").stderr)
     assert.match("^cache/journal: the file, which is read whole,", go_on("truncate -s 300G journal").stderr)
+  end)
+end)
+
+describe("the folder of a view's cache", function()
+  it("makes and changes nothing elsewhere", function()
+    local folder = command.folder()
+    folder:write("scene.lua", 'local rapid = require "rapid" ' ..
+      "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } } :solve {}")
+    folder:write("victim", "precious")
+    local view = '"$RAPID" view scene.lua -f 1-3 --no-open --cache cache'
+    command.shell("timeout 60 " .. view .. " >said 2>&1 & until [ -e cache/view/*/index ]; do kill -0 $! || exit 1; " ..
+      "sleep 0.02; done; kill $!; wait $!; exit 0", { cwd = folder.path })
+    command.shell("cd cache/view/*/ && rm index && ln -s ../../../victim index", { cwd = folder.path })
+    command.shell("timeout 4 " .. view .. " >said 2>&1", { cwd = folder.path })
+    assert.equal("precious", folder:read "victim")
+    command.shell("cd cache/view && rm -f .lock && ln -s ../../seen .lock", { cwd = folder.path })
+    local result = ended(folder, view)
+    assert.equal(2, result.status)
+    assert.match("^%-%-cache cache: its .lock is a link", result.stderr)
+    assert.is_nil(folder:read "seen")
   end)
 end)

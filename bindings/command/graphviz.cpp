@@ -12,6 +12,7 @@
 
 #include "runtime/error.h"
 #include "runtime/files/file_error.h"
+#include "runtime/files/program_path.h"
 
 namespace rapid {
 namespace {
@@ -54,6 +55,10 @@ std::string lay_out(const std::string& graph, const std::string& format)
     const Descriptor input = memory_file(), output = memory_file(), messages = memory_file();
     write_all(input, graph);
 
+    const std::string program = program_path("dot");
+    if (program.empty())
+        throw Error("graphs are laid out by dot, which is not here; install it (apt install graphviz), or write .dot");
+
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     posix_spawn_file_actions_init(&actions);
@@ -71,11 +76,9 @@ std::string lay_out(const std::string& graph, const std::string& format)
     std::string name = "dot", option = "-T" + format;
     char* const arguments[] = {name.data(), option.data(), nullptr};
     pid_t child = -1;
-    const int failed = posix_spawnp(&child, "dot", &actions, &attributes, arguments, environ);
+    const int failed = posix_spawn(&child, program.c_str(), &actions, &attributes, arguments, environ);
     posix_spawn_file_actions_destroy(&actions);
     posix_spawnattr_destroy(&attributes);
-    if (failed == ENOENT)
-        throw Error("graphs are laid out by dot, which is not here; install it (apt install graphviz), or write .dot");
     if (failed) throw Error(fmt::format("dot can't be started: {}", std::strerror(failed)));
 
     int status = 0;

@@ -9,12 +9,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <cstdlib>
 #include <set>
 #include <sstream>
 
 #include "bindings/command/command.h"
 #include "runtime/files/file_error.h"
+#include "runtime/files/program_path.h"
 
 namespace rapid {
 namespace {
@@ -38,6 +38,7 @@ Output output_of(const std::vector<std::string>& words)
 {
     const Descriptor out(memfd_create("out", MFD_CLOEXEC)), errors(memfd_create("errors", MFD_CLOEXEC));
     if (!out || !errors) throw file_error("no memory for what a process says", errno);
+    const std::string program = program_path(words.front());
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
@@ -47,7 +48,7 @@ Output output_of(const std::vector<std::string>& words)
         dup2(open("/dev/null", O_RDONLY | O_CLOEXEC), STDIN_FILENO);
         dup2(out.number(), STDOUT_FILENO);
         dup2(errors.number(), STDERR_FILENO);
-        execvp(arguments[0], arguments.data());
+        execv(program.c_str(), arguments.data());
         _exit(127);
     }
     int status = 0;
@@ -85,22 +86,13 @@ std::string list_of(const std::vector<std::int64_t>& jobs)
     return fmt::format("{}", fmt::join(each, ","));
 }
 
-bool is_on_path(const std::string& program)
-{
-    const char* path = std::getenv("PATH");
-    std::istringstream folders(path ? path : "");
-    for (std::string folder; std::getline(folders, folder, ':');)
-        if (access((fs::path(folder) / program).c_str(), X_OK) == 0) return true;
-    return false;
-}
-
 }  // namespace
 
 void require_slurm()
 {
     std::vector<std::string> missing;
     for (const char* program : {"sbatch", "squeue", "scancel"})
-        if (!is_on_path(program)) missing.emplace_back(program);
+        if (program_path(program).empty()) missing.emplace_back(program);
     if (!missing.empty())
         throw Error(
             fmt::format("--farm slurm: {} {} not on PATH; install slurm-client, or give --dry-run to see the "

@@ -10,13 +10,12 @@
 
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "runtime/error.h"
+#include "runtime/files/program_path.h"
 
 namespace rapid {
 namespace {
@@ -25,12 +24,7 @@ constexpr int input = STDIN_FILENO, output = 3;  // of ffmpeg
 
 std::string path_of_ffmpeg()
 {
-    const char* const path = std::getenv("PATH");
-    std::istringstream folders(path ? path : "/usr/bin");
-    for (std::string folder; std::getline(folders, folder, ':');) {
-        const std::string file = (folder.empty() ? "." : folder) + "/ffmpeg";
-        if (access(file.c_str(), X_OK) == 0) return file;
-    }
+    if (std::string file = program_path("ffmpeg"); !file.empty()) return file;
     throw Error(
         "films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
 }

@@ -30,6 +30,22 @@ describe("a library of Lua", function()
   end)
 end)
 
+describe("a program", function()
+  it("that is beside a scene, in the current folder, is not run, whatever PATH says", function()
+    local folder = command.folder()
+    folder:write("scene.lua", 'local rapid = require "rapid" return ' .. point)
+    for _, name in ipairs { "ffmpeg", "dot", "sbatch", "squeue", "scancel" } do
+      folder:write(name, "#!/bin/sh\n: >seen\necho 17\n")
+      command.shell("chmod +x " .. name, { cwd = folder.path })
+    end
+    for _, line in ipairs { "run scene.lua -f 1-2 --quiet -o film.mp4", "graph scene.lua -o graph.svg",
+      "run scene.lua -f 1-2 -o a.####.csv --farm slurm --parts 2" } do
+      command.rapid(line, { cwd = folder.path, environment = { PATH = ":.:" .. folder.path:gsub("^/", "") } })
+      assert.is_nil(folder:read "seen", line)
+    end
+  end)
+end)
+
 describe("the name of an output", function()
   it("does not lead out of the folder that it is written to", function()
     for _, name in ipairs { "../x", "/tmp/x", "a/../../x", "..", ".", ".hidden", "", "a\\0b", "a\\nb", "\\27[2J",

@@ -4,6 +4,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/graphviz.h"
+#include "bindings/command/untrusted.h"
 #include "bindings/command/whole_file.h"
 #include "bindings/host/threads.h"
 #include "runtime/report/graph_picture.h"
@@ -11,7 +12,7 @@
 namespace rapid {
 namespace {
 
-class GraphCommand : public Command {
+class GraphCommand : public Command, public Confined {
 public:
     std::string name() const override { return "graph"; }
     std::string doc() const override { return "draws a graph: its nodes, from Create to Solve and back"; }
@@ -23,6 +24,14 @@ public:
                        "the file: .svg, .dot (Graphviz's language) or .json (nodes, edges and their places) [default: "
                        ".dot to standard output]")
             ->type_name("FILE");
+        untrusted_.declare(app, "graph");
+    }
+
+    void confine(const CommonOptions& common) override
+    {
+        SandboxAccess access{{folder_of(graph_.file())}, {}};
+        if (!file_.empty()) access.writable.push_back(folder_of(file_));
+        untrusted_.confine([&] { return access; }, common);
     }
 
     int run(const CommonOptions& common) override
@@ -30,6 +39,9 @@ public:
         const std::string extension = std::filesystem::path(file_).extension();
         if (!file_.empty() && extension != ".svg" && extension != ".dot" && extension != ".json")
             throw Error(fmt::format("-o {}: it must be a file of .svg, .dot or .json", file_));
+        if (untrusted_.asked() && !file_.empty() && extension != ".dot")
+            throw Error(fmt::format(
+                "-o {}: dot, a program of its own, lays it out, which --untrusted forbids; write .dot", file_));
         Threads threads(common.threads);
         return threads.run([&] {
             const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
@@ -52,6 +64,7 @@ public:
 private:
     GraphOptions graph_;
     std::string file_;
+    UntrustedOptions untrusted_;
 };
 RAPID_COMMAND(GraphCommand);
 

@@ -229,6 +229,24 @@ describe("--untrusted of other commands", function()
     assert.equal(against.stdout, explain("--against other/scene.lua --untrusted --allow-read outside").stdout)
   end)
 
+  it("keeps graphs that are drawn in their folders, and starts no program for it", function()
+    local folder = new_folder(read)
+    local function draw(arguments)
+      return command.rapid("graph inside/scene.lua " .. arguments, { cwd = folder.path })
+    end
+    local refused = draw "--untrusted"
+    assert.equal(2, refused.status)
+    assert.match("inside/scene.lua:3: rapid.mesh.read: .*outside/mesh.obj", refused.stderr)
+    assert.equal(draw("").stdout, draw("--untrusted --allow-read outside").stdout)
+    assert.equal(0, draw("--untrusted --allow-read outside -o out.dot").status)
+    assert.equal(draw("").stdout, folder:read "out.dot")
+    for _, name in ipairs { "out.svg", "out.json" } do
+      local laid_out = draw("--untrusted --allow-read outside -o " .. name)
+      assert.equal(2, laid_out.status)
+      assert.match("a program of its own, lays it out, which %-%-untrusted forbids; write .dot", laid_out.stderr)
+    end
+  end)
+
   it("keeps a graph that is studied in its folder, and writes the study", function()
     local folder = new_folder(plain:gsub("gravity {}", "gravity {} :attract { strength = 1 }"))
     local function study(arguments)

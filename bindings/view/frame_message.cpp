@@ -260,6 +260,10 @@ ShownPoints shown_points(const PointSet& points, const FrameWish& wish)
     // By id, so that the same points are shown in every frame.
     const Strided<std::int64_t> id = points.id().read();
     while (places.size() > wish.most) {
+        if (shown.every > UINT64_MAX / 2) {  // files of others may have many points of one id
+            places.resize(wish.most);
+            break;
+        }
         shown.every *= 2;
         std::erase_if(places, [&](std::uint32_t i) { return static_cast<std::uint64_t>(id[i]) % shown.every != 0; });
     }

@@ -327,11 +327,13 @@ private:
 void ViewServer::Impl::accept()
 {
     acceptor_.async_accept([this](const beast::error_code& error, Tcp::socket socket) {
-        if (!error) {
-            beast::error_code none;
-            socket.set_option(Tcp::no_delay(true), none);
-            std::make_shared<Connection>(*this, std::move(socket))->read();
+        if (error) {  // as a rule for want of descriptors, until others have ended
+            auto pause = std::make_shared<asio::steady_timer>(net_, std::chrono::milliseconds(100));
+            return pause->async_wait([this, pause](const beast::error_code&) { accept(); });
         }
+        beast::error_code none;
+        socket.set_option(Tcp::no_delay(true), none);
+        std::make_shared<Connection>(*this, std::move(socket))->read();
         accept();
     });
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace rapid {
 
@@ -43,35 +44,66 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
 }
 
 // Between contacts the mean acceleration stands for springs: where these turn a point several times in the sub-step it
-// may come out with any energy. It keeps what it had, and what displacements have given it; a place that this does not
-// reach is not taken, and the point waits where the sub-step began. Shapes that move may give it velocity, and push it
-// against springs to places.
+// may come out with any energy. It keeps what it had, what displacements have given it, and what shapes that move can;
+// a place that this does not reach is not taken, and the point waits where the sub-step began. What has changed its
+// energy then is the work of contacts; drag, which may have taken part of it, gives none.
 void Collisions::limit_energy(std::size_t displaced)
 {
     constexpr double rounding = 1e-12;
-    const bool any_moves =
-        std::any_of(block_.obstacles.begin(), block_.obstacles.end(), [](const Obstacle& o) { return o.moves; });
     const auto moved = ejection_.displacements().subspan(displaced);
     for (const std::uint32_t i : touched_.list()) {
-        if (stuck_.has(i) || !(any_moves ? motion_.is_drawn_to_surface(i) : motion_.is_drawn(i))) continue;
+        if (stuck_.has(i) || !motion_.is_drawn(i)) continue;
         Vec3d &P = block_.P[i], &v = block_.v[i], by = Vec3d::Zero();
         for (const Ejection::Displacement& one : moved)
             if (one.i == i) by += one.by;
         const Vec3d from = motion_.initial_P(i) + by, v0 = motion_.initial_v(i);
-        const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from), potential = motion_.potential(i, P);
-        double kinetic = energy - potential;
-        if (kinetic < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
+        const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from);
+        const double speed = speed_of_shapes(i, from);
+        const double most = speed > 0 ? driven_energy(i, energy, speed) : energy;
+        double potential = motion_.potential(i, P);
+        if (most - potential < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
             P = from;
-            if (!any_moves) v = v0;
-            audit_.set_work(i, 0.5 * (v - v0).dot(v + v0));
-            continue;
+            potential = motion_.potential(i, P);
+            if (!(speed > 0)) v = v0;
         }
-        kinetic = std::max(0.0, kinetic);
-        const double excess = 0.5 * v.squaredNorm() - kinetic;
-        if (any_moves || !(excess > 0)) continue;
-        v *= std::sqrt(2 * kinetic / v.squaredNorm());
-        audit_.add_work(i, -excess);
+        const double kinetic = std::max(0.0, most - potential);
+        if (0.5 * v.squaredNorm() > kinetic) v *= std::sqrt(2 * kinetic / v.squaredNorm());
+        const double work = 0.5 * v.squaredNorm() + potential - energy;
+        audit_.set_work(i, motion_.is_dragged(i) ? std::max(audit_.work_now(i), work) : work);
     }
+}
+
+// m/s: the fastest that a shape which moves goes where a spring may take the point, between where it is and as far
+// behind the place that draws it.
+double Collisions::speed_of_shapes(std::size_t i, const Vec3d& from) const
+{
+    const Damped::Pull& pull = motion_.pull(i);
+    const Vec3d to = pull.w2 > 0 ? Vec3d(from + 2 / pull.w2 * pull.G) : from;
+    double fastest = 0;
+    for (const Obstacle& obstacle : block_.obstacles) {
+        if (!obstacle.moves || !block_.has_member(obstacle, i)) continue;
+        for (const Vec3d& P : {from, to})
+            fastest = std::max(fastest, obstacle.shape->velocity_at(P, block_.frame_time(i, 0)).norm());
+    }
+    return fastest;
+}
+
+// J/kg: the most that a point on a spring has after shapes of the speed V have met it. Each time that the spring brings
+// it back they give it twice their speed at most, and they push it V t against the spring:
+//
+//   √(2E) <= √(2E0) + 2V (1 + Ωt)          E above the least potential energy
+//
+// Where the spring turns it by less than a radian in the sub-step, what stands for it is right, and has no bound; nor
+// has what draws to a surface and elsewhere by a force.
+double Collisions::driven_energy(std::size_t i, double energy, double speed) const
+{
+    constexpr double unbounded = std::numeric_limits<double>::infinity();
+    const Damped::Pull& pull = motion_.pull(i);
+    const double turns = std::sqrt(pull.w2 + pull.surface.w2) * block_.dt[i];
+    if (!(turns > 1) || (!(pull.w2 > 0) && !pull.G.isZero(0))) return unbounded;
+    const double least = pull.w2 > 0 ? -0.5 * pull.G.squaredNorm() / pull.w2 : 0;
+    const double root = std::sqrt(2 * std::max(0.0, energy - least)) + 2 * speed * (1 + turns);
+    return least + 0.5 * root * root;
 }
 
 // By the paper's methods, which correct after the sub-step.

@@ -38,6 +38,7 @@ public:
     void begin_work();
     void add_work(std::size_t i, double by) { work_[i] += by; }
     void set_work(std::size_t i, double work) { work_[i] = work; }
+    double work_now(std::size_t i) const { return work_[i]; }
     void count_work(const TouchedPoints& touched);
     void add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion);
     void add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion);

@@ -40,6 +40,9 @@ public:
         const double surface = pull.surface.w2 > 0 ? potential_energy(pull.surface, P) : 0;
         return 0.5 * pull.w2 * d.squaredNorm() - pull.G.dot(d) + surface;
     }
+    bool is_dragged(std::size_t i) const { return damped_[i].k > 0; }
+    // What draws a damped point.
+    const Damped::Pull& pull(std::size_t i) const { return damped_[i].pull; }
     // Sets that mean, from the velocity of the point now.
     void update_acceleration(std::size_t i, double left)
     {

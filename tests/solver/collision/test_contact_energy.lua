@@ -47,27 +47,29 @@ return rapid.create { fps = 24, points = rapid.points.from {
   return text .. ("  :solve { substeps = %d }"):format(draw.pick { 4, 8 })
 end
 
--- Of points that springs of so many N/m draw to the origin: how much more energy they have in the last frame than in
--- the first, what contacts have added and taken between, and the most that was in motion, and in springs, at once; J.
-local function energies(text, stiffness)
+-- Of points that springs of so many N/m draw to a place: how much more energy they have in the last frame than in
+-- the first, what contacts have added and taken between, the most that was in motion, and in springs, at once, and what
+-- was at first; J.
+local function energies(text, stiffness, target)
   local ran = scene.command("run", text, ("-f 1-%d --stats stats.json --quiet"):format(frames))
   assert.equal(0, ran.status, ran.stderr .. text)
   local added, taken, size = 0, 0, 0
   for _, frame in ipairs(json.decode(scene.folder:read "stats.json").frames) do
     added, taken = added + frame.contact_energy.added, taken + frame.contact_energy.lost
   end
-  local first, last
+  local first, last, start
   for _, points in scene.run(text, { frames = {1, frames} }):frames() do
     local inner, potential = 0, 0
     for i = 1, #points do
       local p = points[i]
-      inner = inner + 0.5 * (p.mass * p.v:dot(p.v) + stiffness * p.P:dot(p.P))
+      local d = target and p.P - target or p.P
+      inner = inner + 0.5 * (p.mass * p.v:dot(p.v) + stiffness * d:dot(d))
       potential = potential + p.mass * g * p.P.y
     end
     last, size = inner + potential, math.max(size, inner)
-    first = first or last
+    first, start = first or last, start or inner
   end
-  return last - first, added, taken, size
+  return last - first, added, taken, size, start
 end
 
 -- takes: the largest part of `size` that drag can take in a second, 2 k or 2 c v.
@@ -79,6 +81,20 @@ local kinds = {
 }
 
 describe("the energy that contacts add and take", function()
+  -- Springs that turn points by up to tens of radians in a sub-step; shapes at rest in every other scene.
+  it("is what points on stiff springs gain, and no more than shapes that move can give", function()
+    for number = 1, 24 do
+      draw.start(2, number)
+      local stiffness = draw.magnitude(3, 6)
+      local moves = number % 2 == 0
+      local text = random_scene(moves, (":spring { stiffness = %g, target = {0, 0.4, 0} }"):format(stiffness), false)
+      local gained, added, taken, size, first = energies(text, stiffness, vec3(0, 0.4, 0))
+      local told = ("gained %g J, told %g - %g J, at most %g J:\n%s"):format(gained, added, taken, size, text)
+      assert.truthy(math.abs(gained - (added - taken)) < rounding * size, told)
+      assert.truthy(added < (moves and 2 or 1e-6) * first, told)
+    end
+  end)
+
   for _, couples in ipairs { false, true } do
     for _, kind in ipairs(kinds) do
       it(("is what points gain under %s%s"):format(kind.name, couples and ", and from each other" or ""), function()

@@ -46,7 +46,7 @@ void ContactResolver::resolve(CollidingPoint& point, const Arrival& arrival, con
     if ((response == Response::Stick && !stuck_.is_torn(point.i, o)) || response == Response::Die)
         capture(point, contact, o);
     else if (contact.depth > 0)
-        ejection_.eject(point, contact, o, arrival.a);
+        ejection_.eject(point, contact, o, arrival.path_v, arrival.a);
     else
         respond(point, arrival, contact, o);
 }
@@ -58,7 +58,7 @@ void ContactResolver::resolve_on_path(CollidingPoint& point, const Contact& cont
     if (point.kind == CollidingPoint::Curved)
         resolve(point, arrival_on_chord(point, s), contact, o);
     else
-        resolve(point, {path.at(s), path.v + s * path.a, path.a}, contact, o);
+        resolve(point, {path.at(s), path.v + s * path.a, path.a, path.v}, contact, o);
 }
 
 // A contact that was found on the chord of a piece along a curved surface: the arc is off the chord by
@@ -74,7 +74,7 @@ ContactResolver::Arrival ContactResolver::arrival_on_chord(CollidingPoint& point
     on.curvature = end.curvature;
     Vec3d v = (1 - u) * v0 + u * end.v - on.vc;
     v += on.vc - v.dot(on.n) * on.n;
-    return {chord.P + u * d + 0.5 * end.curvature * d.squaredNorm() * u * (1 - u) * on.n, v, end.a};
+    return {chord.P + u * d + 0.5 * end.curvature * d.squaredNorm() * u * (1 - u) * on.n, v, end.a, chord.v};
 }
 
 // The shape keeps the point, or ends its life: its sub-step is over.
@@ -108,7 +108,7 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
     const Obstacle& obstacle = block_.obstacles[o];
     const std::size_t i = point.i;
     const double epsilon = obstacle.restitution(block_.indices[i]), friction = obstacle.friction[block_.indices[i]];
-    const auto& [P, v, a] = arrival;
+    const Vec3d &P = arrival.P, &v = arrival.v, &a = arrival.a;
     const Vec3d& n = contact.n;
     const Vec3d relative = v - contact.vc;
     const double vn = relative.dot(n);

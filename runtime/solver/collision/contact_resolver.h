@@ -11,9 +11,9 @@ namespace rapid {
 
 class ContactResolver {
 public:
-    // The state with which a point arrives at a contact.
+    // The state with which a point arrives at a contact; path_v: the velocity of the path on which that was found.
     struct Arrival {
-        Vec3d P, v, a;
+        Vec3d P, v, a, path_v;
     };
 
     ContactResolver(const CollisionBlock& block, const FreeMotion& motion, Ejection& ejection, StuckPoints& stuck,

@@ -11,8 +11,8 @@ void ContactRounds::start(std::uint32_t i)
     CollidingPoint& point = points_[slot];
     point.begin(i, block_.dt[i]);
     const double s = contacts_.contact(i).time;
-    const ContactResolver::Arrival arrival{motion_.path(i).at(s), motion_.velocity_after(i, s),
-                                           motion_.acceleration(i)};
+    const Path path = motion_.path(i);
+    const ContactResolver::Arrival arrival{path.at(s), motion_.velocity_after(i, s), motion_.acceleration(i), path.v};
     point.by_forces.begin(arrival.P, arrival.v);
     resolver_.resolve(point, arrival, contacts_.contact(i), contacts_.obstacle(i));
     if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));

@@ -129,7 +129,7 @@ void CurvedMotion::meet_kink(CollidingPoint& point, const Vec3d& n)
     contact.vc = on.vc;
     Path& path = point.path;
     path.v += contact.vc;
-    resolver_.resolve(point, {path.P, path.v, path.a + on.ac}, contact, on.collider);
+    resolver_.resolve(point, {path.P, path.v, path.a + on.ac, path.v}, contact, on.collider);
     point.kind = CollidingPoint::Waits;
 }
 

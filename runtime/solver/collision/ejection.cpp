@@ -2,11 +2,11 @@
 
 namespace rapid {
 
-void Ejection::eject(CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& a)
+void Ejection::eject(CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& path_v, const Vec3d& a)
 {
     point.supports = 0;
     const Vec3d before = block_.P[point.i];
-    if (++point.ejections > max_ejections || !move_out(point, contact, obstacle, a)) {
+    if (++point.ejections > max_ejections || !move_out(point, contact, obstacle, path_v, a)) {
         lost_.push_back(point.i);
         point.left = 0;
     }
@@ -15,7 +15,8 @@ void Ejection::eject(CollidingPoint& point, const Contact& contact, int obstacle
 }
 
 // False where there is no way out.
-bool Ejection::move_out(const CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& a)
+bool Ejection::move_out(const CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& path_v,
+                        const Vec3d& a)
 {
     Vec3d& P = block_.P[point.i];
     if (!contact.n.isZero()) {
@@ -23,7 +24,7 @@ bool Ejection::move_out(const CollidingPoint& point, const Contact& contact, int
         return true;
     }
     if (contact.back != Contact::none) {
-        P -= contact.back * (block_.v[point.i] - contact.vc);
+        P -= contact.back * (path_v - contact.vc);
         return true;
     }
     // It has not come in by itself: out against what pulls it, or upwards.

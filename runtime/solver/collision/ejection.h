@@ -32,8 +32,9 @@ public:
         lost_.clear();
     }
 
-    // Along the shortest way out that is known. a: the acceleration on the point.
-    void eject(CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& a);
+    // Along the shortest way out that is known. path_v: the velocity of the path on which the contact was found, which
+    // under drag and springs is not the point's; a: the acceleration on the point.
+    void eject(CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& path_v, const Vec3d& a);
 
     // Of a point that stays where it is put.
     void displace(std::uint32_t i, const Vec3d& by)
@@ -47,7 +48,8 @@ public:
     const std::vector<std::uint32_t>& lost() const { return lost_; }
 
 private:
-    bool move_out(const CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& a);
+    bool move_out(const CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& path_v,
+                  const Vec3d& a);
 
     const CollisionBlock& block_;
     std::vector<Displacement> displacements_;

@@ -114,6 +114,19 @@ describe("a level set's ball", function()
   end)
 end)
 
+describe("a level set's block", function()
+  -- Straight back, the way that a spring would let it go from there, which it hardly leaves by.
+  it("lets out what is born deep inside on a stiff, damped spring", function()
+    local result = run(":spring { stiffness = 4e6, damping = 0.048, target = {0, 0.3, 0} } " ..
+      ":collide { shape = rapid.levelset.box { size = {2, 2, 2}, voxel = 0.05 } }",
+      "P = {{0.4, 0.3, 0.2}}, v = {{-2, 3, 1}}, mass = {1e-5}", 9)
+    for frame = 2, 9 do
+      local P = result[frame][1].P
+      assert.truthy(math.max(math.abs(P.x), math.abs(P.y), math.abs(P.z)) > 0.99 and P:length() < 5, tostring(P))
+    end
+  end)
+end)
+
 describe("a level set's ball that moves", function()
   -- It is as if the point had flown in from there.
   it("lets out ahead of it what is deep inside, beyond its band", function()

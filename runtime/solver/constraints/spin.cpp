@@ -13,8 +13,10 @@ namespace {
 
 constexpr double solid_sphere = 2.5;  // m r²/I
 
+// Rounding may leave an impulse, and so what limits friction, below 0.
 Vec3d limited(const Vec3d& x, double most)
 {
+    if (!(most > 0)) return Vec3d::Zero();
     const double size = x.norm();
     return size > most ? Vec3d(most / size * x) : x;
 }

@@ -168,6 +168,14 @@ TEST_CASE("friction that sticks leaves the surfaces of two spheres at one speed"
     for (const std::size_t i : {0, 1}) CHECK_THAT(scene.w(i), close_to(Vec3d(2.5 / 0.1 * n.cross(along) / 7), 2e-5));
 }
 
+TEST_CASE("an impact that rounding leaves without a closing speed, and that does not slide, changes nothing", "[spin]")
+{
+    Spin spin{Vec3d::Zero(), 2.5, 0.1, 0};
+    const Vec3d n(0, 1, 0), impulse = spinning_impact(spin, 2.0, n, 1e-17 * n, 0.5, 1.0);
+    CHECK(impulse.norm() < 1e-16);
+    CHECK(spin.s.isZero(0));
+}
+
 TEST_CASE("what turns freely turns by exp(w t)", "[spin]")
 {
     const Vec3d w(3, -4, 12);

@@ -355,15 +355,14 @@ private:
         if (result.contact_limit > 0)
             warn(
                 "points reached the limit of contacts in a step, two thousand impacts, and rest where they are for "
-                "what "
-                "was "
-                "left of it; take more substeps");
+                "what was left of it; take more substeps");
         if (result.residual.loose > 0)
             warn("constraints are off by more than a tenth of their size; take more substeps, or more iterations");
         if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())
             warn(
-                "constraints gave energy or momentum that nothing accounts for; take more substeps, or more "
-                "iterations");
+                fmt::format("constraints gave {:.1e} of the energy and {:.1e} of the momentum in motion that nothing "
+                            "accounts for; take more substeps, or more iterations",
+                            result.ledger->residue->energy, result.ledger->residue->momentum));
         if (result.trapped > 0)
             warn(has_band(flow)
                      ? "points are deep in a shape, where its field shows no way out; a level set of a larger "

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "runtime/shapes/level_set/level_set.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "tests/operators/node_test.h"
 
 namespace rapid {
@@ -128,6 +129,48 @@ TEST_CASE("the band of a level set is as wide as the largest radius needs", "[so
     // A level set of voxels of 5 cm is off by (5 cm)²/(8 · 1.4 m).
     for (std::size_t i = 0; i < 2; ++i) CHECK(points.P()[i].norm() == Approx(1.4).margin(5e-4));
     CHECK(solve.figures.penetration_max < 1e-6);
+}
+
+// Says that it acts by impulses between points, and multiplies the velocity of one: in the sub-steps, or after them.
+class Leak : public Constraint, public Coupling {
+public:
+    double in_substeps = 1, after = 1;
+
+    std::shared_ptr<Coupling> begin(const PointSet&, double) const override { return std::make_shared<Leak>(*this); }
+    bool keeps_momentum() const override { return true; }
+    void project(Substep&) override {}
+    void solve_velocities(Substep& step) override { step.v[0] *= in_substeps; }
+    Residual close(Substep& step) override
+    {
+        step.v[0] *= after;
+        return {};
+    }
+};
+
+TEST_CASE("energy or momentum that nothing accounts for is a warning with its size", "[solve][ledger]")
+{
+    PointSet points = points_at({{0, 0, 0}, {1, 0, 0}});
+    for (const std::size_t i : {0, 1}) points.v().write()[i] = {2, 0, 0};
+    const auto warnings = [&](double in_substeps, double after) {
+        auto leak = std::make_shared<Leak>();
+        leak->node = "leak1";
+        leak->in_substeps = in_substeps;
+        leak->after = after;
+        Flow flow{points, {}, test::simulation()};
+        flow.dynamics.add(std::move(leak));
+        NodeTest solve("solve", {});
+        solve.evaluate(2, {std::move(flow)});
+        return solve.warnings;
+    };
+    // Each of the two has half of the momentum, and of the energy.
+    CHECK(warnings(1, 1).empty());
+    CHECK(
+        warnings(0.99, 1) ==
+        std::vector<std::string>{"node \"solve1\": constraints gave 0.0e+00 of the energy and 5.0e-03 of the momentum "
+                                 "in motion that nothing accounts for; take more substeps, or more iterations"});
+    const std::vector<std::string> of_energy = warnings(1, 1.1);  // (1.1² - 1) / (1.1² + 1), (1.1 - 1) / (1.1 + 1)
+    REQUIRE(of_energy.size() == 1);
+    CHECK(of_energy[0].find("gave 9.5e-02 of the energy and 4.8e-02 of the momentum") != std::string::npos);
 }
 
 TEST_CASE("substeps below 1 are refused", "[solve]")

@@ -76,6 +76,30 @@ describe("the ledger", function()
     check({ by_shapes = 3 * g * h, by_friction = 0 }, sums, 1e-3 * 3 * g * h)
   end)
 
+  it("has what pins put into springs, where they jump, hold a point twice, or draw it against a force", function()
+    local spring = 5000 -- N/m
+    for name, case in pairs {
+      ["a jump"] = [[:pin { group = "held", target = {-0.5, 0.6, 0.9} }
+  :distance { pairs = {{1, 2}}, compliance = 1 / 5000 }]],
+      ["two pins"] = [[:pin { group = "held", compliance = 1 / 5000 }
+  :pin { group = "held", transform = function(frame) return rapid.translate(0, 0.5 * frame.time, 0) end }]],
+      ["a force"] = [[:spring { stiffness = 5000, target = {0, 0, 0}, group = "held" } :pin { group = "held",
+  transform = function(frame) return rapid.translate(0, 0.5 * frame.time, 0) end }]],
+    } do
+      local sums = ledger([[rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} } } :group { name = "held",
+  where = function(p) return p.id == 0 end } ]] .. case .. " :solve { substeps = 4 }")
+      if name == "a jump" then
+
+        local stretch = (vec3(-0.5, 0.6, 0.9) - vec3(1, 0, 0)):length() - 1
+        assert.near(spring / 2 * stretch ^ 2, sums.by_pins, 0.01 * spring * stretch ^ 2, name)
+        assert.near(0, sums.by_motion, 1e-3 * spring, name)
+      else
+        assert.near(spring / 2 * 0.25, sums.by_pins, 1e-3 * spring, name)
+        assert.near(name == "a force" and -spring / 2 * 0.25 or 0, sums.by_motion, 1e-3 * spring, name)
+      end
+    end
+  end)
+
   it("has m g h of a pin that lifts, and of what hangs from it", function()
     local text = [[rapid.points.from { P = {{0, 0, 0}, {0, -1, 0}}, v = {{0, 0.5, 0}, {0, 0.5, 0}} } }
   :attribute { mass = 2 } :gravity {} ROD :group { name = "held", where = function(p) return HELD end }

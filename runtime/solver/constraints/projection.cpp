@@ -129,24 +129,28 @@ double Projection::credited()
     return std::accumulate(credit.begin(), credit.end(), 0.0);
 }
 
-// What pins move gains what they do.
+// What pins move gains what they do, and so do the rows that they stretch, before these act.
 void Projection::move_kinematic(Substep& step)
 {
+    if (has_forces_ || is_driven_) begun_.assign(step.start.begin(), step.start.end());
     const double before = is_driven_ ? driven_energy(step) : 0;
     each([&](Coupling& coupling) { coupling.move_kinematic(step); });
-    if (is_driven_) changes_.pins += driven_energy(step) - before;
+    if (!is_driven_) return;
+    for (std::size_t i = 0; i < begun_.size(); ++i)
+        if (!(step.points[i].w > 0)) begun_[i] = step.points[i].P;
+    changes_.pins += driven_energy(step) - before;
 }
 
-// J, of the points, and in rows where the sub-step begins.
+// J, of the points, and in rows where these begin.
 double Projection::driven_energy(const Substep& step) const
 {
     std::vector<double> energy(step.size());
-    add_stored(step, step.start, 1, energy);
+    add_stored(step, begun_, 1, energy);
     double sum = 0;
     for (std::size_t i = 0; i < step.size(); ++i) {
         sum += energy[i];
         if (step.inverse_mass[i] > 0)
-            sum += (0.5 * step.v[i].squaredNorm() - step.acceleration.dot(step.points[i].P)) / step.inverse_mass[i];
+            sum += 0.5 * step.v[i].squaredNorm() / step.inverse_mass[i] + potential_energy(step, i, step.points[i].P);
     }
     return sum;
 }
@@ -163,7 +167,7 @@ void Projection::advance_linked(Substep& step)
         changes_.contacts += work;
     }
     stored_.assign(step.size(), 0.0);
-    add_stored(step, step.start, 1, stored_);
+    add_stored(step, begun_, 1, stored_);
     bound_.begin(step, [&](double factor, std::span<double> energy) {
         for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
     });

@@ -73,7 +73,8 @@ private:
     std::optional<ShapeContacts> shapes_;
     std::vector<Vec3d> free_;                           // where the points' free motion has ended
     std::vector<Vec3d> linked_;                         // where the projection begins, if elsewhere
-    std::vector<double> stored_;                        // J, in rows, where the sub-step begins
+    std::vector<Vec3d> begun_;                          // where rows begin: with what pins move where they move it
+    std::vector<double> stored_;                        // J, in rows, there
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
     std::vector<std::uint32_t> rods_;                   // by point, the island that rods and springs link it to
 };

@@ -138,8 +138,8 @@ public:
         for (const Row& row : rows_) {
             if (!(row.compliance > 0) || !row.active || row.asleep) continue;
             const auto moves = [&](std::uint32_t i) { return step.points[i].w > 0; };
-            const auto one = std::find_if(row.points.begin(), row.points.end(), moves);
-            if (one == row.points.end()) continue;
+            auto one = std::find_if(row.points.begin(), row.points.end(), moves);
+            if (one == row.points.end()) one = row.points.begin();
             for (int k = 0; k < arity; ++k) P[k] = at.empty() ? step.points[row.points[k]].P : at[row.points[k]];
             double C = row.function.residual(P, gradient);
             if (Traits::one_sided) C = std::min(C, 0.0);

@@ -141,6 +141,7 @@ public:
         formats();
         small_scenes();
         static_level_set();
+        tolerance_check();
         scripts();
         main_job();
         by_hand();
@@ -325,6 +326,31 @@ private:
             }
         }
         add({name, median(ms), 0.1, "ms", false, fmt::format("the first two: {:.3g} ms", 2 * median(of_first))});
+    }
+
+    // Of the README's scenes mill alone has a tolerance. It is checked in each of the first four steps, of few points,
+    // and then in every fourth: what a frame with the check takes more than the two beside it.
+    void tolerance_check()
+    {
+        const std::string name = "mill.lua: checking its tolerance, of the time of the run";
+        if (!asked(name)) return;
+        constexpr int first = 6, every = 4, last = 71;
+        const fs::path stats = scratch_ / "mill.json";
+        std::vector<double> parts;
+        for (int k = 0; k < repeat_; ++k) {
+            run(command(graphs_ / "mill.lua",
+                        {"-f", fmt::format("1-{}", last), "--threads", "1", "--stats", stats.string()}));
+            std::ifstream file(stats);
+            const json all = json::parse(file);
+            std::vector<double> seconds(1);
+            for (const json& frame : all.at("frames")) seconds.push_back(frame.at("seconds").at("total"));
+            double checks = 0, total = 0;
+            for (const double s : seconds) total += s;
+            for (int f = first; f < last; f += every)
+                checks += seconds.at(f) - 0.5 * (seconds.at(f - 1) + seconds.at(f + 1));
+            parts.push_back(checks / (total - checks));
+        }
+        add({name, median(parts), 0.02, "", false, ""});
     }
 
     void scripts()

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <memory>
 #include <mutex>
@@ -19,7 +20,7 @@ namespace rapid {
 // An open scene, with the texts that it has handed out.
 struct OpenScene {
     Scene scene;
-    std::mutex mutex;  // of the texts
+    std::atomic<bool> is_busy = false;
     std::string node_types, warnings;
 };
 struct OpenFrame {
@@ -85,6 +86,23 @@ auto open(const void* handle, const char* what)
     return object;
 }
 inline auto open_scene(rapid_scene* handle) { return open<Scenes>(handle, "scene"); }
+// The scene for the length of a call. Refusal: another one is running, which what is merely read would see half done.
+class SceneCall {
+public:
+    explicit SceneCall(rapid_scene* handle) : open_(open_scene(handle))
+    {
+        if (open_->is_busy.exchange(true)) throw Refusal{busy()};
+    }
+    ~SceneCall() { open_->is_busy = false; }
+    SceneCall(const SceneCall&) = delete;
+    SceneCall& operator=(const SceneCall&) = delete;
+
+    OpenScene* operator->() const { return open_.get(); }
+    Scene& scene() const { return open_->scene; }
+
+private:
+    const std::shared_ptr<OpenScene> open_;  // closed meanwhile, it lives to the end of the call
+};
 inline auto open_offers(rapid_offers* handle) { return open<AllOffers>(handle, "offers"); }
 inline auto open_frame(rapid_frame* handle) { return open<Frames>(handle, "frame"); }
 inline auto open_snapshot(rapid_snapshot* handle) { return open<Snapshots>(handle, "snapshot"); }

@@ -56,6 +56,13 @@ std::size_t bytes_of(ColumnType type)
     return bytes[static_cast<int>(type)];
 }
 
+// Of points or triangles, none of which takes more than 16 bytes a column. Refusal: more than an address has bits for.
+void check_count(std::size_t count, const char* name)
+{
+    constexpr std::size_t most = SIZE_MAX / 64;
+    if (count > most) refuse(fmt::format("{} = {}; no memory holds as many", name, count));
+}
+
 // The values of a column, packed.
 std::shared_ptr<std::vector<char>> copied(const rapid_column& column, std::size_t bytes, std::size_t count)
 {
@@ -138,6 +145,8 @@ int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* posit
                       const int32_t* triangles, size_t triangle_count, rapid_error** error)
 {
     return add(offers, name, error, [&] {
+        check_count(count, "count");
+        check_count(triangle_count, "triangle_count");
         HostMesh mesh;
         mesh.positions.resize(count);
         mesh.triangles.resize(triangle_count);
@@ -154,6 +163,7 @@ int rapid_offers_points(rapid_offers* offers, const char* name, size_t count, co
     return guarded(error, [&] {
         const auto open = open_offers(offers);
         const std::string wanted = &not_null(name, "name");
+        check_count(count, "count");
         if (column_count > 0) not_null(columns, "columns");
         HostPoints points;
         points.count = count;

@@ -67,7 +67,7 @@ int open_into(rapid_scene** scene, rapid_error** error, const auto& open)
 {
     return guarded(error, [&] {
         not_null(scene, "scene") = nullptr;
-        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), {}, {}, {}});
+        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), false, {}, {}});
         *scene = static_cast<rapid_scene*>(Scenes::add(std::move(object)));
     });
 }
@@ -76,9 +76,29 @@ int advance_into(rapid_scene* scene, rapid_frame** frame, rapid_error** error, c
 {
     return guarded(error, [&] {
         if (frame) *frame = nullptr;
-        SceneFrame result = take(advance(open_scene(scene)->scene));
+        SceneFrame result = take(advance(SceneCall(scene).scene()));
         if (frame) *frame = new_frame(std::move(result));
     });
+}
+
+std::string in_json(const std::string& text)
+{
+    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// Written as text: the destructor of a tree of nlohmann's takes memory, and ends the program where there is none.
+std::string in_json(const NodeParameter& parameter)
+{
+    return fmt::format(R"({{"name":{},"type":{},"unit":{},"doc":{},"default":{},"required":{}}})",
+                       in_json(parameter.name), in_json(parameter.type), in_json(parameter.unit),
+                       in_json(parameter.doc), in_json(parameter.fallback), parameter.required);
+}
+std::string in_json(const SceneNodeType& type)
+{
+    std::vector<std::string> parameters;
+    for (const NodeParameter& parameter : type.parameters) parameters.push_back(in_json(parameter));
+    return fmt::format(R"({{"name":{},"doc":{},"parameters":[{}]}})", in_json(type.name), in_json(type.doc),
+                       fmt::join(parameters, ","));
 }
 
 std::string joined(const std::vector<std::string>& lines) { return fmt::format("{}", fmt::join(lines, "\n")); }
@@ -151,14 +171,14 @@ int rapid_scene_close(rapid_scene* scene, rapid_error** error)
 
 int rapid_scene_parameter_count(rapid_scene* scene, size_t* count, rapid_error** error)
 {
-    return guarded(error, [&] { not_null(count, "count") = open_scene(scene)->scene.parameters().size(); });
+    return guarded(error, [&] { not_null(count, "count") = SceneCall(scene).scene().parameters().size(); });
 }
 
 int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error)
 {
     return guarded(error, [&] {
-        const auto open = open_scene(scene);
-        const auto& all = open->scene.parameters();
+        const SceneCall open(scene);
+        const auto& all = open.scene().parameters();
         if (place >= all.size()) refuse(fmt::format("place = {}; the scene has {} parameters", place, all.size()));
         const SceneParameter& found = all[place];
         give(parameter, {0, found.name.c_str(), found.doc.c_str(), value_in_c(found.value), value_in_c(found.fallback)},
@@ -168,19 +188,19 @@ int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* par
 
 int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t count, rapid_error** error)
 {
-    return guarded(error, [&] { take(open_scene(scene)->scene.set(settings_of(settings, count))); });
+    return guarded(error, [&] { take(SceneCall(scene).scene().set(settings_of(settings, count))); });
 }
 
 int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error)
 {
-    return guarded(error, [&] { not_null(count, "count") = open_scene(scene)->scene.nodes().size(); });
+    return guarded(error, [&] { not_null(count, "count") = SceneCall(scene).scene().nodes().size(); });
 }
 
 int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error)
 {
     return guarded(error, [&] {
-        const auto open = open_scene(scene);
-        const auto& all = open->scene.nodes();
+        const SceneCall open(scene);
+        const auto& all = open.scene().nodes();
         if (place >= all.size()) refuse(fmt::format("place = {}; the scene has {} nodes", place, all.size()));
         const SceneNode& found = all[place];
         give(node, {0, found.name.c_str(), found.type.c_str(), found.file.c_str(), found.line}, "node");
@@ -191,21 +211,10 @@ int rapid_scene_node_types(rapid_scene* scene, const char** json, rapid_error** 
 {
     return guarded(error, [&] {
         not_null(json, "json") = nullptr;
-        const auto open = open_scene(scene);
-        auto types = nlohmann::ordered_json::array();
-        for (const SceneNodeType& type : take(open->scene.node_types())) {
-            auto parameters = nlohmann::ordered_json::array();
-            for (const NodeParameter& parameter : type.parameters)
-                parameters.push_back({{"name", parameter.name},
-                                      {"type", parameter.type},
-                                      {"unit", parameter.unit},
-                                      {"doc", parameter.doc},
-                                      {"default", parameter.fallback},
-                                      {"required", parameter.required}});
-            types.push_back({{"name", type.name}, {"doc", type.doc}, {"parameters", std::move(parameters)}});
-        }
-        const std::lock_guard lock(open->mutex);
-        open->node_types = types.dump();
+        const SceneCall open(scene);
+        std::vector<std::string> types;
+        for (const SceneNodeType& type : take(open.scene().node_types())) types.push_back(in_json(type));
+        open->node_types = fmt::format("[{}]", fmt::join(types, ","));
         *json = open->node_types.c_str();
     });
 }
@@ -214,9 +223,8 @@ int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** er
 {
     return guarded(error, [&] {
         not_null(text, "text") = nullptr;
-        const auto open = open_scene(scene);
-        const std::lock_guard lock(open->mutex);
-        open->warnings = joined(open->scene.warnings());
+        const SceneCall open(scene);
+        open->warnings = joined(open.scene().warnings());
         *text = open->warnings.c_str();
     });
 }
@@ -224,21 +232,21 @@ int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** er
 int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** error)
 {
     return guarded(error, [&] {
-        const auto open = open_scene(scene);
+        const SceneCall open(scene);
         const auto given = open_offers(offers);
         const std::lock_guard lock(given->mutex);
-        for (const auto& [name, object] : given->objects) take(open->scene.offer(name, object));
+        for (const auto& [name, object] : given->objects) take(open.scene().offer(name, object));
     });
 }
 
 int rapid_scene_first_frame(rapid_scene* scene, int64_t* frame, rapid_error** error)
 {
-    return guarded(error, [&] { not_null(frame, "frame") = open_scene(scene)->scene.first_frame(); });
+    return guarded(error, [&] { not_null(frame, "frame") = SceneCall(scene).scene().first_frame(); });
 }
 
 int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** error)
 {
-    return guarded(error, [&] { not_null(frame, "frame") = open_scene(scene)->scene.next_frame(); });
+    return guarded(error, [&] { not_null(frame, "frame") = SceneCall(scene).scene().next_frame(); });
 }
 
 int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error)
@@ -253,7 +261,7 @@ int rapid_scene_advance_to(rapid_scene* scene, int64_t number, rapid_frame** fra
 
 int rapid_scene_restart(rapid_scene* scene, rapid_error** error)
 {
-    return guarded(error, [&] { take(open_scene(scene)->scene.restart()); });
+    return guarded(error, [&] { take(SceneCall(scene).scene().restart()); });
 }
 
 int rapid_scene_cancel(rapid_scene* scene, rapid_error** error)
@@ -265,14 +273,14 @@ int rapid_scene_save(rapid_scene* scene, rapid_snapshot** snapshot, rapid_error*
 {
     return guarded(error, [&] {
         not_null(snapshot, "snapshot") = nullptr;
-        auto saved = std::make_shared<SceneSnapshot>(take(open_scene(scene)->scene.save()));
+        auto saved = std::make_shared<SceneSnapshot>(take(SceneCall(scene).scene().save()));
         *snapshot = static_cast<rapid_snapshot*>(Snapshots::add(std::move(saved)));
     });
 }
 
 int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_error** error)
 {
-    return guarded(error, [&] { take(open_scene(scene)->scene.restore(*open_snapshot(snapshot))); });
+    return guarded(error, [&] { take(SceneCall(scene).scene().restore(*open_snapshot(snapshot))); });
 }
 
 int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error)
@@ -299,9 +307,9 @@ int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int h
     return guarded(error, [&] {
         not_null(png, "png") = nullptr;
         not_null(bytes, "bytes") = 0;
-        const auto open = open_scene(scene);
+        const SceneCall open(scene);
         const auto of = open_frame(frame);
-        std::string picture = take(open->scene.picture(of->frame, {width, height}));
+        std::string picture = take(open.scene().picture(of->frame, {width, height}));
         const std::lock_guard lock(of->mutex);
         of->picture = std::move(picture);
         *png = of->picture.data();

@@ -1,5 +1,6 @@
 #include "bindings/host/modules.h"
 
+#include <dirent.h>
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <link.h>
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <memory>
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
@@ -118,12 +120,16 @@ std::optional<Modules::Source> Modules::find(std::string_view name, bool node, s
     return std::nullopt;
 }
 
+// By the system's own list of a folder: libstdc++'s iterator ends the process where memory runs out.
 std::vector<std::string> shipped_nodes()
 {
     std::vector<std::string> names;
-    std::error_code ignored;
-    for (const auto& entry : std::filesystem::directory_iterator(lua_folder() / "nodes", ignored))
-        if (entry.path().extension() == ".lua") names.push_back(entry.path().stem().string());
+    const std::unique_ptr<DIR, int (*)(DIR*)> folder(opendir((lua_folder() / "nodes").c_str()), closedir);
+    if (!folder) return names;
+    while (const dirent* entry = readdir(folder.get())) {
+        const std::filesystem::path file = entry->d_name;
+        if (file.extension() == ".lua") names.push_back(file.stem().string());
+    }
     std::sort(names.begin(), names.end());
     return names;
 }

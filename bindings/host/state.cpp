@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <lua.hpp>
-#include <sstream>
 #include <utility>
 
 #include "bindings/host/compiled_code.h"
@@ -24,11 +22,9 @@ constexpr char state_field[] = "rapid.state";  // in the registry
 
 std::string read_text(const std::filesystem::path& path)
 {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw Error(fmt::format("can't read {}: Rapid's own Lua files are missing", path.string()));
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
+    std::optional<std::string> text = read_lua_file(path);
+    if (!text) throw Error(fmt::format("can't read {}: Rapid's own Lua files are missing", path.string()));
+    return std::move(*text);
 }
 
 // Lua looks for modules in the current folder first, which may be that of a scene of others: what the host requires is

@@ -158,10 +158,10 @@ private:
         arguments.kill = kill.data();
         call_program(title_of(node_).c_str(), node_.call, arguments);
 
-        kill.check("what it kills", 1);
+        kill.check(fmt::format("what the program's {} kills", title_of(node_)), 1);
         for (std::size_t k = 0; k < written.size(); ++k) {
             const auto& [name, type] = node_.writes[k];
-            written[k].check(name, width_of(type));
+            written[k].check(fmt::format("{} of the program's {}", name, title_of(node_)), width_of(type));
             put(points, name, written[k].data());
         }
         for (std::size_t i = 0; i < count; ++i) keep[i] = kill[i] == 0;

@@ -112,15 +112,6 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         }
     }
 
-    static SceneError busy()
-    {
-        SceneError error;
-        error.kind = SceneError::Busy;
-        error.message =
-            "the scene is in another call: of another thread, or the one that has called back; wait for its end";
-        return error;
-    }
-
     SessionOptions session_options(const std::map<std::string, std::string>& set)
     {
         SessionOptions result;

@@ -5,6 +5,19 @@
 #include <new>
 
 namespace rapid {
+namespace {
+
+// Whether it is of memory that the system or a limit refuses. Errors pass through Lua as their text, so that is all
+// that tells: Rapid's (runtime/at_node.h), LuaJIT's, and those of the limits.
+bool is_of_memory(std::string_view message)
+{
+    for (const std::string_view words :
+         {"out of memory", "not enough memory", "--script-memory sets the limit", "or set --memory"})
+        if (message.find(words) != message.npos) return true;
+    return false;
+}
+
+}  // namespace
 
 std::string SceneError::text() const
 {
@@ -21,6 +34,15 @@ SceneError wrong_call(std::string message)
     return error;
 }
 
+SceneError busy()
+{
+    SceneError error;
+    error.kind = SceneError::Busy;
+    error.message =
+        "the scene is in another call: of another thread, or the one that has called back; wait for its end";
+    return error;
+}
+
 SceneError caught_error(SceneError::Kind kind)
 {
     SceneError result;
@@ -29,7 +51,7 @@ SceneError caught_error(SceneError::Kind kind)
     } catch (const Refusal& refusal) {
         return refusal.error;
     } catch (const Error& error) {
-        result.kind = kind;
+        result.kind = is_of_memory(error.message()) ? SceneError::OutOfMemory : kind;
         result.message = error.message();
         result.file = error.location().file;
         result.line = error.location().line;

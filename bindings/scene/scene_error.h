@@ -10,6 +10,7 @@
 namespace rapid {
 
 SceneError wrong_call(std::string message);
+SceneError busy();  // of a call while the scene is in another one
 
 // Thrown inside of a call that is refused.
 struct Refusal {

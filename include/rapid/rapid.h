@@ -38,10 +38,10 @@ enum {
     RAPID_WRONG_SCENE = 2,  /* found before the first frame: Lua, a node's argument, a missing file */
     RAPID_FAILED_FRAME = 3, /* found while a frame was computed */
     RAPID_CANCELLED = 4,
-    RAPID_TOO_LONG = 5, /* a script took longer than script_seconds */
-    RAPID_OUT_OF_MEMORY = 6,
-    RAPID_BUSY = 7,      /* the scene is in another call */
-    RAPID_UNEXPECTED = 8 /* of a library or a callback; the text is all that is known */
+    RAPID_TOO_LONG = 5,      /* a script took longer than script_seconds */
+    RAPID_OUT_OF_MEMORY = 6, /* the system has no more, or a limit does not let it */
+    RAPID_BUSY = 7,          /* the scene is in another call */
+    RAPID_UNEXPECTED = 8     /* of a library or a callback; the text is all that is known */
 };
 
 /* Handles. */

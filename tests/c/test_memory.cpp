@@ -1,5 +1,5 @@
-// A program that embeds Rapid goes on where memory runs out while a state of Lua is made: an error says so, and the
-// next scene opens.
+// A program that embeds Rapid goes on where memory runs out, while a state of Lua is made or anywhere else: an error
+// says so, and the next scene opens.
 #include <cstdlib>
 #include <fstream>
 
@@ -24,6 +24,17 @@ bool passes(int n, const fs::path& counted)
     const std::string command = "RAPID_FAULT=state:" + std::to_string(n) + ":12 RAPID_FAULT_COUNT='" +
                                 counted.string() + "' LD_PRELOAD='" + library.string() + "' '" + program.string() +
                                 "' '" + tried_again + "' > /dev/null";
+    return std::system(command.c_str()) == 0;
+}
+
+// Runs the program that uses all of the interface (tests/faults/embedding.cpp) so many times with these variables in
+// this folder; what it says goes to the file `said`.
+bool runs(const fs::path& folder, const std::string& variables, int times)
+{
+    const fs::path build = fs::read_symlink("/proc/self/exe").parent_path().parent_path();
+    const std::string command = "cd '" + folder.string() + "' && " + variables + " LD_PRELOAD='" +
+                                (build / "lib/librapid_fault.so").string() + "' '" +
+                                (build / "bin/rapid_embedding").string() + "' " + std::to_string(times) + " > said";
     return std::system(command.c_str()) == 0;
 }
 
@@ -61,6 +72,29 @@ TEST_CASE("memory that runs out while a state of Lua is made is an error of the 
         CHECK(passes(n, folder / "count"));
     }
     CHECK_FALSE(passes(requests, folder / "count"));  // of no first state
+}
+
+// EMBEDDING_FAULTS=10000 has more of them.
+TEST_CASE("memory that is refused in any call is an error of that call, and the next scene runs", "[c]")
+{
+    const test::TemporaryFolder folder;
+    REQUIRE(runs(folder.path(), "RAPID_FAULT=alloc:0:12 RAPID_FAULT_COUNT=count", 1));
+    long requests = 0;
+    std::ifstream(folder / "count") >> requests;
+    REQUIRE(requests > 10000);
+    const char* const wanted = std::getenv("EMBEDDING_FAULTS");
+    const long faults = wanted ? std::atol(wanted) : 100;
+    std::string list;
+    for (long k = 0; k < faults; ++k) list += "alloc:" + std::to_string(1 + k * requests / faults) + ":12\n";
+    folder.write("list", list);
+    REQUIRE(runs(folder.path(), "RAPID_FAULT_LIST=list", 2));
+    std::ifstream statuses(folder / "said");
+    long count = 0;
+    for (int k = 0, status = 0; statuses >> k >> status; ++count) {
+        CAPTURE(k, requests, test::file_text(folder / std::to_string(k) / "said"));
+        CHECK(status == 0);
+    }
+    CHECK(count == faults);
 }
 
 }  // namespace rapid

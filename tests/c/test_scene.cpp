@@ -231,7 +231,21 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("file", [&](rapid_error** e) { return rapid_scene_open(nullptr, nullptr, &other, e); });
     refused("text", [&](rapid_error** e) { return rapid_scene_open_text("a", nullptr, nullptr, &other, e); });
     refused("scene", [&](rapid_error** e) { return rapid_scene_open_text("a", fall, nullptr, nullptr, e); });
+    refused("scene", [&](rapid_error** e) { return rapid_scene_open("a.lua", nullptr, nullptr, e); });
+    refused("name", [&](rapid_error** e) { return rapid_scene_open_text(nullptr, fall, nullptr, &other, e); });
     refused("count", [&](rapid_error** e) { return rapid_scene_parameter_count(scene, nullptr, e); });
+    refused("count", [&](rapid_error** e) { return rapid_scene_node_count(scene, nullptr, e); });
+    refused("text", [&](rapid_error** e) { return rapid_scene_warnings(scene, nullptr, e); });
+    refused("frame", [&](rapid_error** e) { return rapid_scene_first_frame(scene, nullptr, e); });
+    refused("offers", [&](rapid_error** e) { return rapid_scene_offer(scene, nullptr, e); });
+    refused("a setting's name", [&](rapid_error** e) {
+        const rapid_setting unnamed = {nullptr, {RAPID_NUMBER, {1, 0, 0}, nullptr}};
+        return rapid_scene_set(scene, &unnamed, 1, e);
+    });
+    refused("the text of a value", [&](rapid_error** e) {
+        const rapid_setting empty = {"height", {RAPID_TEXT, {0, 0, 0}, nullptr}};
+        return rapid_scene_set(scene, &empty, 1, e);
+    });
     refused("parameter", [&](rapid_error** e) { return rapid_scene_parameter(scene, 0, nullptr, e); });
     refused("settings", [&](rapid_error** e) { return rapid_scene_set(scene, nullptr, 1, e); });
     refused("node", [&](rapid_error** e) { return rapid_scene_node(scene, 0, nullptr, e); });
@@ -244,6 +258,20 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
         return rapid_frame_column(frame, nullptr, &column, e);
     });
     refused("column", [&](rapid_error** e) { return rapid_frame_column(frame, "P", nullptr, e); });
+    refused("column", [&](rapid_error** e) { return rapid_frame_expanded(frame, "heat", nullptr, e); });
+    refused("name", [&](rapid_error** e) { return rapid_frame_detail(frame, nullptr, nullptr, e); });
+    refused("frame", [&](rapid_error** e) { return rapid_frame_output(frame, "main", nullptr, e); });
+    refused("lines", [&](rapid_error** e) { return rapid_frame_names(frame, RAPID_COLUMNS, nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_frame_statistics(frame, nullptr, e); });
+    refused("png", [&](rapid_error** e) {
+        size_t bytes = 0;
+        return rapid_scene_picture(scene, frame, 32, 18, nullptr, &bytes, e);
+    });
+    refused("bytes", [&](rapid_error** e) {
+        const void* png = nullptr;
+        return rapid_scene_picture(scene, frame, 32, 18, &png, nullptr, e);
+    });
+    refused("call", [&](rapid_error** e) { return rapid_call_add_rod(nullptr, 0, 1, 1, 0, e); });
     refused("info", [&](rapid_error** e) { return rapid_frame_get_info(frame, nullptr, e); });
     refused("path", [&](rapid_error** e) { return rapid_frame_write(frame, nullptr, e); });
     CHECK(rapid_scene_set(scene, nullptr, 0, nullptr) == RAPID_OK);

@@ -448,14 +448,18 @@ TEST_CASE("limits of memory are errors of the scene that has them", "[scene]")
     SceneOptions small;
     small.script_memory = std::size_t{8} << 20;
     const std::string greedy = "local t = {} for i = 1, 1e7 do t[i] = {i} end";
-    CHECK_THAT(Scene::open_text("greedy.lua", greedy, small).error().message, Contains("needs more than 8 MiB"));
+    const SceneError script = Scene::open_text("greedy.lua", greedy, small).error();
+    CHECK_THAT(script.message, Contains("needs more than 8 MiB"));
+    CHECK(script.kind == SceneError::OutOfMemory);
 
     const std::string grid =
         "local rapid = require 'rapid'\n"
         "return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing = 0.05 } } :solve {}";
     SceneOptions narrow;
     narrow.memory = std::uint64_t{64} << 20;
-    CHECK_THAT(Scene::open_text("grid.lua", grid, narrow).error().message, Contains("would take about"));
+    const SceneError process = Scene::open_text("grid.lua", grid, narrow).error();
+    CHECK_THAT(process.message, Contains("would take about"));
+    CHECK(process.kind == SceneError::OutOfMemory);
     good(Scene::open_text("grid.lua", grid));
 }
 

@@ -1,0 +1,616 @@
+// Each function of rapid.h with handles that are wrong, within a call of its scene, and behind a frame that failed. The
+// table of functions is held against the header.
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <regex>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "include/rapid/rapid.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Catch::Contains;
+
+// Its kernel fails from frame 5 on.
+const char* const fall = R"(
+local rapid = require "rapid"
+local height = rapid.param("height", 10, "m, of the drop")
+return rapid.create { points = rapid.points.from { P = {{0, height, 0}} } }
+  :attribute { heat = 2 }
+  :points("fails", function(p, frame)
+    p:join "all"
+    if frame.number >= 5 then error "no more" end
+  end)
+  :detail("count", function(points) points.detail.count = #points end)
+  :gravity {} :solve {}
+)";
+
+template <class T>
+T sized()
+{
+    T result{};
+    result.size = sizeof(T);
+    return result;
+}
+
+// What functions are called with.
+struct Handles {
+    rapid_scene* scene = nullptr;
+    rapid_frame* frame = nullptr;
+    rapid_snapshot* snapshot = nullptr;
+    rapid_offers* offers = nullptr;
+
+    std::array<void*, 4> all() const { return {scene, frame, snapshot, offers}; }
+    void set(std::size_t which, void* handle)
+    {
+        if (which == 0) scene = static_cast<rapid_scene*>(handle);
+        if (which == 1) frame = static_cast<rapid_frame*>(handle);
+        if (which == 2) snapshot = static_cast<rapid_snapshot*>(handle);
+        if (which == 3) offers = static_cast<rapid_offers*>(handle);
+    }
+};
+
+// The handles of a scene at frame 2.
+struct Opened : Handles {
+    explicit Opened(const rapid_options* options = nullptr)
+    {
+        REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+        REQUIRE(rapid_scene_open_text("fall.lua", fall, options, &scene, nullptr) == RAPID_OK);
+        REQUIRE(rapid_scene_advance_to(scene, 2, &frame, nullptr) == RAPID_OK);
+        REQUIRE(rapid_scene_save(scene, &snapshot, nullptr) == RAPID_OK);
+    }
+    Opened(const Opened&) = delete;
+    Opened& operator=(const Opened&) = delete;
+    ~Opened()
+    {
+        rapid_frame_release(frame, nullptr);
+        rapid_snapshot_release(snapshot, nullptr);
+        rapid_scene_close(scene, nullptr);
+        rapid_offers_release(offers, nullptr);
+    }
+};
+
+// A function with right arguments. takes: the handles that it takes, of "scene frame snapshot offers" the first
+// letters, where a snapshot is "n".
+struct Function {
+    const char* name;
+    std::string takes;
+    std::function<int(const Handles&, rapid_error**)> call;
+    bool is_for_any_thread = false;  // at any time
+};
+
+template <class T>
+int released(int (*release)(T*, rapid_error**), T* made, int status)
+{
+    if (made) release(made, nullptr);
+    return status;
+}
+
+const std::vector<Function>& functions()
+{
+    static const float corners[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    static const std::int32_t triangle[] = {0, 1, 2};
+    static const std::vector<Function> all = {
+        {"rapid_scene_open", "",
+         [](const Handles&, rapid_error** e) {
+             rapid_scene* scene = nullptr;
+             const std::string file = std::string(RAPID_SOURCE_DIR) + "/graphs/first.lua";
+             const int status = rapid_scene_open(file.c_str(), nullptr, &scene, e);
+             return released(rapid_scene_close, scene, status);
+         }},
+        {"rapid_scene_open_text", "",
+         [](const Handles&, rapid_error** e) {
+             rapid_scene* scene = nullptr;
+             const int status = rapid_scene_open_text("fall.lua", fall, nullptr, &scene, e);
+             return released(rapid_scene_close, scene, status);
+         }},
+        {"rapid_scene_close", "s", [](const Handles& h, rapid_error** e) { return rapid_scene_close(h.scene, e); },
+         true},
+        {"rapid_scene_parameter_count", "s",
+         [](const Handles& h, rapid_error** e) {
+             std::size_t count = 0;
+             return rapid_scene_parameter_count(h.scene, &count, e);
+         }},
+        {"rapid_scene_parameter", "s",
+         [](const Handles& h, rapid_error** e) {
+             auto parameter = sized<rapid_parameter>();
+             return rapid_scene_parameter(h.scene, 0, &parameter, e);
+         }},
+        {"rapid_scene_set", "s",
+         [](const Handles& h, rapid_error** e) {
+             const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
+             return rapid_scene_set(h.scene, &height, 1, e);
+         }},
+        {"rapid_scene_node_count", "s",
+         [](const Handles& h, rapid_error** e) {
+             std::size_t count = 0;
+             return rapid_scene_node_count(h.scene, &count, e);
+         }},
+        {"rapid_scene_node", "s",
+         [](const Handles& h, rapid_error** e) {
+             auto node = sized<rapid_node>();
+             return rapid_scene_node(h.scene, 0, &node, e);
+         }},
+        {"rapid_scene_node_types", "s",
+         [](const Handles& h, rapid_error** e) {
+             const char* json = nullptr;
+             return rapid_scene_node_types(h.scene, &json, e);
+         }},
+        {"rapid_scene_warnings", "s",
+         [](const Handles& h, rapid_error** e) {
+             const char* text = nullptr;
+             return rapid_scene_warnings(h.scene, &text, e);
+         }},
+        {"rapid_scene_first_frame", "s",
+         [](const Handles& h, rapid_error** e) {
+             std::int64_t frame = 0;
+             return rapid_scene_first_frame(h.scene, &frame, e);
+         }},
+        {"rapid_scene_next_frame", "s",
+         [](const Handles& h, rapid_error** e) {
+             std::int64_t frame = 0;
+             return rapid_scene_next_frame(h.scene, &frame, e);
+         }},
+        {"rapid_scene_advance", "s",
+         [](const Handles& h, rapid_error** e) { return rapid_scene_advance(h.scene, nullptr, e); }},
+        {"rapid_scene_advance_to", "s",
+         [](const Handles& h, rapid_error** e) { return rapid_scene_advance_to(h.scene, 3, nullptr, e); }},
+        {"rapid_scene_restart", "s", [](const Handles& h, rapid_error** e) { return rapid_scene_restart(h.scene, e); }},
+        {"rapid_scene_cancel", "s", [](const Handles& h, rapid_error** e) { return rapid_scene_cancel(h.scene, e); },
+         true},
+        {"rapid_scene_save", "s",
+         [](const Handles& h, rapid_error** e) {
+             rapid_snapshot* snapshot = nullptr;
+             const int status = rapid_scene_save(h.scene, &snapshot, e);
+             return released(rapid_snapshot_release, snapshot, status);
+         }},
+        {"rapid_scene_restore", "sn",
+         [](const Handles& h, rapid_error** e) { return rapid_scene_restore(h.scene, h.snapshot, e); }},
+        {"rapid_snapshot_frame", "n",
+         [](const Handles& h, rapid_error** e) {
+             std::int64_t frame = 0;
+             return rapid_snapshot_frame(h.snapshot, &frame, e);
+         }},
+        {"rapid_snapshot_bytes", "n",
+         [](const Handles& h, rapid_error** e) {
+             std::uint64_t bytes = 0;
+             return rapid_snapshot_bytes(h.snapshot, &bytes, e);
+         }},
+        {"rapid_snapshot_release", "n",
+         [](const Handles& h, rapid_error** e) { return rapid_snapshot_release(h.snapshot, e); }},
+        {"rapid_offers_new", "",
+         [](const Handles&, rapid_error** e) {
+             rapid_offers* offers = nullptr;
+             const int status = rapid_offers_new(&offers, e);
+             return released(rapid_offers_release, offers, status);
+         }},
+        {"rapid_offers_guard", "o",
+         [](const Handles& h, rapid_error** e) { return rapid_offers_guard(h.offers, 1, e); }},
+        {"rapid_offers_mesh", "o",
+         [](const Handles& h, rapid_error** e) {
+             return rapid_offers_mesh(h.offers, "corner", corners, 3, triangle, 1, e);
+         }},
+        {"rapid_offers_points", "o",
+         [](const Handles& h, rapid_error** e) {
+             auto P = sized<rapid_column>();
+             P.name = "P";
+             P.type = RAPID_FLOAT_VEC3;
+             P.data = corners;
+             return rapid_offers_points(h.offers, "cloud", 3, &P, 1, e);
+         }},
+        {"rapid_offers_shape", "o",
+         [](const Handles& h, rapid_error** e) {
+             auto shape = sized<rapid_shape>();
+             shape.distance = [](void*, std::size_t, const double*, double*, double*) { return 0; };
+             return rapid_offers_shape(h.offers, "ball", &shape, e);
+         }},
+        {"rapid_offers_node", "o",
+         [](const Handles& h, rapid_error** e) {
+             auto type = sized<rapid_node_type>();
+             type.name = "nothing";
+             type.call = [](void*, const rapid_call*) { return 0; };
+             return rapid_offers_node(h.offers, &type, e);
+         }},
+        {"rapid_offers_release", "o",
+         [](const Handles& h, rapid_error** e) { return rapid_offers_release(h.offers, e); }},
+        {"rapid_scene_offer", "so",
+         [](const Handles& h, rapid_error** e) { return rapid_scene_offer(h.scene, h.offers, e); }},
+        {"rapid_frame_output", "f",
+         [](const Handles& h, rapid_error** e) {
+             rapid_frame* frame = nullptr;
+             const int status = rapid_frame_output(h.frame, "main", &frame, e);
+             return released(rapid_frame_release, frame, status);
+         }},
+        {"rapid_frame_names", "f",
+         [](const Handles& h, rapid_error** e) {
+             const char* lines = nullptr;
+             return rapid_frame_names(h.frame, RAPID_COLUMNS, &lines, e);
+         }},
+        {"rapid_frame_get_info", "f",
+         [](const Handles& h, rapid_error** e) {
+             auto info = sized<rapid_frame_info>();
+             return rapid_frame_get_info(h.frame, &info, e);
+         }},
+        {"rapid_frame_statistics", "f",
+         [](const Handles& h, rapid_error** e) {
+             const char* json = nullptr;
+             return rapid_frame_statistics(h.frame, &json, e);
+         }},
+        {"rapid_frame_column", "f",
+         [](const Handles& h, rapid_error** e) {
+             auto column = sized<rapid_column>();
+             return rapid_frame_column(h.frame, "P", &column, e);
+         }},
+        {"rapid_frame_group", "f",
+         [](const Handles& h, rapid_error** e) {
+             auto column = sized<rapid_column>();
+             return rapid_frame_group(h.frame, "all", &column, e);
+         }},
+        {"rapid_frame_expanded", "f",
+         [](const Handles& h, rapid_error** e) {
+             auto column = sized<rapid_column>();
+             return rapid_frame_expanded(h.frame, "heat", &column, e);
+         }},
+        {"rapid_frame_detail", "f",
+         [](const Handles& h, rapid_error** e) {
+             rapid_value value{};
+             return rapid_frame_detail(h.frame, "count", &value, e);
+         }},
+        {"rapid_frame_write", "f",
+         [](const Handles& h, rapid_error** e) {
+             const test::TemporaryFolder folder;
+             return rapid_frame_write(h.frame, (folder / "fall.csv").c_str(), e);
+         }},
+        {"rapid_scene_picture", "sf",
+         [](const Handles& h, rapid_error** e) {
+             const void* png = nullptr;
+             std::size_t bytes = 0;
+             return rapid_scene_picture(h.scene, h.frame, 32, 18, &png, &bytes, e);
+         }},
+        {"rapid_frame_release", "f", [](const Handles& h, rapid_error** e) { return rapid_frame_release(h.frame, e); }},
+    };
+    return all;
+}
+
+// The status of a function, whose error has a message where there is one.
+int status_of(const Function& function, const Handles& handles)
+{
+    rapid_error* error = nullptr;
+    const int status = function.call(handles, &error);
+    CHECK(rapid_error_status(error) == status);
+    CHECK(std::string(rapid_error_message(error)).empty() == (status == RAPID_OK));
+    rapid_error_free(error);
+    CHECK((status == RAPID_OK || function.call(handles, nullptr) == status));
+    return status;
+}
+
+bool takes_scene(const Function& function) { return function.takes.find('s') != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("the table has all functions of the header", "[c]")
+{
+    std::ifstream file(RAPID_SOURCE_DIR "/include/rapid/rapid.h");
+    const std::string header(std::istreambuf_iterator<char>(file), {});
+    // Those that take no handle, or take NULL for one.
+    std::set<std::string> known = {"rapid_version",    "rapid_error_message", "rapid_error_file",
+                                   "rapid_error_line", "rapid_error_node",    "rapid_error_text",
+                                   "rapid_error_free", "rapid_error_status",  "rapid_call_add_rod"};
+    for (const Function& function : functions()) known.insert(function.name);
+    std::set<std::string> declared;
+    const std::regex declaration(R"((?:^|\n)(?:int|void|const char\*) (rapid_\w+)\()");
+    for (std::sregex_iterator match(header.begin(), header.end(), declaration); match != std::sregex_iterator();
+         ++match)
+        declared.insert((*match)[1]);
+    CHECK(declared == known);
+}
+
+TEST_CASE("each function does what it is for", "[c]")
+{
+    for (const Function& function : functions()) {
+        CAPTURE(function.name);
+        const Opened opened;
+        CHECK(status_of(function, opened) == RAPID_OK);
+    }
+}
+
+TEST_CASE("each function refuses handles that are NULL, closed, made up or of something else", "[c]")
+{
+    const Opened opened;
+    Handles closed;
+    {
+        const Opened other;
+        closed = other;
+    }
+    int made_up = 0;
+    const std::string letters = "sfno";
+    for (const Function& function : functions())
+        for (const char letter : function.takes) {
+            const std::size_t which = letters.find(letter);
+            const void* const other = opened.all()[(which + 1) % 4];
+            for (const void* wrong : {static_cast<const void*>(nullptr), static_cast<const void*>(closed.all()[which]),
+                                      static_cast<const void*>(&made_up), other}) {
+                CAPTURE(function.name, letter, wrong);
+                Handles handles = opened;
+                handles.set(which, const_cast<void*>(wrong));
+                CHECK(status_of(function, handles) == RAPID_WRONG_CALL);
+            }
+        }
+}
+
+TEST_CASE("within a call of its scene each function of it is refused, and those of frames are not", "[c]")
+{
+    struct Seen {
+        const Opened* opened = nullptr;
+        const Function* function = nullptr;
+        int status = -1;
+    } seen;
+    rapid_options options = RAPID_OPTIONS;
+    options.user = &seen;
+    options.progress = [](void* user, std::int64_t, std::int64_t) {
+        auto& now = *static_cast<Seen*>(user);
+        if (now.opened) now.status = status_of(*now.function, *now.opened);
+        return 1;
+    };
+    for (const Function& function : functions()) {
+        CAPTURE(function.name);
+        seen.opened = nullptr;
+        const Opened opened(&options);
+        seen = {&opened, &function, -1};
+        const int status = rapid_scene_advance_to(opened.scene, 3, nullptr, nullptr);
+        const bool refused = takes_scene(function) && !function.is_for_any_thread;
+        CHECK(seen.status == (refused ? RAPID_BUSY : RAPID_OK));
+        const bool cancels = std::string(function.name) == "rapid_scene_cancel";
+        CHECK(status == (cancels ? RAPID_CANCELLED : RAPID_OK));
+    }
+}
+
+TEST_CASE("behind a frame that failed a scene takes any call, and has no next frame until it goes back", "[c]")
+{
+    const std::set<std::string> refused = {"rapid_scene_advance", "rapid_scene_advance_to", "rapid_scene_save"};
+    const Opened opened;
+    for (const Function& function : functions()) {
+        CAPTURE(function.name);
+        const bool ends = std::string(function.name).find("_close") != std::string::npos ||
+                          std::string(function.name).find("_release") != std::string::npos;
+        if (ends) continue;
+        REQUIRE(rapid_scene_restart(opened.scene, nullptr) == RAPID_OK);
+        REQUIRE(rapid_scene_advance_to(opened.scene, 5, nullptr, nullptr) == RAPID_FAILED_FRAME);
+        CHECK(status_of(function, opened) == (refused.count(function.name) ? RAPID_WRONG_CALL : RAPID_OK));
+        REQUIRE(rapid_scene_restart(opened.scene, nullptr) == RAPID_OK);
+        CHECK(rapid_scene_advance_to(opened.scene, 4, nullptr, nullptr) == RAPID_OK);
+    }
+}
+
+TEST_CASE("a struct whose size can't be is refused by each function that takes one", "[c]")
+{
+    const Opened h;
+    for (const std::size_t size : {std::size_t{0}, std::size_t{3}, std::size_t{1} << 20}) {
+        CAPTURE(size);
+        const auto with_size = [&](auto made, const auto& call) {
+            made.size = size;
+            CHECK(call(made) == RAPID_WRONG_CALL);
+        };
+        with_size(rapid_options(RAPID_OPTIONS), [&](auto& s) {
+            rapid_scene* scene = nullptr;
+            return rapid_scene_open_text("fall.lua", fall, &s, &scene, nullptr);
+        });
+        with_size(rapid_parameter(), [&](auto& s) { return rapid_scene_parameter(h.scene, 0, &s, nullptr); });
+        with_size(rapid_node(), [&](auto& s) { return rapid_scene_node(h.scene, 0, &s, nullptr); });
+        with_size(rapid_shape(), [&](auto& s) { return rapid_offers_shape(h.offers, "ball", &s, nullptr); });
+        with_size(rapid_node_type(), [&](auto& s) { return rapid_offers_node(h.offers, &s, nullptr); });
+        with_size(rapid_frame_info(), [&](auto& s) { return rapid_frame_get_info(h.frame, &s, nullptr); });
+        with_size(rapid_column(), [&](auto& s) { return rapid_frame_column(h.frame, "P", &s, nullptr); });
+        with_size(rapid_column(), [&](auto& s) { return rapid_frame_group(h.frame, "all", &s, nullptr); });
+        with_size(rapid_column(), [&](auto& s) { return rapid_frame_expanded(h.frame, "P", &s, nullptr); });
+    }
+}
+
+TEST_CASE("names, types and numbers that there are not are refused", "[c]")
+{
+    const Opened h;
+    rapid_scene* scene = nullptr;
+    rapid_frame* frame = nullptr;
+    const char* lines = nullptr;
+    const void* png = nullptr;
+    std::size_t bytes = 0;
+    rapid_value value{};
+    auto column = sized<rapid_column>();
+    auto parameter = sized<rapid_parameter>();
+    auto node = sized<rapid_node>();
+    const auto refused = [](const std::string& what, const auto& call, int status = RAPID_WRONG_CALL) {
+        rapid_error* error = nullptr;
+        CHECK(call(&error) == status);
+        CHECK_THAT(rapid_error_text(error), Contains(what));
+        rapid_error_free(error);
+    };
+    const auto setting = [&](const char* name, rapid_value to) {
+        return [=, &h](rapid_error** e) {
+            const rapid_setting wrong = {name, to};
+            return rapid_scene_set(h.scene, &wrong, 1, e);
+        };
+    };
+    refused(
+        "nowhere.lua", [&](auto e) { return rapid_scene_open("nowhere.lua", nullptr, &scene, e); }, RAPID_WRONG_SCENE);
+    refused("no file", [&](auto e) { return rapid_scene_open("", nullptr, &scene, e); });
+    refused("no name", [&](auto e) { return rapid_scene_open_text("", fall, nullptr, &scene, e); });
+    refused("threads = -1", [&](auto e) {
+        rapid_options options = RAPID_OPTIONS;
+        options.threads = -1;
+        return rapid_scene_open_text("fall.lua", fall, &options, &scene, e);
+    });
+    refused("script_seconds = -1", [&](auto e) {
+        rapid_options options = RAPID_OPTIONS;
+        options.script_seconds = -1;
+        return rapid_scene_open_text("fall.lua", fall, &options, &scene, e);
+    });
+    refused("heigth", setting("heigth", {RAPID_NUMBER, {1, 0, 0}, nullptr}));
+    refused("height", setting("height", {RAPID_TEXT, {0, 0, 0}, "high"}));
+    refused("height", setting("height", {RAPID_VEC3, {1, 2, 3}, nullptr}));
+    refused("height", setting("height", {RAPID_NUMBER, {NAN, 0, 0}, nullptr}));
+    refused("type of its value is 9", setting("height", {9, {0, 0, 0}, nullptr}));
+    refused("has 1 parameters", [&](auto e) { return rapid_scene_parameter(h.scene, 1, &parameter, e); });
+    refused("place = 99", [&](auto e) { return rapid_scene_node(h.scene, 99, &node, e); });
+    refused("frame 0", [&](auto e) { return rapid_scene_advance_to(h.scene, 0, &frame, e); });
+    refused("frame 2", [&](auto e) { return rapid_scene_advance_to(h.scene, 2, &frame, e); });
+    refused("\"other\"", [&](auto e) { return rapid_frame_output(h.frame, "other", &frame, e); });
+    refused("what = 4", [&](auto e) { return rapid_frame_names(h.frame, 4, &lines, e); });
+    refused("did you mean \"heat\"", [&](auto e) { return rapid_frame_column(h.frame, "haet", &column, e); });
+    refused("\"al\"", [&](auto e) { return rapid_frame_group(h.frame, "al", &column, e); });
+    refused("\"x\"", [&](auto e) { return rapid_frame_expanded(h.frame, "x", &column, e); });
+    refused("\"x\"", [&](auto e) { return rapid_frame_detail(h.frame, "x", &value, e); });
+    refused(".xyz", [&](auto e) { return rapid_frame_write(h.frame, "points.xyz", e); });
+    refused("/dev/null", [&](auto e) { return rapid_frame_write(h.frame, "/dev/null/points.csv", e); });
+    refused("column is NULL", [&](auto e) { return rapid_frame_group(h.frame, "all", nullptr, e); });
+    refused("value is NULL", [&](auto e) { return rapid_frame_detail(h.frame, "count", nullptr, e); });
+    for (const int width : {0, -1, 1 << 30})
+        refused("each side must be",
+                [&](auto e) { return rapid_scene_picture(h.scene, h.frame, width, 18, &png, &bytes, e); });
+    const float P[3] = {0, 0, 0};
+    const std::int32_t corners[3] = {0, 1, 2};
+    column.name = "P";
+    column.data = P;
+    for (const std::size_t count : {SIZE_MAX, SIZE_MAX / 12 + 1}) {
+        refused("count", [&](auto e) { return rapid_offers_mesh(h.offers, "a", P, count, corners, 1, e); });
+        refused("triangle_count", [&](auto e) { return rapid_offers_mesh(h.offers, "a", P, 1, corners, count, e); });
+        refused("count", [&](auto e) { return rapid_offers_points(h.offers, "a", count, &column, 1, e); });
+    }
+    column.type = 17;
+    refused("its type is 17", [&](auto e) { return rapid_offers_points(h.offers, "a", 1, &column, 1, e); });
+    CHECK(scene == nullptr);
+    CHECK(frame == nullptr);
+    CHECK(rapid_scene_advance(h.scene, nullptr, nullptr) == RAPID_OK);  // nothing of that has changed anything
+}
+
+// What callbacks of a program do wrong, as C sees them.
+TEST_CASE("what a callback does wrong is an error of the scene, which goes on behind it", "[c]")
+{
+    struct Program {
+        int (*wrong)(const rapid_call*) = nullptr;
+    } program;
+    rapid_offers* offers = nullptr;
+    REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+    REQUIRE(rapid_offers_guard(offers, 1, nullptr) == RAPID_OK);
+    const rapid_node_column heat = {"heat", RAPID_FLOAT};
+    auto edit = sized<rapid_node_type>();
+    edit.name = "warm";
+    edit.kind = RAPID_EDIT;
+    edit.writes = &heat;
+    edit.write_count = 1;
+    edit.user = &program;
+    edit.call = [](void* user, const rapid_call* now) {
+        int (*const wrong)(const rapid_call*) = static_cast<Program*>(user)->wrong;
+        return wrong && now->frame > 2 ? wrong(now) : 0;
+    };
+    REQUIRE(rapid_offers_node(offers, &edit, nullptr) == RAPID_OK);
+    rapid_options options = RAPID_OPTIONS;
+    options.offers = offers;
+    rapid_scene* scene = nullptr;
+    REQUIRE(rapid_scene_open_text("warm.lua",
+                                  "local rapid = require 'rapid'\n"
+                                  "return rapid.create { points = rapid.points.grid {} } :warm {} :solve {}",
+                                  &options, &scene, nullptr) == RAPID_OK);
+    struct Wrong {
+        const char* told;
+        int (*does)(const rapid_call*);
+    };
+    for (const Wrong& wrong : {
+             Wrong{"it returned -1", [](const rapid_call*) { return -1; }},
+             Wrong{"broken", [](const rapid_call*) -> int { throw std::runtime_error("broken"); }},
+             Wrong{"no std::exception", [](const rapid_call*) -> int { throw 3; }},
+             Wrong{"nan at place 2", [](const rapid_call* now) { return now->writes[0][2] = NAN, 0; }},
+             Wrong{"inf at place 0", [](const rapid_call* now) { return now->writes[0][0] = INFINITY, 0; }},
+             Wrong{"\"warm\" was written past the end",
+                   [](const rapid_call* now) { return now->writes[0][now->count] = 1, 0; }},
+             Wrong{"kills was written past the end",
+                   [](const rapid_call* now) { return now->kill[now->count] = 1, 0; }},
+             Wrong{"takes no rods",
+                   [](const rapid_call* now) -> int {
+                       rapid_error* error = nullptr;
+                       if (rapid_call_add_rod(now, 0, 1, 1, 0, &error) == RAPID_OK) return 0;
+                       const std::string message = rapid_error_message(error);
+                       rapid_error_free(error);
+                       throw std::runtime_error(message);
+                   }},
+         }) {
+        CAPTURE(wrong.told);
+        program.wrong = wrong.does;
+        rapid_error* error = nullptr;
+        CHECK(rapid_scene_advance_to(scene, 3, nullptr, &error) == RAPID_FAILED_FRAME);
+        CHECK_THAT(rapid_error_message(error), Contains(wrong.told) && Contains("warm"));
+        CHECK(std::string(rapid_error_node(error)) == "warm1");
+        CHECK(rapid_error_line(error) == 2);
+        rapid_error_free(error);
+        program.wrong = nullptr;
+        REQUIRE(rapid_scene_restart(scene, nullptr) == RAPID_OK);
+        CHECK(rapid_scene_advance_to(scene, 3, nullptr, nullptr) == RAPID_OK);
+        REQUIRE(rapid_scene_restart(scene, nullptr) == RAPID_OK);
+    }
+    rapid_scene_close(scene, nullptr);
+    rapid_offers_release(offers, nullptr);
+}
+
+TEST_CASE("what the other callbacks throw is an error that names them", "[c]")
+{
+    const char* const text = R"(
+print("begun")
+require "other"
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.read("points.csv") } :solve {}
+)";
+    const test::TemporaryFolder folder;
+    const std::string points = folder.write("points.csv", "id,Px,Py,Pz\n0,0,0,0\n");
+    struct Program {
+        std::string throws, points;
+        void in(const char* callback) const
+        {
+            if (throws == callback) throw std::runtime_error("broken");
+        }
+    } program{"", points};
+    rapid_options options = RAPID_OPTIONS;
+    options.user = &program;
+    options.log = [](void* user, int, const char*) { static_cast<Program*>(user)->in("log"); };
+    options.find_module = [](void* user, const char* name) -> const char* {
+        static_cast<Program*>(user)->in("find_module");
+        return std::string(name) == "other" ? "return {}" : nullptr;
+    };
+    options.find_file = [](void* user, const char*) {
+        static_cast<Program*>(user)->in("find_file");
+        return static_cast<Program*>(user)->points.c_str();
+    };
+    options.progress = [](void* user, std::int64_t, std::int64_t) {
+        return static_cast<Program*>(user)->in("progress"), 1;
+    };
+    rapid_scene* scene = nullptr;
+    for (const char* callback : {"log", "find_module", "find_file", "progress"}) {
+        CAPTURE(callback);
+        program.throws = callback;
+        rapid_error* error = nullptr;
+        int status = rapid_scene_open_text("begun.lua", text, &options, &scene, &error);
+        if (program.throws == "progress") {
+            REQUIRE(status == RAPID_OK);
+            status = rapid_scene_advance_to(scene, 1, nullptr, &error);
+            CHECK(status == RAPID_FAILED_FRAME);
+        } else {
+            CHECK(status == RAPID_WRONG_SCENE);
+        }
+        CHECK_THAT(rapid_error_message(error),
+                   Contains(std::string("the program's ") + callback) && Contains("broken"));
+        rapid_error_free(error);
+        rapid_scene_close(scene, nullptr);
+        program.throws.clear();
+        REQUIRE(rapid_scene_open_text("begun.lua", text, &options, &scene, nullptr) == RAPID_OK);
+        CHECK(rapid_scene_advance_to(scene, 1, nullptr, nullptr) == RAPID_OK);
+        rapid_scene_close(scene, nullptr);
+    }
+}
+
+}  // namespace rapid

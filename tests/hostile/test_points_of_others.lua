@@ -30,4 +30,35 @@ describe("a point with a number that is none", function()
       end
     end
   end)
+
+  it("has no place on a shape, and ends no run by a signal", function()
+    local folder = command.folder()
+    local shapes = [[
+local rapid = require "rapid"
+local sheet = rapid.mesh.from { points = {{-1, 0, -1}, {1, 0, -1}, {1, 0, 1}}, faces = {{1, 2, 3}},
+                                values = { heat = {1, 1, 1} } }
+local turning = sheet:transform(function(frame) return rapid.rotate({0, 1, 0}, 20 * frame.number) end)
+local ball = rapid.levelset.sphere { radius = 0.5, voxel = 0.1 }
+local moving = rapid.shape.sphere { radius = 0.5 }:transform { [1] = rapid.translate(0, 0, 0),
+                                                               [3] = rapid.translate(1, 0, 0) }
+]]
+    for _, row in ipairs { "inf,0,0,0.1,0", "nan,0,0,0.1,0", "0,0,0,0.1,nan", "1e38,1e38,0,0.1,0" } do
+      folder:write("points.csv", "id,Px,Py,Pz,pscale,vx,vy,vz\n5," .. row .. ",0,0\n6,0,0.1,0,0.1,0,0,0\n")
+      for _, node in ipairs { ":transfer { source = sheet }", ":transfer { source = turning }",
+        ":pin { target = turning }", ":pin { target = moving }", ":pin { compliance = 0.1 }",
+        ":attract { shape = sheet }", ":attract { shape = turning }", ":attract { shape = ball }",
+        ":spring { target = turning }", ":spring { target = ball }",
+        ":collide { shape = moving, response = 'stick' }", ":collide { shape = ball, response = 'stick' }",
+        ":nearest_place { shape = turning }", ":curve_force { curve = {{0, 0, 0}, {1, 0, 0}} }",
+        ":points('k', function(p) p.v = p.v * turning:distance(p.P) end)", ":trail { places = 3 } :picture {}" } do
+        folder:write("scene.lua", shapes .. 'return rapid.create { points = rapid.points.read "points.csv" } ' ..
+          node .. " :solve {}\n")
+        local result = command.shell('ulimit -t 20; exec "$RAPID" run scene.lua -f 1-3 --quiet -o a.####.png ' ..
+          "--size 32x32", { cwd = folder.path })
+        local what = row .. " " .. node .. ": " .. result.stderr
+        assert.truthy(result.status <= 1, what)
+        assert.falsy(node:find "transfer" and row:find "^nan" and not result.stderr:find("heat = nan", 1, true), what)
+      end
+    end
+  end)
 end)

@@ -121,6 +121,7 @@ void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, doub
 MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::int32_t hint) const
 {
     Place place;
+    place.triangle = tree_->order.front();  // for a P that is no number, which is near to none
     double best = std::numeric_limits<double>::infinity();
     if (hint >= 0) test(hint, P, t, best, place);
 

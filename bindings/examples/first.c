@@ -22,11 +22,11 @@ static int ball(void* user, size_t n, const double* P, double* phi, double* grad
     return 0;
 }
 
-static void check(int status, rapid_error* error)
+static void check(int status, rapid_error** error)
 {
     if (status == RAPID_OK) return;
-    fprintf(stderr, "%s\n", rapid_error_text(error));
-    rapid_error_free(error);
+    fprintf(stderr, "%s\n", rapid_error_text(*error));
+    rapid_error_free(*error);
     exit(1);
 }
 
@@ -46,20 +46,20 @@ int main(int count, char** arguments)
                                       {"collide1.shape", {RAPID_TEXT, {0, 0, 0}, "host:ball"}}};
     rapid_options options = RAPID_OPTIONS;
 
-    check(rapid_offers_new(&offers, &error), error);
-    check(rapid_offers_shape(offers, "ball", &shape, &error), error);
+    check(rapid_offers_new(&offers, &error), &error);
+    check(rapid_offers_shape(offers, "ball", &shape, &error), &error);
     options.offers = offers;
     options.settings = settings;
     options.setting_count = 2;
     options.log = warn;
-    check(rapid_scene_open(count > 1 ? arguments[1] : "graphs/first.lua", &options, &scene, &error), error);
+    check(rapid_scene_open(count > 1 ? arguments[1] : "graphs/first.lua", &options, &scene, &error), &error);
 
     for (int number = 24; number <= 96; number += 24) {
         rapid_frame* frame = NULL;
         rapid_column P = {sizeof P, NULL, 0, 0, 0, 0, NULL};
         double sum = 0, nearest = INFINITY;
-        check(rapid_scene_advance_to(scene, number, &frame, &error), error);
-        check(rapid_frame_column(frame, "P", &P, &error), error);
+        check(rapid_scene_advance_to(scene, number, &frame, &error), &error);
+        check(rapid_frame_column(frame, "P", &P, &error), &error);
         for (size_t i = 0; i < P.count; ++i) {
             const float* at = (const float*)((const char*)P.data + i * P.stride);
             const double d[3] = {at[0] - center[0], at[1] - center[1], at[2] - center[2]};
@@ -68,9 +68,9 @@ int main(int count, char** arguments)
         }
         printf("frame %d: %zu points, mean height %.4f m, nearest to the ball's middle %.3f m\n", number, P.count,
                P.count ? sum / (double)P.count : 0, nearest);
-        check(rapid_frame_release(frame, &error), error);
+        check(rapid_frame_release(frame, &error), &error);
     }
     rapid_offers_release(offers, NULL);
-    check(rapid_scene_close(scene, &error), error);
+    check(rapid_scene_close(scene, &error), &error);
     return 0;
 }

@@ -9,6 +9,8 @@
 
 #include "runtime/graph/points_object.h"
 #include "runtime/graph/value.h"
+#include "runtime/points/point_lines.h"
+#include "runtime/points/trail.h"
 
 namespace rapid {
 namespace {
@@ -16,7 +18,7 @@ namespace {
 // How many points each run of equal values of the attribute has.
 std::vector<std::size_t> runs_of(const PointSet& points)
 {
-    const auto* curve = points.find<std::int32_t>("curve");
+    const auto* curve = points.find<std::int32_t>(curve_attribute);
     if (!curve) return {points.size()};
     std::vector<std::size_t> counts;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -24,6 +26,13 @@ std::vector<std::size_t> runs_of(const PointSet& points)
         ++counts.back();
     }
     return counts;
+}
+
+PointSet trails_as_curves(const PointSet& points)
+{
+    PointSet ordered = in_order_of_lines(with_lines(points));
+    for (const AttributeSpec& column : trail_columns(Trails(points).places())) ordered.remove(column.name);
+    return ordered;
 }
 
 // The points of a value that is no function.
@@ -102,9 +111,15 @@ private:
 CurvesPtr curves_of(const PointSet& points, bool closed, const std::string& name)
 {
     std::vector<std::size_t> counts;
+    if (Trails(points).places() > 0) return curves_of(trails_as_curves(points), closed, name);
+    const auto* curve = points.find<std::int32_t>(curve_attribute);
     std::vector<std::size_t> kept;  // without the last point of a closed curve that is where the first one is
     std::size_t first = 0;
     for (const std::size_t count : runs_of(points)) {
+        if (curve && (*curve)[first] < 0) {  // of no line
+            first += count;
+            continue;
+        }
         const bool repeats = closed && count > 2 && points.P()[first] == points.P()[first + count - 1];
         counts.push_back(count - repeats);
         for (std::size_t k = 0; k < counts.back(); ++k) kept.push_back(first + k);

@@ -2,14 +2,16 @@
 //
 // Big-endian throughout:
 //
-//   "Bgeo" 'V' | int32: 5, points, primitives 0, point groups, primitive groups 0, point attributes, 0, 0, 0
+//   "Bgeo" 'V' | int32: 5, points, lines, point groups, primitive groups 0, point attributes, 0, 0, 0
 //   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 4 text, 5 vector), size defaults
 //   for each point: float x y z 1, then the attributes
+//   for each line (points/point_lines.h): int32 1, vertices, ':', then the place of each (int16 below 65536 points)
 //   for each group: int16 length, name, int32 points, and a bit for each point in int32 words, from the lowest bit on
 //   0x00 0xff: the (empty) extra section
 //
-// int64 (id) is written as int32, and refused where it does not fit. Partio reads no groups. The groups of a file with
-// primitives are not read: they come after the primitives, whose size only Houdini knows.
+// int64 (id) is written as int32, and refused where it does not fit. Partio reads no groups. Of primitives polygons are
+// read, and open ones are lines; other primitives, and the groups behind them, are not, as only Houdini knows their
+// size.
 #include <fmt/format.h>
 
 #include <bit>
@@ -21,6 +23,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/point_file.h"
 #include "runtime/io/records.h"
+#include "runtime/points/point_lines.h"
 
 namespace rapid {
 namespace {
@@ -106,6 +109,28 @@ std::string group_section(const PointSet& points)
     return section.text();
 }
 
+constexpr std::int32_t polygon = 1;
+constexpr std::uint32_t run_of_primitives = 0xffffffff;
+constexpr char closed_mark = '<', open_mark = ':';
+
+// Bytes of a point's number in a primitive.
+constexpr std::size_t number_bytes(std::size_t points) { return points < 65536 ? 2 : 4; }
+
+std::string line_section(const PointLines& lines)
+{
+    BigEndianText section;
+    const bool is_short = number_bytes(lines.points.size()) == 2;
+    std::size_t next = 0;
+    for (const std::uint32_t size : lines.sizes) {
+        section.int32(polygon);
+        section.int32(size);
+        section.bytes({&open_mark, 1});
+        for (const std::size_t end = next + size; next < end; ++next)
+            is_short ? section.int16(lines.vertices[next]) : section.int32(lines.vertices[next]);
+    }
+    return section.text();
+}
+
 constexpr std::size_t count_offset = 9;  // in the file, of the number of points
 constexpr std::string_view end_section("\x00\xff", 2);
 
@@ -115,12 +140,12 @@ void check_count(std::size_t points)
 }
 
 // What comes before the records.
-std::string header_section(const PointSet& points, const std::vector<std::string>& names)
+std::string header_section(const PointSet& points, const std::vector<std::string>& names, std::size_t lines)
 {
     BigEndianText header;
     header.bytes("BgeoV");
-    for (const std::size_t count : {std::size_t{5}, points.size(), std::size_t{0}, points.groups().size(),
-                                    std::size_t{0}, names.size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
+    for (const std::size_t count : {std::size_t{5}, points.size(), lines, points.groups().size(), std::size_t{0},
+                                    names.size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
         header.int32(count);
     for (const std::string& name : names) {
         const AnyColumn& column = *points.find(name);
@@ -150,14 +175,16 @@ RecordWriter records_of(const PointSet& points, const std::vector<std::string>& 
     return records;
 }
 
-void write_bgeo(OutputFile& file, const PointSet& points, const FrameInfo&)
+void write_bgeo(OutputFile& file, const PointSet& given, const FrameInfo&)
 {
+    const PointLines lines = with_lines(given);
+    const PointSet& points = lines.points;
     check_count(points.size());
     const std::vector<std::string> names = attribute_names(points);
     check_column_names(points.group_names(), std::string_view("\0", 1));
-    const std::string end = group_section(points) + std::string(end_section);
+    const std::string end = line_section(lines) + group_section(points) + std::string(end_section);
     const RecordWriter records = records_of(points, names);
-    const std::string header = header_section(points, names);
+    const std::string header = header_section(points, names, lines.sizes.size());
 
     file.append(header.data(), header.size());
     records.write(file, file.appended(), points.size());
@@ -168,7 +195,7 @@ class BgeoStream : public PointStream {
 public:
     BgeoStream(OutputFile& file, const PointSet& like) : file_(file), names_(attribute_names(like))
     {
-        const std::string header = header_section(like, names_);
+        const std::string header = header_section(like, names_, 0);
         file_.append(header.data(), header.size());
         end_ = file_.appended();
     }
@@ -289,6 +316,46 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
     return dictionary;
 }
 
+// The bytes of attributes that no point has, behind their dictionary.
+std::size_t stride_of_unread(BigEndianReader& reader, std::uint32_t count)
+{
+    const Dictionary dictionary = read_dictionary(reader, count, 0);
+    for (const RecordAttribute& attribute : dictionary.attributes)
+        LeftOut::add(fmt::format("the attribute \"{}\" of no point", attribute.name));
+    return dictionary.stride;
+}
+
+// Polygons of any attributes; open ones are lines. False: there are primitives of another kind, which end somewhere.
+bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t vertex_bytes, std::size_t polygon_bytes,
+                PointLines& lines)
+{
+    const std::size_t number = number_bytes(lines.points.size());
+    std::uint32_t closed = 0;
+    for (std::uint32_t left = primitives; left > 0;) {
+        std::uint32_t type = reader.integer(4), count = 1;
+        if (type == run_of_primitives) count = reader.integer(2), type = reader.integer(4);
+        if (type != polygon || count > left) return false;
+        for (left -= count; count > 0; --count) {
+            const std::uint32_t size = reader.integer(4);
+            const std::uint32_t mark = reader.integer(1);
+            if (mark != closed_mark && mark != open_mark) return false;
+            const bool is_line = mark == open_mark && size > 1;
+            for (std::uint32_t k = 0; k < size; ++k) {
+                const std::uint32_t point = reader.integer(number);
+                if (point >= lines.points.size())
+                    throw Error(fmt::format("a polygon has the point {} of {}", point, lines.points.size()));
+                reader.take(vertex_bytes);
+                if (is_line) lines.vertices.push_back(point);
+            }
+            reader.take(polygon_bytes);
+            if (is_line) lines.sizes.push_back(size);
+            closed += !is_line;
+        }
+    }
+    if (closed > 0) LeftOut::add(fmt::format("its {} closed polygons", closed));
+    return true;
+}
+
 void read_group(BigEndianReader& reader, PointSet& points)
 {
     const bool ordered = !reader.rest().empty() && reader.rest().front() == ordered_mark;
@@ -323,10 +390,9 @@ PointSet read_bgeo(const std::filesystem::path& path)
     if (version != 5) throw Error(fmt::format("bgeo version {} can't be read; it must be 5", version));
     const std::size_t n = reader.integer(4);
     const std::uint32_t primitives = reader.integer(4), groups = reader.integer(4);
-    reader.take(4);  // groups of primitives
-    const std::uint32_t attributes = reader.integer(4);
-    reader.take(2 * 4);  // attributes of vertices and primitives
-    const std::uint32_t of_the_whole = reader.integer(4);
+    reader.take(4);  // groups of primitives, which come after those of points
+    const std::uint32_t attributes = reader.integer(4), of_vertices = reader.integer(4),
+                        of_primitives = reader.integer(4), of_the_whole = reader.integer(4);
 
     constexpr std::size_t position_bytes = 16;
     Dictionary dictionary = read_dictionary(reader, attributes, position_bytes);
@@ -338,15 +404,20 @@ PointSet read_bgeo(const std::filesystem::path& path)
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
     for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first, has none
         set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
-    if (primitives > 0) {
+    PointLines lines{std::move(points), {}, {}};
+    reader.enter("primitives");
+    const std::size_t vertex_bytes = stride_of_unread(reader, of_vertices);
+    const std::size_t polygon_bytes = stride_of_unread(reader, of_primitives);
+    if (!read_lines(reader, primitives, vertex_bytes, polygon_bytes, lines)) {
         LeftOut::add(fmt::format("its {} primitives{}", primitives, groups > 0 ? ", and its groups behind them" : ""));
-        return points;
+        return lines.points;
     }
     reader.enter("attributes of the whole");
-    if (of_the_whole > 0) reader.take(read_dictionary(reader, of_the_whole, 0).stride);
+    reader.take(stride_of_unread(reader, of_the_whole));
     reader.enter("groups");
-    for (std::uint32_t g = 0; g < groups; ++g) read_group(reader, points);
-    return points;
+    for (std::uint32_t g = 0; g < groups; ++g) read_group(reader, lines.points);
+    if (lines.points.find_group(trail_places_group)) return without_trail_places(std::move(lines.points));
+    return in_order_of_lines(lines);
 }
 
 RAPID_FORMAT(Format{".bgeo", "classic Houdini geometry, read by Houdini and Partio; id as int32", write_bgeo,

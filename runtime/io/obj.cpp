@@ -1,8 +1,8 @@
 // .obj: Wavefront's text, as lines.
 //
-//   v x y z          each point, and behind them the places of its trail, from the newest on
-//   p 1 2 ...        the points without a trail
-//   l 1 7 8 ...      a trail, from the point itself backwards
+//   v x y z          each point, and behind them the places of trails
+//   p 1              a point of no line
+//   l 1 7 8 ...      a line: a trail, from the point itself backwards, or a curve (points/point_lines.h)
 //
 // It holds places alone: no velocities, attributes and groups. The places of the lines of any such file are read as
 // points in the order of the lines, with the number of the line as the attribute `curve`, from 0; where there are no
@@ -15,41 +15,42 @@
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/memory_budget.h"
-#include "runtime/points/trail.h"
+#include "runtime/points/point_lines.h"
 
 namespace rapid {
 namespace {
 
-void add_place(std::string& text, const Vec3f& P)
+void write_obj(OutputFile& file, const PointSet& given, const FrameInfo&)
 {
-    fmt::format_to(std::back_inserter(text), "v {} {} {}\n", P.x(), P.y(), P.z());
-}
-
-void write_obj(OutputFile& file, const PointSet& points, const FrameInfo&)
-{
-    const Trails trails(points);
-    const std::size_t n = points.size();
-    std::vector<std::size_t> begin(n + 1, n);  // of each point's trail among the vertices
-    for (std::size_t i = 0; i < n; ++i) begin[i + 1] = begin[i] + static_cast<std::size_t>(trails.count(i));
+    const PointLines lines = with_lines(given);
+    const PointSet& points = lines.points;
+    std::vector<bool> is_on_line(points.size());
+    for (const std::uint32_t i : lines.vertices) is_on_line[i] = true;
+    std::vector<std::size_t> begin = {0};  // of each line among the vertices
+    for (const std::uint32_t size : lines.sizes) begin.push_back(begin.back() + size);
 
     const std::string head = "# Rapid points, metres\n";
     file.append(head.data(), head.size());
-    append_chunks(file, n, [&](std::size_t first, std::size_t last) {
-        std::string text;
-        for (std::size_t i = first; i < last; ++i) add_place(text, points.P()[i]);
-        return text;
-    });
-    append_chunks(file, n, [&](std::size_t first, std::size_t last) {
-        std::string text;
-        for (std::size_t i = first; i < last; ++i)
-            for (int place = 1; place <= trails.count(i); ++place) add_place(text, trails.at(i, place));
-        return text;
-    });
-    append_chunks(file, n, [&](std::size_t first, std::size_t last) {
+    append_chunks(file, points.size(), [&](std::size_t first, std::size_t last) {
         std::string text;
         for (std::size_t i = first; i < last; ++i) {
-            text += fmt::format("{} {}", begin[i] == begin[i + 1] ? 'p' : 'l', i + 1);
-            for (std::size_t k = begin[i]; k < begin[i + 1]; ++k) text += fmt::format(" {}", k + 1);
+            const Vec3f& P = points.P()[i];
+            fmt::format_to(std::back_inserter(text), "v {} {} {}\n", P.x(), P.y(), P.z());
+        }
+        return text;
+    });
+    append_chunks(file, points.size(), [&](std::size_t first, std::size_t last) {
+        std::string text;
+        for (std::size_t i = first; i < last; ++i)
+            if (!is_on_line[i]) text += fmt::format("p {}\n", i + 1);
+        return text;
+    });
+    append_chunks(file, lines.sizes.size(), [&](std::size_t first, std::size_t last) {
+        std::string text;
+        for (std::size_t line = first; line < last; ++line) {
+            text += 'l';
+            for (std::size_t k = begin[line]; k < begin[line + 1]; ++k)
+                text += fmt::format(" {}", lines.vertices[k] + 1);
             text += '\n';
         }
         return text;
@@ -146,7 +147,7 @@ PointSet read_obj(const std::filesystem::path& path)
     points.P() = Column<Vec3f>(std::span<const Vec3f>(places));
     const std::span<std::int64_t> id = points.id().overwrite();
     for (std::size_t i = 0; i < id.size(); ++i) id[i] = static_cast<std::int64_t>(i);
-    points.set("curve", Column<std::int32_t>(std::span<const std::int32_t>(curves)));
+    points.set(curve_attribute, Column<std::int32_t>(std::span<const std::int32_t>(curves)));
     return points;
 }
 

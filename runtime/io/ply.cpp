@@ -1,13 +1,15 @@
-// .ply: binary little-endian PLY, one element "vertex".
+// .ply: binary little-endian PLY, an element "vertex".
 //
 // P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), any other vec3 NAMEx NAMEy NAMEz, a
-// quaternion also NAMEw; integers are int (an int64 that does not fit is refused); a group is uchar group_NAME.
+// quaternion also NAMEw; integers are int (an int64 that does not fit is refused); a group is uchar group_NAME. Lines
+// (points/point_lines.h) are elements "edge" with vertex1 and vertex2.
 //
 // Reads any PLY whose vertices have no lists (files/ply_file.h); red green blue become Cd.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
@@ -15,6 +17,7 @@
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
+#include "runtime/points/point_lines.h"
 
 namespace rapid {
 namespace {
@@ -36,8 +39,25 @@ std::string_view ply_type(const AnyColumn& column)
     return type == AttributeType::Int32 || type == AttributeType::Int64 ? "int" : "float";
 }
 
-void write_ply(OutputFile& file, const PointSet& points, const FrameInfo&)
+// element edge: two neighbours on a line each.
+std::string edge_section(const PointLines& lines)
 {
+    std::string section;
+    const auto put = [&](std::uint32_t vertex) {
+        for (int byte = 0; byte < 4; ++byte) section += static_cast<char>(vertex >> 8 * byte & 0xff);
+    };
+    std::size_t first = 0;
+    for (const std::uint32_t size : lines.sizes) {
+        for (std::size_t k = first; k + 1 < first + size; ++k) put(lines.vertices[k]), put(lines.vertices[k + 1]);
+        first += size;
+    }
+    return section;
+}
+
+void write_ply(OutputFile& file, const PointSet& given, const FrameInfo&)
+{
+    const PointLines lines = with_lines(given);
+    const PointSet& points = lines.points;
     RecordWriter records(ByteOrder::Little);
     std::vector<std::string> names;
     std::string properties;
@@ -58,12 +78,19 @@ void write_ply(OutputFile& file, const PointSet& points, const FrameInfo&)
     }
     check_column_names(names, white_space);
 
+    const std::string edges = edge_section(lines);
+    constexpr std::size_t edge_bytes = 8;
+    const std::string edges_of_header =
+        edges.empty()
+            ? ""
+            : fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", edges.size() / edge_bytes);
     const std::string header = fmt::format(
-        "ply\nformat binary_little_endian 1.0\ncomment Rapid points, metres and seconds\nelement vertex {}\n{}"
+        "ply\nformat binary_little_endian 1.0\ncomment Rapid points, metres and seconds\nelement vertex {}\n{}{}"
         "end_header\n",
-        points.size(), properties);
+        points.size(), properties, edges_of_header);
     file.append(header.data(), header.size());
     records.write(file, file.appended(), points.size());
+    file.write_at(file.appended() + records.record_bytes() * points.size(), edges.data(), edges.size());
 }
 
 // Rapid's name for a property; the components of an attribute share a stem.
@@ -128,14 +155,20 @@ PointSet read_ply(const std::filesystem::path& path)
 {
     const InputFile input(path);
     PlyFile file(input.text());
-    for (const PlyElement& element : file.elements())
-        if (element.name != "vertex" && element.count > 0)
-            LeftOut::add(fmt::format("its {} elements \"{}\"", element.count, element.name));
+    std::optional<PointSet> points;
     for (const PlyElement& element : file.elements()) {
-        if (element.name == "vertex") return read_vertices(file, element);
-        file.pass_over(element);
+        if (points) break;
+        if (element.name == "vertex")
+            points = read_vertices(file, element);
+        else
+            file.pass_over(element);
     }
-    throw Error("the PLY file has no element \"vertex\"");
+    if (!points) throw Error("the PLY file has no element \"vertex\"");
+    const bool has_trails = points->find_group(trail_places_group) != nullptr;  // whose edges are in the points
+    for (const PlyElement& element : file.elements())
+        if (element.name != "vertex" && element.count > 0 && !(has_trails && element.name == "edge"))
+            LeftOut::add(fmt::format("its {} elements \"{}\"", element.count, element.name));
+    return without_trail_places(std::move(*points));
 }
 
 RAPID_FORMAT(Format{".ply", "binary PLY: points for viewers and mesh tools; id as int32", write_ply, read_ply});

@@ -96,6 +96,39 @@ return rapid.create { fps = 24,
     end
   end)
 
+  it("takes the lines of trails and curves in .bgeo files", function()
+    local result = scene.command("run", [[
+return rapid.create { fps = 24,
+    points = rapid.points.from { P = {{0, 0, 0}, {0, 3, 0}}, v = {{24, 0, 0}, {0, 24, 0}} } }
+  :trail { places = 3 } :solve {}]], "-f 1-6 -o trail.####.bgeo")
+    assert.equal(0, result.status, result.stderr)
+    -- Born along the first trail, from (5, 0, 0) to (2, 0, 0), or the second, from (0, 8, 0) to (0, 5, 0).
+    local born = scene.run([[
+return rapid.create { fps = 24 }
+  :emit { source = rapid.curve.read "trail.0006.bgeo", count = 400, birth = "end" } :solve {}]],
+      { frames = {2, 2} })[2]
+    local on_first = 0
+    for i = 1, #born do
+      local P = born[i].P
+      local first = P.y == 0 and P.x >= 2 and P.x <= 5
+      assert.is_true(first or (P.x == 0 and P.y >= 5 and P.y <= 8))
+      if first then on_first = on_first + 1 end
+    end
+    assert.is_true(on_first > 150 and on_first < 250) -- both are as long
+
+    -- What is written of the lines of an .obj comes back as lines from a .bgeo.
+    scene.folder:write("path.obj", "v 0 0 0\nv 2 0 0\nv 0 5 0\nv 0 9 0\nl 1 2\nl 3 4\n")
+    assert.equal(0, scene.command("run", [[
+return rapid.create { fps = 24, points = rapid.points.read "path.obj" } :solve {}]], "-f 1-1 -o path.bgeo").status)
+    born = scene.run([[
+return rapid.create { fps = 24 }
+  :emit { source = rapid.curve.read "path.bgeo", count = 100, birth = "end" } :solve {}]], { frames = {2, 2} })[2]
+    for i = 1, #born do
+      local P = born[i].P
+      assert.is_true((P.y == 0 and P.x <= 2) or (P.x == 0 and P.y >= 5 and P.y <= 9))
+    end
+  end)
+
   it("says what is wrong", function()
     local function fault(arguments)
       return scene.error("return rapid.create {} :curve_force { " .. arguments .. " } :solve {}")

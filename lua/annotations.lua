@@ -128,6 +128,11 @@ function Mesh:gradient(P) end
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Mesh:velocity(P) end
+---The nearest place; or, with a name, what the mesh has there of that attribute; in kernels.
+---@param P rapid.Vec3
+---@param attribute? string
+---@return any
+function Mesh:closest(P, attribute) end
 
 ---@class rapid.Shape
 local Shape = {}
@@ -143,6 +148,10 @@ function Shape:gradient(P) end
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:velocity(P) end
+---The nearest place of the surface; of a level set within its band.
+---@param P rapid.Vec3
+---@return rapid.Vec3
+function Shape:closest(P) end
 
 ---@class rapid.LevelSet: rapid.Shape
 local LevelSet = {}

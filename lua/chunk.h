@@ -31,6 +31,11 @@ typedef double (*rapid_shape_distance)(const void* shape, double x, double y, do
 // The velocity of its surface, m/s; value: shape [3].
 typedef void (*rapid_shape_velocity)(const void* shape, double x, double y, double z, double* value);
 
+// Of a mesh's own pointer and that of its surface in the step: the numbers of the attribute where it is nearest, 1 or 3,
+// or 0 where it has none of this name; value: shape [3].
+typedef int32_t (*rapid_mesh_value)(const void* mesh, const void* shape, const char* name, double x, double y, double z,
+                                    double* value);
+
 // Of a grid of vectors' own pointer; value: shape [3].
 typedef void (*rapid_vector_grid_sample)(const void* grid, double x, double y, double z, double* value);
 

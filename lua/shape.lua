@@ -3,12 +3,15 @@
 --   shape:distance(P)    m, negative inside; beyond a level set's band a bound of the right sign
 --   shape:gradient(P)    a vec3 out of the shape, of length 1 where the distance is exact; zero where there is none
 --   shape:velocity(P)    a vec3, m/s, of what is there of the shape
+--   shape:closest(P)     a vec3, the place of the surface that is nearest; beyond a level set's band about there
+--   mesh:closest(P, "Cd")  the mesh's attribute at that place: a number or a vec3
 --   grid:sample(P)       a vec3, between the voxels' values; of a fog a number, the density
 --
 -- Shapes that move or deform, and meshes, can be asked in kernels alone, where they are as in the step.
 --
 -- An object's pointer is asked of the host once, and then found in a table, which compiled traces can do; of a shape
 -- that moves once a chunk. The functions are vararg for the reason that vec3.lua gives.
+local describe = require "describe"
 local ffi = require "ffi"
 local vector = require "vec3"
 
@@ -20,6 +23,7 @@ local vec3, istype = vector.type, ffi.istype
 local function make(native)
   local ask = ffi.cast("rapid_shape_distance", native.shape_distance)
   local ask_velocity = ffi.cast("rapid_shape_velocity", native.shape_velocity)
+  local ask_value = ffi.cast("rapid_mesh_value", native.mesh_value)
   local ask_grid = ffi.cast("rapid_vector_grid_sample", native.vector_grid_sample)
   local ask_fog = ffi.cast("rapid_fog_sample", native.fog_sample)
   local gradient, value = ffi.new "double[3]", ffi.new "double[3]"
@@ -53,6 +57,7 @@ local function make(native)
   local pointer_of, forget_moving = pointers_by(native.shape)
   local grid_of = pointers_by(native.vector_grid)
   local fog_of = pointers_by(native.fog)
+  local mesh_of = pointers_by(native.mesh)
 
   local function place_shown(P)
     return (type(P) == "number" or P == nil) and tostring(P) or "a " .. type(P)
@@ -92,6 +97,28 @@ local function make(native)
     local pointer = type(shape) == "userdata" and pointer_of(shape)
     if not pointer or not istype(vec3, P) then refuse("velocity", shape, P) end
     ask_velocity(pointer, P.x, P.y, P.z, value)
+    return (vec3(value[0], value[1], value[2]))
+  end
+
+  function queries.closest(...)
+    local shape, P, name = ...
+    local pointer = type(shape) == "userdata" and pointer_of(shape)
+    if not pointer or not istype(vec3, P) then refuse("closest", shape, P) end
+    if name == nil then
+      local distance = ask(pointer, P.x, P.y, P.z, gradient)
+      return (vec3(P.x - distance * gradient[0], P.y - distance * gradient[1], P.z - distance * gradient[2]))
+    end
+    local mesh = mesh_of(shape)
+    if not mesh or type(name) ~= "string" then
+      error(("shape:closest(P, NAME) takes the name of an attribute, of a mesh, not %s"):format(
+        describe.value(name)), 0)
+    end
+    local numbers = ask_value(mesh, pointer, name, P.x, P.y, P.z, value)
+    if numbers == 0 then error(("the mesh has no attribute %q"):format(describe.name(name)), 0) end
+    if numbers == 1 then
+      local number = value[0]
+      return number
+    end
     return (vec3(value[0], value[1], value[2]))
   end
 

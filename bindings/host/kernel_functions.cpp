@@ -9,6 +9,7 @@
 #include "runtime/random.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
+#include "runtime/shapes/motion/value_on_mesh.h"
 
 namespace rapid {
 namespace {
@@ -79,6 +80,18 @@ void shape_velocity(const void* shape, double x, double y, double z, double* val
     Eigen::Map<Vec3d>(value, 3) = known->velocity_at(Vec3d(x, y, z), step ? KernelMoment::since_begin(*step) : 0);
 }
 
+// mesh: of which the shape is the surface, in this step. Of one that deforms the values are those of its first file.
+std::int32_t mesh_value(const void* mesh, const void* shape, const char* name, double x, double y, double z,
+                        double* value)
+{
+    const auto* step = dynamic_cast<const StepShape*>(static_cast<const Shape*>(shape));
+    const auto* surface = step ? dynamic_cast<const MovingBody*>(&step->shape()) : nullptr;
+    if (!surface) return 0;
+    const MeshSurfaces surfaces{*surface, dynamic_cast<const MovingBody*>(step->at_rest())};
+    return value_on_mesh(*static_cast<const Mesh*>(mesh), surfaces, name, {x, y, z}, KernelMoment::since_begin(*step),
+                         std::span<double, 3>(value, 3));
+}
+
 // So it does the grid.
 template <class G>
 typename G::Value sample(const void* grid, const Vec3d& P)
@@ -113,6 +126,7 @@ void set_kernel_functions(lua_State* L)
     set("curl_noise", &curl_noise_at);
     set("shape_distance", &shape_distance);
     set("shape_velocity", &shape_velocity);
+    set("mesh_value", &mesh_value);
     set("vector_grid_sample", &vector_grid_sample);
     set("fog_sample", &fog_sample);
 }

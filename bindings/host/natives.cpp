@@ -23,6 +23,7 @@
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/motion/animated.h"
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
@@ -85,6 +86,19 @@ int pointer_to_shape(State& state)
         lua_pushnil(L);
     lua_pushboolean(L, moves);
     return 2;
+}
+
+// native.mesh(object): the pointer to a mesh, or to that at rest of one that moves; nil for any other object.
+int pointer_to_mesh(State& state)
+{
+    const ObjectPtr object = to_object(state, 1);
+    const auto* moving = dynamic_cast<const AnimatedMesh*>(object.get());
+    const auto* mesh = moving ? moving->rest().get() : dynamic_cast<const Mesh*>(object.get());
+    if (mesh)
+        lua_pushlightuserdata(state.lua(), const_cast<Mesh*>(mesh));
+    else
+        lua_pushnil(state.lua());
+    return 1;
 }
 
 // native.vector_grid(object), .fog(object): its pointer, valid while the object is; nil for any other object.
@@ -211,6 +225,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"shape", native<pointer_to_shape>},
                                       {"vector_grid", native<pointer_to<VectorGrid>>},
                                       {"fog", native<pointer_to<DensityGrid>>},
+                                      {"mesh", native<pointer_to_mesh>},
                                       {"outside_kernels", native<outside_kernels>},
                                       {"trace_aborted", native<trace_aborted>},
                                       {"add_code", native<add_code>},

@@ -106,7 +106,10 @@ std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const Frame
     const ShapePtr shape = shape_in_step(object, step);
     if (!shape) return nullptr;
     if (step.is_start()) return std::make_shared<StepShape>(shape, 0, 0);
-    return std::make_shared<StepShape>(shape, clock.at_step(step.number - 1).time, 1 / clock.steps_per_second());
+    const auto mesh = std::dynamic_pointer_cast<const AnimatedMesh>(object);
+    const ShapePtr at_rest = mesh && !mesh->deforms() ? mesh_surface(mesh->rest()) : nullptr;
+    return std::make_shared<StepShape>(shape, clock.at_step(step.number - 1).time, 1 / clock.steps_per_second(),
+                                       at_rest);
 }
 
 Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame)

@@ -15,11 +15,14 @@ public:
     static constexpr std::string_view param_type = "shape at rest or moving";
 
     // shape: with times in seconds since the step began. begin: of the step, s since the start of the simulation.
-    StepShape(ShapePtr shape, double begin, double duration)
-        : shape_(std::move(shape)), begin_(begin), duration_(duration)
+    // at_rest: of a mesh that moves as a rigid body, its surface, else null.
+    StepShape(ShapePtr shape, double begin, double duration, ShapePtr at_rest = nullptr)
+        : shape_(std::move(shape)), at_rest_(std::move(at_rest)), begin_(begin), duration_(duration)
     {
     }
 
+    const Shape& shape() const { return *shape_; }
+    const Shape* at_rest() const { return at_rest_.get(); }
     double begin() const { return begin_; }
     double duration() const { return duration_; }  // s; 0 at the start, where nothing moves
 
@@ -48,7 +51,7 @@ public:
     }
 
 private:
-    ShapePtr shape_;
+    ShapePtr shape_, at_rest_;
     double begin_, duration_;
 };
 

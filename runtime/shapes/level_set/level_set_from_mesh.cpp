@@ -74,7 +74,8 @@ void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& o
                         thin, pieces.size(), mesh.name, options.voxel));
     Box3f bounds;
     for (const Box3f& piece : pieces) bounds.extend(piece);
-    if (const double size = bounds.isEmpty() ? 0 : bounds.sizes().maxCoeff(); 2 * options.voxel >= size && size > 0)
+    if (const double size = bounds.isEmpty() ? 0 : bounds.sizes().maxCoeff();
+        2 * options.voxel >= size * (1 - 1e-6) && size > 0)  // sizes are floats
         warnings.push_back(
             fmt::format("a voxel of {:g} m is half as large as mesh \"{}\" or larger: it is {:g} m long; a voxel of "
                         "{:.1g} m shows its form",

@@ -1,8 +1,9 @@
 // Meshes from files, by Assimp: OBJ, STL and glTF.
 //
 // Vertex colours become Cd, and Alpha if any is not 1; normals N (of STL they are those of the faces, and are left
-// out); texture coordinates uv, and uv2, uv3, ...; faces are in groups by the names of their part, of the node that has
-// it, and of their material. Skins, animations and morph targets, lights and cameras are left out.
+// out); texture coordinates uv, and uv2, uv3, ...; _NAME of glTF is NAME; faces are in groups by the names of their
+// part, of the node that has it, and of their material. Skins, animations and morph targets, lights and cameras are
+// left out.
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -16,28 +17,48 @@
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
+#include "runtime/shapes/mesh/gltf_attributes.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
 namespace rapid {
 namespace {
 
-// A vec3 of each corner, so far 0 for corners without one.
-std::vector<Vec3f>& vectors(const std::string& name, MeshFile& corners)
+void leave_out(const std::string& what, MeshFile& corners)
 {
-    Mesh::VertexValues& values = corners.values.try_emplace(name, std::vector<Vec3f>()).first->second;
-    return std::get<std::vector<Vec3f>>(values);
+    if (std::find(corners.left_out.begin(), corners.left_out.end(), what) == corners.left_out.end())
+        corners.left_out.push_back(what);
+}
+
+template <class T>
+T zero()
+{
+    if constexpr (std::is_same_v<T, Vec3f>)
+        return Vec3f::Zero();
+    else
+        return 0;
+}
+
+// A value of each corner, so far 0 for corners without one.
+template <class T>
+void append_list(const std::string& name, const std::vector<T>& list, std::size_t first, MeshFile& corners)
+{
+    Mesh::VertexValues& values = corners.values.try_emplace(name, std::vector<T>()).first->second;
+    auto* known = std::get_if<std::vector<T>>(&values);
+    if (!known) return leave_out(fmt::format("\"{}\" of a part, which has another type in others", name), corners);
+    known->resize(first, zero<T>());
+    known->insert(known->end(), list.begin(), list.end());
 }
 
 void append_values(const aiMesh& part, const aiMatrix4x4& to_world, std::size_t first, bool with_normals,
                    MeshFile& corners)
 {
     const auto append = [&](const std::string& name, const auto& value_of) {
-        std::vector<Vec3f>& values = vectors(name, corners);
-        values.resize(first, Vec3f::Zero());
+        std::vector<Vec3f> list;
         for (unsigned i = 0; i < part.mNumVertices; ++i) {
             const aiVector3D value = value_of(i);
-            values.emplace_back(value.x, value.y, value.z);
+            list.emplace_back(value.x, value.y, value.z);
         }
+        append_list(name, list, first, corners);
     };
     for (unsigned set = 0; set < AI_MAX_NUMBER_OF_TEXTURECOORDS; ++set)
         if (part.HasTextureCoords(set))
@@ -58,15 +79,13 @@ void join_group(const std::string& name, std::size_t first, MeshFile& corners)
     members.resize(corners.triangles.size(), 1);
 }
 
-void leave_out(const std::string& what, MeshFile& corners)
-{
-    if (std::find(corners.left_out.begin(), corners.left_out.end(), what) == corners.left_out.end())
-        corners.left_out.push_back(what);
-}
+// The further attributes of each part, by its number.
+using PartValues = std::vector<std::map<std::string, Mesh::VertexValues>>;
 
-void append(const aiScene& scene, const aiMesh& part, const std::string& node, const aiMatrix4x4& to_world,
-            bool with_normals, MeshFile& corners)
+void append(const aiScene& scene, unsigned number, const std::string& node, const aiMatrix4x4& to_world,
+            bool with_normals, const PartValues& values, MeshFile& corners)
 {
+    const aiMesh& part = *scene.mMeshes[number];
     const auto first = corners.positions.size(), first_face = corners.triangles.size();
     const bool moved = !to_world.IsIdentity();
     for (unsigned i = 0; i < part.mNumVertices; ++i) {
@@ -97,6 +116,9 @@ void append(const aiScene& scene, const aiMesh& part, const std::string& node, c
         corners.triangles.push_back(t);
     }
     append_values(part, to_world, first, with_normals, corners);
+    if (number < values.size())
+        for (const auto& [name, any] : values[number])
+            std::visit([&, &key = name](const auto& list) { append_list(key, list, first, corners); }, any);
     std::set<std::string> groups = {part.mName.C_Str(), node};
     if (part.mMaterialIndex < scene.mNumMaterials) {
         const std::string material = scene.mMaterials[part.mMaterialIndex]->GetName().C_Str();
@@ -108,13 +130,14 @@ void append(const aiScene& scene, const aiMesh& part, const std::string& node, c
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, bool with_normals,
-            MeshFile& corners)
+            const PartValues& values, MeshFile& corners)
 {
     const aiMatrix4x4 to_world = to_parent * node.mTransformation;
     const std::string name = node.mName.C_Str();
     for (unsigned i = 0; i < node.mNumMeshes; ++i)
-        append(scene, *scene.mMeshes[node.mMeshes[i]], name, to_world, with_normals, corners);
-    for (unsigned i = 0; i < node.mNumChildren; ++i) append(scene, *node.mChildren[i], to_world, with_normals, corners);
+        append(scene, node.mMeshes[i], name, to_world, with_normals, values, corners);
+    for (unsigned i = 0; i < node.mNumChildren; ++i)
+        append(scene, *node.mChildren[i], to_world, with_normals, values, corners);
 }
 
 // What is appended later has none of what comes before it.
@@ -125,7 +148,8 @@ void complete(MeshFile& corners)
         corners.colours.resize(n, Vec3f::Ones());
         corners.alphas.resize(n, 1.0f);
     }
-    for (auto& [name, values] : corners.values) std::get<std::vector<Vec3f>>(values).resize(n, Vec3f::Zero());
+    for (auto& [name, values] : corners.values)
+        std::visit([n]<class T>(std::vector<T>& list) { list.resize(n, zero<T>()); }, values);
     for (auto& [name, members] : corners.face_groups) members.resize(corners.triangles.size(), 0);
 }
 
@@ -139,6 +163,28 @@ public:
     }
 };
 
+// Of glTF the attributes that Assimp does not read, where its parts are the file's.
+PartValues further_values(const std::filesystem::path& path, const aiScene& scene, MeshFile& corners)
+{
+    PartValues values;
+    const std::string extension = path.extension().string();
+    if (extension.size() < 2 || std::string_view("gG").find(extension[1]) == std::string_view::npos) return values;
+    GltfAttributes attributes = read_gltf_attributes(path);
+    for (const std::string& what : attributes.left_out) leave_out(what, corners);
+    for (std::size_t k = 0; k < attributes.primitives.size(); ++k) {
+        GltfAttributes::Primitive& primitive = attributes.primitives[k];
+        const bool is_part =
+            attributes.primitives.size() == scene.mNumMeshes && primitive.vertices == scene.mMeshes[k]->mNumVertices;
+        for (const char* taken : {"P", "v", "id", "N", "Cd", "Alpha", "uv"})
+            if (primitive.values.erase(taken) > 0) leave_out(fmt::format("the attribute \"_{}\"", taken), corners);
+        if (!is_part)
+            for (const auto& [name, list] : primitive.values)
+                leave_out(fmt::format("the attribute \"_{}\"", name), corners);
+        values.push_back(is_part ? std::move(primitive.values) : std::map<std::string, Mesh::VertexValues>());
+    }
+    return values;
+}
+
 MeshFile import(const std::filesystem::path& path)
 {
     Assimp::Importer importer;
@@ -147,7 +193,8 @@ MeshFile import(const std::filesystem::path& path)
     if (!scene) throw Error(fmt::format("{}; it must be an OBJ, STL or glTF file", importer.GetErrorString()));
     MeshFile corners;
     const bool with_normals = path.extension() != ".stl" && path.extension() != ".STL";
-    if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), with_normals, corners);
+    const PartValues values = further_values(path, *scene, corners);
+    if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), with_normals, values, corners);
     complete(corners);
     if (scene->mNumAnimations > 0) leave_out("its animations", corners);
     if (scene->mNumLights > 0) leave_out("its lights", corners);

@@ -168,6 +168,85 @@ describe("what is born on a mesh of a glTF file", function()
   end)
 end)
 
+describe("attributes that a glTF file names by itself", function()
+  local ffi = require "ffi"
+
+  -- A triangle with _HEAT, as floats or as normalized bytes, and _Way; in a buffer that is a file, in the text, or in a
+  -- binary file.
+  local function document(uri, heat)
+    return ([[{
+      "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+      "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "_HEAT": 1, "_Way": 2, "_PAIR": 3}}]}],
+      "buffers": [{%%s"byteLength": 96}],
+      "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36},
+        {"buffer": 0, "byteOffset": 36, "byteLength": 12%s},
+        {"buffer": 0, "byteOffset": 48, "byteLength": 36}],
+      "accessors": [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, -1], "max": [1, 0, 0]},
+        {"bufferView": 1, "componentType": %s, "count": 3, "type": "SCALAR"},
+        {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC3"},
+        {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC2"}]}]])
+      :format(heat == "bytes" and ', "byteStride": 4' or "", heat == "bytes" and '5121, "normalized": true' or "5126")
+      :format(uri)
+  end
+  local function bytes(heat)
+    local buffer = ffi.new("uint8_t[96]")
+    local floats = ffi.cast("float*", buffer)
+    for k, x in ipairs { 0, 0, 0, 1, 0, 0, 0, 0, -1 } do floats[k - 1] = x end
+    for k, x in ipairs { 0, 1, 0.2 } do
+      if heat == "bytes" then buffer[36 + 4 * (k - 1)] = x * 255 else floats[8 + k] = x end
+    end
+    for k, x in ipairs { 1, 0, 0, 0, 1, 0, 0, 0, 1 } do floats[11 + k] = x end
+    return ffi.string(buffer, 96)
+  end
+  local digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+  local function base64(text)
+    return (text:gsub("(.)(.)(.)", function(a, b, c)
+      local word = (a:byte() * 256 + b:byte()) * 256 + c:byte()
+      local group = ""
+      for shift = 18, 0, -6 do
+        local k = math.floor(word / 2 ^ shift) % 64 + 1
+        group = group .. digits:sub(k, k)
+      end
+      return group
+    end))
+  end
+  local function check(file, tolerance)
+    local points = born(file, "")[2]
+    assert.equal(3000, #points)
+    for i = 1, #points do
+      local p = points[i]
+      local b, c = p.P.x, -p.P.z
+      assert.near(b + 0.2 * c, p.HEAT, tolerance)
+      assert.near({1 - b - c, b, c}, p.Way, 1e-5)
+    end
+  end
+
+  it("are those of the points that are born on it", function()
+    scene.folder:write("own.bin", bytes "floats")
+    scene.folder:write("own.gltf", document('"uri": "own.bin", ', "floats"))
+    check("own.gltf", 1e-5)
+    scene.folder:write("text.gltf",
+      document('"uri": "data:application/octet-stream;base64,' .. base64(bytes "bytes") .. '", ', "bytes"))
+    check("text.gltf", 1e-5)
+
+    local text, data = document("", "floats"), bytes "floats"
+    text = text .. (" "):rep(-#text % 4)
+    local head = ffi.new("uint32_t[5]", 0x46546c67, 2, 28 + #text + #data, #text, 0x4e4f534a)
+    local second = ffi.new("uint32_t[2]", #data, 0x004e4942)
+    scene.folder:write("own.glb", ffi.string(head, 20) .. text .. ffi.string(second, 8) .. data)
+    check("own.glb", 1e-5)
+  end)
+
+  it("are told where they are no numbers and no vectors of three", function()
+    scene.folder:write("own.bin", bytes "floats")
+    scene.folder:write("own.gltf", document('"uri": "own.bin", ', "floats"))
+    local result = scene.command("check", [[
+return rapid.create {} :emit { source = rapid.mesh.read "own.gltf", count = 1 } :solve {}]], "")
+    assert.matches('the attribute "_PAIR"', result.stderr, 1, true)
+  end)
+end)
+
 describe("the normals of a mesh", function()
   it("turn with the mesh, and are not those of the mesh at rest where it moves", function()
     scene.folder:write("squares.obj", obj)

@@ -59,6 +59,16 @@ describe("the ledger", function()
     check({ by_drag = -mass * k * (g / k) ^ 2 * fall }, sums, 1e-4)
   end)
 
+  it("has no more of drag than drag takes, where a method puts a point back after the step", function()
+    for _, method in ipairs { "project", "backtrack" } do
+      local sums = ledger(([[rapid.points.from { P = {{0, 0.5, 0}}, v = {{1, -4, 0}} } }
+  :drag { linear = 0.5 } :collide { shape = rapid.shape.plane {}, bounce = 0, method = %q }
+  :contact { radius = 0.1 } :solve {}]]):format(method))
+      assert.near(0, sums.by_motion, 1e-4, method)
+      assert.truthy(sums.by_drag < 0 and sums.by_contacts < -5, method)
+    end
+  end)
+
   it("has what restitution and friction take of an oblique impact, apart", function()
     -- They touch along x: p = (1 + e) 4/W, q = μ p, W = 1 + 1/3.
     local sums = ledger [[rapid.points.from { P = {{-0.3, -0.075, 0}, {0, 0, 0}}, v = {{4, 3, 0}, {0, 0, 0}},

@@ -78,7 +78,9 @@ void ContactAudit::add_corrections(std::span<const Vec3d> P, std::span<const Vec
         const double mass = block_.context.mass[block_.indices[i]];
         if (std::isinf(mass) || (P[i] == block_.P[i] && v[i] == block_.v[i])) continue;
         const double kinetic = 0.5 * (block_.v[i] - v[i]).dot(block_.v[i] + v[i]);
-        counts_.energy.take(mass * (kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i])));
+        const double work = kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i]);
+        counts_.energy.take(mass * work);
+        all_work_[i] += work;
     }
 }
 

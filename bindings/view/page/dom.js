@@ -33,11 +33,12 @@ export function brief(x) {
 export function exact(value) {
   if (Array.isArray(value)) return value.map(exact).join("  ");
   if (typeof value !== "number" || Number.isInteger(value)) return String(value);
-  for (let digits = 6; digits < 9; ++digits) {
-    const short = Number(value.toPrecision(digits));
-    if (Math.fround(short) === Math.fround(value)) return String(short);
+  let short;
+  for (let digits = 6; digits <= 9; ++digits) {
+    short = Number(value.toPrecision(digits));
+    if (Math.fround(short) === Math.fround(value)) break;
   }
-  return String(Number(value.toPrecision(9)));
+  return Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
 }
 
 // How many, in the room of a node.

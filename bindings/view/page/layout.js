@@ -35,7 +35,11 @@ export function layOut(nodes, edges, widest) {
   lines.push({ y, tall: tallest });
   const paths = edges.map(({ from, to, kind }) => {
     const a = nodes[from], b = nodes[to], ax = a.x + a.width / 2, bx = b.x - b.width / 2;
-    if (line[from] === line[to] && bx > ax) return `M${ax},${a.y} C${(ax + bx) / 2},${a.y} ${(ax + bx) / 2},${b.y} ${bx},${b.y}`;
+    if (line[from] === line[to] && bx > ax) {
+      // Across at the lower of the two, where fewer nodes are in the way.
+      const turn = a.y > b.y ? bx - gapX : ax, middle = turn + gapX / 2;
+      return `M${ax},${a.y} L${turn},${a.y} C${middle},${a.y} ${middle},${b.y} ${turn + gapX},${b.y} L${bx},${b.y}`;
+    }
     // Along the gap below the line that it comes from, or, backward, below the line that it goes to.
     const at = lines[Math.min(line[from], line[to])], between = at.y + at.tall + gapLine / 2 + (lanes[kind] ?? 0), out = ax + gapX / 3, into = bx - gapX / 3;
     return `M${ax},${a.y} L${out},${a.y} L${out},${between} L${into},${between} L${into},${b.y} L${bx},${b.y}`;

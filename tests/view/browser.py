@@ -7,6 +7,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -38,6 +39,8 @@ class Browser:
     """One chromium; its pages have WebGL by software."""
 
     def __init__(self, width=1280, height=800):
+        # Whoever ends the tests ends them by close(): a browser outlives its driver.
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
         self.port = free_port()
         words = ["setpriv", "--pdeathsig", "TERM", "chromedriver", f"--port={self.port}"]
         self.driver = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,

@@ -1,7 +1,7 @@
 -- bin: pebbles fall between two walls, come to rest, and sleep; to be looked at in the viewer (tests/view/screenshots).
 local rapid = require "rapid"
 
-local friction = rapid.param("friction", 0.6, "Coulomb's coefficient")
+local friction = rapid.param("friction", 0.3, "Coulomb's coefficient")
 local size = rapid.param("size", 0.05, "radius of a pebble, m")
 
 local function wall(name, side)

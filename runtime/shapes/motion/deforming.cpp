@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/points/state_archive.h"
+#include "runtime/error.h"
 #include "runtime/shapes/motion/cubic_part.h"
 #include "runtime/shapes/motion/deforming_shape.h"
 
@@ -75,7 +75,7 @@ Deformation::Interval Deformation::over(const FrameClock& clock, double from, do
         band_ = band;
         return body_->at(clock, whole, band);
     };
-    StateReader::expect(band_ >= 0 && std::isfinite(band_));
+    if (!std::isfinite(band_)) throw Error("a band without end: the snapshot is of another graph, or damaged");
     if (!at_end_ && end_ == from) at_end_ = build(mesh.at(clock, static_cast<std::int64_t>(from)), band_);
     if (path.kind == FramePath::Still) {
         if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = at_frame(frame);

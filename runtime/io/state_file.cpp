@@ -21,42 +21,20 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::string_view magic = "\x89RAPID\r\n";
-constexpr int format = 2;
+constexpr int format = 3;
 constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
 constexpr std::array<std::string_view, 6> types = {"float", "vec3", "int32", "int64", "quat", "uint8"};  // KeptColumn's
 constexpr std::string_view type_of_bytes = "bytes";
 
-// Compressed and read on all threads. Blosc sorts the bytes of numbers by their place, which makes ids a hundredth and
-// takes a tenth off positions; LZ4 on its first level reads and writes gigabytes a second.
+// Compressed and read on all threads. Blosc sorts the bytes of numbers by their place, which makes ids a hundredth; LZ4
+// on its first level reads and writes gigabytes a second. Of positions and velocities it takes a tenth off, and more
+// time than the tenth takes to be written: they are stored as they are.
 constexpr std::size_t piece_bytes = std::size_t{1} << 20;
+constexpr std::size_t sample_bytes = std::size_t{1} << 16;
+constexpr double worthwhile = 0.75;  // of the bytes, that are left of a sample
 constexpr int level = 1;
 constexpr const char* codec = "lz4";
 constexpr std::uint64_t most_expansion = 1024;  // more than any codec's
-
-struct Piece {
-    std::unique_ptr<char[]> data;
-    std::size_t size = 0;
-};
-
-Piece compressed(const char* data, std::size_t bytes, std::size_t scalar)
-{
-    const std::size_t most = bytes + BLOSC_MAX_OVERHEAD;
-    Piece piece{std::make_unique_for_overwrite<char[]>(most)};
-    const int size = blosc_compress_ctx(level, BLOSC_SHUFFLE, scalar, bytes, data, piece.data.get(), most, codec, 0, 1);
-    if (size <= 0) throw Error("can't be compressed");
-    piece.size = static_cast<std::size_t>(size);
-    return piece;
-}
-
-[[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
-
-void decompress(std::span<const unsigned char> piece, char* data, std::size_t bytes)
-{
-    std::size_t known = 0;
-    if (blosc_cbuffer_validate(piece.data(), piece.size(), &known) != 0 || known != bytes ||
-        blosc_decompress_ctx(piece.data(), data, bytes, 1) != static_cast<int>(bytes))
-        damaged("a block does not fit its header");
-}
 
 // What is in a block before it is compressed.
 struct Raw {
@@ -65,6 +43,50 @@ struct Raw {
 
     std::size_t pieces() const { return (bytes + piece_bytes - 1) / piece_bytes; }
 };
+
+// As it is in the file.
+struct Piece {
+    std::unique_ptr<char[]> packed;  // null: the block's own bytes
+    std::span<const char> bytes;
+};
+
+Piece packed(std::span<const char> bytes, std::size_t scalar)
+{
+    const std::size_t most = bytes.size() + BLOSC_MAX_OVERHEAD;
+    Piece piece{std::make_unique_for_overwrite<char[]>(most), bytes};
+    const int size = blosc_compress_ctx(level, BLOSC_SHUFFLE, scalar, bytes.size(), bytes.data(), piece.packed.get(),
+                                        most, codec, 0, 1);
+    if (size <= 0) throw Error("can't be compressed");
+    if (const auto fewer = static_cast<std::size_t>(size); fewer < bytes.size())
+        piece.bytes = {piece.packed.get(), fewer};
+    else
+        piece.packed.reset();
+    return piece;
+}
+
+bool is_worth_packing(const Raw& raw)
+{
+    if (raw.bytes == 0) return false;
+    const std::size_t size = std::min(raw.bytes, sample_bytes);
+    const std::size_t at = (raw.bytes - size) / 2 / raw.scalar * raw.scalar;
+    return static_cast<double>(packed({raw.data + at, size}, raw.scalar).bytes.size()) <=
+           worthwhile * static_cast<double>(size);
+}
+
+[[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
+
+// A piece of the size of its content is stored.
+void unpack(std::span<const unsigned char> piece, char* data, std::size_t bytes)
+{
+    if (piece.size() == bytes) {
+        std::memcpy(data, piece.data(), bytes);
+        return;
+    }
+    std::size_t known = 0;
+    if (blosc_cbuffer_validate(piece.data(), piece.size(), &known) != 0 || known != bytes ||
+        blosc_decompress_ctx(piece.data(), data, bytes, 1) != static_cast<int>(bytes))
+        damaged("a block does not fit its header");
+}
 
 template <class T>
 constexpr std::size_t scalar_bytes = sizeof(T) % sizeof(float) == 0 && !std::is_integral_v<T> ? sizeof(float)
@@ -104,19 +126,23 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
 {
     std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
     for (const KeptColumn& column : state.columns) blocks.push_back(raw_of(column));
-    std::vector<std::pair<const Raw*, std::size_t>> places;  // block and offset of each piece
-    for (const Raw& raw : blocks)
-        for (std::size_t k = 0; k < raw.pieces(); ++k) places.emplace_back(&raw, k * piece_bytes);
+    std::vector<std::pair<std::size_t, std::size_t>> places;  // block and offset of each piece
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+        for (std::size_t k = 0; k < blocks[b].pieces(); ++k) places.emplace_back(b, k * piece_bytes);
+    std::vector<std::uint8_t> is_packed(blocks.size());
+    tbb::parallel_for(std::size_t{0}, blocks.size(),
+                      [&](std::size_t b) { is_packed[b] = is_worth_packing(blocks[b]); });
     std::vector<Piece> pieces(places.size());
     tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t k) {
-        const auto& [raw, at] = places[k];
-        pieces[k] = compressed(raw->data + at, std::min(piece_bytes, raw->bytes - at), raw->scalar);
+        const auto& [b, at] = places[k];
+        const std::span<const char> bytes(blocks[b].data + at, std::min(piece_bytes, blocks[b].bytes - at));
+        pieces[k] = is_packed[b] ? packed(bytes, blocks[b].scalar) : Piece{nullptr, bytes};
     });
     header["format"] = format;
     ordered_json& list = header["blocks"] = ordered_json::array();
     for (std::size_t b = 0, next = 0; b < blocks.size(); ++b) {
         ordered_json sizes = ordered_json::array();
-        for (std::size_t k = 0; k < blocks[b].pieces(); ++k) sizes.push_back(pieces[next++].size);
+        for (std::size_t k = 0; k < blocks[b].pieces(); ++k) sizes.push_back(pieces[next++].bytes.size());
         list.push_back({{"type", b == 0 ? type_of_bytes : types[state.columns[b - 1].index()]},
                         {"values", b == 0 ? state.bytes.size() : values_of(state.columns[b - 1])},
                         {"pieces", std::move(sizes)}});
@@ -134,7 +160,7 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
     append(magic.data(), magic.size());
     append(&length, sizeof length);
     append(text.data(), text.size());
-    for (const Piece& piece : pieces) append(piece.data.get(), piece.size);
+    for (const Piece& piece : pieces) append(piece.bytes.data(), piece.bytes.size());
     const std::uint64_t digest = XXH3_64bits_digest(sum.get());
     file.append(&digest, sizeof digest);
 }
@@ -224,7 +250,7 @@ SavedState StateFile::state() const
         damaged("its header can't be read");
     }
     tbb::parallel_for(std::size_t{0}, places.size(),
-                      [&](std::size_t k) { decompress(places[k].piece, places[k].to, places[k].bytes); });
+                      [&](std::size_t k) { unpack(places[k].piece, places[k].to, places[k].bytes); });
     return state;
 }
 

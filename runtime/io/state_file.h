@@ -2,8 +2,10 @@
 //
 //   "\x89RAPID\r\n"    what the file is
 //   8 bytes            the length of the header
-//   the header         JSON: what its writer says of it, "format", and "blocks", each with "type", "values", "pieces"
-//   the blocks         the bytes of the state, then its columns, in pieces of a megabyte, compressed by Blosc
+//   the header         JSON: what its writer says of it, "format", and "blocks": each with "type", "values" and
+//                      "pieces", their sizes in bytes
+//   the blocks         the bytes of the state, then its columns, in pieces of a megabyte, which Blosc has compressed
+//                      where that makes them smaller
 //   8 bytes            XXH3 of all that is before
 //
 // The checksum finds damage. It is no protection from those who mean harm: what is in a state is checked by whose it is

@@ -60,6 +60,24 @@ TEST_CASE("equal values are stored in less than they take", "[state]")
     CHECK(fs::file_size(written(folder, state_of(points))) < points.id().bytes() / 16);
 }
 
+TEST_CASE("columns of several pieces are kept, those that compress and those that do not", "[state]")
+{
+    const test::TemporaryFolder folder;
+    const std::size_t size = GENERATE(std::size_t{262144}, std::size_t{700001});  // a piece of floats, and a few more
+    const PointSet points = test::random_points({.size = size, .seed = 3});
+    const SavedState state = state_of(points);
+    const fs::path path = written(folder, state);
+    CHECK(StateFile(path).state() == state);
+    // The first half of a column is noise, and the sample, behind it, is not.
+    SavedState mixed;
+    Column<std::int32_t> half(0);
+    const std::span<std::int32_t> values = half.append_for_writing(size);
+    for (std::size_t i = 0; i < size; ++i)
+        values[i] = i < size / 2 - 20000 ? static_cast<std::int32_t>(i * 2654435761u) : 0;
+    mixed.columns.push_back(half);
+    CHECK(StateFile(written(folder, mixed)).state() == mixed);
+}
+
 TEST_CASE("a file with any bit flipped, or torn anywhere, is refused", "[state]")
 {
     const test::TemporaryFolder folder;

@@ -1,5 +1,6 @@
 // rapid merge: puts the parts of a run together.
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <map>
@@ -10,6 +11,7 @@
 #include "bindings/command/part_record.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/host/threads.h"
+#include "runtime/first_error.h"
 #include "runtime/frame.h"
 #include "runtime/io/format.h"
 #include "runtime/io/frame_pattern.h"
@@ -24,6 +26,9 @@ namespace fs = std::filesystem;
 // Bytes of a frame's files beyond which its points are not all held in memory, and of them that then are.
 constexpr std::uintmax_t most_in_memory = 24 << 20;
 constexpr std::size_t resident = 32 << 20;
+
+// Bytes of the files of parts that are read at the same time; in memory they take several times as much.
+constexpr std::uintmax_t most_read_at_once = 48 << 20;
 
 // Parts or frames that are said to be missing; a record of others may promise any number.
 constexpr std::size_t most_missing = 1000;
@@ -226,13 +231,24 @@ private:
         return status_done;
     }
 
-    static PointSet read_part(const std::string& file, bool into_files)
+    // One or several at the same time: .vdb is read by processes of one thread (read_apart.h).
+    static std::vector<PointSet> read_parts(const std::vector<std::string>& files, bool into_files)
     {
-        if (!into_files) return read_points(file);
-        std::optional<ColumnFiles::Pause> pause(std::in_place);
-        PointSet part = read_points(file);
-        pause.reset();
-        return ColumnFiles::moved(std::move(part));
+        std::vector<PointSet> parts(files.size());
+        std::error_code none;
+        for (std::size_t first = 0, end = 0; first < files.size(); first = end) {
+            std::uintmax_t bytes = fs::file_size(files[end++], none);
+            while (end < files.size() && (bytes += fs::file_size(files[end], none)) <= most_read_at_once) ++end;
+            FirstError error;
+            std::optional<ColumnFiles::Pause> pause(std::in_place);
+            tbb::parallel_for(first, end,
+                              [&](std::size_t k) { error.guard(0, k, [&] { parts[k] = read_points(files[k]); }); });
+            error.rethrow();
+            pause.reset();
+            if (into_files)
+                for (std::size_t k = first; k < end; ++k) parts[k] = ColumnFiles::moved(std::move(parts[k]));
+        }
+        return parts;
     }
 
     std::uint64_t merge_frame(const std::vector<PartFiles>& parts, int frame) const
@@ -245,12 +261,9 @@ private:
         std::optional<ColumnFiles> columns;
         if (bytes > most_in_memory) columns.emplace(folder_of(path), resident);
 
-        std::vector<PointSet> read;
         std::vector<std::string> names;
-        for (const PartFiles& part : parts) {
-            names.push_back(part.frames.at(frame).string());
-            read.push_back(read_part(names.back(), columns.has_value()));
-        }
+        for (const PartFiles& part : parts) names.push_back(part.frames.at(frame).string());
+        std::vector<PointSet> read = read_parts(names, columns.has_value());
         const PointSet whole = merge_parts(read, names);
         read.clear();
         const PartRecord& record = parts.front().record;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <type_traits>
@@ -20,12 +21,6 @@ namespace {
 // Points that are merged together; their list stays in the second-level cache.
 constexpr std::size_t bucket_points = 32768;
 
-// Where a point of the result is now.
-struct Source {
-    std::uint32_t part;
-    std::uint32_t place;
-};
-
 void check_ids(const PointSet& points, std::size_t part, std::size_t count, const std::string& name)
 {
     const Strided<std::int64_t> ids = points.id().read();
@@ -40,6 +35,7 @@ void check_ids(const PointSet& points, std::size_t part, std::size_t count, cons
                     fmt::format("point {} is not of part {} of {}, but of part {}", ids[i], part + 1, count, own + 1))
                     .at({name, 0});
         }
+        trim_columns();
     });
 }
 
@@ -122,44 +118,48 @@ std::vector<Bucket> buckets_of(const std::vector<PointSet>& parts)
         bucket.end = at;
         first += bucket.size;
         buckets.push_back(std::move(bucket));
+        trim_columns();
     }
     return buckets;
 }
 
-// In order of id.
-void find_sources(const std::vector<PointSet>& parts, const Bucket& bucket,
-                  std::vector<std::pair<std::int64_t, Source>>& sources)
+// A bucket's values of a column, those of each part one after the other.
+template <class T>
+void read_bucket(const std::vector<Strided<T>>& parts, const Bucket& bucket, std::vector<T>& values)
+{
+    values.resize(bucket.size, Column<T>::zero());
+    T* to = values.data();
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+        const std::size_t size = bucket.end[k] - bucket.begin[k];
+        read_values(to, parts[k], bucket.begin[k], size);
+        to += size;
+    }
+}
+
+// For each point of the result its place among those of the parts, in order of id.
+void find_sources(const std::vector<std::int64_t>& ids, std::vector<std::uint32_t>& sources)
 {
     sources.clear();
-    for (std::size_t k = 0; k < parts.size(); ++k) {
-        const Strided<std::int64_t> ids = parts[k].id().read();
-        for (std::size_t i = bucket.begin[k]; i < bucket.end[k]; ++i)
-            sources.push_back({ids[i], {static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(i)}});
-    }
-    if (sources.empty()) return;
-    const auto [least, most] = std::minmax_element(sources.begin(), sources.end(),
-                                                   [](const auto& a, const auto& b) { return a.first < b.first; });
-    const std::uint64_t range = static_cast<std::uint64_t>(most->first) - static_cast<std::uint64_t>(least->first);
-    if (range >= 8 * sources.size()) {
-        std::sort(sources.begin(), sources.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    if (ids.empty()) return;
+    const auto [least, most] = std::minmax_element(ids.begin(), ids.end());
+    const std::uint64_t range = static_cast<std::uint64_t>(*most) - static_cast<std::uint64_t>(*least);
+    if (range >= 8 * ids.size()) {
+        sources.resize(ids.size());
+        std::iota(sources.begin(), sources.end(), 0u);
+        std::sort(sources.begin(), sources.end(), [&](std::uint32_t a, std::uint32_t b) { return ids[a] < ids[b]; });
         return;
     }
     // Ids are dense, mostly: each has its own place.
     constexpr std::uint32_t none = UINT32_MAX;
     thread_local std::vector<std::uint32_t> by_id;
-    thread_local std::vector<std::pair<std::int64_t, Source>> sorted;
     by_id.assign(range + 1, none);
-    const std::int64_t first = least->first;
-    for (std::size_t i = 0; i < sources.size(); ++i)
-        by_id[static_cast<std::size_t>(sources[i].first - first)] = static_cast<std::uint32_t>(i);
-    sorted.clear();
+    for (std::uint32_t i = 0; i < ids.size(); ++i) by_id[static_cast<std::size_t>(ids[i] - *least)] = i;
     for (const std::uint32_t i : by_id)
-        if (i != none) sorted.push_back(sources[i]);
-    sources.swap(sorted);
+        if (i != none) sources.push_back(i);
 }
 
 // Gathers a bucket's values of one column.
-using Gather = std::function<void(const Bucket& bucket, const std::vector<std::pair<std::int64_t, Source>>& sources)>;
+using Gather = std::function<void(const Bucket& bucket, const std::vector<std::uint32_t>& sources)>;
 
 template <class T, class From>
 T converted(const From& value)
@@ -178,9 +178,12 @@ Gather gather_into(std::span<T> values, const std::vector<PointSet>& parts, cons
     for (const PointSet& part : parts)
         if (const Column<T>* column = columns_of(part)) from.push_back(column->read());
     RAPID_ASSERT(from.size() == parts.size());
-    return [values, from](const Bucket& bucket, const std::vector<std::pair<std::int64_t, Source>>& sources) {
-        T* to = values.data() + bucket.first;
-        for (const auto& [id, source] : sources) *to++ = from[source.part][source.place];
+    return [values, from](const Bucket& bucket, const std::vector<std::uint32_t>& sources) {
+        thread_local std::vector<T> read, gathered;
+        read_bucket(from, bucket, read);
+        gathered.clear();
+        for (const std::uint32_t source : sources) gathered.push_back(read[source]);
+        write_values(values.data() + bucket.first, gathered.data(), gathered.size() * sizeof(T));
     };
 }
 
@@ -260,9 +263,13 @@ PointSet merge_parts(const std::vector<PointSet>& given, const std::vector<std::
                                           [&, &key = name](const PointSet& part) { return part.find_group(key); }));
         result.group(name) = std::move(merged);
     }
+    std::vector<Strided<std::int64_t>> ids_of_parts;
+    for (const PointSet& part : parts) ids_of_parts.push_back(part.id().read());
     tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
-        thread_local std::vector<std::pair<std::int64_t, Source>> sources;
-        find_sources(parts, buckets[b], sources);
+        thread_local std::vector<std::int64_t> ids;
+        thread_local std::vector<std::uint32_t> sources;
+        read_bucket(ids_of_parts, buckets[b], ids);
+        find_sources(ids, sources);
         for (const Gather& gather : gathers) gather(buckets[b], sources);
         trim_columns();
     });

@@ -21,8 +21,8 @@ using openvdb::Coord;
 constexpr std::size_t least_block = 65536, most_blocks = 64;
 // Points of columns in files that are sorted together, in memory.
 constexpr std::size_t cell_points = 131072;
-// Points that are put into cells between two looks at the memory that this takes.
-constexpr std::size_t stretch = 16384;
+// Points that are put into cells together.
+constexpr std::size_t stretch = 131072;
 
 constexpr std::int32_t leaf_edge = 8;
 
@@ -224,10 +224,28 @@ std::vector<Cell> cells_of(const std::vector<VdbLeaf>& leaves)
     return cells;
 }
 
+// Points that follow each other in one order and in another.
+struct Run {
+    std::size_t from, to, size;
+};
+
+// A stretch of the points on its way into cells: in which order it is read, and where the runs of this order go.
+struct Scatter {
+    std::vector<std::uint32_t> order;  // places in the stretch
+    std::vector<Run> runs;             // from: in `order`
+};
+
+template <class T>
+void read_column(const Strided<T>& column, std::size_t begin, std::size_t size, std::vector<T>& values)
+{
+    values.resize(size, Column<T>::zero());
+    read_values(values.data(), column, begin, size);
+}
+
 // A column on its way into another order.
 struct MovedColumn {
-    // Points from `begin` on, to these places.
-    std::function<void(std::size_t begin, std::span<const std::size_t> places)> scatter;
+    // Points from `begin` on, into cells.
+    std::function<void(std::size_t begin, const Scatter& scatter)> scatter;
     // The points from `first` on are to be these, by their places from `first` on.
     std::function<void(std::size_t first, std::span<const std::int64_t> entries)> sort;
 };
@@ -236,16 +254,55 @@ template <class T>
 MovedColumn moved(const Column<T>& column, Column<T>& into)
 {
     const std::span<T> to = into.append_for_writing(column.size());
-    return {[from = column.read(), to](std::size_t begin, std::span<const std::size_t> places) {
-                for (std::size_t i = 0; i < places.size(); ++i) to[places[i]] = from[begin + i];
+    return {[from = column.read(), to](std::size_t begin, const Scatter& scatter) {
+                thread_local std::vector<T> read, values;
+                read_column(from, begin, scatter.order.size(), read);
+                values.clear();
+                for (const std::uint32_t i : scatter.order) values.push_back(read[i]);
+                for (const Run& run : scatter.runs) write_values(&to[run.to], &values[run.from], run.size * sizeof(T));
             },
             [to](std::size_t first, std::span<const std::int64_t> entries) {
-                thread_local std::vector<T> sorted;
+                thread_local std::vector<T> read, sorted;
+                read_column({to.data(), 1}, first, entries.size(), read);
                 sorted.clear();
-                for (const std::int64_t e : entries) sorted.push_back(to[first + static_cast<std::uint32_t>(e)]);
-                std::copy(sorted.begin(), sorted.end(), to.begin() + static_cast<std::ptrdiff_t>(first));
+                for (const std::int64_t e : entries) sorted.push_back(read[static_cast<std::uint32_t>(e)]);
+                write_values(&to[first], sorted.data(), sorted.size() * sizeof(T));
             }};
 }
+
+// The places where the next point of each cell goes.
+class CellEnds {
+public:
+    CellEnds(const std::vector<Cell>& cells, std::size_t leaves) : cell_of_(leaves)
+    {
+        for (const Cell& cell : cells) {
+            std::fill(cell_of_.begin() + static_cast<std::ptrdiff_t>(cell.first_leaf),
+                      cell_of_.begin() + static_cast<std::ptrdiff_t>(cell.end_leaf), next_.size());
+            next_.push_back(cell.first);
+        }
+    }
+
+    // The leaves of a stretch of points.
+    void add(std::span<const std::int32_t> numbers, const std::vector<std::uint32_t>& leaves, Scatter& scatter)
+    {
+        const auto cell_of = [&](std::int32_t number) { return cell_of_[leaves[static_cast<std::size_t>(number)]]; };
+        std::vector<std::size_t> at(next_.size());
+        for (const std::int32_t number : numbers) ++at[cell_of(number)];
+        scatter.runs.clear();
+        std::size_t first = 0;
+        for (std::size_t cell = 0; cell < at.size(); ++cell) {
+            if (at[cell] == 0) continue;
+            scatter.runs.push_back({first, next_[cell], at[cell]});
+            next_[cell] += at[cell];
+            first += std::exchange(at[cell], first);
+        }
+        scatter.order.resize(numbers.size());
+        for (std::uint32_t i = 0; i < numbers.size(); ++i) scatter.order[at[cell_of(numbers[i])]++] = i;
+    }
+
+private:
+    std::vector<std::size_t> cell_of_, next_;  // by leaf, and by cell
+};
 
 // The points themselves in order: first each into its cell, then cell by cell.
 PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& lookup)
@@ -273,22 +330,14 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
     }
 
     const std::vector<Cell> cells = cells_of(lookup.leaves);
-    std::vector<std::uint32_t> cell_of(lookup.leaves.size());
-    std::vector<std::size_t> next;
-    for (const Cell& cell : cells) {
-        std::fill(cell_of.begin() + static_cast<std::ptrdiff_t>(cell.first_leaf),
-                  cell_of.begin() + static_cast<std::ptrdiff_t>(cell.end_leaf), next.size());
-        next.push_back(cell.first);
-    }
+    CellEnds ends(cells, lookup.leaves.size());
     const Strided<std::int32_t> numbers = std::as_const(lookup.numbers).read();
-    std::vector<std::size_t> places;
+    Scatter scatter;
     for (const Block& block : lookup.blocks)
         for (std::size_t begin = block.begin; begin < block.end; begin += stretch) {
-            places.clear();
-            for (std::size_t i = begin; i < std::min(block.end, begin + stretch); ++i)
-                places.push_back(next[cell_of[block.leaves[static_cast<std::size_t>(numbers[i])]]]++);
+            ends.add({numbers.data + begin, std::min(stretch, block.end - begin)}, block.leaves, scatter);
             tbb::parallel_for(std::size_t{0}, columns.size(),
-                              [&](std::size_t c) { columns[c].scatter(begin, places); });
+                              [&](std::size_t c) { columns[c].scatter(begin, scatter); });
             trim_columns();
         }
 
@@ -301,9 +350,11 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
             numbers_of.add(lookup.leaves[k].origin);
             at.push_back(lookup.leaves[k].first - cell.first);
         }
-        std::vector<std::int64_t> entries(cell.end - cell.first);
+        std::vector<Vec3f> P_of_cell;
+        read_column(P, cell.first, cell.end - cell.first, P_of_cell);
+        std::vector<std::int64_t> entries(P_of_cell.size());
         for (std::size_t i = 0; i < entries.size(); ++i) {
-            const Coord voxel = voxels.of(P[cell.first + i]);
+            const Coord voxel = voxels.of(P_of_cell[i]);
             entries[at[numbers_of[leaf_of(voxel)]]++] = entry(place_in_leaf(voxel), i);
         }
         for (std::size_t k = cell.first_leaf; k < cell.end_leaf; ++k) {

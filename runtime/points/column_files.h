@@ -5,6 +5,7 @@
 // For one process that does one thing, as `rapid merge` does: the setting is that of the process.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -45,6 +46,21 @@ bool columns_lie_in_files();
 // Between two stretches of columns that are gone over in their order: what is in memory of them is taken back at once
 // if it is too much. From any thread; nothing where no ColumnFiles lives.
 void trim_columns();
+
+// From and to values of a column, wherever they lie; those of the column in one block. In a file these are a read and a
+// write of the file: through its mapping each page would be a fault, and stay in memory. Error: the file can't be read
+// or written.
+void read_values(void* to, const void* from, std::size_t bytes);
+void write_values(void* to, const void* from, std::size_t bytes);
+// The values of `size` points from `begin` on.
+template <class T>
+void read_values(T* to, const Strided<T>& column, std::size_t begin, std::size_t size)
+{
+    if (column.stride == 0)
+        std::fill_n(to, size, *column.data);
+    else
+        read_values(to, column.data + begin, size * sizeof(T));
+}
 
 // For Buffer: whole pages in a file; null where no ColumnFiles lives. Error: no room.
 void* map_in_file(std::size_t bytes);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <fstream>
 #include <numeric>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "runtime/points/column.h"
 #include "tests/files/temporary_folder.h"
@@ -92,6 +94,35 @@ TEST_CASE("a pause keeps columns in memory, and points are moved into files with
     CHECK(wrong == 0);
     points = PointSet();
     CHECK(blocks_in(folder.path()) == 0);
+}
+
+TEST_CASE("values that are written are those of the column, in files and in memory, and no others", "[column_files]")
+{
+    const test::TemporaryFolder folder;
+    const std::size_t size = GENERATE(std::size_t{100}, std::size_t{1} << 20);  // of the heap, and of pages
+    const bool in_files = GENERATE(false, true);
+    CAPTURE(size, in_files);
+    std::optional<ColumnFiles> files;
+    if (in_files) files.emplace(folder.path(), 1 << 20);
+    Column<std::int32_t> column, neighbour;
+    std::vector<std::int32_t> expected(size);
+    std::iota(expected.begin(), expected.end(), 0);
+    std::span<std::int32_t> values = column.append_for_writing(size);
+    std::copy(expected.begin(), expected.end(), values.begin());
+    neighbour.append(std::span<const std::int32_t>(expected));
+
+    const std::vector<std::int32_t> other(size / 3, -7);
+    for (const std::size_t at : {std::size_t{0}, size / 2 + 1, size - other.size()}) {
+        write_values(&values[at], other.data(), other.size() * sizeof(std::int32_t));
+        std::copy(other.begin(), other.end(), expected.begin() + static_cast<std::ptrdiff_t>(at));
+        const auto grown = column.append_for_writing(size / 4);  // it may be elsewhere now
+        std::iota(grown.begin(), grown.end(), 3);
+        for (std::size_t i = 0; i < size / 4; ++i) expected.push_back(3 + static_cast<std::int32_t>(i));
+        values = column.write();
+    }
+    CHECK(std::equal(values.begin(), values.end(), expected.begin(), expected.end()));
+    CHECK(neighbour[size / 2] == static_cast<std::int32_t>(size / 2));
+    CHECK(blocks_in(folder.path()) == (in_files && size > 100 ? 2 : 0));
 }
 
 TEST_CASE("a folder that takes no files is refused", "[column_files]")

@@ -26,8 +26,10 @@ add_library(rapid_private INTERFACE)
 target_include_directories(rapid_private INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/include)
 target_link_libraries(rapid_private INTERFACE rapid_public)
 target_compile_definitions(rapid_private INTERFACE $<$<NOT:$<CONFIG:Release>>:RAPID_ASSERTIONS>)
+# For RAPID_ARCH, but for a target with a level of its own (RapidLevels.cmake).
+set(level $<TARGET_PROPERTY:RAPID_LEVEL>)
 target_compile_options(rapid_private INTERFACE
-  -march=${RAPID_ARCH} -Wall -Wextra -Wshadow $<$<BOOL:${RAPID_WERROR}>:-Werror>
+  -march=$<IF:$<BOOL:${level}>,${level},${RAPID_ARCH}> -Wall -Wextra -Wshadow $<$<BOOL:${RAPID_WERROR}>:-Werror>
   # The same for executables as for the library, so that they share precompiled headers. Calls inside the library may
   # be inlined although it is shared: nobody replaces a function of it.
   -fPIC -fno-semantic-interposition)

@@ -12,9 +12,9 @@ function(rapid_precompile name)
   target_precompile_headers(${name} PRIVATE ${ARGN})
 endfunction()
 
-set(common <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <span> <string> <string_view>
+set(rapid_common_headers <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <span> <string> <string_view>
   <variant> <vector> <Eigen/Core> <Eigen/Geometry> <fmt/format.h> <tbb/parallel_for.h>)
 
-rapid_precompile(rapid_precompiled ${common})
-rapid_precompile(rapid_precompiled_openvdb ${common} <openvdb/openvdb.h>)
+rapid_precompile(rapid_precompiled ${rapid_common_headers})
+rapid_precompile(rapid_precompiled_openvdb ${rapid_common_headers} <openvdb/openvdb.h>)
 target_link_libraries(rapid_precompiled_openvdb PRIVATE OpenVDB::openvdb)

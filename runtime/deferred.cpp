@@ -9,6 +9,7 @@
 #include <string>
 
 #include "runtime/error.h"
+#include "runtime/library_folder.h"
 
 namespace rapid {
 namespace {
@@ -31,15 +32,7 @@ DeferredFunctions::Any defined(const char* name)
     return found == table().functions.end() ? nullptr : found->second;
 }
 
-std::filesystem::path library()
-{
-    Dl_info here{};
-    dladdr(reinterpret_cast<const void*>(&load_deferred), &here);
-    // The target of a symbolic link: the two libraries are in the same folder.
-    std::error_code missing;
-    const auto file = std::filesystem::canonical(here.dli_fname ? here.dli_fname : "", missing);
-    return file.parent_path() / RAPID_DEFERRED_LIBRARY;
-}
+std::filesystem::path library() { return library_folder() / RAPID_DEFERRED_LIBRARY; }
 
 }  // namespace
 

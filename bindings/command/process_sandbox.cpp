@@ -1,6 +1,5 @@
 #include "bindings/command/process_sandbox.h"
 
-#include <dlfcn.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/landlock.h>
@@ -18,6 +17,7 @@
 #include "bindings/host/modules.h"
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"
+#include "runtime/library_folder.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {
@@ -77,10 +77,8 @@ void allow(int ruleset, const std::filesystem::path& path, std::uint64_t rights)
 
 std::vector<std::filesystem::path> own_files()
 {
-    std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), lua_folder()};
-    Dl_info library;
-    if (dladdr(reinterpret_cast<void*>(&known_attribute), &library) != 0)
-        files.push_back(std::filesystem::path(library.dli_fname).parent_path());
+    std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), lua_folder(),
+                                                library_folder()};
     // Of the process no more than the memory that it has: its environment and its addresses are for nobody.
     for (const char* path :
          {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null", "/proc/cpuinfo",

@@ -1,0 +1,48 @@
+# Levels of processors: the hot files of the library compiled again for newer processors, each time linked with the
+# objects of all others into a librapid of its own, in the folder below the library's where glibc's loader looks first
+# on such a processor (ld.so(8), glibc-hwcaps). In a build for this machine there is nothing to choose from: its levels,
+# below `levels`, are compared by tests/package/levels and not installed.
+#
+# The same bits: a level changes which instructions compute, not what. No product is fused with a sum (rapid_public), and
+# loops become vectors lane by lane, however wide. Eigen alone asks what the processor has: of __FMA__ it makes fused
+# products, and the order of its sums follows the width of its vectors. With these undefined it is that of x86-64-v2 at
+# each level, while the compiler may still use all of it.
+set(RAPID_LEVELS "" CACHE STRING "Processors that the hot files are compiled for besides RAPID_ARCH, such as x86-64-v3;x86-64-v4")
+
+# By the profile of the scenes of graphs and of tests/bench.
+set(rapid_hot_files
+  noise.cpp points/cell_grid.cpp shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp shapes/motion/rigid_field.cpp
+  solver/collision/contact_rounds.cpp solver/collision/curved_motion.cpp solver/collision/slide.cpp
+  solver/constraints/contact_pack.cpp solver/constraints/contact_search.cpp solver/constraints/contacts.cpp
+  solver/constraints/neighbour_list.cpp solver/constraints/pair_blocks.cpp solver/motion/ballistic_batch.cpp
+  solver/motion/damped_motion.cpp solver/motion/free_paths.cpp)
+
+# rapid_level(LEVEL PART...): the library for processors of this level. Parts: all of the library.
+function(rapid_level level)
+  add_library(rapid_hot_${level} OBJECT ${rapid_hot_files})
+  target_link_libraries(rapid_hot_${level} PRIVATE rapid_private)
+  target_precompile_headers(rapid_hot_${level} PRIVATE ${rapid_common_headers})
+  set_property(TARGET rapid_hot_${level} PROPERTY RAPID_LEVEL ${level})
+  target_compile_options(rapid_hot_${level} PRIVATE -U__AVX__ -U__AVX2__ -U__AVX512F__ -U__FMA__)
+
+  list(TRANSFORM rapid_hot_files REPLACE "\\.cpp$" "" OUTPUT_VARIABLE hot)
+  list(JOIN hot "|" hot)
+  set(name rapid_${level})
+  add_library(${name} SHARED $<TARGET_OBJECTS:rapid_hot_${level}>)
+  foreach(part ${ARGN})
+    target_sources(${name} PRIVATE $<FILTER:$<TARGET_OBJECTS:${part}>,EXCLUDE,/\(${hot}\)\\.cpp\\.o$>)
+  endforeach()
+  rapid_link_parts(${name})
+  target_link_libraries(${name} PRIVATE rapid_private)
+  rapid_set_library(${name})
+  set_target_properties(${name} PROPERTIES OUTPUT_NAME rapid LINKER_LANGUAGE CXX)
+  set(folder glibc-hwcaps/${level})
+  if(RAPID_ARCH STREQUAL "native")
+    set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/levels/${folder})
+    file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/levels)
+    file(CREATE_LINK ../lib/librapid_deferred.so ${PROJECT_BINARY_DIR}/levels/librapid_deferred.so SYMBOLIC)
+  else()
+    set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/${folder})
+    install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/${folder} NAMELINK_SKIP)
+  endif()
+endfunction()

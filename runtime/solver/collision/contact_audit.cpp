@@ -4,6 +4,17 @@
 #include <map>
 
 namespace rapid {
+namespace {
+
+// Of a point that is displaced several times, by what it is altogether.
+std::map<std::uint32_t, Vec3d> by_point(std::span<const Ejection::Displacement> displacements)
+{
+    std::map<std::uint32_t, Vec3d> sums;
+    for (const auto& [i, by] : displacements) sums.try_emplace(i, Vec3d::Zero()).first->second += by;
+    return sums;
+}
+
+}  // namespace
 
 void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
 {
@@ -64,7 +75,7 @@ void ContactAudit::count_work(const TouchedPoints& touched)
 
 void ContactAudit::add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion)
 {
-    for (const auto& [i, by] : displacements) {
+    for (const auto& [i, by] : by_point(displacements)) {
         const double mass = block_.context.mass[block_.indices[i]];
         if (!std::isinf(mass))
             counts_.energy.take(
@@ -88,9 +99,7 @@ void ContactAudit::add_final_corrections(std::span<const Vec3d> P,
                                          std::span<const Ejection::Displacement> displacements,
                                          const FreeMotion& motion)
 {
-    std::map<std::uint32_t, Vec3d> by_point;
-    for (const auto& [i, by] : displacements) by_point.try_emplace(i, Vec3d::Zero()).first->second += by;
-    for (const auto& [i, by] : by_point) {
+    for (const auto& [i, by] : by_point(displacements)) {
         const double mass = block_.context.mass[block_.indices[i]];
         if (std::isinf(mass)) continue;
         const double work = motion.is_damped() ? motion.potential(i, P[i]) - motion.potential(i, P[i] - by)

@@ -162,7 +162,9 @@ bool WedgeReport::write_sheet() const
                                                                   duration_text(result.seconds))
                                                     : "failed");
     }
-    if (drawn) write_whole(folder_ / "wedge.png", encode_png(contact_sheet(tiles)));
+    // Of combinations those that differ by the last setting alone belong together.
+    const std::size_t of_last = varied_.back().values.size(), series = of_last < rows_.size() ? of_last : 1;
+    if (drawn) write_whole(folder_ / "wedge.png", encode_png(contact_sheet(tiles, series)));
     return drawn;
 }
 

@@ -68,13 +68,23 @@ void draw(Picture& sheet, int x, int y, int width, int height, const Picture& pi
                             fitted_height, 3 * sheet.width, 3, STBIR_ALPHA_CHANNEL_NONE, 0);
 }
 
+// As near to a square as there are columns that take whole series, or a part of one in whole rows.
+int columns_of(int count, int series)
+{
+    const int square = std::max(1, static_cast<int>(std::ceil(std::sqrt(count))));
+    const auto fits = [&](int columns) { return columns % series == 0 || series % columns == 0; };
+    for (int off = 0; 2 * off <= square; ++off)
+        for (const int columns : {square - off, square + off})
+            if (fits(columns)) return columns;
+    return square;
+}
+
 }  // namespace
 
-Picture contact_sheet(const std::vector<SheetTile>& tiles)
+Picture contact_sheet(const std::vector<SheetTile>& tiles, std::size_t series)
 {
     const int count = static_cast<int>(tiles.size());
-    const int columns = std::max(1, static_cast<int>(std::ceil(std::sqrt(count)))),
-              rows = (count + columns - 1) / columns;
+    const int columns = columns_of(count, static_cast<int>(series)), rows = (count + columns - 1) / columns;
     const int width = std::clamp((widest_sheet - gap) / columns - gap, narrowest_tile, widest_tile);
     double shape = 9.0 / 16;  // height by width
     std::size_t lines = 0;

@@ -14,7 +14,8 @@ struct SheetTile {
 };
 
 // Tiles from left to right and from the top, in about as many rows as columns; at most 8,192 pixels wide. All have the
-// shape of the first picture; others are fitted into it.
-Picture contact_sheet(const std::vector<SheetTile>& tiles);
+// shape of the first picture; others are fitted into it. So many tiles each are a series, which begins with a row, or
+// lies in one, where that is possible.
+Picture contact_sheet(const std::vector<SheetTile>& tiles, std::size_t series = 1);
 
 }  // namespace rapid

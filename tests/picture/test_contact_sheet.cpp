@@ -71,6 +71,20 @@ TEST_CASE("labels stay below their own tile, however long, and in ASCII")
     CHECK(marks(sheet, 12 + 400 + 1, 12 + 200 + 2, 400, 2 * 22) == 0);
 }
 
+TEST_CASE("series of tiles begin with a row, or lie in one")
+{
+    const auto columns = [](std::size_t count, std::size_t series) {
+        return (contact_sheet(std::vector<SheetTile>(count), series).width - 12) / (400 + 12);
+    };
+    CHECK(columns(20, 1) == 5);
+    CHECK(columns(20, 4) == 4);
+    CHECK(columns(20, 5) == 5);
+    CHECK(columns(20, 10) == 5);  // each in two rows
+    CHECK(columns(21, 3) == 6);   // two in a row
+    CHECK(columns(14, 7) == 4);   // 7 and 1 are too far from a square
+    CHECK(columns(12, 6) == 3);
+}
+
 TEST_CASE("a contact sheet of many tiles stays within 8,192 pixels")
 {
     const Picture sheet = contact_sheet(std::vector<SheetTile>(900, {{}, {"x"}}));

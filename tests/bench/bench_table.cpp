@@ -138,6 +138,7 @@ public:
         fall();
         forces();
         colliders();
+        grains();
         formats();
         small_scenes();
         static_level_set();
@@ -183,19 +184,19 @@ private:
         rows_.push_back(std::move(row));
     }
 
-    // Medians of several benchmarks of one program, ms, run in turn.
-    std::map<std::string, double> measure(const std::string& program, const Words& names) const
+    // Medians of several benchmarks of one program, run in turn: times in ms, and counters.
+    std::map<std::string, json> measure(const std::string& program, const Words& names) const
     {
         const fs::path answer = scratch_ / "benchmarks.json";
         run({(bin_ / program).string(), fmt::format("--benchmark_filter=^({})$", fmt::join(names, "|")),
              fmt::format("--benchmark_repetitions={}", repeat_), "--benchmark_enable_random_interleaving=true",
              "--benchmark_min_time=0.2", "--benchmark_format=json"},
             answer);
-        std::map<std::string, double> medians;
+        std::map<std::string, json> medians;
         std::ifstream file(answer);
         const json all = json::parse(file);
         for (const json& one : all.at("benchmarks"))
-            if (one.value("aggregate_name", "") == "median") medians[one.at("run_name")] = one.at("real_time");
+            if (one.value("aggregate_name", "") == "median") medians[one.at("run_name")] = one;
         for (const std::string& name : names)
             if (!medians.count(name)) throw std::runtime_error(fmt::format("{} has no benchmark {}", program, name));
         return medians;
@@ -205,9 +206,9 @@ private:
                  const std::string& theirs, double limit)
     {
         if (!asked(name)) return;
-        const auto ms = measure(program, {ours, theirs});
-        add({name, ms.at(ours) / ms.at(theirs), limit, "", false,
-             fmt::format("{:.4g} ms, {:.4g} ms", ms.at(ours), ms.at(theirs))});
+        const auto medians = measure(program, {ours, theirs});
+        const double a = medians.at(ours).at("real_time"), b = medians.at(theirs).at("real_time");
+        add({name, a / b, limit, "", false, fmt::format("{:.4g} ms, {:.4g} ms", a, b)});
     }
 
     fs::path scene(const std::string& name, const std::string& text) const
@@ -269,6 +270,36 @@ private:
     {
         compare("a collider that no point is near / without it", "bench_solver",
                 "far_from_level_set/threads:2/real_time", "nothing_to_hit/threads:2/real_time", 1.2);
+    }
+
+    // By the time of one thread; overlaps at the end, in smaller radii.
+    void grains()
+    {
+        const std::string name = "column of 10,000 grains, a frame";
+        if (!asked(name)) return;
+        const auto column = [](const char* points, int sizes, int substeps, int frames) {
+            return fmt::format("column/points:{}/threads:1/sizes:{}/substeps:{}/frames:{}/iterations:1", points, sizes,
+                               substeps, frames);
+        };
+        const std::string one = column("10000", 1, 10, 48), deeper = column("30000", 1, 10, 48);
+        const std::string sizes = column("10000", 3, 14, 48), deep = column("100000", 1, 10, 48);
+        const std::string few = column("10000", 1, 10, 6), million = column("1000000", 1, 10, 6);
+        const auto medians = measure("bench_contacts", {one, deeper, sizes, deep, few, million});
+        const auto ms = [&](const std::string& of) { return medians.at(of).at("cpu_time").get<double>(); };
+        const auto overlaps = [&](const std::string& what, const std::string& of) {
+            add({what + ": 99 % of overlaps", medians.at(of).at("p99"), 0.05, "r", false, ""});
+            add({what + ": all overlaps", medians.at(of).at("worst"), 0.15, "r", false, ""});
+        };
+        add({name, ms(one) / 48, 25, "ms", false, ""});
+        overlaps("the same", one);
+        add({"the same of 30,000 / of 10,000", ms(deeper) / ms(one), 3.5, "", false, ""});
+        overlaps("the same of 30,000", deeper);
+        add({"the same of three sizes / of one", ms(sizes) / ms(one), 1.5, "", false, ""});
+        overlaps("the same of three sizes", sizes);
+        add({"the same of 100,000 / of 10,000, a grain", ms(deep) / ms(one) / 10, 1.1, "", false, ""});
+        overlaps("the same of 100,000", deep);
+        add({"the same of a million / of 10,000, a grain, six frames", ms(million) / ms(few) / 100, 1.1, "", false,
+             ""});
     }
 
     void formats()

@@ -81,9 +81,11 @@ template <class Weights>
     scatter(b, step.points, pack.j, pack.count);
 }
 
-// The gap is to be no less than at the beginning of the sub-step, nor than 0.
+// The gap is to be no less than at the beginning of the sub-step, nor than 0. relaxation: above 1 more than one contact
+// would need, as others will push against it (successive over-relaxation); the sweep over velocities takes back what
+// was too much.
 template <class Weights>
-[[gnu::always_inline]] inline void project_positions(ContactPack& pack, Substep& step, double per_dt,
+[[gnu::always_inline]] inline void project_positions(ContactPack& pack, Substep& step, double per_dt, double relaxation,
                                                      const Weights& weights)
 {
     PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
@@ -91,7 +93,7 @@ template <class Weights>
     const Vectors<Doubles> n = widen(pack.n);
     const Doubles before = widen(pack.normal_impulse);
     const Doubles C = dot(n, a.P - b.P) - widen(pack.reach) - widen(pack.initial_gap);
-    const Doubles impulse = most(before - C * per_dt * widen(pack.effective_mass), Doubles{});
+    const Doubles impulse = most(before - (relaxation * per_dt) * C * widen(pack.effective_mass), Doubles{});
     const Doubles change = step.dt * (impulse - before);
     pack.normal_impulse = narrow(impulse);
     a.P += (wa * change) * n;

@@ -26,6 +26,7 @@
 #include "runtime/solver/constraints/neighbour_list.h"
 #include "runtime/solver/constraints/pair_blocks.h"
 #include "runtime/solver/constraints/pair_impulses.h"
+#include "runtime/solver/constraints/stray_pairs.h"
 
 namespace rapid {
 
@@ -66,6 +67,9 @@ private:
     bool is_consistent() const;
     void renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index);
     void search(const Substep& step);
+    void follow_strays(const Substep& step);
+    void note_hits(std::size_t from);
+    void measure_reaches(std::size_t from);
     void update_contacts(Substep& step);
     void find_contacts(const Substep& step);
     bool sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t since);
@@ -86,6 +90,7 @@ private:
     bool records_ = false;
     RadiusGrids grids_{{nullptr, 0}, 0, 0, 1};
     NeighbourList list_;
+    StrayPairs strays_;
     PairBlocks blocks_;
     PairImpulses impulses_, previous_;  // in the order of the blocks; and of the list before
     // Of each pair, whether an impact has hit it in this sub-step; and those of the lists before that it has hit.

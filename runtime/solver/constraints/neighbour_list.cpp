@@ -12,12 +12,12 @@
 namespace rapid {
 namespace {
 
-// How far points may move before the list expires, as a part of their radius: at least, at most, and between these as
+// How far points may move before they are strays, as a part of their radius: at least, at most, and between these as
 // far as they go in so many sub-steps. More pairs to look at, or more searches.
-constexpr double least_slack = 0.25, most_slack = 1, slack_substeps = 3;
+constexpr double least_slack = 0.25, most_slack = 0.5, slack_substeps = 3;
 
-// Blocks whose points are handed to a thread together.
-constexpr std::size_t blocks_a_task = 16;
+// The part of the points that may be strays: their pairs take longer to find, one by one, and are solved on one thread.
+constexpr double most_strays = 0.02;
 
 // What a pair takes: in the search, the blocks, two sets of impulses, and packs that are full.
 constexpr double bytes_a_pair = 160;
@@ -28,8 +28,10 @@ void NeighbourList::build(const Substep& step, std::span<const float> radius, co
 {
     store_positions(step, radius);
     cut_blocks(radius);
-    predict_motion(step);
+    move_frames([&](std::uint32_t i) -> Vec3d { return step.dt * step.v[i]; });
     choose_slack(step, radius);
+    is_stray_.assign(step.size(), 0);
+    strays_.clear();
     const double largest = grids.grids.empty() ? 0 : grids.grids.front().radius;
     search_.find(at_, {reach_.data(), 1}, grids, pairs_,
                  {fmt::format("radius = {:g} m", largest), "give a smaller radius", bytes_a_pair});
@@ -39,7 +41,8 @@ bool NeighbourList::is_of(std::size_t points) const
 {
     const std::size_t blocks = frames_.size();
     return at_.size() == points && slack_.size() == points && are_below(points_, points) &&
-           are_offsets(begin_, blocks, points_.size()) && are_below(neighbouring_, blocks);
+           are_offsets(pairs_.begin, points, pairs_.other.size()) && are_offsets(begin_, blocks, points_.size()) &&
+           are_below(neighbouring_, blocks);
 }
 
 void NeighbourList::store_positions(const Substep& step, std::span<const float> radius)
@@ -106,23 +109,24 @@ void NeighbourList::cut_blocks(std::span<const float> radius)
                 }
 }
 
-// What the velocities shift each block by in a sub-step; its excess is how far its neighbours leave it.
-void NeighbourList::predict_motion(const Substep& step)
+// displacement(i): m, of a point.
+template <class F>
+void NeighbourList::move_frames(const F& displacement)
 {
     for_each_chunk(
         frames_.size(),
         [&](std::size_t first, std::size_t last) {
             for (std::size_t b = first; b < last; ++b) {
                 frames_[b] = {};
-                for (std::uint32_t p = begin_[b]; p < begin_[b + 1]; ++p) frames_[b].shift += step.v[points_[p]];
-                frames_[b].shift *= step.dt / (begin_[b + 1] - begin_[b]);
+                for (const std::uint32_t i : points_of(b)) frames_[b].shift += displacement(i);
+                frames_[b].shift /= static_cast<double>(points_of(b).size());
             }
         },
         blocks_a_task);
     for (const auto& [a, b] : neighbouring_) {
         const double apart = 0.5 * (frames_[a].shift - frames_[b].shift).norm();
-        frames_[a].excess = std::max(frames_[a].excess, apart);
-        frames_[b].excess = std::max(frames_[b].excess, apart);
+        frames_[a].parting = std::max(frames_[a].parting, apart);
+        frames_[b].parting = std::max(frames_[b].parting, apart);
     }
 }
 
@@ -132,20 +136,15 @@ void NeighbourList::choose_slack(const Substep& step, std::span<const float> rad
     // m, by which a point leaves its frame in a sub-step, or its neighbours' frames leave it.
     const auto leaves = [&](std::size_t i) {
         const Frame& frame = frames_[block_of_[i]];
-        return (step.dt * step.v[i] - frame.shift).norm() + frame.excess;
+        return (step.dt * step.v[i] - frame.shift).norm() + frame.parting;
     };
-    // Where lists do not last, because of a single point maybe, more slack only finds more pairs: it is tried again at
-    // every eighth.
-    short_lived_ = age_ > 1 ? 0 : short_lived_ + 1;
-    const double substeps = short_lived_ % 8 == 0 ? slack_substeps : 0;
-    age_ = 0;
     reach_.assign(n, 0);
     slack_.resize(n);
     for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (!(radius[i] > 0)) continue;
             slack_[i] =
-                std::clamp(static_cast<float>(substeps * leaves(i)), static_cast<float>(least_slack) * radius[i],
+                std::clamp(static_cast<float>(slack_substeps * leaves(i)), static_cast<float>(least_slack) * radius[i],
                            static_cast<float>(most_slack) * radius[i]);
             reach_[i] = radius[i] + slack_[i];
             slack_[i] = reach_[i] - radius[i];
@@ -155,39 +154,39 @@ void NeighbourList::choose_slack(const Substep& step, std::span<const float> rad
 
 bool NeighbourList::expired(const Substep& step)
 {
-    ++age_;
-    measure_motion(step);
+    move_frames([&](std::uint32_t i) -> Vec3d { return step.points[i].P - at_[i]; });
+    if (!blocks_stay_apart()) return true;
+    find_strays(step);
+    return static_cast<double>(strays_.size()) > most_strays * static_cast<double>(step.size());
+}
+
+bool NeighbourList::blocks_stay_apart() const
+{
     Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
     for (const Frame& frame : frames_) {
-        if (!(frame.excess <= 0)) return true;
         low = low.cwiseMin(frame.shift);
         high = high.cwiseMax(frame.shift);
     }
-    if (!frames_.empty() && (high - low).norm() > far_) return true;
-    return std::any_of(neighbouring_.begin(), neighbouring_.end(), [&](const auto& pair) {
-        const Frame &a = frames_[pair[0]], &b = frames_[pair[1]];
-        return a.excess + b.excess + (a.shift - b.shift).norm() > 0;
-    });
+    return frames_.empty() || (high - low).norm() <= far_;
 }
 
-void NeighbourList::measure_motion(const Substep& step)
+void NeighbourList::find_strays(const Substep& step)
 {
+    is_stray_.assign(step.size(), 0);
     for_each_chunk(
         frames_.size(),
         [&](std::size_t first, std::size_t last) {
-            for (std::size_t b = first; b < last; ++b) {
-                const std::span<const std::uint32_t> here =
-                    std::span(points_).subspan(begin_[b], begin_[b + 1] - begin_[b]);
-                Vec3d shift = Vec3d::Zero();
-                for (const std::uint32_t i : here) shift += step.points[i].P - at_[i];
-                shift /= static_cast<double>(here.size());
-                double excess = -std::numeric_limits<double>::infinity();
-                for (const std::uint32_t i : here)
-                    excess = std::max(excess, (step.points[i].P - at_[i] - shift).norm() - slack_[i]);
-                frames_[b] = {shift, excess};
-            }
+            for (std::size_t b = first; b < last; ++b)
+                for (const std::uint32_t i : points_of(b)) {
+                    const double left = slack_[i] - frames_[b].parting;
+                    const Vec3d x = step.points[i].P - at_[i] - frames_[b].shift;
+                    is_stray_[i] = !(left >= 0 && x.squaredNorm() <= left * left);
+                }
         },
         blocks_a_task);
+    strays_.clear();
+    for (std::uint32_t i = 0; i < is_stray_.size(); ++i)
+        if (is_stray_[i]) strays_.push_back(i);
 }
 
 }  // namespace rapid

@@ -20,12 +20,28 @@ void PairBlocks::clear()
 {
     begin_.assign(1, 0);
     colours_.clear();
+    some_unlisted_ = false;
+}
+
+void PairBlocks::set_unlisted(std::size_t pairs)
+{
+    if (some_unlisted_) begin_.pop_back(), colours_.pop_back();
+    some_unlisted_ = pairs > 0;
+    if (!some_unlisted_) return;
+    begin_.push_back(begin_.back() + static_cast<std::uint32_t>(pairs));
+    colours_.push_back(static_cast<std::uint32_t>(size()));
 }
 
 bool PairBlocks::are_of(std::size_t pairs) const
 {
     return are_offsets(begin_, size(), pairs) &&
            (colours_.empty() ? size() == 0 : are_offsets(colours_, colours_.size() - 1, size()));
+}
+
+bool PairBlocks::have_listed(std::size_t pairs) const
+{
+    if (!some_unlisted_) return begin_.back() == pairs;
+    return colours_.size() > 1 && colours_[colours_.size() - 2] + 1 == size() && begin_[size() - 1] == pairs;
 }
 
 void PairBlocks::build(const NeighbourList& list, std::vector<ContactPair>& ordered)
@@ -69,6 +85,7 @@ void PairBlocks::begin_blocks()
     std::partial_sum(next_.begin(), next_.end(), next_.begin());
     begin_.clear();
     colours_.clear();
+    some_unlisted_ = false;
     for (std::size_t b = 0; b < blocks; ++b) {
         if (b % blocks_a_colour == 0) colours_.push_back(static_cast<std::uint32_t>(begin_.size()));
         if (next_[b] < next_[b + 1]) begin_.push_back(next_[b]);

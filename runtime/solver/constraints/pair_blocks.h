@@ -2,7 +2,8 @@
 //
 // A pair belongs to the block that its points are in, or to the least of their blocks along each axis: it then touches
 // points of that block and of those after it. Blocks of one colour are two apart along some axis and share no point, so
-// that they are solved at the same time, to the same bits on any number of threads.
+// that they are solved at the same time, to the same bits on any number of threads. Pairs that are not in the list make
+// a block and a colour of their own.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -24,6 +25,8 @@ class PairBlocks {
 public:
     // Orders the pairs of the list: colour by colour, block by block.
     void build(const NeighbourList& list, std::vector<ContactPair>& ordered);
+    // So many pairs follow those of the list, in place of those that did so before.
+    void set_unlisted(std::size_t pairs);
     void clear();
 
     std::size_t size() const { return begin_.size() - 1; }
@@ -47,11 +50,12 @@ public:
     template <class Archive>
     void serialize(Archive& keep)
     {
-        keep(begin_, colours_);
+        keep(begin_, colours_, some_unlisted_);
         if constexpr (Archive::is_loading::value) StateReader::expect(!begin_.empty());
     }
-    // Of a snapshot: whether they are blocks of so many pairs, in colours.
+    // Of a snapshot: whether they are blocks of so many pairs, in colours; and whether so many of these are listed.
     bool are_of(std::size_t pairs) const;
+    bool have_listed(std::size_t pairs) const;
 
 private:
     template <class F>
@@ -76,6 +80,7 @@ private:
     std::vector<std::uint32_t> begin_{0};  // of each block's pairs, and the end
     std::vector<std::uint32_t> colours_;   // the first of each colour's blocks, and the end
     std::vector<std::uint32_t> slot_;
+    bool some_unlisted_ = false;
 
     // While it is built.
     std::vector<std::uint16_t> owner_;  // of each pair, its block, empty ones counted

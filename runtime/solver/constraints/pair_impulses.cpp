@@ -75,4 +75,31 @@ void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std:
     });
 }
 
+bool PairImpulses::set_unlisted(std::size_t listed, std::span<const ContactPair> found)
+{
+    const std::vector<ContactPair> before(pairs.begin() + static_cast<std::ptrdiff_t>(listed), pairs.end());
+    std::vector<ContactPair> pressing, wanted;
+    for (std::size_t k = 0; k < before.size(); ++k)
+        if (normal[listed + k] > 0) pressing.push_back(before[k]);
+    std::set_union(found.begin(), found.end(), pressing.begin(), pressing.end(), std::back_inserter(wanted));
+    if (wanted == before) return false;
+    const auto follow = [&](auto& values, const auto& none) {
+        const std::vector old(values.begin() + static_cast<std::ptrdiff_t>(listed), values.end());
+        values.resize(listed);
+        auto known = before.begin();
+        for (const ContactPair& pair : wanted) {
+            known = std::lower_bound(known, before.end(), pair);
+            values.push_back(
+                known != before.end() && *known == pair ? old[static_cast<std::size_t>(known - before.begin())] : none);
+        }
+    };
+    follow(normal, 0.0f);
+    follow(tangential, Vec3f(Vec3f::Zero()));
+    if (!resting.empty()) follow(resting, Vec3f(Vec3f::Zero()));
+    if (!rolling.empty()) follow(rolling, Vec3f(Vec3f::Zero()));
+    pairs.resize(listed);
+    pairs.insert(pairs.end(), wanted.begin(), wanted.end());
+    return true;
+}
+
 }  // namespace rapid

@@ -34,6 +34,10 @@ struct PairImpulses {
     // Takes over the impulses of the pairs before a search that are listed still; pairs[slot[k]] is the k-th of the
     // list. Others have been moved apart by a node: sleepers among them wake.
     void take_over(const PairImpulses& before, const Pairs& list, std::span<const std::uint32_t> slot, Sleep* sleep);
+
+    // The pairs beyond the first `listed` become these, which ascend, and those of before that press. False where they
+    // are so already.
+    bool set_unlisted(std::size_t listed, std::span<const ContactPair> found);
 };
 
 }  // namespace rapid

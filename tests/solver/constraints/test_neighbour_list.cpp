@@ -1,8 +1,10 @@
-// NeighbourList: as long as it is valid it misses no contact, and a common motion does not expire it.
+// NeighbourList and StrayPairs: together they miss no contact as long as the list is valid, and a common motion makes
+// no strays.
 #include "runtime/solver/constraints/neighbour_list.h"
 
 #include <random>
 
+#include "runtime/solver/constraints/stray_pairs.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -14,6 +16,7 @@ struct Swarm {
     std::vector<Vec3d> v;
     std::vector<float> radius;
     NeighbourList list;
+    StrayPairs strays;
     std::vector<std::pair<std::size_t, std::size_t>> unlisted;
 
     Substep step()
@@ -33,11 +36,13 @@ struct Swarm {
                 if ((at[i].P - at[j].P).norm() >= double(list.reach()[i]) + double(list.reach()[j]))
                     unlisted.emplace_back(i, j);
     }
-    bool misses_one() const
+    bool misses_one()
     {
+        const std::vector<ContactPair>& found = strays.find(step(), radius, list);
         return std::any_of(unlisted.begin(), unlisted.end(), [&](const auto& pair) {
             const auto [i, j] = pair;
-            return (at[i].P - at[j].P).norm() < double(radius[i]) + double(radius[j]);
+            return (at[i].P - at[j].P).norm() < double(radius[i]) + double(radius[j]) &&
+                   !std::binary_search(found.begin(), found.end(), ContactPair{std::uint32_t(j), std::uint32_t(i)});
         });
     }
 };
@@ -83,18 +88,31 @@ TEST_CASE("a common motion does not expire the list, whatever others do far away
     }
 }
 
-TEST_CASE("a point that is put elsewhere expires the list", "[contacts]")
+TEST_CASE("of a few points that stray the pairs are found apart, of many the list expires", "[contacts]")
 {
+    // A lattice, out of reach of each other; in some rows the first and the third point come to the second.
+    const std::uint32_t side = 12, rows = GENERATE(0u, 1u, 17u, 18u);  // two strays each, of 1,728 points
+    CAPTURE(rows);
     Swarm swarm;
-    for (int k = 0; k < 100; ++k) {
-        swarm.at.push_back({Vec3d(0.05 * k, 0, 0), 1});
+    for (std::uint32_t i = 0; i < side * side * side; ++i) {
+        swarm.at.push_back({0.052 * Vec3d(i % side, i / side % side, i / side / side), 1});
         swarm.v.push_back(Vec3d::Zero());
         swarm.radius.push_back(0.02f);
     }
     swarm.search();
-    CHECK_FALSE(swarm.list.expired(swarm.step()));
-    swarm.at[0].P = swarm.at[99].P;
-    CHECK(swarm.list.expired(swarm.step()));
+    REQUIRE(swarm.list.pairs().size() == 0);
+    std::vector<ContactPair> expected;
+    for (std::uint32_t row = 0; row < rows; ++row) {
+        const std::uint32_t i = row * side;
+        swarm.at[i].P.x() += 0.035;
+        swarm.at[i + 2].P.x() -= 0.035;
+        for (const ContactPair& pair : {ContactPair{i, i + 1}, ContactPair{i, i + 2}, ContactPair{i + 1, i + 2}})
+            expected.push_back(pair);
+    }
+    REQUIRE(swarm.list.expired(swarm.step()) == (rows > 17));
+    if (rows > 17) return;
+    CHECK(swarm.list.strays().size() == 2 * rows);
+    CHECK(swarm.strays.find(swarm.step(), swarm.radius, swarm.list) == expected);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ end
 local function landing(frame)
   return rapid.translate(0, math.max(0, 96 - frame.number) / 24 * 2, 0)
 end
-return rapid.create { fps = 24, seed = 1,
+return rapid.create { fps = 24, seed = 2,
     points = rapid.points.grid { size = {1.3, 1, 1.3}, spacing = 0.26, center = {0, 0.7, 0} } }
   :attribute { pscale = 0.1 }
   :points ("shake", function(p, frame)

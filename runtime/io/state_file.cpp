@@ -21,7 +21,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::string_view magic = "\x89RAPID\r\n";
-constexpr int format = 3;
 constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
 constexpr std::array<std::string_view, 6> types = {"float", "vec3", "int32", "int64", "quat", "uint8"};  // KeptColumn's
 constexpr std::string_view type_of_bytes = "bytes";
@@ -138,7 +137,7 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
         const std::span<const char> bytes(blocks[b].data + at, std::min(piece_bytes, blocks[b].bytes - at));
         pieces[k] = is_packed[b] ? packed(bytes, blocks[b].scalar) : Piece{nullptr, bytes};
     });
-    header["format"] = format;
+    header["format"] = state_format;
     ordered_json& list = header["blocks"] = ordered_json::array();
     for (std::size_t b = 0, next = 0; b < blocks.size(); ++b) {
         ordered_json sizes = ordered_json::array();
@@ -192,9 +191,9 @@ StateFile::StateFile(const std::filesystem::path& path) : file_(path)
                                           return true;
                                       });
         if (!header_.is_object()) damaged("its header can't be read");
-        if (header_.at("format").get<int>() != format)
+        if (header_.at("format").get<int>() != state_format)
             throw Error(fmt::format("it has the format {} of snapshots; this Rapid reads {}",
-                                    header_.at("format").get<int>(), format));
+                                    header_.at("format").get<int>(), state_format));
     } catch (const nlohmann::json::exception&) {
         damaged("its header can't be read");
     }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "runtime/report/json_text.h"
+
 namespace rapid {
 
 using nlohmann::ordered_json;
@@ -89,81 +91,151 @@ FrameStatistics statistics_of(const FrameResult& result)
 
 namespace {
 
-ordered_json to_json(const Ledger& ledger)
+void write(JsonText& json, const Ledger& ledger)
 {
-    const auto list = [](const Vec3d& v) { return ordered_json{v.x(), v.y(), v.z()}; };
-    ordered_json json = {{"kinetic", ledger.kinetic},
-                         {"potential", ledger.potential},
-                         {"elastic", ledger.elastic},
-                         {"by_rods", ledger.by.rods},
-                         {"by_contacts", ledger.by.contacts},
-                         {"by_friction", nullptr},
-                         {"by_shapes", nullptr},
-                         {"by_pins", ledger.by.pins},
-                         {"by_drag", ledger.by.drag},
-                         {"by_motion", ledger.by_motion},
-                         {"momentum", list(ledger.momentum)},
-                         {"angular_momentum", list(ledger.angular_momentum)},
-                         {"residue", nullptr}};
+    const auto list = [](const Vec3d& v) { return std::vector<double>{v.x(), v.y(), v.z()}; };
+    json.begin_object();
+    json.member("kinetic", ledger.kinetic);
+    json.member("potential", ledger.potential);
+    json.member("elastic", ledger.elastic);
+    json.member("by_rods", ledger.by.rods);
+    json.member("by_contacts", ledger.by.contacts);
     if (ledger.by.split) {
-        json["by_friction"] = ledger.by.split->friction;
-        json["by_shapes"] = ledger.by.split->shapes;
+        json.member("by_friction", ledger.by.split->friction);
+        json.member("by_shapes", ledger.by.split->shapes);
+    } else {
+        json.member("by_friction", nullptr);
+        json.member("by_shapes", nullptr);
     }
-    if (ledger.residue)
-        json["residue"] = {{"energy", ledger.residue->energy},
-                           {"momentum", ledger.residue->momentum},
-                           {"angular_momentum", ledger.residue->angular_momentum}};
-    return json;
+    json.member("by_pins", ledger.by.pins);
+    json.member("by_drag", ledger.by.drag);
+    json.member("by_motion", ledger.by_motion);
+    json.member("momentum", list(ledger.momentum));
+    json.member("angular_momentum", list(ledger.angular_momentum));
+    json.key("residue");
+    if (ledger.residue) {
+        json.begin_object();
+        json.member("energy", ledger.residue->energy);
+        json.member("momentum", ledger.residue->momentum);
+        json.member("angular_momentum", ledger.residue->angular_momentum);
+        json.end();
+    } else {
+        json.value(nullptr);
+    }
+    json.end();
 }
 
-ordered_json to_json(const FrameStatistics::Error& error)
+void write(JsonText& json, const FrameStatistics::Error& error)
 {
-    return {{"position_p50", error.p50}, {"position_p95", error.p95}, {"position_max", error.max}};
+    json.begin_object();
+    json.member("position_p50", error.p50);
+    json.member("position_p95", error.p95);
+    json.member("position_max", error.max);
+    json.end();
 }
 
-ordered_json to_json(const FrameStatistics& frame)
+void write(JsonText& json, const StageSeconds& seconds)
 {
-    const StageSeconds& s = frame.seconds;
-    ordered_json json = {
-        {"frame", frame.frame},
-        {"points", frame.points},
-        {"born", frame.born},
-        {"died", frame.died},
-        {"substeps", frame.substeps},
-        {"seconds",
-         {{"total", s.total()}, {"graph", s.graph}, {"script", s.script}, {"solve", s.solve}, {"write", s.write}}}};
-    if (frame.error) json["error"] = to_json(*frame.error);
-    if (frame.frame_error) json["frame_error"] = to_json(*frame.frame_error);
-    if (!frame.left_out_of_errors.empty()) json["left_out_of_errors"] = frame.left_out_of_errors;
-    json["rounding"] = frame.rounding;
-    json["energy_drift"] = nullptr;
-    if (frame.energy_drift)
-        json["energy_drift"] = {{"mean", frame.energy_drift->mean}, {"max", frame.energy_drift->max}};
-    json["penetration_max"] = frame.penetration_max;
-    json["constraint_residual_max"] = frame.constraint_residual_max;
-    if (frame.constraint_rows > 0) json["constraint_rows"] = frame.constraint_rows;
-    if (frame.constraint_rows > 0) json["loose_constraints"] = frame.loose_constraints;
-    json["asleep"] = frame.asleep;
-    if (frame.contact_search)
-        json["contact_grids"] = {{"points", frame.contact_search->grids},
-                                 {"error", frame.contact_search->error},
-                                 {"excess", frame.contact_search->excess},
-                                 {"search_seconds", frame.contact_search->seconds}};
-    json["collisions"] = frame.collisions;
-    json["contact_energy"] = {{"added", frame.contact_energy.added}, {"lost", frame.contact_energy.lost}};
-    if (frame.ledger) json["ledger"] = to_json(*frame.ledger);
-    for (const BandFigures& band : frame.bands)
-        json["bands"].push_back(
-            {{"node", band.node}, {"width", band.width}, {"voxels", band.voxels}, {"seconds", band.seconds}});
-    json["contact_limit"] = frame.contact_limit;
-    json["trapped"] = frame.trapped;
-    json["beyond_tolerance"] = frame.beyond_tolerance;
-    ordered_json nodes = ordered_json::array();
-    for (const FrameStatistics::Node& node : frame.nodes)
-        nodes.push_back(
-            {{"nodes", node.nodes}, {"seconds", node.seconds}, {"points", node.points}, {"bytes", node.bytes}});
-    json["nodes"] = std::move(nodes);
-    return json;
+    json.begin_object();
+    json.member("total", seconds.total());
+    json.member("graph", seconds.graph);
+    json.member("script", seconds.script);
+    json.member("solve", seconds.solve);
+    json.member("write", seconds.write);
+    json.end();
+}
+
+void write(JsonText& json, const BandFigures& band)
+{
+    json.begin_object();
+    json.member("node", band.node);
+    json.member("width", band.width);
+    json.member("voxels", band.voxels);
+    json.member("seconds", band.seconds);
+    json.end();
+}
+
+void write(JsonText& json, const FrameStatistics::Node& node)
+{
+    json.begin_object();
+    json.member("nodes", node.nodes);
+    json.member("seconds", node.seconds);
+    json.member("points", node.points);
+    json.member("bytes", node.bytes);
+    json.end();
+}
+
+std::string to_json(const FrameStatistics& frame)
+{
+    JsonText json;
+    json.begin_object();
+    json.member("frame", frame.frame);
+    json.member("points", frame.points);
+    json.member("born", frame.born);
+    json.member("died", frame.died);
+    json.member("substeps", frame.substeps);
+    json.key("seconds");
+    write(json, frame.seconds);
+    if (frame.error) {
+        json.key("error");
+        write(json, *frame.error);
+    }
+    if (frame.frame_error) {
+        json.key("frame_error");
+        write(json, *frame.frame_error);
+    }
+    if (!frame.left_out_of_errors.empty()) json.member("left_out_of_errors", frame.left_out_of_errors);
+    json.member("rounding", frame.rounding);
+    json.key("energy_drift");
+    if (frame.energy_drift) {
+        json.begin_object();
+        json.member("mean", frame.energy_drift->mean);
+        json.member("max", frame.energy_drift->max);
+        json.end();
+    } else {
+        json.value(nullptr);
+    }
+    json.member("penetration_max", frame.penetration_max);
+    json.member("constraint_residual_max", frame.constraint_residual_max);
+    if (frame.constraint_rows > 0) {
+        json.member("constraint_rows", frame.constraint_rows);
+        json.member("loose_constraints", frame.loose_constraints);
+    }
+    json.member("asleep", frame.asleep);
+    if (frame.contact_search) {
+        json.key("contact_grids");
+        json.begin_object();
+        json.member("points", frame.contact_search->grids);
+        json.member("error", frame.contact_search->error);
+        json.member("excess", frame.contact_search->excess);
+        json.member("search_seconds", frame.contact_search->seconds);
+        json.end();
+    }
+    json.member("collisions", frame.collisions);
+    json.key("contact_energy");
+    json.begin_object();
+    json.member("added", frame.contact_energy.added);
+    json.member("lost", frame.contact_energy.lost);
+    json.end();
+    if (frame.ledger) {
+        json.key("ledger");
+        write(json, *frame.ledger);
+    }
+    if (!frame.bands.empty()) {
+        json.key("bands");
+        json.begin_list();
+        for (const BandFigures& band : frame.bands) write(json, band);
+        json.end();
+    }
+    json.member("contact_limit", frame.contact_limit);
+    json.member("trapped", frame.trapped);
+    json.member("beyond_tolerance", frame.beyond_tolerance);
+    json.key("nodes");
+    json.begin_list();
+    for (const FrameStatistics::Node& node : frame.nodes) write(json, node);
+    json.end();
+    json.end();
+    return json.text();
 }
 
 }  // namespace
@@ -177,17 +249,18 @@ std::string json_head(const RunStatistics& run)
 
 std::string json_line(const FrameStatistics& frame, bool first)
 {
-    return fmt::format("{}\n    {}", first ? "" : ",",
-                       to_json(frame).dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+    return fmt::format("{}\n    {}", first ? "" : ",", to_json(frame));
 }
 
 std::string json_end(const RunStatistics& run)
 {
     std::string text = "\n  ],\n";
     if (!run.stiff.empty()) {
-        ordered_json stiff = ordered_json::array();
-        for (const Stiffness& stiffness : run.stiff) stiff.push_back(text_of(stiffness));
-        text += fmt::format("  \"stiff\": {},\n", stiff.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+        JsonText stiff;
+        stiff.begin_list();
+        for (const Stiffness& stiffness : run.stiff) stiff.value(text_of(stiffness));
+        stiff.end();
+        text += fmt::format("  \"stiff\": {},\n", stiff.text());
     }
     return text +
            fmt::format("  \"peak_bytes\": {}, \"seconds\": {} }}\n", run.peak_bytes, ordered_json(run.seconds).dump());

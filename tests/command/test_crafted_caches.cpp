@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <regex>
 
 #include "runtime/files/content_hash.h"
 #include "runtime/io/state_file.h"
@@ -85,11 +86,14 @@ TEST_CASE("a snapshot with any header is told, or is an error that names it", "[
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "rapid";
     const std::string nested = std::string(200000, '[') + std::string(200000, ']');
     int told = 0;
-    for (const std::string header :
-         {R"({"format": 2})", R"({"format": 2, "graph": "a", "frame": 1})", "{}", "[]", "1", "null", "", "{",
-          R"({"format": "2"})", R"({"format": 2, "graph": "a"})", R"({"format": 2, "nodes": 1, "fingerprint": [1]})",
-          R"({"format": 2, "graph": "\u001b[2J", "frame": {"a": 1}})", R"({"format": 2, "file": 1, "bytes": "x"})"})
-        for (const std::string& text : {header, R"({"format": 2, "x": )" + nested + "}"}) {
+    for (const std::string body :
+         {R"({"format": FORMAT})", R"({"format": FORMAT, "graph": "a", "frame": 1})", "{}", "[]", "1", "null", "", "{",
+          R"({"format": "FORMAT"})", R"({"format": FORMAT, "graph": "a"})",
+          R"({"format": FORMAT, "nodes": 1, "fingerprint": [1]})",
+          R"({"format": FORMAT, "graph": "\u001b[2J", "frame": {"a": 1}})",
+          R"({"format": FORMAT, "file": 1, "bytes": "x"})"})
+        for (const std::string& header : {body, R"({"format": FORMAT, "x": )" + nested + "}"}) {
+            const std::string text = std::regex_replace(header, std::regex("FORMAT"), std::to_string(state_format));
             folder.write("a.csv", snapshot_with(text));
             for (const char* json : {"", " --json"}) {
                 const std::string line = "cd '" + folder.path().string() + "' && '" + program.string() +

@@ -15,10 +15,10 @@ end
 
 describe("what a reader leaves out", function()
   it("is told of .bgeo: strings and primitives", function()
-    -- A point at 0, with an attribute of strings.
+    -- A point at 0, with an attribute of strings, and spheres (7), of which only their number can be told.
     scene.folder:write("one.bgeo", "BgeoV" .. big(5, 4) .. big(1, 4) .. big(3, 4) .. big(0, 4):rep(2) .. big(1, 4) ..
       big(0, 4):rep(3) .. big(4, 2) .. "kind" .. big(1, 2) .. big(4, 4) .. big(1, 4) .. big(4, 2) .. "rock" ..
-      big(0, 4):rep(3) .. "\63\128\0\0" .. big(0, 4) .. "\0\255")
+      big(0, 4):rep(3) .. "\63\128\0\0" .. big(0, 4) .. big(7, 4) .. "\0\255")
     local text = warnings "one.bgeo"
     assert.matches('rapid.points.read: ".*one.bgeo": the attribute "kind", a string can\'t be read, and is left out',
       text)

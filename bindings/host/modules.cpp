@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <fstream>
 #include <memory>
+#include <new>
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
@@ -76,7 +78,9 @@ std::filesystem::path lua_folder()
 std::optional<std::string> read_lua_file(const std::filesystem::path& path)
 {
     std::error_code none;
+    errno = 0;
     std::ifstream file(path, std::ios::binary);
+    if (!file && errno == ENOMEM) throw std::bad_alloc();
     if (!file || std::filesystem::is_directory(path, none)) return std::nullopt;
     std::string text;
     for (char block[1 << 16]; file;) {

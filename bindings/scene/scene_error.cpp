@@ -8,11 +8,13 @@ namespace rapid {
 namespace {
 
 // Whether it is of memory that the system or a limit refuses. Errors pass through Lua as their text, so that is all
-// that tells: Rapid's (runtime/at_node.h), LuaJIT's, and those of the limits.
+// that tells: Rapid's (runtime/at_node.h), LuaJIT's, and those of the limits. "C++ exception" is LuaJIT's word for one
+// that passes through it: functions for Lua turn theirs into errors (guarded()), so it is one for which there was no
+// memory, neither.
 bool is_of_memory(std::string_view message)
 {
     for (const std::string_view words :
-         {"out of memory", "not enough memory", "--script-memory sets the limit", "or set --memory"})
+         {"out of memory", "not enough memory", "C++ exception", "--script-memory sets the limit", "or set --memory"})
         if (message.find(words) != message.npos) return true;
     return false;
 }

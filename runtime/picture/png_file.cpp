@@ -4,6 +4,8 @@
 #include <png.h>
 
 #include <csetjmp>
+#include <cstdlib>
+#include <new>
 #include <utility>
 
 namespace rapid {
@@ -22,7 +24,18 @@ struct PngImage : png_image {
 struct PngOutput {
     std::string bytes;
     std::string error;
+    bool has_memory = true;
 };
+
+// libpng and zlib say in words of their own that memory ran out, each another: noted where it happens.
+void* allocate(png_structp png, png_alloc_size_t size)
+{
+    void* const block = std::malloc(size);
+    if (!block) static_cast<PngOutput*>(png_get_mem_ptr(png))->has_memory = false;
+    return block;
+}
+
+void release(png_structp, void* block) { std::free(block); }
 
 void note_error(png_structp png, png_const_charp message)
 {
@@ -32,19 +45,26 @@ void note_error(png_structp png, png_const_charp message)
 
 void take_bytes(png_structp png, png_bytep data, png_size_t size)
 {
-    static_cast<PngOutput*>(png_get_io_ptr(png))->bytes.append(reinterpret_cast<const char*>(data), size);
+    PngOutput& output = *static_cast<PngOutput*>(png_get_io_ptr(png));
+    try {
+        output.bytes.append(reinterpret_cast<const char*>(data), size);
+        return;
+    } catch (const std::bad_alloc&) {
+        output.has_memory = false;
+    }
+    png_error(png, "out of memory");
 }
 
 void encode(const Picture& picture, PngOutput& output)
 {
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &output, note_error, nullptr);
+    png_structp png =
+        png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &output, note_error, nullptr, &output, allocate, release);
     if (!png) {
-        output.error = "out of memory";
+        output.error = "libpng does not start";
         return;
     }
     png_infop info = png_create_info_struct(png);
     if (!info || setjmp(png_jmpbuf(png))) {
-        if (output.error.empty()) output.error = "out of memory";
         png_destroy_write_struct(&png, &info);
         return;
     }
@@ -66,6 +86,7 @@ std::string encode_png(const Picture& picture)
 {
     PngOutput output;
     encode(picture, output);
+    if (!output.has_memory) throw Error("can't be written: out of memory");
     if (!output.error.empty()) throw Error(fmt::format("can't be written: {}", output.error));
     return std::move(output.bytes);
 }

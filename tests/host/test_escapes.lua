@@ -1,19 +1,10 @@
 -- Attempts to escape the sandbox: each ends in an error that names the file and the line, and has no effect.
 --
 -- An attempt is a piece of graph code that raises no error if it works. It is made wherever graph code runs.
+local places = require "tests.script_places"
 local scene = require "testing.scene"
 
 local bytecode = ("%q"):format(string.dump(function() return 1 end)):gsub("\n", "n")
-
--- Where graph code runs; each puts the attempt into line 2.
-local places = {
-  body = "\n%s\nreturn rapid.create { points = two } :solve {}",
-  kernel = "return rapid.create { points = two } :points('k', function(p, frame)\n%s\nend) :solve {}",
-  test = "return rapid.create { points = two } :delete { where = function(p)\n%s\nend } :solve {}",
-  action = "return rapid.create { points = two } :action('a', function(p, step)\n%s\nend) :solve {}",
-  detail = "return rapid.create { points = two } :detail('d', function(points, frame)\n%s\nend) :solve {}",
-  parameter = "return rapid.create { points = two } :gravity { g = function(frame)\n%s\nend } :solve {}",
-}
 
 -- In files beside the graph.
 local files = {

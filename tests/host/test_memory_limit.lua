@@ -3,17 +3,8 @@
 --
 --   RAPID_LIMITS=100 build/test/bin/rapid test tests/host/test_memory_limit.lua   as many of each place and program (2)
 local lehmer = require "tests.lehmer".new(5)
+local places = require "tests.script_places"
 local scene = require "testing.scene"
-
--- Where a script runs; each puts the program into line 2.
-local places = {
-  body = "\n%s\nreturn rapid.create { points = two } :solve {}",
-  kernel = "return rapid.create { points = two } :points('k', function(p, frame)\n%s\nend) :solve {}",
-  test = "return rapid.create { points = two } :delete { where = function(p)\n%s\nend } :solve {}",
-  action = "return rapid.create { points = two } :action('a', function(p, step)\n%s\nend) :solve {}",
-  detail = "return rapid.create { points = two } :detail('d', function(points, frame)\n%s\nend) :solve {}",
-  parameter = "return rapid.create { points = two } :gravity { g = function(frame)\n%s\nend } :solve {}",
-}
 
 -- Each takes memory without end.
 local programs = {

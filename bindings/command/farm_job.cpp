@@ -60,13 +60,16 @@ std::string head(const FarmJob& job, const std::string& log)
         shell_word(job.name), shell_word((job.scripts() / log).string()), shell_word(job.folder.string()));
 }
 
-// Runs commands of this program and notes how they ended. Threads are those that the job was given.
+// Runs commands of this program and notes how they ended. Threads are those that the job was given; Slurm says how many
+// by the first name where --cpus-per-task is an option of the job, else by the second.
 std::string body(const std::string& status, const std::string& program, const std::vector<std::string>& commands)
 {
-    std::string text = fmt::format("trap : TERM\nstatus={}\nrm -f \"$status\"\nended=0\n", status);
+    std::string text = fmt::format(
+        "trap : TERM\nstatus={}\nrm -f \"$status\"\nended=0\n"
+        "threads=${{SLURM_CPUS_PER_TASK:-$SLURM_CPUS_ON_NODE}}\n",
+        status);
     for (const std::string& words : commands)
-        text += fmt::format("{} {} ${{SLURM_CPUS_PER_TASK:+--threads=$SLURM_CPUS_PER_TASK}} || ended=$?\n",
-                            shell_word(program), words);
+        text += fmt::format("{} {} ${{threads:+--threads=$threads}} || ended=$?\n", shell_word(program), words);
     return text + "echo $ended >\"$status.new\" && mv \"$status.new\" \"$status\"\nexit $ended\n";
 }
 
@@ -102,8 +105,10 @@ std::string script_of_tasks(const FarmJob& job, const std::string& program)
     const std::string status = shell_word(job.scripts().string() + '/') + "$SLURM_ARRAY_TASK_ID.status";
     std::string words = shell_words(job.words) + " \"$@\"";
     // What the job was given of the node's memory, in MiB.
-    if (!limits_memory(job.words) && !limits_memory(job.tasks.front().words))
-        words += " ${SLURM_MEM_PER_NODE:+--memory=${SLURM_MEM_PER_NODE}M}";
+    if (!limits_memory(job.words) && !limits_memory(job.tasks.front().words)) {
+        text += "memory=${SLURM_MEM_PER_NODE:-${SLURM_MEM_PER_CPU:+$((SLURM_MEM_PER_CPU * SLURM_CPUS_ON_NODE))}}\n";
+        words += " ${memory:+--memory=${memory}M}";
+    }
     return text + body(status, program, {words});
 }
 

@@ -72,7 +72,8 @@ end)
 describe("rapid run --farm slurm", function()
   it("computes parts in tasks and merges them to the files of the whole run", function()
     done "run drops.lua -f 1-8 -o 'whole/a.####.bgeo' --quiet"
-    local said = done "run drops.lua -f 1-8 -o 'out/a.####.bgeo' --farm slurm --parts 5 --farm-options '-c 2 --nice=3'"
+    local said = done("run drops.lua -f 1-8 -o 'out/a.####.bgeo' --stats out/s.json --farm slurm --parts 5 "
+      .. "--farm-options '-c 2 --nice=3'")
     local array, last = said:match "job (%d+): 5 tasks\njob (%d+): merge, when they are done\n"
     assert.truthy(array, said)
     local submitted = json.decode((folder:read "out/FARM.json"))
@@ -86,6 +87,7 @@ describe("rapid run --farm slurm", function()
     end
     assert.matches("rapid%-drops: 6 tasks: 6 done", done "farm status out/FARM.json")
     assert.matches("NumCPUs=2", shell("scontrol show job " .. array).stdout)
+    assert.equal(2, json.decode((folder:read "out/s_part3of5.json")).threads)
     assert.equal("nothing has failed\n", done "farm retry out/FARM.json")
   end)
 
@@ -160,10 +162,21 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
   end)
 
   it("submits the whole run as one task without --parts", function()
-    done "run drops.lua -f 1-4 --set rate=500 -o 'one/a.####.csv' --farm slurm"
+    done "run drops.lua -f 1-4 --set rate=500 -o 'one/a.####.csv' --stats one/s.json --farm slurm"
     assert.equal("done", states(settled "one/FARM.json"))
+    assert.equal(1, json.decode((folder:read "one/s.json")).threads) -- of the one processor that it was given
     done "run drops.lua -f 1-4 --set rate=500 -o 'direct/a.####.csv' --quiet"
     assert.equal(folder:read "direct/a.0004.csv", folder:read "one/a.0004.csv")
+  end)
+
+  it("keeps to the memory of the job, whether that is told by the node or by the processor", function()
+    for k, options in ipairs { "--mem=60", "--mem-per-cpu=30 -c 2" } do
+      local name = ("memory%d/"):format(k)
+      done(("run drops.lua -f 1-4 --set rate=50000000 -o '%sa.####.csv' --farm slurm --farm-options '%s'")
+        :format(name, options))
+      assert.equal("failed", states(settled(name .. "FARM.json")))
+      assert.matches("free of 60 MiB", folder:read(name .. "FARM/1.log"), 1, true)
+    end
   end)
 
   it("prints scripts that a shell reads, and submits nothing, with --dry-run", function()

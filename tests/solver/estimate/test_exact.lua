@@ -1,5 +1,6 @@
 -- What Rapid calls exact, over random scenes, against closed forms: drags and springs of which advice says that they
--- are treated exactly, and balls that bounce on planes. EXACT_SCENES=2000 EXACT_SEED=7 rapid test tests/solver/estimate
+-- are treated exactly, springs to planes, quadratic drag alone, balls that bounce on planes, and what slides on them.
+-- EXACT_SCENES=2000 EXACT_SEED=7 rapid test tests/solver/estimate
 -- runs more, and others.
 local ffi = require "ffi"
 local scene = require "testing.scene"
@@ -136,6 +137,95 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
     end
     assert.equal("", table.concat(faults, "\n"))
     assert.truthy(told > scenes / 3, told)
+  end)
+
+  -- A unit vector and single numbers of its direction.
+  local function direction()
+    local n = vector(1)
+    n[2] = single(between(0.5, 2))
+    local all = vec3(unpack(n))
+    return all:normalized(), list(n), all:length()
+  end
+  local function as_vec3(v) return vec3(v[1], v[2], v[3]) end
+  -- Where the points of a scene are in its last frame, each beside where it must be: expected(p).
+  local function compare(source, points, expected, number, faults)
+    local set = scene.run(source, { frames = {1 + frames, 1 + frames} })[1 + frames]
+    for i, p in ipairs(points) do
+      local P = expected(p)
+      local off, size = (set[i].P - P):length(), math.max(1, P:length(), as_vec3(p.v):length())
+      if off > frames * 2 ^ -21 * size or off ~= off then
+        faults[#faults + 1] = ("scene %d: point %d is off by %g m\n%s"):format(number, i - 1, off, source)
+      end
+    end
+  end
+
+  it("of springs to planes, with weight and drag, are where a closed form has them", function()
+    local faults = {}
+    for number = 1, scenes do
+      draw.start(seed, number)
+      local n, normal, length = direction()
+      local points, g, offset = some_points(magnitude(-1, 1)), vector(10), single(between(-1, 1))
+      local k, stiffness, damping = single(magnitude(-2, 2)), single(magnitude(-2, 4)), single(magnitude(-2, 1))
+      local source = ("return rapid.create { fps = %d, %s } :gravity { g = %s } :drag { linear = %s } :spring { "
+        .. "target = rapid.shape.plane { normal = %s, offset = %s }, stiffness = %s, damping = %s } "
+        .. ":solve { substeps = %d }"):format(fps, columns(points, { "P", "v", "mass" }), list(g), text(k), normal,
+        text(offset), text(stiffness), text(damping), pick { 1, 1, 2, 5 })
+      compare(source, points, function(p)
+        local P, v, G, t = as_vec3(p.P), as_vec3(p.v), as_vec3(g), frames / fps
+        local drag, w2 = k + damping / p.mass, stiffness / p.mass
+        local d = n:dot(P) - offset / length
+        local height = moved(d, n:dot(v), n:dot(G), drag, w2, t)
+        local along = v - n * n:dot(v)
+        local pull = G - n * n:dot(G)
+        local one = moved(0, 1, 0, drag, 0, t)
+        return P + n * (height - d) + along * one + pull * moved(0, 0, 1, drag, 0, t)
+      end, number, faults)
+    end
+    assert.equal("", table.concat(faults, "\n"))
+  end)
+
+  it("of quadratic drag alone are where the logarithm has them", function()
+    local faults = {}
+    for number = 1, scenes do
+      draw.start(seed, number)
+      local points, c = some_points(magnitude(-2, 5)), single(magnitude(-6, 6))
+      local source = ("return rapid.create { fps = %d, %s } :drag { quadratic = %s } :solve { substeps = %d }"):format(
+        fps, columns(points, { "P", "v" }), text(c), pick { 1, 1, 2, 5 })
+      compare(source, points, function(p)
+        local v = as_vec3(p.v)
+        local x = c * v:length() * frames / fps
+        local way = x < 1e-5 and v:length() * frames / fps * (1 - x / 2) or math.log(1 + x) / c
+        return as_vec3(p.P) + v:normalized() * way
+      end, number, faults)
+    end
+    assert.equal("", table.concat(faults, "\n"))
+  end)
+
+  it("of points that slide down a plane are where friction has them", function()
+    local faults = {}
+    for number = 1, scenes do
+      draw.start(seed, number)
+      local n, normal, length = direction()
+      local points, offset = some_points(1), single(between(-1, 1))
+      local g = single(between(1, 30))
+      local down = vec3(0, -1, 0) + n * n.y
+      local friction = single(down:length() / n.y * draw.random())
+      for _, p in ipairs(points) do
+        local P = as_vec3(p.P)
+        P = P - n * (n:dot(P) - offset / length)
+        local v = down:normalized() * between(0, 3)
+        for axis, name in ipairs { "x", "y", "z" } do p.P[axis], p.v[axis] = single(P[name]), single(v[name]) end
+      end
+      local source = ("return rapid.create { fps = %d, %s } :gravity { g = {0, %s, 0} } :collide { bounce = 0, "
+        .. "friction = %s, shape = rapid.shape.plane { normal = %s, offset = %s } } :solve { substeps = %d }"):format(
+        fps, columns(points, { "P", "v" }), text(-g), text(friction), normal, text(offset), pick { 1, 1, 2, 5 })
+      compare(source, points, function(p)
+        local t = frames / fps
+        local a = g * (down:length() - friction * n.y)
+        return as_vec3(p.P) + as_vec3(p.v) * t + down:normalized() * (a * t * t / 2)
+      end, number, faults)
+    end
+    assert.equal("", table.concat(faults, "\n"))
   end)
 
   it("of balls that bounce on a plane are where parabolas between impacts have them", function()

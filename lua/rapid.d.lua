@@ -801,7 +801,7 @@ function Node:color_by_speed(params) end
 ---@field radius? number|rapid.Attribute|fun(frame: rapid.Frame): number  of the points; the attribute pscale where they have it, else 0 [number, m, at least 0, takes rapid.attr]
 ---@field bounce? number|rapid.Attribute|fun(frame: rapid.Frame): number  restitution; of two points that differ the larger [number, from 0 to 1, default 0, takes rapid.attr]
 ---@field friction? number|rapid.Attribute|fun(frame: rapid.Frame): number  Coulomb's coefficient; of two points that differ the geometric mean [number, at least 0, default 0, takes rapid.attr]
----@field max_difference? number|fun(frame: rapid.Frame): number  of the radii in one grid; where not given, a quarter of the largest [number, m, at least 0]
+---@field max_difference? number|fun(frame: rapid.Frame): number  of the radii in one grid; where not given, half of the largest in it [number, m, at least 0]
 ---@field max_grids? integer|fun(frame: rapid.Frame): integer  the most grids for different radii [integer, from 1 to 254, default 8]
 ---@field mass_scaling? number|fun(frame: rapid.Frame): number  a point counts as e^mass_scaling times lighter than what it stands on, against gravity: tall stacks hold with few sub-steps, and flow less [number, from 0 to 4, default 0]
 ---@field record? boolean  writes the forces of contacts, with points and shapes, to the attributes normalforce and frictionforce (N, means over the frame) and contactnum [boolean, default false]

@@ -113,7 +113,7 @@ private:
         }
         if (now == memory->searched) return;
         Pairs near;
-        ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, largest / 4, 8), near,
+        ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, {}, 8), near,
                              {fmt::format("radius = {:g} m", largest / touch), "give a smaller radius", bytes_a_bond});
 
         std::set<std::array<std::int64_t, 2>> touching;

@@ -52,7 +52,7 @@ struct ContactNode {
             .param(&ContactNode::friction, "friction", 0.0, at_least(0), "",
                    "Coulomb's coefficient; of two points that differ the geometric mean")
             .param(&ContactNode::max_difference, "max_difference", Value(), at_least(0), "m",
-                   "of the radii in one grid; where not given, a quarter of the largest")
+                   "of the radii in one grid; where not given, half of the largest in it")
             .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "", "the most grids for different radii")
             .param(
                 &ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, most_scaling), "",

@@ -144,8 +144,7 @@ public:
     void detect(Substep& step) override
     {
         if (near_.begin.empty() || list_.expired(step) || !list_.strays().empty()) {
-            const float largest = *std::max_element(radius_.begin(), radius_.end());
-            list_.build(step, radius_, RadiusGrids({radius_.data(), 1}, step.size(), largest / 4, 8));
+            list_.build(step, radius_, RadiusGrids({radius_.data(), 1}, step.size(), {}, 8));
             before_ = std::exchange(near_, list_.pairs());
             take_over();
         }

@@ -22,7 +22,6 @@ ContactMaterial::ContactMaterial(const PointSet& points, const ContactOptions& o
         root_friction[i] = std::sqrt(friction[i]);
         restitution[i] = bounce[i];
         bounces |= bounce[i] > 0;
-        largest_radius = std::max(largest_radius, radius[i]);
     }
     if (options.spin) follow_spin(options.rolling.read(points));
 }

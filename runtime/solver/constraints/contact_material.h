@@ -14,7 +14,7 @@ struct ContactOptions {
     std::optional<PerPoint<float>> radius;  // the attribute pscale where the points have it, else 0
     PerPoint<float> bounce{0.0f};           // ε in [0, 1]; of two points the larger
     PerPoint<float> friction{0.0f};         // μ >= 0; of two points the geometric mean
-    std::optional<double> max_difference;   // m, of the radii in a grid; a quarter of the largest radius
+    std::optional<double> max_difference;   // m, of the radii in a grid (radius_grids.h)
     int max_grids = 8;
     double mass_scaling = 0;        // at least 0: a point counts as e^mass_scaling times lighter than what it stands on
     bool record = false;            // contact forces (contact_forces.h)
@@ -25,7 +25,6 @@ struct ContactOptions {
 struct ContactMaterial {
     std::vector<float> radius;  // m; 0 of points that take no part
     std::vector<float> root_friction, restitution;
-    float largest_radius = 0;    // m
     bool bounces = false;        // some restitution is above 0
     std::vector<float> rolling;  // empty where points do not turn
 

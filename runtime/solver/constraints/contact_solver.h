@@ -106,10 +106,10 @@ template <class Weights>
 // throughout the sub-step, and so half of it on positions: else a point that is held would creep. recovery(pack): which
 // part of an overlap is taken away; null but in the last iteration. impact_speed: pairs that bounce, are pushed into
 // one another by recovery and close faster than this are left to the impacts of the next sub-step; infinite where none
-// bounce. frictional: false where points turn, and friction is solved apart (spin.h).
+// bounce. frictional: false where points turn, and friction is solved apart (spin.h). Returns the overlaps before.
 template <bool frictional, class Weights, class Recovery>
-[[gnu::always_inline]] inline void solve_pack_velocities(ContactPack& pack, Substep& step, const Weights& weights,
-                                                         const Recovery* recovery, double impact_speed)
+[[gnu::always_inline]] inline Doubles solve_pack_velocities(ContactPack& pack, Substep& step, const Weights& weights,
+                                                            const Recovery* recovery, double impact_speed)
 {
     // As a part of the sum of the radii, an overlap that is left: a contact that is just lost is found again in the
     // next sub-step, and that is jitter.
@@ -149,6 +149,24 @@ template <bool frictional, class Weights, class Recovery>
     scatter(b, step.points, pack.j, pack.count);
     scatter(va, step.v, pack.i, pack.count);
     scatter(vb, step.v, pack.j, pack.count);
+    return overlap;
+}
+
+// Takes this part of what overlaps are beyond `allowed` away, without giving speed.
+template <class Weights>
+[[gnu::always_inline]] inline void recover_overlaps(const ContactPack& pack, Substep& step, const Weights& weights,
+                                                    const Doubles& part, const Doubles& allowed)
+{
+    PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
+    const Vectors<Doubles> n = widen(pack.n);
+    const Doubles beyond = widen(pack.reach) - allowed - dot(n, a.P - b.P);
+    if (!any(beyond > 0)) return;
+    const auto [wa, wb] = weights(pack, a, b);
+    const Vectors<Doubles> shift = (part * most(beyond, Doubles{}) * widen(pack.effective_mass)) * n;
+    a.P += wa * shift;
+    b.P -= wb * shift;
+    scatter(a, step.points, pack.i, pack.count);
+    scatter(b, step.points, pack.j, pack.count);
 }
 
 }  // namespace rapid

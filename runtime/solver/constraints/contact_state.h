@@ -15,8 +15,7 @@ namespace rapid {
 template <StateArchive Archive>
 void serialize(Archive& keep, ContactMaterial& material)
 {
-    keep(material.radius, material.root_friction, material.restitution, material.largest_radius, material.bounces,
-         material.rolling);
+    keep(material.radius, material.root_friction, material.restitution, material.bounces, material.rolling);
 }
 
 template <StateArchive Archive>

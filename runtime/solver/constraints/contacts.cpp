@@ -24,6 +24,12 @@ namespace {
 // point between them neither gives way, and it would be pushed to and fro.
 constexpr double overlap_recovery = 0.8, overlap_recovery_asleep = 0.1;
 
+// One sweep leaves a few overlaps much deeper than the rest. Those beyond this part of the smaller radius are recovered
+// by so many more sweeps, forwards and backwards, which costs little as they are few. Contacts that have had an overlap
+// beyond this part of the sum of the radii are looked at again.
+constexpr double deep_overlap = 0.02, deep_part_of_reach = 0.005;
+constexpr int deep_sweeps = 2;
+
 // With 1.5 columns of grain overlap even less, but their grains are off the converged path by twice as far.
 // Where points may sleep it is left out: piles would take longer to come to rest.
 constexpr double over_relaxation = 1.2;
@@ -70,8 +76,7 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     const ContactMaterial before = std::exchange(material_, ContactMaterial(points, options, group));
     const bool same_radii = material_.radius == before.radius;
     if (!same_radii)
-        grids_ = RadiusGrids({material_.radius.data(), 1}, points.size(),
-                             options.max_difference.value_or(material_.largest_radius / 4), options.max_grids);
+        grids_ = RadiusGrids({material_.radius.data(), 1}, points.size(), options.max_difference, options.max_grids);
     scaling_.set(options.mass_scaling);
     records_ = options.record;
     search_seconds_ = 0;
@@ -177,13 +182,16 @@ void Contacts::measure_reaches(std::size_t from)
 template <class F>
 void Contacts::sweep(const F& f)
 {
-    blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
-        std::vector<ContactPack>& packs = packs_[b];
-        if (backwards_)
-            std::for_each(packs.rbegin(), packs.rend(), f);
-        else
-            std::for_each(packs.begin(), packs.end(), f);
-    });
+    blocks_.for_each_coloured(backwards_, [&](std::size_t b) { in_turn(packs_[b], f); });
+}
+
+template <class T, class F>
+void Contacts::in_turn(std::vector<T>& list, const F& f) const
+{
+    if (backwards_)
+        std::for_each(list.rbegin(), list.rend(), f);
+    else
+        std::for_each(list.begin(), list.end(), f);
 }
 
 void Contacts::join(Sleep* sleep)
@@ -393,25 +401,49 @@ void Contacts::solve_velocities(Substep& step)
             sweep([&](ContactPack& pack) { solve_pack(pack, step, weights, none, impact_speed); });
         }
         backwards_ = !backwards_;
-        sweep([&](ContactPack& pack) {
-            solve_pack(pack, step, weights, &part_recovered, impact_speed);
-            store(pack);
-            if (step.forces) add_forces(pack, step);
-            if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
-            if (some_asleep)
+        deep_.resize(std::max(deep_.size(), blocks_.size()));
+        blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
+            deep_[b].clear();
+            in_turn(packs_[b], [&](ContactPack& pack) {
+                const Doubles overlap = solve_pack(pack, step, weights, &part_recovered, impact_speed);
+                if (any(overlap > deep_part_of_reach * widen(pack.reach))) deep_[b].push_back(&pack);
+                store(pack);
+                if (step.forces) add_forces(pack, step);
+                if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
+                if (!some_asleep) return;
                 for_each_contact(pack,
                                  [&](const PairContact& contact) { sleep_.wake_by_load(contact, impulses_, step); });
+            });
+            if (backwards_) std::reverse(deep_[b].begin(), deep_[b].end());
         });
+        if (heavy_.any()) return;  // light ones between heavy ones and a shape would be pushed to and fro
+        for (int k = 0; k < deep_sweeps; ++k) {
+            backwards_ = !backwards_;
+            blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
+                in_turn(deep_[b], [&](const ContactPack* pack) {
+                    recover_overlaps(*pack, step, weights, part_recovered(*pack), allowed_overlaps(*pack));
+                });
+            });
+        }
     });
 }
 
+Doubles Contacts::allowed_overlaps(const ContactPack& pack) const
+{
+    Doubles smaller;
+    for (std::uint32_t l = 0; l < lanes; ++l)
+        smaller[l] = std::min(material_.radius[pack.i[l]], material_.radius[pack.j[l]]);
+    return deep_overlap * smaller;
+}
+
 template <class Weights, class Recovery>
-void Contacts::solve_pack(ContactPack& pack, Substep& step, const Weights& weights, const Recovery* recovery,
-                          double impact_speed)
+Doubles Contacts::solve_pack(ContactPack& pack, Substep& step, const Weights& weights, const Recovery* recovery,
+                             double impact_speed)
 {
     if (!material_.turns()) return solve_pack_velocities<true>(pack, step, weights, recovery, impact_speed);
-    solve_pack_velocities<false>(pack, step, weights, recovery, impact_speed);
+    const Doubles overlaps = solve_pack_velocities<false>(pack, step, weights, recovery, impact_speed);
     solve_spins(pack, step, impulses_.rolling);
+    return overlaps;
 }
 
 void Contacts::store(const ContactPack& pack)

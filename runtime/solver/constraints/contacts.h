@@ -81,9 +81,12 @@ private:
     static void add_forces(const ContactPack& pack, const Substep& step);
     template <class F>
     void sweep(const F& f);
+    template <class T, class F>
+    void in_turn(std::vector<T>& list, const F& f) const;
     template <class Weights, class Recovery>
-    void solve_pack(ContactPack& pack, Substep& step, const Weights& weights, const Recovery* recovery,
-                    double impact_speed);
+    Doubles solve_pack(ContactPack& pack, Substep& step, const Weights& weights, const Recovery* recovery,
+                       double impact_speed);
+    Doubles allowed_overlaps(const ContactPack& pack) const;
 
     std::vector<std::int64_t> ids_;
     ContactMaterial material_;
@@ -98,6 +101,7 @@ private:
     std::vector<ContactPair> hit_before_;
     std::vector<float> reach_;  // m, of each pair; padded for whole packs
     ContactPacks packs_;
+    std::vector<std::vector<const ContactPack*>> deep_;  // by block, those with an overlap that a sweep leaves deep
     MassScaling scaling_;
     HeavyContacts heavy_;
     ContactSleep sleep_;

@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-RadiusGrids::RadiusGrids(Strided<float> radius, std::size_t size, double max_difference, int max_grids)
+RadiusGrids::RadiusGrids(Strided<float> radius, std::size_t size, std::optional<double> max_difference, int max_grids)
 {
     if (size == 0) return;
     std::vector<float> sorted;  // distinct, descending
@@ -31,12 +31,15 @@ RadiusGrids::RadiusGrids(Strided<float> radius, std::size_t size, double max_dif
     measure(radius, size);
 }
 
-void RadiusGrids::cluster(std::span<const float> descending, double max_difference, int max_grids,
+void RadiusGrids::cluster(std::span<const float> descending, std::optional<double> max_difference, int max_grids,
                           std::vector<float>& least)
 {
     const auto most = static_cast<std::size_t>(std::clamp<int>(max_grids, 1, none - 1));
+    const auto is_too_small = [&](double r, const Grid& grid) {
+        return grid.radius - r > max_difference.value_or(0.5 * grid.radius);
+    };
     for (const float r : descending) {
-        if (grids.empty() || (grids.back().radius - r > max_difference && grids.size() < most)) {
+        if (grids.empty() || (is_too_small(r, grids.back()) && grids.size() < most)) {
             grids.push_back({r, 0});
             least.push_back(r);
         }

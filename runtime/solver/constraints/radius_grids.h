@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,8 +13,9 @@ namespace rapid {
 
 class RadiusGrids {
 public:
-    // max_difference: m, between the radii in a grid. Points of radius 0 touch nothing, and are in no grid.
-    RadiusGrids(Strided<float> radius, std::size_t size, double max_difference, int max_grids);
+    // max_difference: m, between the radii in a grid; where it is not given, half of the largest in it. Points of
+    // radius 0 touch nothing, and are in no grid.
+    RadiusGrids(Strided<float> radius, std::size_t size, std::optional<double> max_difference, int max_grids);
 
     struct Grid {
         double radius;  // m, the largest in it
@@ -28,7 +30,8 @@ public:
     double error = 0, excess = 0;
 
 private:
-    void cluster(std::span<const float> descending, double max_difference, int max_grids, std::vector<float>& least);
+    void cluster(std::span<const float> descending, std::optional<double> max_difference, int max_grids,
+                 std::vector<float>& least);
     void assign(Strided<float> radius, std::size_t size, std::span<const float> least);
     void measure(Strided<float> radius, std::size_t size);
 };

@@ -561,6 +561,12 @@ TEST_CASE("grids are those of Algorithm 1, and their quality that of equation 5"
     CHECK(grids.error == Approx(cells - spheres));
     CHECK(grids.excess == Approx((cells - cut) / cut));
 
+    // By default each holds radii down to half of its largest, whatever the others are.
+    const std::vector<float> sizes = {10, 5.1f, 3, 1.6f, 0.3f, 0.2f};
+    const RadiusGrids halves({sizes.data(), 1}, sizes.size(), {}, 8);
+    REQUIRE(halves.grids.size() == 3);
+    for (const auto& grid : halves.grids) CHECK(grid.points == 2);
+
     const float same = 0.5f;
     CHECK(RadiusGrids({&same, 0}, 10, 0, 8).excess == 0);
 }

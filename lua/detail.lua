@@ -84,12 +84,25 @@ local types = {
   },
 }
 
+-- texts: those of attributes (lua/text.lua).
+local function string_type(texts)
+  return {
+    pointer = "uint32_t*", scalars = 1,
+    load = function(data, k) return texts.text(data[k]) end,
+    store = function(data, k, x) data[k] = texts.number(x) end,
+    check = function(name, x)
+      if type(x) ~= "string" then wrong_type(name, "a text", x) end
+    end,
+  }
+end
+
 local over = "points can't be used outside the :detail function that they were given to"
 
 -- native: the host's functions, all about the set that the function runs on; rand: as kernels draw; point_names: the
--- table of the host. Returns run(f, frame, params, size, random, details): the places (from 0) of the killed, and the
--- details.
-local function make(native, rand, point_names)
+-- table of the host; texts: those of attributes (lua/text.lua). Returns run(f, frame, params, size, random, details):
+-- the places (from 0) of the killed, and the details.
+local function make(native, rand, point_names, texts)
+  local of_texts = string_type(texts)
   local read_only = point_names.read_only
   -- Of the run: one at a time.
   local columns, groups, killed, added, size, frame, random, details
@@ -105,7 +118,7 @@ local function make(native, rand, point_names)
     if column and (column.writable or not writable) then return column end
     if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe.value(name)), 0) end
     local data, stride, kind = native.column(name, writable) -- says which attributes there are
-    local about = types[kind]
+    local about = kind == "string" and of_texts or types[kind]
     column = {
       data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
       load = about.load, store = about.store, check = about.check, kind = kind,
@@ -199,7 +212,9 @@ local function make(native, rand, point_names)
   -- Folds a column's values, in order.
   local function fold(name, empty, start, step)
     local column = column_of(name, false)
-    if column.kind == "quat" then error(("attribute %q is a quat, which has no order and no sum"):format(name), 0) end
+    if column.kind == "quat" or column.kind == "string" then
+      error(("attribute %q is a %s, which has no order and no sum"):format(name, column.kind), 0)
+    end
     if size == 0 then return empty end
     if column.kind ~= "vec3" then
       local total = start

@@ -16,6 +16,7 @@ local ramp = require "ramp"
 local shape = require "shape"
 local shared_state = require "shared_state"
 local study = require "study"
+local attribute_texts = require "text"
 local vector = require "vec3"
 local ffi = require "ffi"
 
@@ -54,14 +55,15 @@ jit.opt.start("hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxirconst=2000"
 
 ffi.cdef(native.chunk_header)
 local shapes = shape.make(native)
-local engine = kernel.prepare(native.rand, shapes.pointer_of, native.point_names)
+local texts = attribute_texts.make(native)
+local engine = kernel.prepare(native.rand, shapes.pointer_of, native.point_names, texts)
 
 local studies = study.make(native, vector)
 local rapid = language.make(native, load_node, numeric.make(native.noise, native.curl_noise), shapes, studies)
 loaded.rapid = rapid
 env.vec3, env.quat = vector.make, vector.make_quat
 
-local run_detail = detail.make(native.detail, engine.rand, native.point_names)
+local run_detail = detail.make(native.detail, engine.rand, native.point_names, texts)
 
 local entry = {}
 

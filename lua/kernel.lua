@@ -20,6 +20,7 @@ local getter_text = {
   int64 = "return (tonumber($C[$I]))",
   vec3 = "local a = $C[$I] return (vec3(a.x, a.y, a.z))",
   quat = "local a = $C[$I] return (quat(a.x, a.y, a.z, a.w))",
+  string = "return (texts.text($C[$I]))",
 }
 
 -- A sum of squares below MAX2 proves in one comparison that all are finite and in range; near MAX2, each is tested.
@@ -53,6 +54,9 @@ local setter_text = {
     end
     local a = $C[i]
     a.x, a.y, a.z, a.w = x1, x2, x3, x4]],
+  string = [[
+    if type(x) ~= "string" then wrong_type($S, "a text", x) end
+    $C[i] = texts.number(x)]],
 }
 
 -- As Solve holds P and v within a frame.
@@ -64,12 +68,13 @@ local operators = {
 
 -- Of the attributes whose types Houdini fixes, as :attribute takes them.
 local conventional = {
-  Alpha = "1", Cd = "{1, 1, 1}", N = "{0, 0, 0}", instance = "0", orient = "{0, 0, 0, 1}", scale = "{1, 1, 1}",
+  Alpha = "Alpha = 1", Cd = "Cd = {1, 1, 1}", N = "N = {0, 0, 0}", instance = "instance = 0",
+  name = "attributes = { name = \"\" }", orient = "orient = {0, 0, 0, 1}", scale = "scale = {1, 1, 1}",
 }
 
 local element_type = {
   vec3d = "rapid_double3", float = "float", vec3 = "rapid_float3", quat = "rapid_float4", int32 = "int32_t",
-  int64 = "int64_t",
+  int64 = "int64_t", string = "uint32_t",
 }
 
 -- Lets every operator say what to compute with instead.
@@ -114,7 +119,7 @@ end
 -- look-up in a table would leave its checks. Upvalues that are never assigned, and are no longer than two pointers, are
 -- constants there too: the chunk's address, the view, the frame.
 local text_head = [[
-local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush = ...
+local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush, texts = ...
 local istype, floor, type, tonumber, error = ffi.istype, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
@@ -324,8 +329,8 @@ return run, set_params
       error(("assigns %q under a computed name; declare it: writes = { %q }"):format(name, name), 0)
     end
     name = describe.name(name)
-    error(("no attribute %q here; add :attribute{ %s = %s } before it, or where its name is computed writes = { %q }")
-      :format(name, name, conventional[name] or "0", name), 0)
+    error(("no attribute %q here; add :attribute{ %s } before it, or where its name is computed writes = { %q }")
+      :format(name, conventional[name] or name .. " = 0", name), 0)
   end
   function refuse.param(name, values)
     error(("no parameter %q; the node has %s"):format(describe.name(name), table.concat(sorted_names(values), ", ")), 0)
@@ -347,12 +352,12 @@ return run, set_params
   local make = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
   local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
   return make(ffi, vec3, quat, kernel, pointer, shared.frame_type, shared.draw, shared.adopt, shared.shown,
-    refuse, names, jit.flush)
+    refuse, names, jit.flush, shared.texts)
 end
 
 -- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua);
--- point_names: the table of the host.
-local function prepare(rand, adopt, point_names)
+-- point_names: the table of the host; texts: those of attributes (lua/text.lua).
+local function prepare(rand, adopt, point_names, texts)
   -- The detail values that frame.detail and step.detail show: those of the pass that runs.
   local shown = { details = {} }
   shown.view = newproxy(true) -- no table: table.insert would write into it
@@ -386,7 +391,7 @@ local function prepare(rand, adopt, point_names)
   }))
   local shared = {
     frame_type = frame_type, draw = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown,
-    point_names = point_names,
+    point_names = point_names, texts = texts,
   }
   return {
     frame = function(number, time, dt, details)

@@ -155,6 +155,22 @@ int rapid_frame_expanded(rapid_frame* frame, const char* name, rapid_column* col
     return column_into(frame, name, column, error, [](auto& of, const char* which) { return of.expanded(which); });
 }
 
+int rapid_token_text(uint32_t token, const char** text, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(text, "text") = nullptr;
+        *text = take(SceneFrame::text_of(token)).data();
+    });
+}
+
+int rapid_text_token(const char* text, uint32_t* token, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(token, "token") = 0;
+        *token = take(SceneFrame::token_of(&not_null(text, "text")));
+    });
+}
+
 int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value, rapid_error** error)
 {
     return guarded(error, [&] {

@@ -45,14 +45,14 @@ HostParameter parameter_of(const rapid_node_parameter& given)
 
 ColumnType column_type_of(int type, const std::string& name)
 {
-    if (type < RAPID_FLOAT || type > RAPID_UINT8)
-        refuse(fmt::format("{}: its type is {}; it must be RAPID_FLOAT to RAPID_UINT8", name, type));
+    if (type < RAPID_FLOAT || type > RAPID_STRING)
+        refuse(fmt::format("{}: its type is {}; it must be RAPID_FLOAT to RAPID_STRING", name, type));
     return static_cast<ColumnType>(type);
 }
 
 std::size_t bytes_of(ColumnType type)
 {
-    constexpr std::size_t bytes[] = {4, 12, 4, 8, 16, 1};  // in the order of the types
+    constexpr std::size_t bytes[] = {4, 12, 4, 8, 16, 1, 4};  // in the order of the types
     return bytes[static_cast<int>(type)];
 }
 

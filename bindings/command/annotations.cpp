@@ -27,6 +27,8 @@ std::string_view lua_type(AttributeType type)
             return "rapid.Vec3";
         case AttributeType::Quat:
             return "rapid.Quat";
+        case AttributeType::String:
+            return "string";
         default:
             return "integer";
     }
@@ -36,8 +38,8 @@ std::string_view lua_type(AttributeType type)
 std::string lua_type(const Param& param)
 {
     static const std::map<std::string_view, std::string_view> known = {
-        {"attribute value", "number|number[]|rapid.Vec3"},
-        {"attributes", "table<string, number|rapid.Vec3|any[]>"},
+        {"attribute value", "number|number[]|rapid.Vec3|string"},
+        {"attributes", "table<string, number|rapid.Vec3|string|any[]>"},
         {"boolean", "boolean"},
         {"event or function of a point", "string|fun(p: rapid.Point, frame: rapid.Frame): any"},
         {"function of a place", "fun(P: rapid.Vec3): rapid.Vec3"},

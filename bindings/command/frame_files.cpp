@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "bindings/command/part_options.h"
+#include "runtime/io/text_table.h"
 #include "runtime/operators/rasterize.h"
 
 namespace rapid {
@@ -340,6 +341,7 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
         if (const auto* file = whole_file(last, pattern.expand(frame_number(last), output), how)) before = file->fit;
     if (named_.insert(key + '\n' + output).second) first_names_.push_back(path);
     if (part_) begin_sequence(to.pattern, output, info);
+    warn_of_texts(to, points);
     FrameWriter* writer = nullptr;
     {
         const std::lock_guard lock(mutex_);
@@ -349,6 +351,24 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
         writer = &found->second->frames;
     }
     writer->submit(std::move(points), std::move(info), output, std::move(before));
+}
+
+// Once for each attribute that a file does not get.
+void FrameFiles::warn_of_texts(const OutputTarget& to, const PointSet& points)
+{
+    const Format& format = format_of(to.pattern);
+    if (format.holds_texts) return;
+    for (const std::string& name : names_of_texts(points)) {
+        const auto& asked = to.attributes;
+        if (asked && std::find(asked->begin(), asked->end(), name) == asked->end()) continue;
+        if (!warned_.insert(to.pattern + '\n' + name).second) continue;
+        std::string others;
+        for (const Format& other : formats())
+            if (other.read && other.holds_texts && !other.places_alone)
+                others += (others.empty() ? "" : ", ") + other.extension;
+        warnings_.push_back(fmt::format("{}: {} holds no texts, and leaves out \"{}\"; these do: {}", to.pattern,
+                                        format.extension, name, others));
+    }
 }
 
 // Empty where the format of the extension writes.

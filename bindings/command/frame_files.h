@@ -83,6 +83,9 @@ public:
     // The first name of each pattern and output, once it is known; then no more.
     std::vector<std::string> take_first_names() { return std::exchange(first_names_, {}); }
 
+    // Of what files do not hold, once for each.
+    std::vector<std::string> take_warnings() { return std::exchange(warnings_, {}); }
+
     // The files that are complete since the last call; the first frame of which one is still to come, of those that
     // have been queued. From any thread.
     struct Written : FrameWriter::Written {
@@ -99,6 +102,7 @@ private:
         std::vector<std::string> outputs;  // whose points it takes
     };
     void resolve(Target& target, const Plan& plan) const;
+    void warn_of_texts(const OutputTarget& to, const PointSet& points);
     std::string name_in_part(const std::string& pattern) const;
     void check_part(const std::string& pattern) const;
     void begin_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info);
@@ -127,6 +131,8 @@ private:
 
     std::set<std::string> named_;
     std::vector<std::string> first_names_;
+    std::set<std::string> warned_;  // patterns and attributes
+    std::vector<std::string> warnings_;
 
     mutable std::mutex mutex_;  // for take_written() and first_unwritten(), while a frame adds a writer
     struct Writer {

@@ -23,23 +23,6 @@ struct ColumnHead {
     AttributeType type;
 };
 
-AnyColumn column_of(AttributeType type)
-{
-    switch (type) {
-        case AttributeType::Float:
-            return Column<float>();
-        case AttributeType::Vec3:
-            return Column<Vec3f>();
-        case AttributeType::Int32:
-            return Column<std::int32_t>();
-        case AttributeType::Int64:
-            return Column<std::int64_t>();
-        case AttributeType::Quat:
-            break;
-    }
-    return Column<Quatf>();
-}
-
 }  // namespace
 
 PointStore::PointStore() : descriptor_(memfd_create("rapid study", MFD_CLOEXEC))
@@ -97,7 +80,7 @@ PointSet PointStore::read(std::int64_t frame, std::uint64_t& place) const
         take(&column_head, sizeof column_head);
         std::string name(column_head.name_size, ' ');
         take(name.data(), name.size());
-        AnyColumn any = column_of(column_head.type);
+        AnyColumn any = column_of_type<AnyColumn>(static_cast<std::size_t>(column_head.type));
         std::visit(
             [&](auto& column) {
                 const auto values = column.append_for_writing(head.points);

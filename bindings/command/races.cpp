@@ -35,6 +35,7 @@ std::string text_of(const Quatf& q)
 {
     return fmt::format("quat({:.9g}, {:.9g}, {:.9g}, {:.9g})", q.x(), q.y(), q.z(), q.w());
 }
+std::string text_of(Token text) { return fmt::format("\"{}\"", text.text()); }
 std::string text_of(const DetailValue& value)
 {
     return std::visit([](const auto& v) { return text_of(v); }, value);

@@ -256,6 +256,7 @@ private:
                 for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
                 if (frames.contains(result.frame)) files_.write(result);
                 for (const std::string& name : files_.take_first_names()) report.line("writing " + name);
+                for (const std::string& warning : files_.take_warnings()) report.warning(warning, result.frame);
                 report.frame(result);
                 events_.add(result);
                 if (!cache_.asked()) continue;

@@ -36,10 +36,9 @@ int column(State& state)
     std::visit(
         [&]<class T>(Column<T>& values) {
             if (writable) values.write();
-            constexpr int scalars = std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1;
             const Strided<T> memory = std::as_const(values).read();
             lua_pushlightuserdata(L, const_cast<T*>(memory.data));
-            lua_pushnumber(L, static_cast<double>(scalars * memory.stride));
+            lua_pushnumber(L, static_cast<double>(components_of<T> * memory.stride));
         },
         *any);
     push_text(L, type_name(type_of(*any)));

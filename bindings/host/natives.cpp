@@ -19,6 +19,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/io/frame_pattern.h"
 #include "runtime/points/point_names.h"
+#include "runtime/points/token.h"
 #include "runtime/printable.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
@@ -110,6 +111,18 @@ int pointer_to(State& state)
         lua_pushlightuserdata(state.lua(), const_cast<T*>(object.get()));
     else
         lua_pushnil(state.lua());
+    return 1;
+}
+
+// native.text(number), native.number(text): of an attribute (runtime/points/token.h).
+int text_of_number(State& state)
+{
+    push_text(state.lua(), token_of_number(static_cast<std::uint32_t>(lua_tonumber(state.lua(), 1))).text());
+    return 1;
+}
+int number_of_text(State& state)
+{
+    lua_pushnumber(state.lua(), token_of(text_at(state.lua(), 1)).number);
     return 1;
 }
 
@@ -219,6 +232,8 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"did_you_mean", native<suggest>},
                                       {"kind", native<kind_of>},
                                       {"names_frames", native<names_frames>},
+                                      {"text", native<text_of_number>},
+                                      {"number", native<number_of_text>},
                                       {"print", native<print_text>},
                                       {"set_index", native<set_object_methods>},
                                       {"run", run_body},

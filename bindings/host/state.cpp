@@ -156,7 +156,7 @@ void State::open_libraries()
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();
     for (const char* name : {"describe", "engine_errors", "vec3", "bytecode", "kernel", "detail", "numeric", "shape",
-                             "ramp", "protected", "sandbox", "shared_state", "study", "rapid"}) {
+                             "ramp", "protected", "sandbox", "shared_state", "study", "text", "rapid"}) {
         lua_getglobal(L_, "package");
         lua_getfield(L_, -1, "preload");
         const std::string text = read_text(folder / (std::string(name) + ".lua"));

@@ -34,6 +34,12 @@ void append(lua_State* L, int& place, const Quatf& q)
     for (const float number : {q.x(), q.y(), q.z(), q.w()}) append(L, place, number);
 }
 
+void append(lua_State* L, int& place, Token text)
+{
+    push_text(L, text.text());
+    lua_rawseti(L, -2, ++place);
+}
+
 // { { name, numbers a value, flat numbers }, ... }
 void push_columns(lua_State* L, const PointSet& points)
 {
@@ -46,7 +52,7 @@ void push_columns(lua_State* L, const PointSet& points)
         std::visit(
             [&](const auto& column) {
                 using T = std::decay_t<decltype(column[0])>;
-                lua_pushinteger(L, std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1);
+                lua_pushinteger(L, static_cast<lua_Integer>(components_of<T>));
                 lua_rawseti(L, -2, 2);
                 lua_newtable(L);
                 int place = 0;

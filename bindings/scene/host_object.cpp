@@ -22,7 +22,9 @@ Column<T> copied(const HostPoints::Column& from, std::size_t count)
     const std::span<T> to = column.overwrite();
     for (std::size_t i = 0; i < count; ++i)
         std::memcpy(static_cast<void*>(&to[i]), static_cast<const char*>(from.data) + i * stride, sizeof(T));
-    if constexpr (!std::is_integral_v<T>) {
+    if constexpr (std::is_same_v<T, Token>) {
+        for (const Token token : to) token_of_number(token.number);
+    } else if constexpr (!std::is_integral_v<T>) {
         const auto* numbers = reinterpret_cast<const float*>(to.data());
         constexpr std::size_t each = sizeof(T) / sizeof(float);
         for (std::size_t k = 0; k < each * count; ++k)
@@ -45,10 +47,12 @@ AnyColumn copied_column(const HostPoints::Column& from, std::size_t count)
             return copied<std::int64_t>(from, count);
         case ColumnType::Quat:
             return copied<Quatf>(from, count);
+        case ColumnType::String:
+            return copied<Token>(from, count);
         case ColumnType::UInt8:
             break;
     }
-    throw Error(fmt::format("{} is of bytes; columns are Float, Vec3, Int32, Int64 or Quat", from.name));
+    throw Error(fmt::format("{} is of bytes; columns are Float, Vec3, Int32, Int64, Quat or String", from.name));
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ constexpr ColumnType type_in_header()
     if constexpr (std::is_same_v<T, std::int32_t>) return ColumnType::Int32;
     if constexpr (std::is_same_v<T, std::int64_t>) return ColumnType::Int64;
     if constexpr (std::is_same_v<T, Quatf>) return ColumnType::Quat;
+    if constexpr (std::is_same_v<T, Token>) return ColumnType::String;
     if constexpr (std::is_same_v<T, std::uint8_t>) return ColumnType::UInt8;
 }
 
@@ -31,7 +32,7 @@ SceneColumn view_of(std::string_view name, const Column<T>& column)
     view.name = name;
     view.type = type_in_header<T>();
     view.count = column.size();
-    view.components = std::is_same_v<T, Vec3f> ? 3 : std::is_same_v<T, Quatf> ? 4 : 1;
+    view.components = components_of<T>;
     view.stride = values.stride * sizeof(T);
     view.data = values.data;
     return view;
@@ -105,6 +106,24 @@ Result<SceneColumn> SceneFrame::expanded(std::string_view name) const
             }
         return std::visit([&](const auto& column) { return view_of(view->name, column); },
                           std::as_const(entry->second));
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<std::string_view> SceneFrame::text_of(std::uint32_t token)
+{
+    try {
+        return token_of_number(token).text();
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<std::uint32_t> SceneFrame::token_of(std::string_view text)
+{
+    try {
+        return rapid::token_of(text).number;
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }

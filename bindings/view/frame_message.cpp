@@ -9,9 +9,11 @@
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "runtime/error.h"
 #include "runtime/graph/evaluation.h"
+#include "runtime/io/text_table.h"
 
 namespace rapid {
 namespace {
@@ -210,6 +212,21 @@ void add_colours(Message& message, const PointSet& points, const FrameWish& wish
 
 }  // namespace
 
+// The place of each text among those of the points, in the order of the alphabet.
+std::vector<float> ranks_of(const Column<Token>& column)
+{
+    const TextTable table = text_table(column);
+    std::vector<std::size_t> order(table.texts.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return table.texts[a].text() < table.texts[b].text(); });
+    std::vector<float> rank(order.size());
+    for (std::size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<float>(k);
+    std::vector<float> ranks(column.size());
+    for (std::size_t i = 0; i < ranks.size(); ++i) ranks[i] = rank[static_cast<std::size_t>(table.places[i])];
+    return ranks;
+}
+
 std::vector<float> numbers_of(const PointSet& points, const std::string& name)
 {
     std::vector<float> numbers(points.size());
@@ -227,6 +244,7 @@ std::vector<float> numbers_of(const PointSet& points, const std::string& name)
     }
     const AnyColumn* column = points.find(name);
     if (!column) throw Error(fmt::format("the points have no attribute \"{}\" here", name));
+    if (const auto* texts = std::get_if<Column<Token>>(column)) return ranks_of(*texts);
     std::visit(
         [&](const auto& values) {
             const auto from = values.read();
@@ -236,7 +254,7 @@ std::vector<float> numbers_of(const PointSet& points, const std::string& name)
                     numbers[i] = from[i].norm();
                 else if constexpr (std::is_same_v<T, Quatf>)
                     numbers[i] = from[i].w();
-                else
+                else if constexpr (std::is_arithmetic_v<T>)
                     numbers[i] = static_cast<float>(from[i]);
             }
         },

@@ -76,6 +76,8 @@ Json value_at(const AnyColumn& column, std::size_t i)
                 return {number(value.x()), number(value.y()), number(value.z()), number(value.w())};
             else if constexpr (std::is_same_v<T, float>)
                 return number(value);
+            else if constexpr (std::is_same_v<T, Token>)
+                return std::string(value.text());
             else
                 return value;
         },

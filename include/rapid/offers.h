@@ -19,8 +19,8 @@
 
 namespace rapid {
 
-// Of the values of an attribute; a UInt8 is a member of a group.
-enum class ColumnType { Float = 0, Vec3 = 1, Int32 = 2, Int64 = 3, Quat = 4, UInt8 = 5 };
+// Of the values of an attribute; a UInt8 is a member of a group, a String the token of a text (SceneFrame::text_of).
+enum class ColumnType { Float = 0, Vec3 = 1, Int32 = 2, Int64 = 3, Quat = 4, UInt8 = 5, String = 6 };
 
 // A triangle mesh, as rapid.mesh.read gives it.
 struct HostMesh {

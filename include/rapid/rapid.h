@@ -77,7 +77,15 @@ typedef struct rapid_value {
 } rapid_value;
 
 /* Types of a column. */
-enum { RAPID_FLOAT = 0, RAPID_FLOAT_VEC3 = 1, RAPID_INT32 = 2, RAPID_INT64 = 3, RAPID_QUAT = 4, RAPID_UINT8 = 5 };
+enum {
+    RAPID_FLOAT = 0,
+    RAPID_FLOAT_VEC3 = 1,
+    RAPID_INT32 = 2,
+    RAPID_INT64 = 3,
+    RAPID_QUAT = 4,
+    RAPID_UINT8 = 5,
+    RAPID_STRING = 6 /* tokens of texts: rapid_token_text() */
+};
 
 /* Values of one attribute, or members of a group (RAPID_UINT8, 0 or 1): shape [count][components], packed within a
  * point; the value of point i is at (const char*)data + i * stride. stride is 0 where all points share one value. */
@@ -88,8 +96,13 @@ typedef struct rapid_column {
     size_t count;      /* of points */
     size_t components; /* 3 of RAPID_FLOAT_VEC3 (x y z), 4 of RAPID_QUAT (x y z w), else 1 */
     size_t stride;     /* bytes */
-    const void* data;  /* of float, int32_t, int64_t or uint8_t */
+    const void* data;  /* of float, int32_t, int64_t, uint8_t; of RAPID_STRING uint32_t, tokens */
 } rapid_column;
+
+/* Texts of attributes are held as tokens: equal texts have equal ones in a process, in no order, and 0 is the empty
+ * text. Tokens and their texts stay valid. From any thread. */
+int rapid_token_text(uint32_t token, const char** text, rapid_error** error);
+int rapid_text_token(const char* text, uint32_t* token, rapid_error** error);
 
 /* ---- Scenes. */
 

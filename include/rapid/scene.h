@@ -133,7 +133,7 @@ struct SceneColumn {
     std::size_t count = 0;                // of points
     std::size_t components = 1;           // 3 of Vec3 (x y z), 4 of Quat (x y z w)
     std::size_t stride = 0;               // bytes
-    const void* data = nullptr;           // of float, std::int32_t, std::int64_t or std::uint8_t
+    const void* data = nullptr;  // of float, std::int32_t, std::int64_t, std::uint8_t; of String std::uint32_t, tokens
 
     // The values of point i. T: the type of a component, which must agree with `type`.
     template <class T>
@@ -176,6 +176,11 @@ public:
     // Takes some nanoseconds, however many points there are. Error: no such column, with the nearest name.
     Result<SceneColumn> column(std::string_view name) const;
     Result<SceneColumn> group(std::string_view name) const;
+    // The text of a token, a value of a String column: equal texts have equal ones in a process, in no order, and 0 is
+    // the empty text. Valid as long as the process is. Error: no text has the token.
+    static Result<std::string_view> text_of(std::uint32_t token);
+    // For points that the program offers. Error: text that is no UTF-8.
+    static Result<std::uint32_t> token_of(std::string_view text);
     // As column(), where `stride` is never 0: values that all points share are written out once, and kept by the frame.
     Result<SceneColumn> expanded(std::string_view name) const;
 

@@ -101,11 +101,10 @@ const Table& names_only(const Param& param, const Value& value, Map& field)
     return *table;
 }
 
-// Error: a name that every point has, a parameter of every node, or one that files and scripts can't spell.
+// Error: a name that every point has, that of groups, or one that files and scripts can't spell.
 void check_attribute_name(std::string_view name)
 {
-    const bool of_every_node = name == "name" || name == "group";
-    if (of_every_node || find_point_name(name))
+    if (name == "group" || find_point_name(name))
         throw Error(fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", name));
     const auto letter = [](unsigned char c) { return std::isalpha(c) || c == '_'; };
     const auto part = [&](unsigned char c) { return letter(c) || std::isdigit(c); };
@@ -226,7 +225,8 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
 
     // Lua has one type of number: that of an unknown name is a float, so that 1 and 1.5 give the same column.
     const bool is_scalar =
-        !known || (!std::holds_alternative<Vec3f>(known->fallback) && !std::holds_alternative<Quatf>(known->fallback));
+        !known || (!std::holds_alternative<Vec3f>(known->fallback) && !std::holds_alternative<Quatf>(known->fallback) &&
+                   !std::holds_alternative<Token>(known->fallback));
     if (const double* number = value.get<double>(); number && is_scalar) {
         if (known && std::holds_alternative<std::int64_t>(known->fallback)) {
             field = static_cast<std::int64_t>(whole(param, *number, -0x1p53, 0x1p53));
@@ -255,9 +255,20 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
         return;
     }
 
-    const std::string right = !known ? "a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}"
+    const bool is_text = !known || std::holds_alternative<Token>(known->fallback);
+    if (const std::string* text = value.get<std::string>(); text && is_text) {
+        try {
+            field = token_of(*text);
+        } catch (const Error& error) {
+            throw Error(fmt::format("{}: {}", param.name, error.what()));
+        }
+        return;
+    }
+
+    const std::string right = !known ? "a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a text"
                               : std::holds_alternative<Vec3f>(known->fallback) ? "a vec3 or {x, y, z}"
                               : std::holds_alternative<Quatf>(known->fallback) ? "a quaternion {x, y, z, w}"
+                              : std::holds_alternative<Token>(known->fallback) ? "a text, in quotes"
                                                                                : "a number";
     throw Error(fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right));
 }

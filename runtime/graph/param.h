@@ -53,7 +53,8 @@ void read_value(const Param& param, const Value& value, ObjectPtr& field);
 // A motion: an object, a function of the frame that returns one, or keys {[1] = m1, [24] = m2} of constant motions.
 void read_value(const Param& param, const Value& value, MotionPtr& field);
 // The value of an attribute, which has the name of the parameter. A known attribute has its type, any other that of the
-// value: a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion. Error: a reserved name (P, v, id, dt, ...).
+// value: a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion, a text a string. Error: a reserved name (P,
+// v, id, dt, ...).
 void read_value(const Param& param, const Value& value, AttributeValue& field);
 // Attribute values by name: {heat = 1, Cd = {1, .5, 0}}.
 void read_value(const Param& param, const Value& value, std::map<std::string, AttributeValue>& field);

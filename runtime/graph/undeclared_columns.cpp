@@ -19,6 +19,12 @@ namespace {
 constexpr std::uint32_t poison_bits = 0x7fedbeefu;
 const float poison_float = std::bit_cast<float>(poison_bits);
 
+Token poison_token()
+{
+    static const Token poisoned = token_of("a value that is not declared");
+    return poisoned;
+}
+
 template <class T>
 T poison()
 {
@@ -28,6 +34,8 @@ T poison()
         return Vec3f::Constant(poison_float);
     else if constexpr (std::is_same_v<T, Quatf>)
         return Quatf(poison_float, poison_float, poison_float, poison_float);
+    else if constexpr (std::is_same_v<T, Token>)
+        return poison_token();
     else if constexpr (sizeof(T) == 1)
         return T{0xa5};
     else
@@ -95,6 +103,8 @@ bool is_poisoned(const AnyColumn& any)
     if (const auto* floats = std::get_if<Column<float>>(&any)) return holds(*floats, is_poison);
     if (const auto* vectors = std::get_if<Column<Vec3f>>(&any))
         return holds(*vectors, [&](const Vec3f& x) { return is_poison(x[0]) || is_poison(x[1]) || is_poison(x[2]); });
+    if (const auto* texts = std::get_if<Column<Token>>(&any))
+        return holds(*texts, [](Token x) { return x == poison_token(); });
     return false;
 }
 

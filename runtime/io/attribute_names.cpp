@@ -18,7 +18,8 @@ bool is_component(const std::string& name, std::string_view stem, char suffix)
 
 std::size_t component_count(AttributeType type)
 {
-    return type == AttributeType::Vec3 ? 3 : type == AttributeType::Quat ? 4 : 1;
+    return std::visit([]<class T>(const Column<T>&) { return components_of<T>; },
+                      column_of_type<AnyColumn>(static_cast<std::size_t>(type)));
 }
 
 std::vector<std::string> component_names(std::string_view name, std::size_t count)

@@ -3,8 +3,9 @@
 // Big-endian throughout:
 //
 //   "Bgeo" 'V' | int32: 5, points, lines, point groups, primitive groups 0, point attributes, 0, 0, 0
-//   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 4 text, 5 vector), size defaults
-//   for each point: float x y z 1, then the attributes
+//   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 5 vector), size defaults;
+//                         of texts the type 4, int32 texts, and for each int16 length, text
+//   for each point: float x y z 1, then the attributes; of a text its place, int32
 //   for each line (points/point_lines.h): int32 1, vertices, ':', then the place of each (int16 below 65536 points)
 //   for each group: int16 length, name, int32 points, and a bit for each point in int32 words, from the lowest bit on
 //   0x00 0xff: the (empty) extra section
@@ -16,6 +17,7 @@
 
 #include <bit>
 #include <cstring>
+#include <map>
 
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
@@ -23,6 +25,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/point_file.h"
 #include "runtime/io/records.h"
+#include "runtime/io/text_table.h"
 #include "runtime/points/point_lines.h"
 
 namespace rapid {
@@ -33,6 +36,8 @@ constexpr unsigned char ordered_mark = 1;
 constexpr std::size_t longest_group_name = 255;
 
 constexpr std::size_t words_of(std::size_t bits) { return (bits + 31) / 32; }
+
+constexpr std::size_t longest_text = 32767;
 
 enum HoudiniType : std::int32_t { FloatType = 0, IntType = 1, TextType = 2, IndexType = 4, VectorType = 5 };
 
@@ -65,6 +70,8 @@ HoudiniType houdini_type(const std::string& name, AttributeType type)
         // Vectors rotate with the geometry; colours do not.
         case AttributeType::Vec3:
             return name == "Cd" ? FloatType : VectorType;
+        case AttributeType::String:
+            return IndexType;
         case AttributeType::Float:
         case AttributeType::Quat:
             break;
@@ -139,10 +146,32 @@ void check_count(std::size_t points)
     if (points > 0x7fffffff) throw Error(fmt::format("{} points are more than .bgeo can count; write .vdb", points));
 }
 
+// The points as records hold them: of a text its place, an int32.
+struct Recorded {
+    PointSet points;
+    std::map<std::string, std::vector<Token>> texts;  // by attribute, each in its place
+};
+
+Recorded recorded(const PointSet& points)
+{
+    Recorded result{points, {}};
+    for (const std::string& name : names_of_texts(points)) {
+        TextTable table = text_table(points.column<Token>(name));
+        for (const Token text : table.texts)
+            if (text.text().size() > longest_text)
+                throw Error(fmt::format("the attribute \"{}\" has a text of {} bytes; .bgeo holds at most {}", name,
+                                        text.text().size(), longest_text));
+        result.points.set(name, std::move(table.places));
+        result.texts[name] = std::move(table.texts);
+    }
+    return result;
+}
+
 // What comes before the records.
-std::string header_section(const PointSet& points, const std::vector<std::string>& names, std::size_t lines)
+std::string header_section(const Recorded& recorded, const std::vector<std::string>& names, std::size_t lines)
 {
     BigEndianText header;
+    const PointSet& points = recorded.points;
     header.bytes("BgeoV");
     for (const std::size_t count : {std::size_t{5}, points.size(), lines, points.groups().size(), std::size_t{0},
                                     names.size(), std::size_t{0}, std::size_t{0}, std::size_t{0}})
@@ -151,6 +180,12 @@ std::string header_section(const PointSet& points, const std::vector<std::string
         const AnyColumn& column = *points.find(name);
         header.string(name);
         header.int16(component_count(type_of(column)));
+        if (const auto texts = recorded.texts.find(name); texts != recorded.texts.end()) {
+            header.int32(IndexType);
+            header.int32(texts->second.size());
+            for (const Token text : texts->second) header.string(text.text());
+            continue;
+        }
         header.int32(houdini_type(name, type_of(column)));
         for (const std::uint32_t word : default_words(column)) header.int32(word);
     }
@@ -178,13 +213,14 @@ RecordWriter records_of(const PointSet& points, const std::vector<std::string>& 
 void write_bgeo(OutputFile& file, const PointSet& given, const FrameInfo&)
 {
     const PointLines lines = with_lines(given);
-    const PointSet& points = lines.points;
+    const Recorded in_file = recorded(lines.points);
+    const PointSet& points = in_file.points;
     check_count(points.size());
     const std::vector<std::string> names = attribute_names(points);
     check_column_names(points.group_names(), std::string_view("\0", 1));
     const std::string end = line_section(lines) + group_section(points) + std::string(end_section);
     const RecordWriter records = records_of(points, names);
-    const std::string header = header_section(points, names, lines.sizes.size());
+    const std::string header = header_section(in_file, names, lines.sizes.size());
 
     file.append(header.data(), header.size());
     records.write(file, file.appended(), points.size());
@@ -195,7 +231,7 @@ class BgeoStream : public PointStream {
 public:
     BgeoStream(OutputFile& file, const PointSet& like) : file_(file), names_(attribute_names(like))
     {
-        const std::string header = header_section(like, names_, 0);
+        const std::string header = header_section({like, {}}, names_, 0);
         file_.append(header.data(), header.size());
         end_ = file_.appended();
     }
@@ -222,8 +258,10 @@ private:
     std::size_t count_ = 0;
 };
 
+// Texts come before the points that have them.
 std::unique_ptr<PointStream> stream_bgeo(OutputFile& file, const PointSet& like)
 {
+    if (!names_of_texts(like).empty()) return nullptr;
     return std::make_unique<BgeoStream>(file, like);
 }
 
@@ -262,6 +300,7 @@ struct Dictionary {
     std::vector<RecordAttribute> attributes;
     std::size_t stride;
     std::vector<std::vector<std::uint32_t>> defaults = {};  // of the attributes, as words
+    std::map<std::string, std::vector<Token>> texts = {};   // of those that hold places of texts
 };
 
 void set_default(PointSet& points, const std::string& name, const std::vector<std::uint32_t>& words)
@@ -303,9 +342,17 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
             stride += size;
             LeftOut::add(fmt::format("the attribute \"{}\", a string", name));
         } else if (type == IndexType) {
-            for (std::uint32_t entries = reader.integer(4); entries > 0; --entries) reader.take(reader.integer(2));
+            std::vector<Token> texts;
+            for (std::uint32_t entries = reader.integer(4); entries > 0; --entries)
+                texts.push_back(token_of(reader.string(reader.integer(2))));
+            if (size == 1) {
+                dictionary.attributes.push_back({name, ScalarType::Int32, {stride}});
+                dictionary.defaults.emplace_back();
+                dictionary.texts[name] = std::move(texts);
+            } else {
+                LeftOut::add(fmt::format("the attribute \"{}\", {} strings a point", name, size));
+            }
             stride += 4 * size;
-            LeftOut::add(fmt::format("the attribute \"{}\", a string", name));
         } else {
             throw Error(fmt::format("attribute \"{}\" has the unknown type {}", name, type));
         }
@@ -356,6 +403,13 @@ bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t v
     return true;
 }
 
+Column<Token> texts_of(const PointSet& points, const std::string& name, const std::vector<Token>& texts)
+{
+    const auto* places = points.find<std::int32_t>(name);
+    if (!places) throw Error(fmt::format("the attribute \"{}\" is a string; it must be a number", name));
+    return texts_at(texts, *places);
+}
+
 void read_group(BigEndianReader& reader, PointSet& points)
 {
     const bool ordered = !reader.rest().empty() && reader.rest().front() == ordered_mark;
@@ -404,6 +458,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
     for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first, has none
         set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
+    for (const auto& [name, texts] : dictionary.texts) points.set(name, texts_of(points, name, texts));
     PointLines lines{std::move(points), {}, {}};
     reader.enter("primitives");
     const std::size_t vertex_bytes = stride_of_unread(reader, of_vertices);

@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include "runtime/io/attribute_names.h"
 #include "runtime/io/id_order.h"
 #include "runtime/parallel.h"
 #include "runtime/printable.h"
@@ -54,6 +55,10 @@ ValueDifference difference(const A& a, const B& b)
         if (a == b) return {0, 0};
         const double amount = std::abs(static_cast<double>(a) - static_cast<double>(b));
         return {std::max(1.0, amount), 0};  // int64 that differ may be one double
+    } else if constexpr (std::is_same_v<A, Token> || std::is_same_v<B, Token>) {
+        if constexpr (std::is_same_v<A, B>)
+            if (a == b) return {0, 0};
+        return {1, 0};
     } else {
         const Numbers x = numbers(a), y = numbers(b);
         Numbers d;
@@ -104,7 +109,7 @@ void compare_columns(AttributeDifference& result, const Column<A>& in_a, const C
 
 bool is_scalar(const AnyColumn& column)
 {
-    return type_of(column) != AttributeType::Vec3 && type_of(column) != AttributeType::Quat;
+    return component_count(type_of(column)) == 1 && type_of(column) != AttributeType::String;
 }
 
 double bounds_diagonal(const PointSet& a, const PointSet& b)
@@ -247,6 +252,8 @@ std::string attribute_text(const AttributeDifference& d, std::size_t width)
     if (d.type_a.empty() || d.type_b.empty())
         return head +
                fmt::format("only in {} ({})\n", d.type_a.empty() ? "B" : "A", d.type_a.empty() ? d.type_b : d.type_a);
+    if (d.type_a == "string" && d.type_b == "string" && !d.same)
+        return head + fmt::format("string {} differ (id {} first)\n", d.different, d.worst_id);
     const std::string type = d.type_a == d.type_b ? d.type_a : d.type_a + " / " + d.type_b;
     if (d.max == 0 && d.same) return head + fmt::format("{:<5}  equal\n", type);
     if (!d.same && d.max == 0) return head + fmt::format("{:<5}  can't be compared\n", type);

@@ -2,7 +2,8 @@
 //
 //   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then group:NAME, 0 or 1
 //
-// Floats have 9 significant digits, which identify the float. The file does not hold types: read back, every column
+// Floats have 9 significant digits, which identify the float. Texts are in quotes, of which one in a text is doubled
+// (RFC 4180). The file does not hold types: read back, a column whose first value is no number is of texts; any other
 // except id is float, unless it holds only integers and float would round one of them; then it is int32, or int64 where
 // that is too small.
 #include <fmt/format.h>
@@ -40,6 +41,17 @@ char* put(char* to, Integer value)
 char* put_value(char* to, float value) { return put(to, value); }
 char* put_value(char* to, std::int32_t value) { return put(to, value); }
 char* put_value(char* to, std::int64_t value) { return put(to, value); }
+
+char* put_value(char* to, Token value)
+{
+    *to++ = '"';
+    for (const char c : value.text()) {
+        if (c == '"') *to++ = '"';
+        *to++ = c;
+    }
+    *to++ = '"';
+    return to;
+}
 
 template <class Vector>
 char* put_numbers(char* to, const Vector& numbers, int count)
@@ -85,7 +97,11 @@ CsvTable csv_table(const PointSet& points)
 // The lines of the points at [begin, end) of the order.
 std::string csv_lines(const CsvTable& table, const std::vector<std::size_t>& order, std::size_t begin, std::size_t end)
 {
-    std::string text(table.numbers * (number_chars + 1) * (end - begin), '\0');
+    std::size_t size = table.numbers * (number_chars + 1) * (end - begin);
+    for (const AnyColumn* column : table.columns)
+        if (const auto* texts = std::get_if<Column<Token>>(column))
+            for (std::size_t i = begin; i < end; ++i) size += 2 * (*texts)[order.empty() ? i : order[i]].text().size();
+    std::string text(size, '\0');
     char* to = text.data();
     for (std::size_t i = begin; i < end; ++i) {
         const std::size_t point = order.empty() ? i : order[i];
@@ -136,13 +152,26 @@ std::unique_ptr<PointStream> stream_csv(OutputFile& file, const PointSet& like)
     return std::make_unique<CsvStream>(file, like);
 }
 
+// The end of the line that begins here: a newline that is not within quotes.
+std::size_t line_end(std::string_view text, std::size_t begin, bool has_quotes)
+{
+    if (!has_quotes) return text.find('\n', begin);
+    bool quoted = false;
+    for (std::size_t i = begin; i < text.size(); ++i) {
+        quoted ^= text[i] == '"';
+        if (text[i] == '\n' && !quoted) return i;
+    }
+    return std::string_view::npos;
+}
+
 // The start of each line, without the header and trailing empty lines.
 std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
 {
+    const bool has_quotes = text.find('"') != std::string_view::npos;
     std::vector<std::size_t> starts;
     while (begin < text.size()) {
         starts.push_back(begin);
-        const std::size_t end = text.find('\n', begin);
+        const std::size_t end = line_end(text, begin, has_quotes);
         if (end == std::string_view::npos) break;
         begin = end + 1;
     }
@@ -156,6 +185,8 @@ struct CsvColumn {
     std::vector<double> numbers;
     std::vector<std::int64_t> whole;
     bool is_whole = true;
+    std::vector<Token> texts = {};  // in place of numbers
+    bool is_text = false;
 
     bool float_would_round() const
     {
@@ -174,8 +205,44 @@ struct CsvColumn {
 
 Error csv_error(std::size_t line, const std::string& what) { return Error(fmt::format("line {}: {}", line, what)); }
 
+// A text at a place, in quotes or up to the next comma or the end of the line; where it ends.
+const char* parse_text(const char* at, const char* stop, std::string& text)
+{
+    text.clear();
+    if (at == stop || *at != '"') {
+        while (at != stop && *at != ',' && *at != '\n' && *at != '\r') text += *at++;
+        return at;
+    }
+    for (++at; at != stop; ++at) {
+        if (*at == '"' && (++at == stop || *at != '"')) return at;
+        text += *at;
+    }
+    return stop;
+}
+
+// Whether a value is no number.
+bool is_text(const char* at, const char* stop)
+{
+    double number = 0;
+    const auto parsed = std::from_chars(at, stop, number);
+    return parsed.ec == std::errc::invalid_argument ||
+           (parsed.ptr != stop && *parsed.ptr != ',' && *parsed.ptr != '\n' && *parsed.ptr != '\r');
+}
+
+// Those of which the first line has no number, of the columns that may be of texts.
+void find_texts(std::string_view line, const std::vector<bool>& may_be_text, std::vector<CsvColumn>& columns)
+{
+    const char *at = line.data(), *stop = line.data() + line.size();
+    std::string text;
+    for (std::size_t c = 0; c < columns.size() && at != stop; ++c) {
+        columns[c].is_text = may_be_text[c] && is_text(at, stop);
+        at = parse_text(at, stop, text);
+        if (at != stop && *at == ',') ++at;
+    }
+}
+
 std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
-                                     const std::vector<std::string>& names)
+                                     const std::vector<std::string>& names, const std::vector<bool>& may_be_text)
 {
     constexpr double bytes_a_number = sizeof(double) + sizeof(std::int64_t);  // as which it is kept until all are read
     const double bytes = bytes_a_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
@@ -183,20 +250,31 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
         throw beyond_memory(fmt::format("{} lines of {} numbers", starts.size(), names.size()), bytes,
                             "split the file, or write .bgeo in its place");
     std::vector<CsvColumn> columns(names.size());
+    if (!starts.empty()) find_texts(text.substr(starts[0]), may_be_text, columns);
     for (CsvColumn& column : columns) {
+        if (column.is_text) {
+            column.texts.resize(starts.size());
+            continue;
+        }
         column.numbers.resize(starts.size());
         column.whole.resize(starts.size());
     }
     std::vector<std::atomic<bool>> broken(names.size());  // columns with a number that is not an integer
     for_each_chunk(starts.size(), [&](std::size_t begin, std::size_t end) {
+        std::string word;
         for (std::size_t i = begin; i < end; ++i) {
             const char* at = text.data() + starts[i];
             const char* const stop = text.data() + text.size();
             for (std::size_t c = 0; c < names.size(); ++c) {
                 if (c > 0) {
                     if (at == stop || *at != ',')
-                        throw csv_error(i + 2, fmt::format("there are {} numbers; there must be {}", c, names.size()));
+                        throw csv_error(i + 2, fmt::format("there are {} values; there must be {}", c, names.size()));
                     ++at;
+                }
+                if (columns[c].is_text) {
+                    at = parse_text(at, stop, word);
+                    columns[c].texts[i] = token_of(word);
+                    continue;
                 }
                 double& number = columns[c].numbers[i];
                 std::int64_t& whole = columns[c].whole[i];
@@ -209,7 +287,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
             }
             if (at != stop && *at == '\r') ++at;
             if (at != stop && *at != '\n')
-                throw csv_error(i + 2, fmt::format("what follows {} numbers can't be understood", names.size()));
+                throw csv_error(i + 2, fmt::format("what follows {} values can't be understood", names.size()));
         }
     });
     for (std::size_t c = 0; c < names.size(); ++c) columns[c].is_whole = !broken[c];
@@ -257,13 +335,19 @@ PointSet read_csv(const std::filesystem::path& path)
         throw csv_error(starts.size() + 1,
                         "there is no newline at its end, so that its last number may be cut short; if the file is "
                         "whole, append a newline (echo >> FILE)");
-    const std::vector<CsvColumn> columns = parse_columns(text, starts, names);
+    std::vector<bool> may_be_text(names.size());
+    for (const JoinedColumns& attribute : attributes)
+        may_be_text[attribute.columns[0]] =
+            attribute.columns.size() == 1 && attribute.name != "id" && !attribute.name.starts_with(group_prefix);
+    const std::vector<CsvColumn> columns = parse_columns(text, starts, names, may_be_text);
     PointSet points;
     points.append(starts.size());
     for (const JoinedColumns& attribute : attributes) {
         const std::vector<std::size_t>& which = attribute.columns;
         const CsvColumn& first = columns[which[0]];
-        if (which.size() == 3) {
+        if (first.is_text) {
+            points.set(attribute.name, Column<Token>(std::span<const Token>(first.texts)));
+        } else if (which.size() == 3) {
             points.set(attribute.name, joined<Vec3f, float>(columns, which));
         } else if (which.size() == 4) {
             points.set(attribute.name, joined<Quatf, float>(columns, which));

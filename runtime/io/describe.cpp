@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/io/attribute_names.h"
+#include "runtime/io/text_table.h"
 #include "runtime/printable.h"
 
 namespace rapid {
@@ -36,6 +37,28 @@ void extend(AttributeSummary& summary, const Column<T>& column)
             summary.max[c] = std::max(summary.max[c], value[c]);
         }
     }
+}
+
+constexpr std::size_t most_texts = 8;  // that are shown
+
+void extend(AttributeSummary& summary, const Column<Token>& column)
+{
+    std::vector<std::string_view> texts;
+    for (const Token text : text_table(column).texts) texts.push_back(text.text());
+    std::sort(texts.begin(), texts.end());
+    summary.uniform = texts.size() <= 1;
+    summary.texts = texts.size();
+    texts.resize(std::min(texts.size(), most_texts));
+    summary.first_texts.assign(texts.begin(), texts.end());
+}
+
+// "bark" "leaf" ... of 40
+std::string text_list(const AttributeSummary& a)
+{
+    std::string list;
+    for (const std::string& text : a.first_texts)
+        list += fmt::format("{}\"{}\"", list.empty() ? "" : " ", printable(text));
+    return a.texts > a.first_texts.size() ? list + fmt::format(" ... of {} texts", a.texts) : list;
 }
 
 std::string number_list(const std::vector<double>& values)
@@ -96,6 +119,7 @@ std::string to_text(const PointSummary& summary)
         if (!a.min.empty())
             text += a.uniform ? fmt::format("  {} everywhere", number_list(a.min))
                               : fmt::format("  {}  to  {}", number_list(a.min), number_list(a.max));
+        if (a.texts > 0) text += fmt::format("  {}{}", text_list(a), a.uniform ? " everywhere" : "");
         if (a.not_finite > 0) text += fmt::format("  ({} not finite)", a.not_finite);
         text += '\n';
     }
@@ -113,13 +137,17 @@ nlohmann::ordered_json to_json(const PointSummary& summary)
         json["bounds"] = {{"min", {low.x(), low.y(), low.z()}}, {"max", {high.x(), high.y(), high.z()}}};
     }
     json["attributes"] = nlohmann::ordered_json::array();
-    for (const AttributeSummary& a : summary.attributes)
+    for (const AttributeSummary& a : summary.attributes) {
         json["attributes"].push_back({{"name", a.name},
                                       {"type", type_name(a.type)},
                                       {"uniform", a.uniform},
                                       {"min", a.min},
                                       {"max", a.max},
                                       {"not_finite", a.not_finite}});
+        if (a.type != AttributeType::String) continue;
+        json["attributes"].back()["texts"] = a.texts;
+        json["attributes"].back()["first_texts"] = a.first_texts;
+    }
     json["groups"] = nlohmann::ordered_json::array();
     for (const GroupSummary& g : summary.groups) json["groups"].push_back({{"name", g.name}, {"points", g.members}});
     return json;

@@ -13,9 +13,11 @@ namespace rapid {
 struct AttributeSummary {
     std::string name;
     AttributeType type;
-    bool uniform;                  // all points have the same bits
-    std::vector<double> min, max;  // of each component; empty where no value is finite
-    std::size_t not_finite = 0;    // points with a NaN or an infinity
+    bool uniform;                               // all points have the same bits
+    std::vector<double> min, max;               // of each component; empty where no value is finite
+    std::size_t not_finite = 0;                 // points with a NaN or an infinity
+    std::size_t texts = 0;                      // different ones, of a string
+    std::vector<std::string> first_texts = {};  // in order, the first few of them
 };
 
 struct GroupSummary {

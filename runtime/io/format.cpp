@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "runtime/io/text_table.h"
+
 namespace rapid {
 namespace {
 
@@ -54,6 +56,11 @@ const Format& format_of(const std::filesystem::path& path)
     throw Error(fmt::format("{}; it must be one of {}", found, known)).at({path.string(), 0});
 }
 
+void write_as(const Format& format, OutputFile& file, const PointSet& points, const FrameInfo& frame)
+{
+    format.write(file, format.holds_texts ? points : without_texts(points), frame);
+}
+
 PointSet read_points(const std::filesystem::path& path)
 {
     const Format& format = format_of(path);
@@ -76,7 +83,7 @@ void write_points(const std::filesystem::path& path, const PointSet& points, con
     const Format& format = format_of(path);
     try {
         OutputFile file(path);
-        format.write(file, points, frame);
+        write_as(format, file, points, frame);
         file.finish();
     } catch (Error& error) {
         throw error.at({path.string(), 0});

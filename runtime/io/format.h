@@ -19,13 +19,15 @@ struct Format {
     // Writes all columns and groups of `points` to a new file; the caller finishes it. Error: a full disk; values that
     // the format can't hold (int64 ids), with the formats that can.
     void (*write)(OutputFile& file, const PointSet& points, const FrameInfo& frame);
-    // Null where the format can't be read (.png). Text and matrices are skipped; an attribute of n other numbers
+    // Null where the format can't be read (.png). Matrices are skipped; an attribute of n other numbers
     // becomes the floats or integers NAME0 ... NAMEn-1. Without an id in the file, points are numbered from 0.
     PointSet (*read)(const std::filesystem::path& path);
     // Whether a file shows all frames of a sequence, one after another (film.h).
     bool film = false;
     // Whether it holds the places of points, and nothing else of them.
     bool places_alone = false;
+    // Whether it holds attributes that are texts; write_as() leaves them out where it does not.
+    bool holds_texts = true;
 };
 
 // All formats, in order of extension.
@@ -38,6 +40,9 @@ struct FormatRegistration {
     explicit FormatRegistration(Format format);
 };
 #define RAPID_FORMAT(...) static const ::rapid::FormatRegistration format_registration(__VA_ARGS__)
+
+// Format::write, of what the format holds.
+void write_as(const Format& format, OutputFile& file, const PointSet& points, const FrameInfo& frame);
 
 // Reads a file of any readable format. Errors name the file.
 PointSet read_points(const std::filesystem::path& path);

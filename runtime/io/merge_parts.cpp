@@ -210,23 +210,8 @@ std::vector<PointSet> of_one_type(const std::vector<PointSet>& parts, const std:
         for (PointSet& part : result) {
             const AnyColumn& column = *part.find(name);
             if (type_of(column) == type) continue;
-            switch (type) {
-                case AttributeType::Float:
-                    part.set(name, column_of<float>(column));
-                    break;
-                case AttributeType::Vec3:
-                    part.set(name, column_of<Vec3f>(column));
-                    break;
-                case AttributeType::Int32:
-                    part.set(name, column_of<std::int32_t>(column));
-                    break;
-                case AttributeType::Int64:
-                    part.set(name, column_of<std::int64_t>(column));
-                    break;
-                case AttributeType::Quat:
-                    part.set(name, column_of<Quatf>(column));
-                    break;
-            }
+            std::visit([&]<class T>(const Column<T>&) { part.set(name, column_of<T>(column)); },
+                       column_of_type<AnyColumn>(static_cast<std::size_t>(type)));
         }
     }
     return result;

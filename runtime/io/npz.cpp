@@ -3,11 +3,12 @@
 //   0x93 "NUMPY" 1 0 | uint16: bytes of the header | {'descr': '<f4', 'fortran_order': False, 'shape': (n, 3), }
 //
 // padded by spaces to 64 bytes, then the numbers. P and every vec3 are <f4 (n, 3), a quaternion <f4 (n, 4) x y z w, a
-// float <f4 (n,), integers <i4 and <i8; a group is |b1 group_NAME. Members are stored, as by numpy.savez.
+// float <f4 (n,), integers <i4 and <i8, a text <Un (n characters of its longest, 4 bytes each); a group is |b1
+// group_NAME. Members are stored, as by numpy.savez.
 //
-// Reads archives of numpy.savez and numpy.savez_compressed, of any order of bytes and of dimensions. Arrays of text and
-// objects (which are Python programs), of more than two dimensions, of more than 16 numbers a point, and of other than
-// n rows are left out; a |b1 (n,) is a group.
+// Reads archives of numpy.savez and numpy.savez_compressed, of any order of bytes and of dimensions. Arrays of objects
+// (which are Python programs), of more than two dimensions, of more than 16 numbers a point, and of other than n rows
+// are left out; a |b1 (n,) is a group.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -18,6 +19,7 @@
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
+#include "runtime/io/text_table.h"
 #include "runtime/io/zip_file.h"
 #include "runtime/parallel.h"
 
@@ -31,6 +33,29 @@ std::string_view numpy_type(AttributeType type)
 {
     if (type == AttributeType::Int32) return "<i4";
     return type == AttributeType::Int64 ? "<i8" : "<f4";
+}
+
+// The characters of a text.
+std::u32string characters_of(Token token)
+{
+    std::u32string result;
+    for (const char c : token.text()) {
+        const auto byte = static_cast<unsigned char>(c);
+        if ((byte & 0xc0) == 0x80)
+            result.back() = result.back() << 6 | (byte & 0x3f);
+        else
+            result += byte < 0x80 ? byte : byte < 0xe0 ? byte & 0x1f : byte < 0xf0 ? byte & 0x0f : byte & 0x07;
+    }
+    return result;
+}
+
+void append_utf8(std::string& to, std::uint32_t c)
+{
+    const auto put = [&](std::uint32_t byte) { to += static_cast<char>(byte); };
+    if (c < 0x80) return put(c);
+    const int more = c < 0x800 ? 1 : c < 0x10000 ? 2 : 3;
+    put((0xff00 >> (more + 1) & 0xff) | c >> 6 * more);
+    for (int k = more - 1; k >= 0; --k) put(0x80 | (c >> 6 * k & 0x3f));
 }
 
 std::string npy_header(std::string_view type, std::size_t n, std::size_t count)
@@ -60,6 +85,27 @@ void write_array(ZipWriter& zip, const std::string& name, const std::string& hea
     zip.end();
 }
 
+void write_texts(ZipWriter& zip, const std::string& name, const Column<Token>& column)
+{
+    const TextTable table = text_table(column);
+    std::vector<std::u32string> texts;
+    std::size_t longest = 1;
+    for (const Token text : table.texts) longest = std::max(longest, texts.emplace_back(characters_of(text)).size());
+    for (std::u32string& text : texts) text.resize(longest, U'\0');
+    const std::string header = npy_header(fmt::format("<U{}", longest), column.size(), 1);
+    const std::size_t bytes = longest * sizeof(char32_t);
+    zip.begin(name + std::string(suffix), header.size() + column.size() * bytes);
+    zip.write(header.data(), header.size());
+    std::string piece;
+    for (std::size_t begin = 0; begin < column.size(); begin += chunk_size) {
+        piece.clear();
+        for (std::size_t i = begin; i < std::min(column.size(), begin + chunk_size); ++i)
+            piece.append(reinterpret_cast<const char*>(texts[static_cast<std::size_t>(table.places[i])].data()), bytes);
+        zip.write(piece.data(), piece.size());
+    }
+    zip.end();
+}
+
 void write_npz(OutputFile& file, const PointSet& points, const FrameInfo&)
 {
     std::vector<std::string> attributes = further_attributes(points), names;
@@ -71,6 +117,10 @@ void write_npz(OutputFile& file, const PointSet& points, const FrameInfo&)
     ZipWriter zip(file);
     for (const std::string& name : attributes) {
         const AnyColumn& column = *points.find(name);
+        if (const auto* texts = std::get_if<Column<Token>>(&column)) {
+            write_texts(zip, name, *texts);
+            continue;
+        }
         RecordWriter array(ByteOrder::Little, RecordWriter::Wide);
         array.add(name, column);
         const AttributeType type = type_of(column);
@@ -161,11 +211,26 @@ private:
     std::string_view text_;
 };
 
+// Of a text: its characters, which are UInt32 (U) or UInt8 (S), as many as characters.
 struct NumberType {
     ScalarType scalar;
     ByteOrder order;
     bool truth;
+    std::size_t characters = 0;
 };
+
+constexpr std::size_t most_characters = 1 << 20;
+
+std::optional<NumberType> text_type(std::string_view descr)
+{
+    const bool wide = descr.substr(1, 1) == "U";
+    std::size_t characters = 0;
+    const auto parsed = std::from_chars(descr.data() + 2, descr.data() + descr.size(), characters);
+    if (parsed.ec != std::errc() || parsed.ptr != descr.data() + descr.size()) return {};
+    if (characters < 1 || characters > most_characters) return {};
+    return NumberType{wide ? ScalarType::UInt32 : ScalarType::UInt8,
+                      descr[0] == '>' ? ByteOrder::Big : ByteOrder::Little, false, characters};
+}
 
 // Nothing for types that are no numbers.
 std::optional<NumberType> number_type(std::string_view descr)
@@ -175,6 +240,7 @@ std::optional<NumberType> number_type(std::string_view descr)
         {"i2", ScalarType::Int16},  {"i4", ScalarType::Int32},  {"i8", ScalarType::Int64},  {"u1", ScalarType::UInt8},
         {"u2", ScalarType::UInt16}, {"u4", ScalarType::UInt32}, {"u8", ScalarType::UInt64}, {"b1", ScalarType::UInt8}};
     if (descr.empty() || std::string_view("<>|=").find(descr[0]) == std::string_view::npos) return {};
+    if (descr.size() > 2 && (descr[1] == 'U' || descr[1] == 'S')) return text_type(descr);
     const auto found = types.find(descr.substr(1));
     if (found == types.end()) return {};
     return NumberType{found->second, descr[0] == '>' ? ByteOrder::Big : ByteOrder::Little, descr.substr(1) == "b1"};
@@ -200,17 +266,42 @@ std::optional<Array> array_in(std::span<const unsigned char> bytes)
     const std::optional<NumberType> type = number_type(header.descr);
     if (!header.complete || !type || header.shape.empty() || header.shape.size() > 2) return {};
     const std::uint64_t rows = header.shape[0], numbers = header.shape.size() == 2 ? header.shape[1] : 1;
-    if (numbers < 1 || numbers > most_numbers) return {};
+    if (numbers < 1 || numbers > (type->characters > 0 ? 1 : most_numbers)) return {};
     const std::span<const unsigned char> data = bytes.subspan(begin + length);
-    const std::size_t row = numbers * scalar_bytes(type->scalar);
+    const std::size_t row = numbers * scalar_bytes(type->scalar) * std::max<std::size_t>(1, type->characters);
     if (rows > data.size() / row)
         throw Error(
             fmt::format("the array ends early: its header promises {} rows, it holds {}", rows, data.size() / row));
     return Array{*type, rows, numbers, header.fortran, data};
 }
 
+// Shorter ones end with zeros.
+Column<Token> texts_in(const Array& array)
+{
+    Column<Token> column;
+    const std::span<Token> to = column.append_for_writing(array.rows);
+    const std::size_t bytes = scalar_bytes(array.type.scalar);
+    const unsigned char* at = array.bytes.data();
+    std::string text;
+    for (Token& token : to) {
+        text.clear();
+        for (std::size_t k = 0; k < array.type.characters; ++k, at += bytes) {
+            if (array.type.scalar == ScalarType::UInt8)
+                text += static_cast<char>(*at);
+            else if (const auto c = load_scalar<std::uint32_t>(at, array.type.order); c <= 0x10ffff)
+                append_utf8(text, c);
+            else
+                throw Error(fmt::format("the text of a row has the character {}; there is none", c));
+        }
+        text.resize(text.find_last_not_of('\0') + 1);
+        token = token_of(text);
+    }
+    return column;
+}
+
 void read_array(PointSet& points, const std::string& name, const Array& array)
 {
+    if (array.type.characters > 0) return points.set(name, array.rows > 0 ? texts_in(array) : Column<Token>());
     RecordAttribute attribute;
     attribute.type = array.type.scalar;
     attribute.group = array.type.truth && array.numbers == 1;
@@ -233,7 +324,8 @@ PointSet read_npz(const std::filesystem::path& path)
             if (const std::optional<Array> array = array_in(bytes))
                 use(*array);
             else
-                LeftOut::add(fmt::format("the array \"{}\", which is not of numbers of each point", member.name));
+                LeftOut::add(
+                    fmt::format("the array \"{}\", which is not of numbers or texts of each point", member.name));
         } catch (const Error& error) {
             throw Error(fmt::format("\"{}\": {}", member.name, error.what()));
         }
@@ -246,7 +338,7 @@ PointSet read_npz(const std::filesystem::path& path)
         if (member.name.ends_with(suffix)) names.push_back(member.name.substr(0, member.name.size() - suffix.size()));
         if (member.name != "P.npy") continue;
         with_array(member, [&](const Array& array) {
-            placed = array.numbers == 3 && is_floating(array.type.scalar);
+            placed = array.numbers == 3 && array.type.characters == 0 && is_floating(array.type.scalar);
             if (placed && points.empty()) points.append(array.rows);
         });
     }
@@ -261,7 +353,7 @@ PointSet read_npz(const std::filesystem::path& path)
                 return LeftOut::add(fmt::format("the array \"{}\" of {} rows; there are {} points", member.name,
                                                 array.rows, points.size()));
             read_array(points, name, array);
-            has_id |= name == "id" && array.numbers == 1 && !array.type.truth;
+            has_id |= name == "id" && array.numbers == 1 && !array.type.truth && array.type.characters == 0;
         });
     }
     if (!has_id) number_points(points);

@@ -71,7 +71,7 @@ void PointFile::append(const PointSet& points)
 void PointFile::finish()
 {
     of_file(path_, [&] {
-        stream_ ? stream_->finish() : format_.write(file_, kept_, {});
+        stream_ ? stream_->finish() : write_as(format_, file_, kept_, {});
         file_.finish();
     });
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "runtime/error.h"
+#include "runtime/io/text_table.h"
 
 namespace rapid {
 namespace {
@@ -27,21 +28,28 @@ Column<T> receive_column(std::size_t points, MessageReader& message)
     return column;
 }
 
+// The other process has its own tokens.
+void send_column(const Column<Token>& column, MessageWriter& message)
+{
+    const TextTable table = text_table(column);
+    message.put(table.texts.size());
+    for (const Token text : table.texts) message.put_text(std::string(text.text()));
+    send_column(table.places, message);
+}
+
+template <>
+Column<Token> receive_column(std::size_t points, MessageReader& message)
+{
+    std::vector<Token> texts;
+    for (auto left = message.take<std::size_t>(); left > 0; --left) texts.push_back(token_of(message.take_text()));
+    return texts_at(texts, receive_column<std::int32_t>(points, message));
+}
+
 AnyColumn receive_any(std::uint8_t type, std::size_t points, MessageReader& message)
 {
-    switch (static_cast<AttributeType>(type)) {
-        case AttributeType::Float:
-            return receive_column<float>(points, message);
-        case AttributeType::Vec3:
-            return receive_column<Vec3f>(points, message);
-        case AttributeType::Int32:
-            return receive_column<std::int32_t>(points, message);
-        case AttributeType::Int64:
-            return receive_column<std::int64_t>(points, message);
-        case AttributeType::Quat:
-            return receive_column<Quatf>(points, message);
-    }
-    throw Error("can't be read: its reader went wrong; it must be damaged");
+    if (type >= std::variant_size_v<AnyColumn>) throw Error("can't be read: its reader went wrong; it must be damaged");
+    return std::visit([&]<class T>(const Column<T>&) -> AnyColumn { return receive_column<T>(points, message); },
+                      column_of_type<AnyColumn>(type));
 }
 
 }  // namespace

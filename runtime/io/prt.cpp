@@ -287,7 +287,8 @@ PointSet read_prt(const std::filesystem::path& path)
     return read_records({{records.get(), bytes}, n, channels.stride, ByteOrder::Little}, channels.attributes);
 }
 
-RAPID_FORMAT(Format{".prt", "Krakatoa's particles, compressed; all types", write_prt, read_prt});
+RAPID_FORMAT(Format{".prt", "Krakatoa's particles, compressed; all types but texts", write_prt, read_prt,
+                    /*film=*/false, /*places_alone=*/false, /*holds_texts=*/false});
 
 }  // namespace
 }  // namespace rapid

@@ -157,6 +157,7 @@ void RecordWriter::add(const std::string& name, const AnyColumn& column)
     std::visit(
         [&](const auto& c) {
             using T = std::decay_t<decltype(c[0])>;
+            RAPID_ASSERT((!std::is_same_v<T, Token>));
             const Strided<T> values = c.read();
             if (std::is_same_v<T, std::int64_t> && integers_ == Narrow) {
                 if constexpr (std::is_same_v<T, std::int64_t>) check_fits_int32(name, c);

@@ -23,7 +23,8 @@ public:
     enum Integers { Narrow, Wide };
     explicit RecordWriter(ByteOrder order, Integers integers = Narrow) : order_(order), integers_(integers) {}
 
-    // Floats and int32 unchanged. Error: an int64 that has to be narrowed and does not fit, naming .vdb and .csv.
+    // Floats and int32 unchanged; of a text the place in the file's table (text_table.h) is added, as an int32. Error:
+    // an int64 that has to be narrowed and does not fit, naming .vdb and .csv.
     void add(const std::string& name, const AnyColumn& column);
     // Membership as a UInt8.
     void add_group(const Column<std::uint8_t>& members);

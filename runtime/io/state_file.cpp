@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "runtime/error.h"
+#include "runtime/io/text_table.h"
 
 namespace rapid {
 namespace {
@@ -22,7 +23,8 @@ using nlohmann::ordered_json;
 
 constexpr std::string_view magic = "\x89RAPID\r\n";
 constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
-constexpr std::array<std::string_view, 6> types = {"float", "vec3", "int32", "int64", "quat", "uint8"};  // KeptColumn's
+constexpr std::string_view types[] = {"float", "vec3", "int32", "int64", "quat", "string", "uint8"};  // KeptColumn's
+static_assert(std::size(types) == std::variant_size_v<KeptColumn>);
 constexpr std::string_view type_of_bytes = "bytes";
 
 // Compressed and read on all threads. Blosc sorts the bytes of numbers by their place, which makes ids a hundredth; LZ4
@@ -91,13 +93,6 @@ template <class T>
 constexpr std::size_t scalar_bytes = sizeof(T) % sizeof(float) == 0 && !std::is_integral_v<T> ? sizeof(float)
                                                                                               : sizeof(T);
 
-KeptColumn empty_column(std::size_t type)
-{
-    const KeptColumn of_type[] = {Column<float>(),        Column<Vec3f>(), Column<std::int32_t>(),
-                                  Column<std::int64_t>(), Column<Quatf>(), Column<std::uint8_t>()};
-    return of_type[type];
-}
-
 Raw raw_of(const KeptColumn& column)
 {
     return std::visit(
@@ -112,6 +107,24 @@ std::size_t values_of(const KeptColumn& column)
     return std::visit([](const auto& values) { return values.size(); }, column);
 }
 
+// The texts of columns that hold their places so far.
+void take_texts(const ordered_json& blocks, SavedState& state)
+{
+    for (std::size_t k = 0; k < state.columns.size(); ++k) {
+        const auto found = blocks[k + 1].find("texts");
+        if (found == blocks[k + 1].end()) continue;
+        std::vector<Token> texts;
+        try {
+            for (const ordered_json& text : *found) texts.push_back(token_of(text.get<std::string>()));
+            state.columns[k] = texts_at(texts, std::get<Column<std::int32_t>>(state.columns[k]));
+        } catch (const nlohmann::json::exception&) {
+            damaged("its header can't be read");
+        } catch (const std::bad_variant_access&) {
+            damaged("a block does not fit its header");
+        }
+    }
+}
+
 std::uint64_t number_at(const unsigned char* at)
 {
     std::uint64_t number;
@@ -124,7 +137,16 @@ std::uint64_t number_at(const unsigned char* at)
 void write_state(OutputFile& file, ordered_json header, const SavedState& state)
 {
     std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
-    for (const KeptColumn& column : state.columns) blocks.push_back(raw_of(column));
+    // Of a column of texts the block holds the places, and the header its texts.
+    std::vector<KeptColumn> columns = state.columns;
+    std::vector<std::vector<Token>> texts(columns.size());
+    for (std::size_t k = 0; k < columns.size(); ++k)
+        if (const auto* tokens = std::get_if<Column<Token>>(&columns[k])) {
+            TextTable table = text_table(*tokens);
+            texts[k] = std::move(table.texts);
+            columns[k] = std::move(table.places);
+        }
+    for (const KeptColumn& column : columns) blocks.push_back(raw_of(column));
     std::vector<std::pair<std::size_t, std::size_t>> places;  // block and offset of each piece
     for (std::size_t b = 0; b < blocks.size(); ++b)
         for (std::size_t k = 0; k < blocks[b].pieces(); ++k) places.emplace_back(b, k * piece_bytes);
@@ -145,6 +167,9 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
         list.push_back({{"type", b == 0 ? type_of_bytes : types[state.columns[b - 1].index()]},
                         {"values", b == 0 ? state.bytes.size() : values_of(state.columns[b - 1])},
                         {"pieces", std::move(sizes)}});
+        if (b == 0 || !std::holds_alternative<Column<Token>>(state.columns[b - 1])) continue;
+        ordered_json& of_block = list.back()["texts"] = ordered_json::array();
+        for (const Token text : texts[b - 1]) of_block.push_back(text.text());
     }
 
     const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> sum(XXH3_createState(), XXH3_freeState);
@@ -235,21 +260,25 @@ SavedState StateFile::state() const
         add(blocks[0], 1, [&](std::size_t size) { return state.bytes.resize(size), state.bytes.data(); });
         state.columns.reserve(blocks.size() - 1);
         for (std::size_t k = 1; k < blocks.size(); ++k) {
-            const auto found = std::find(types.begin(), types.end(), blocks[k].at("type").get<std::string>());
-            if (found == types.end()) damaged("its header can't be read");
+            const auto found = std::find(std::begin(types), std::end(types), blocks[k].at("type").get<std::string>());
+            if (found == std::end(types)) damaged("its header can't be read");
+            const bool is_of_texts = *found == type_name(AttributeType::String);
             std::visit(
                 [&]<class T>(Column<T>& column) {
                     add(blocks[k], sizeof(T), [&](std::size_t size) {
                         return reinterpret_cast<char*>(column.append_for_writing(size).data());
                     });
                 },
-                state.columns.emplace_back(empty_column(static_cast<std::size_t>(found - types.begin()))));
+                state.columns.emplace_back(
+                    is_of_texts ? KeptColumn(Column<std::int32_t>())
+                                : column_of_type<KeptColumn>(static_cast<std::size_t>(found - std::begin(types)))));
         }
     } catch (const nlohmann::json::exception&) {
         damaged("its header can't be read");
     }
     tbb::parallel_for(std::size_t{0}, places.size(),
                       [&](std::size_t k) { unpack(places[k].piece, places[k].to, places[k].bytes); });
+    take_texts(header_.at("blocks"), state);
     return state;
 }
 

@@ -10,6 +10,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <map>
 
 #include "runtime/files/input_file.h"
@@ -38,7 +39,8 @@ constexpr UsdName known_names[] = {{"P", "points", "point3f"},
 
 std::string_view usd_type(AttributeType type)
 {
-    static constexpr std::string_view names[] = {"float", "float3", "int", "int64", "quatf"};
+    static constexpr std::string_view names[] = {"float", "float3", "int", "int64", "quatf", "string"};
+    static_assert(std::size(names) == std::variant_size_v<AnyColumn>);
     return names[static_cast<std::size_t>(type)];
 }
 
@@ -99,6 +101,22 @@ void put_tuple(std::string& text, std::initializer_list<float> numbers)
 void put(std::string& text, const Vec3f& value) { put_tuple(text, {value.x(), value.y(), value.z()}); }
 // The real part first.
 void put(std::string& text, const Quatf& value) { put_tuple(text, {value.w(), value.x(), value.y(), value.z()}); }
+
+void put(std::string& text, Token value)
+{
+    text += '"';
+    for (const char c : value.text()) {
+        if (c == '"' || c == '\\')
+            text += {'\\', c};
+        else if (c == '\n')
+            text += "\\n";
+        else if (static_cast<unsigned char>(c) < ' ')
+            text += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+        else
+            text += c;
+    }
+    text += '"';
+}
 
 class UsdaWriter {
 public:
@@ -212,6 +230,15 @@ std::string attribute_name(std::string_view name)
     return std::string(name.starts_with(primvar) ? name.substr(primvar.size()) : name);
 }
 
+// One of them, or one for each point.
+Column<Token> texts_of(const UsdArray& array, std::size_t size)
+{
+    std::vector<Token> texts(array.rows());
+    std::memcpy(static_cast<void*>(texts.data()), array.bytes.data(), array.bytes.size());
+    if (texts.size() != size) return Column<Token>(size, texts[0], Token());
+    return Column<Token>(std::span<const Token>(texts));
+}
+
 PointSet read_usda(const std::filesystem::path& path)
 {
     const InputFile file(path);
@@ -228,6 +255,11 @@ PointSet read_usda(const std::filesystem::path& path)
         if (array.name == "extent") continue;  // of no point
         if (array.rows() != points.size() && !constant) {
             LeftOut::add(fmt::format("{} of {} values; there are {} points", array.name, array.rows(), points.size()));
+            continue;
+        }
+        if (array.texts) {
+            points.set(attribute_name(array.name), texts_of(array, points.size()));
+            names.push_back(array.name);
             continue;
         }
         RecordAttribute attribute;

@@ -13,6 +13,7 @@
 #include "runtime/error.h"
 #include "runtime/files/left_out.h"
 #include "runtime/memory_budget.h"
+#include "runtime/points/token.h"
 
 namespace rapid {
 namespace {
@@ -35,6 +36,11 @@ std::optional<UsdArray> array_of(std::string_view type)
         return UsdArray{"", scalar, 1, false, Limits::min(), std::int64_t(std::min<std::uint64_t>(Limits::max(), held)),
                         {}};
     };
+    if (type == "string" || type == "token") {
+        UsdArray array = integers_of(ScalarType::UInt32, std::uint32_t{});
+        array.texts = true;
+        return array;
+    }
     if (type == "bool") return integers_of(ScalarType::UInt8, std::int32_t{});
     if (type == "uchar") return integers_of(ScalarType::Int32, std::uint8_t{});
     if (type == "uint") return integers_of(ScalarType::Int64, std::uint32_t{});
@@ -139,6 +145,32 @@ private:
             ++at_;
         }
     }
+    // A text in quotes, with what is escaped in it.
+    std::string text_value()
+    {
+        if (!is_at('"') && !is_at('\'')) throw wrong("there is no text where there should be one");
+        const std::size_t begin = at_;
+        skip_mark();
+        const std::string_view quoted = text_.substr(begin, at_ - begin);
+        const std::size_t quotes = quoted.size() >= 6 && quoted[1] == quoted[0] && quoted[2] == quoted[0] ? 3 : 1;
+        std::string text;
+        for (std::size_t i = quotes; i < quoted.size() - quotes; ++i) {
+            if (quoted[i] != '\\') {
+                text += quoted[i];
+                continue;
+            }
+            const char c = quoted[++i];
+            if (c == 'x' && i + 2 < quoted.size() - quotes) {
+                unsigned byte = 0;
+                std::from_chars(quoted.data() + i + 1, quoted.data() + i + 3, byte, 16);
+                text += static_cast<char>(byte);
+                i += 2;
+            } else {
+                text += c == 'n' ? '\n' : c == 't' ? '\t' : c == 'r' ? '\r' : c;
+            }
+        }
+        return text;
+    }
     // A word, a text, a path, or all between brackets.
     void skip_value()
     {
@@ -199,7 +231,8 @@ private:
     {
         constexpr std::string_view samples = ".timeSamples";
         std::optional<UsdArray> array = array_of(type);
-        if (!array) {
+        // Others than primvars say how the prim is placed and drawn.
+        if (!array || (array->texts && !name.starts_with("primvars:"))) {
             if (type.ends_with("[]")) LeftOut::add(fmt::format("{} of the type {}", name, type));
             return skip_value();
         }
@@ -287,6 +320,7 @@ private:
             at_ = static_cast<std::size_t>(parsed.ptr - text_.data());
             return number;
         };
+        if (array.texts) return put(token_of(text_value()).number);
         switch (array.type) {
             case ScalarType::Int32:
                 return put(parse(std::int32_t{}));

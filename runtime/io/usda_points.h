@@ -14,11 +14,12 @@ namespace rapid {
 
 struct UsdArray {
     std::string name;
-    ScalarType type;           // in memory: UInt8 (of truth values), Int32, Int64 or Double
-    std::size_t tuple;         // numbers of a row
-    bool quaternion;           // the real part first
+    ScalarType type;    // in memory: UInt8 (of truth values), Int32, Int64 or Double; of texts UInt32, their tokens
+    std::size_t tuple;  // numbers of a row
+    bool quaternion;    // the real part first
     std::int64_t least, most;  // of integers
     std::vector<unsigned char> bytes;
+    bool texts = false;
 
     std::size_t rows() const { return bytes.size() / (tuple * scalar_bytes(type)); }
 };

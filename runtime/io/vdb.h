@@ -1,7 +1,7 @@
 // .vdb: OpenVDB points, one PointDataGrid "points", as Houdini and everything else with OpenVDB reads it.
 //
-// Attributes keep their names and become OpenVDB's float, vec3s, int32, int64 and quats, uncompressed in memory and
-// packed with Blosc in the file. A value that all points share is a uniform array in every leaf; groups are OpenVDB
+// Attributes keep their names and become OpenVDB's float, vec3s, int32, int64, quats and str, uncompressed in memory
+// and packed with Blosc in the file. A value that all points share is a uniform array in every leaf; groups are OpenVDB
 // point groups. A set without points is one empty leaf, which defines the attributes and groups.
 //
 // Positions are exact. OpenVDB stores a position as an offset from the centre of its voxel. With a voxel size that is a

@@ -1,6 +1,7 @@
 // Reads .vdb (vdb.h).
 #include <fmt/format.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointDataGrid.h>
 #include <openvdb/points/PointGroup.h>
@@ -112,7 +113,28 @@ void read_attribute(PointSet& points, const std::vector<LeafRange>& ranges, cons
 using ReadAttribute = void (*)(PointSet&, const std::vector<LeafRange>&, const std::string&, const std::string&,
                                vdb::Index);
 
-// By OpenVDB's name of the type; text and matrices are not read.
+void read_texts(PointSet& points, const std::vector<LeafRange>& ranges, const std::string& name)
+{
+    Column<Token>& column = column_for<Token>(points, name);
+    if (ranges.empty()) return;
+    std::map<vdb::Index, Token> texts;  // by number in the file
+    texts[0] = Token();
+    const vdb::points::StringMetaCache list(ranges[0].leaf->attributeSet().descriptor().getMetadata());
+    for (const auto& [text, number] : list.map()) texts[number] = token_of(text);
+    const std::span<Token> values = column.write();
+    for_each_leaf(ranges, [&](const Leaf& leaf, std::size_t at) {
+        const auto& array = vdb::points::StringAttributeArray::cast(leaf.constAttributeArray(name));
+        const vdb::points::AttributeHandle<vdb::Index, vdb::points::StringCodec<false>> numbers(array);
+        for (vdb::Index k = 0; k < leaf.getLastValue(); ++k) {
+            const auto found = texts.find(numbers.get(k));
+            if (found == texts.end())
+                throw Error(fmt::format("the attribute \"{}\" has the text {}; there is none", name, numbers.get(k)));
+            values[at + k] = found->second;
+        }
+    });
+}
+
+// By OpenVDB's name of the type; matrices are not read.
 const std::map<std::string, ReadAttribute>& readers()
 {
     static const std::map<std::string, ReadAttribute> all = {
@@ -152,6 +174,10 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
             (type == "int32" ? read_attribute<std::int64_t, std::int32_t>
                              : read_attribute<std::int64_t, std::int64_t>)(points, ranges, name, name, 0);
             has_id = true;
+            continue;
+        }
+        if (vdb::points::isString(array) && array.stride() == 1) {
+            read_texts(points, ranges, name);
             continue;
         }
         const auto reader = readers().find(type);

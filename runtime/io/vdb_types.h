@@ -5,6 +5,7 @@
 
 #include <type_traits>
 
+#include "runtime/points/token.h"
 #include "runtime/vec.h"
 
 namespace rapid {
@@ -31,6 +32,12 @@ template <>
 struct VdbValue<Quatf> {
     using Type = openvdb::math::Quat<float>;
     static Type from(const Quatf& value) { return {value.x(), value.y(), value.z(), value.w()}; }
+};
+
+// A text is its number among those of the grid, from 1 on; 0 is the empty text.
+template <>
+struct VdbValue<Token> {
+    using Type = openvdb::Index;
 };
 
 // Rapid's value of an OpenVDB value, of any precision.

@@ -3,6 +3,7 @@
 // twice, and by all threads.
 #include <fmt/format.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointDataGrid.h>
 #include <openvdb/points/PointGroup.h>
@@ -19,6 +20,7 @@
 #include <limits>
 
 #include "runtime/files/output_stream.h"
+#include "runtime/io/text_table.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_order.h"
 #include "runtime/io/vdb_types.h"
@@ -55,15 +57,34 @@ PointDataTree::Ptr empty_tree(const PointSet& points)
     for (const auto& [name, column] : points.columns()) {
         if (name == "P") continue;
         std::visit(
-            [&, &attribute = name](const auto& c) {
-                using Value = typename VdbValue<std::decay_t<decltype(c[0])>>::Type;
-                vdb::points::appendAttribute(*tree, attribute,
-                                             vdb::points::TypedAttributeArray<Value>::attributeType());
+            [&, &attribute = name]<class T>(const Column<T>&) {
+                using Array = std::conditional_t<std::is_same_v<T, Token>, vdb::points::StringAttributeArray,
+                                                 vdb::points::TypedAttributeArray<typename VdbValue<T>::Type>>;
+                vdb::points::appendAttribute(*tree, attribute, Array::attributeType());
             },
             column);
     }
     vdb::points::appendGroups(*tree, points.group_names());
     return tree;
+}
+
+// Of each text its number in the grid's list.
+using TextNumbers = std::vector<vdb::Index>;  // by token
+
+// The grid's list of texts, in its metadata, in the order in which points have them.
+TextNumbers list_texts(PointDataTree& tree, const PointSet& points)
+{
+    TextNumbers numbers;
+    const std::vector<std::string> names = names_of_texts(points);
+    if (names.empty()) return numbers;
+    vdb::MetaMap& metadata = vdb::points::makeDescriptorUnique(tree)->getMetadata();
+    vdb::points::StringMetaInserter list(metadata);
+    for (const std::string& name : names)
+        for (const Token text : text_table(points.column<Token>(name)).texts) {
+            if (numbers.size() <= text.number) numbers.resize(std::size_t{text.number} + 1, 0);
+            if (text != Token()) numbers[text.number] = list.insert(std::string(text.text()));
+        }
+    return numbers;
 }
 
 // What a leaf holds of an attribute.
@@ -96,8 +117,16 @@ Attribute attribute_of_positions(const VdbOrder& order, double voxel)
     return result;
 }
 
+// A value as the file holds it.
 template <class T>
-Attribute attribute_of(const VdbOrder& order, const Column<T>& column)
+typename VdbValue<T>::Type value_in_file(const T& value, const TextNumbers&)
+{
+    return VdbValue<T>::from(value);
+}
+vdb::Index value_in_file(const Token& text, const TextNumbers& numbers) { return numbers[text.number]; }
+
+template <class T>
+Attribute attribute_of(const VdbOrder& order, const Column<T>& column, const TextNumbers& numbers)
 {
     using Value = typename VdbValue<T>::Type;
     Attribute result;
@@ -109,9 +138,9 @@ Attribute attribute_of(const VdbOrder& order, const Column<T>& column)
             if (std::memcmp(&values[order.place(leaf.first + k)], &first, sizeof(T)) != 0) return false;
         return true;
     };
-    result.copy = [&order, values = column.read()](const VdbLeaf& leaf, std::uint32_t n, char* to) {
+    result.copy = [&order, &numbers, values = column.read()](const VdbLeaf& leaf, std::uint32_t n, char* to) {
         for (std::uint32_t k = 0; k < n; ++k) {
-            const Value value = VdbValue<T>::from(values[order.place(leaf.first + k)]);
+            const Value value = value_in_file(values[order.place(leaf.first + k)], numbers);
             std::memcpy(to + k * sizeof value, &value, sizeof value);
         }
     };
@@ -141,14 +170,15 @@ Attribute attribute_of_groups(const VdbOrder& order, const std::vector<std::pair
 }
 
 // By their places in the leaf that defines them.
-std::vector<Attribute> attributes_of(const VdbOrder& order, double voxel, const AttributeSet& model)
+std::vector<Attribute> attributes_of(const VdbOrder& order, double voxel, const AttributeSet& model,
+                                     const TextNumbers& numbers)
 {
     const PointSet& points = order.points();
     std::vector<Attribute> attributes(model.size());
     for (const auto& [name, column] : points.columns())
-        attributes[model.find(name)] = name == "P"
-                                           ? attribute_of_positions(order, voxel)
-                                           : std::visit([&](const auto& c) { return attribute_of(order, c); }, column);
+        attributes[model.find(name)] =
+            name == "P" ? attribute_of_positions(order, voxel)
+                        : std::visit([&](const auto& c) { return attribute_of(order, c, numbers); }, column);
     std::map<std::size_t, std::vector<std::pair<int, Strided<std::uint8_t>>>> groups;  // by attribute
     for (const auto& [name, members] : points.groups()) {
         const AttributeSet::Descriptor::GroupIndex index = model.groupIndex(name);
@@ -479,13 +509,14 @@ void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame)
     try {
         const double voxel = std::ldexp(1.0, voxel_exponent(points));
         const PointDataTree::Ptr model = empty_tree(points);
+        const TextNumbers numbers = list_texts(*model, points);
         if (points.empty()) {
             PointDataGrid grid(model);
             write_grid(file, grid, voxel, frame);
         } else {
             const AttributeSet& defined = model->cbeginLeaf()->attributeSet();
             const VdbOrder order(points, voxel);
-            const std::vector<Attribute> attributes = attributes_of(order, voxel, defined);
+            const std::vector<Attribute> attributes = attributes_of(order, voxel, defined, numbers);
             LeafBuffers buffers(order, attributes, defined);
             const PointDataTree::Ptr tree = tree_of(order.leaves());
             PointGrid grid(tree, buffers, memory_of(*tree, buffers, defined));

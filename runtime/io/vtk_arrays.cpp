@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstring>
 #include <map>
@@ -167,6 +168,70 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
     return result;
 }
 
+std::size_t VtkFile::bytes_of(std::string_view text, bool base64) const
+{
+    const std::size_t number = wide_header_ ? 8 : 4;
+    const auto header = [&](std::size_t count) {
+        std::size_t length = 0;
+        if (base64) return from_base64(text, count * number, length);
+        if (count * number > text.size()) throw ends_early();
+        const auto* begin = reinterpret_cast<const unsigned char*>(text.data());
+        return std::vector<unsigned char>(begin, begin + count * number);
+    };
+    if (!compressed_) return header_number(header(1), 0);
+    const std::vector<unsigned char> sizes = header(3);
+    const std::size_t blocks = header_number(sizes, 0), block = header_number(sizes, 1), last = header_number(sizes, 2);
+    if (blocks > text.size() / number || block > text.size() * most_expansion) throw ends_early();
+    return blocks == 0 ? 0 : (blocks - 1) * block + (last > 0 ? last : block);
+}
+
+std::pair<std::string_view, bool> VtkFile::data_of(pugi::xml_node node, std::string_view text) const
+{
+    const std::string_view format = node.attribute("format").value();
+    if (format == "binary") return {text, true};
+    if (format != "appended")
+        throw Error(fmt::format("its format is \"{}\"; it must be ascii, binary or appended", format));
+    const std::optional<std::size_t> offset = whole_number(node.attribute("offset").value());
+    if (!offset || *offset > appended_.size()) throw Error("its offset leads out of the file");
+    return {appended_.substr(*offset), appended_base64_};
+}
+
+std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
+{
+    try {
+        const std::string_view text = without_space(node.text().get());
+        std::vector<unsigned char> bytes;
+        if (node.attribute("format").value() == std::string_view("ascii")) {
+            // The bytes as numbers.
+            std::size_t count = 0;
+            for (std::size_t i = 0; i < text.size(); ++i)
+                count += white_space.find(text[i]) == std::string_view::npos &&
+                         (i == 0 || white_space.find(text[i - 1]) != std::string_view::npos);
+            bytes = parsed_numbers(text, ScalarType::UInt8, count);
+        } else {
+            const auto [data, base64] = data_of(node, text);
+            const std::size_t size = bytes_of(data, base64);
+            if (!base64 && !compressed_) {
+                const std::span<const unsigned char> in_file = raw(data, size);
+                bytes.assign(in_file.begin(), in_file.end());
+            } else {
+                bytes = decode(data, base64, size);
+            }
+        }
+        std::vector<Token> texts;
+        for (auto at = bytes.begin(); texts.size() < rows;) {
+            const auto end = std::find(at, bytes.end(), 0);
+            if (end == bytes.end()) throw ends_early();
+            texts.push_back(token_of(std::string(at, end)));
+            at = end + 1;
+        }
+        return texts;
+    } catch (const Error& error) {
+        throw Error(
+            fmt::format("the array \"{}\" of {} texts: {}", node.attribute("Name").value(), rows, error.what()));
+    }
+}
+
 std::optional<VtkArray> VtkFile::array(pugi::xml_node node, std::size_t rows) const
 {
     if (!node) throw Error("an array is missing");
@@ -183,19 +248,13 @@ std::optional<VtkArray> VtkFile::array(pugi::xml_node node, std::size_t rows) co
         if (format == "ascii") {
             array.decoded = parsed_numbers(text, *type, rows * numbers);
             array.order = ByteOrder::Little;
-        } else if (format == "appended") {
-            const std::optional<std::size_t> offset = whole_number(node.attribute("offset").value());
-            if (!offset || *offset > appended_.size()) throw Error("its offset leads out of the file");
-            const std::string_view data = appended_.substr(*offset);
-            if (!appended_base64_ && !compressed_) {
+        } else {
+            const auto [data, base64] = data_of(node, text);
+            if (!base64 && !compressed_) {
                 array.bytes = raw(data, rows * row);
                 return array;
             }
-            array.decoded = decode(data, appended_base64_, rows * row);
-        } else if (format == "binary") {
-            array.decoded = decode(text, true, rows * row);
-        } else {
-            throw Error(fmt::format("its format is \"{}\"; it must be ascii, binary or appended", format));
+            array.decoded = decode(data, base64, rows * row);
         }
     } catch (const Error& error) {
         throw Error(fmt::format("the array \"{}\" of {} rows: {}", name, rows, error.what()));

@@ -8,9 +8,11 @@
 #include <pugixml.hpp>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "runtime/files/scalars.h"
+#include "runtime/points/token.h"
 
 namespace rapid {
 
@@ -32,11 +34,18 @@ public:
 
     const pugi::xml_document& document() const { return document_; }
 
+    // An array of so many texts, each ended by a 0. Error: it is not there, or holds fewer.
+    std::vector<Token> texts(pugi::xml_node node, std::size_t rows) const;
+
     // An array of so many rows; nothing for those that are no attribute: of text, of bits, of more than 16 numbers a
     // row. Error: an array that is not there, or holds less.
     std::optional<VtkArray> array(pugi::xml_node node, std::size_t rows) const;
 
 private:
+    // How many bytes the array holds whose data begin here.
+    std::size_t bytes_of(std::string_view text, bool base64) const;
+    // The data of an array that is in the XML or appended to it, and whether they are base64.
+    std::pair<std::string_view, bool> data_of(pugi::xml_node node, std::string_view text) const;
     // The bytes that `text` holds behind their count, as they are.
     std::span<const unsigned char> raw(std::string_view text, std::size_t wanted) const;
     // The same where they are encoded or compressed.

@@ -4,8 +4,9 @@
 //   <VTKFile type="PolyData" ...> ... <DataArray type="Float32" Name="v" ... offset="0"/> ... <AppendedData
 //   encoding="raw">_ | for each array: uint64 bytes, its numbers | </AppendedData></VTKFile>
 //
-// P is the Points, an attribute is an array of the PointData, a group UInt8 group_NAME. One cell of all points makes
-// them visible; the field TimeValue is the time of the frame, s. vtk_arrays.h has what is read.
+// P is the Points, an attribute of texts an Array of the type String (its bytes: each text and a 0), any other
+// attribute is an array of the PointData, a group UInt8 group_NAME. One cell of all points makes them visible; the
+// field TimeValue is the time of the frame, s. vtk_arrays.h has what is read.
 #include <fmt/format.h>
 
 #include <numeric>
@@ -26,6 +27,7 @@ constexpr std::string_view group_prefix = "group_";
 
 std::string_view vtk_type(AttributeType type)
 {
+    if (type == AttributeType::String) return "String";
     if (type == AttributeType::Int32) return "Int32";
     return type == AttributeType::Int64 ? "Int64" : "Float32";
 }
@@ -60,9 +62,12 @@ public:
         file.append(xml.data(), place);
         std::uint64_t at = file.appended();
         for (const Array& array : arrays_) {
-            const std::uint64_t bytes = array.records.record_bytes() * array.size;
+            const std::uint64_t bytes = array.bytes();
             file.write_at(at, &bytes, sizeof bytes);
-            array.records.write(file, at + sizeof bytes, array.size);
+            if (array.texts)
+                write_texts(file, at + sizeof bytes, *array.texts);
+            else
+                array.records.write(file, at + sizeof bytes, array.size);
             at += sizeof bytes + bytes;
         }
         file.write_at(at, xml.data() + place, xml.size() - place);
@@ -72,7 +77,29 @@ private:
     struct Array {
         RecordWriter records;
         std::size_t size;
+        const Column<Token>* texts = nullptr;
+
+        std::uint64_t bytes() const
+        {
+            if (!texts) return records.record_bytes() * size;
+            std::uint64_t sum = size;  // a 0 behind each
+            for (std::size_t i = 0; i < size; ++i) sum += (*texts)[i].text().size();
+            return sum;
+        }
     };
+
+    static void write_texts(OutputFile& file, std::uint64_t at, const Column<Token>& texts)
+    {
+        std::string piece;
+        for (std::size_t i = 0; i < texts.size(); ++i) {
+            piece += texts[i].text();
+            piece += '\0';
+            if (i + 1 < texts.size() && piece.size() < (std::size_t{1} << 20)) continue;
+            file.write_at(at, piece.data(), piece.size());
+            at += piece.size();
+            piece.clear();
+        }
+    }
 
     void describe(const FrameInfo& frame)
     {
@@ -123,19 +150,21 @@ private:
     {
         const std::size_t size = std::visit([](const auto& c) { return c.size(); }, column);
         const AttributeType type = type_of(column);
-        add(to, name, vtk_type(type), component_count(type), size).records.add(name, column);
+        Array& array = add(to, name, vtk_type(type), component_count(type), size);
+        if ((array.texts = std::get_if<Column<Token>>(&column)) == nullptr) array.records.add(name, column);
     }
 
     Array& add(pugi::xml_node to, const std::string& name, std::string_view type, std::size_t numbers, std::size_t size)
     {
         if (!arrays_.empty()) {
             const Array& before = arrays_.back();
-            offset_ += sizeof(std::uint64_t) + before.records.record_bytes() * before.size;
+            offset_ += sizeof(std::uint64_t) + before.bytes();
         }
-        pugi::xml_node array = to.append_child("DataArray");
+        pugi::xml_node array = to.append_child(type == "String" ? "Array" : "DataArray");
         array.append_attribute("type") = std::string(type).c_str();
         array.append_attribute("Name") = name.c_str();
         array.append_attribute("NumberOfComponents") = static_cast<unsigned>(numbers);
+        if (type == "String") array.append_attribute("NumberOfTuples") = static_cast<unsigned long long>(size);
         array.append_attribute("format") = "appended";
         array.append_attribute("offset") = static_cast<unsigned long long>(offset_);
         return arrays_.emplace_back(Array{RecordWriter(ByteOrder::Little, RecordWriter::Wide), size});
@@ -162,6 +191,8 @@ RecordAttribute attribute_of(const std::string& name, const VtkArray& array)
     for (std::size_t c = 0; c < array.numbers; ++c) attribute.offsets.push_back(c * scalar_bytes(array.type));
     return attribute;
 }
+
+Column<Token> text_column(const std::vector<Token>& texts) { return Column<Token>(std::span<const Token>(texts)); }
 
 pugi::xml_node only_piece(const pugi::xml_document& document)
 {
@@ -208,6 +239,16 @@ PointSet read_vtp(const std::filesystem::path& path)
         }
         names.emplace_back(node.attribute("Name").value());
         read(names.back(), *array);
+    }
+    for (const pugi::xml_node node : piece.child("PointData").children("Array")) {
+        const std::string name = node.attribute("Name").value();
+        if (node.attribute("type").value() != std::string_view("String") ||
+            node.attribute("NumberOfComponents").as_uint(1) != 1) {
+            LeftOut::add(fmt::format("the array \"{}\" of the type {}", name, node.attribute("type").value()));
+            continue;
+        }
+        names.push_back(name);
+        points.set(name, text_column(vtk.texts(node, *n)));
     }
     for (const auto& [count, what] : {std::pair("NumberOfLines", "lines"), std::pair("NumberOfStrips", "strips"),
                                       std::pair("NumberOfPolys", "polygons")})

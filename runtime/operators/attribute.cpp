@@ -9,29 +9,34 @@ namespace rapid {
 namespace {
 
 struct Attribute {
-    std::map<std::string, AttributeValue> values;
+    std::map<std::string, AttributeValue> values, attributes;
 
     static NodeType declare()
     {
         return node<Attribute>("attribute", "Gives attributes to points that do not have them; never overwrites.")
-            .rest(&Attribute::values, "value of points that have none: a number is a float, {x, y, z} a vec3");
+            .param(&Attribute::attributes, "attributes", Value(), any_number(), "",
+                   "those whose names are parameters of nodes: { name = \"\" }")
+            .rest(&Attribute::values,
+                  "value of points that have none: a number is a float, {x, y, z} a vec3, a text a string");
     }
 
     static std::unique_ptr<Operator> make() { return std::make_unique<PointEditOf<Attribute>>(); }
 
     void uses(Uses& uses) const
     {
-        for (const auto& [name, value] : values) {
-            uses.makes.push_back({name, value});
-            uses.defaults.push_back({name, value});
-        }
+        for (const auto* given : {&values, &attributes})
+            for (const auto& [name, value] : *given) {
+                uses.makes.push_back({name, value});
+                uses.defaults.push_back({name, value});
+            }
     }
 
     // No point is visited: those that exist have a value, or get it with the column.
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before&) const
     {
-        for (const auto& [name, value] : values)
-            if (now.keeps(name)) points.set_fallback({name, value});
+        for (const auto* given : {&values, &attributes})
+            for (const auto& [name, value] : *given)
+                if (now.keeps(name)) points.set_fallback({name, value});
         return nullptr;
     }
 };

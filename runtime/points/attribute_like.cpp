@@ -11,6 +11,7 @@ const AttributeSpec* conventional_attribute(std::string_view name)
         {"Cd", Vec3f(Vec3f::Ones())},
         {"N", Vec3f(Vec3f::Zero())},
         {"instance", std::int32_t{0}},
+        {"name", Token()},
         {"orient", Quatf(Quatf::Identity())},
         {"scale", Vec3f(Vec3f::Ones())},
     };
@@ -23,6 +24,8 @@ std::string text_of_making(const std::string& name)
 {
     const AttributeSpec* usual = conventional_attribute(name);
     if (!usual) return name + " = 0";
+    // A parameter of every node has this name, too.
+    if (type_of(usual->fallback) == AttributeType::String) return fmt::format("attributes = {{ {} = \"\" }}", name);
     const auto list = [&](const auto& value, auto... k) {
         std::string text;
         ((text += fmt::format("{}{:g}", text.empty() ? "" : ", ", value[k])), ...);

@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// The attributes whose types Houdini and its readers fix: Cd, Alpha, N, orient, scale, instance, with the value of
-// points without one. They are made as any other is. Null for any other name.
+// The attributes whose types Houdini and its readers fix: Cd, Alpha, N, orient, scale, instance, name, with the
+// value of points without one. They are made as any other is. Null for any other name.
 const AttributeSpec* conventional_attribute(std::string_view name);
 
 // How an attribute of this name is made by a node `attribute`: "Cd = {1, 1, 1}", "heat = 0".

@@ -28,7 +28,8 @@ Compaction Compaction::from_mask(std::span<const std::uint8_t> keep)
 
 std::string_view type_name(AttributeType type)
 {
-    constexpr std::string_view names[] = {"float", "vec3", "int32", "int64", "quat"};
+    constexpr std::string_view names[] = {"float", "vec3", "int32", "int64", "quat", "string"};
+    static_assert(std::size(names) == std::variant_size_v<AnyColumn>);
     return names[static_cast<std::size_t>(type)];
 }
 

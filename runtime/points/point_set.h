@@ -12,20 +12,9 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/points/column.h"
+#include "runtime/points/attribute_type.h"
 
 namespace rapid {
-
-using AnyColumn = std::variant<Column<float>, Column<Vec3f>, Column<std::int32_t>, Column<std::int64_t>, Column<Quatf>>;
-
-// The index of a type in AnyColumn; a scalar attribute's value in any of them fits AttributeValue.
-enum class AttributeType { Float, Vec3, Int32, Int64, Quat };
-using AttributeValue = std::variant<float, Vec3f, std::int32_t, std::int64_t, Quatf>;
-
-// "float", "vec3", "int32", "int64", "quat".
-std::string_view type_name(AttributeType type);
-inline AttributeType type_of(const AnyColumn& column) { return static_cast<AttributeType>(column.index()); }
-inline AttributeType type_of(const AttributeValue& value) { return static_cast<AttributeType>(value.index()); }
 
 // A column's name, type and the value of points that have none of their own.
 struct AttributeSpec {

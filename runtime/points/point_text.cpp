@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include "runtime/points/point_names.h"
+#include "runtime/printable.h"
 
 namespace rapid {
 namespace {
 
 std::string text_of(const Vec3f& x) { return fmt::format("{{{:g}, {:g}, {:g}}}", x.x(), x.y(), x.z()); }
 std::string text_of(const Quatf& q) { return fmt::format("{{{:g}, {:g}, {:g}, {:g}}}", q.x(), q.y(), q.z(), q.w()); }
+std::string text_of(Token x) { return fmt::format("\"{}\"", printable(x.text())); }
 std::string text_of(float x) { return fmt::format("{:g}", x); }
 template <class Whole>
 std::string text_of(Whole x)

@@ -64,6 +64,14 @@ void StateReader::finish() const
     if (done_ != state_.bytes.size()) fail();
 }
 
+void save(StateWriter& to, const Token& token) { to(std::string(token.text())); }
+void load(StateReader& from, Token& token)
+{
+    std::string text;
+    from(text);
+    token = token_of(text);
+}
+
 void save(StateWriter& to, const PointSet& points)
 {
     to(points.size(), points.columns(), points.groups(), points.details);
@@ -113,10 +121,8 @@ void load(StateReader& from, SavedState& state)
         std::uint32_t place = 0;
         from(type, place);
         const auto take = [&]<class T>(const Column<T>&) { any = from.column_at<T>(place); };
-        const KeptColumn of_type[] = {Column<float>(),        Column<Vec3f>(), Column<std::int32_t>(),
-                                      Column<std::int64_t>(), Column<Quatf>(), Column<std::uint8_t>()};
-        if (type >= std::size(of_type)) StateReader::fail();
-        std::visit(take, of_type[type]);
+        if (type >= std::variant_size_v<KeptColumn>) StateReader::fail();
+        std::visit(take, column_of_type<KeptColumn>(type));
     }
 }
 

@@ -3,15 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <variant>
 #include <vector>
 
-#include "runtime/points/column.h"
+#include "runtime/points/attribute_type.h"
 
 namespace rapid {
 
-using KeptColumn = std::variant<Column<float>, Column<Vec3f>, Column<std::int32_t>, Column<std::int64_t>, Column<Quatf>,
-                                Column<std::uint8_t>>;
+using KeptColumn = AttributeTypes::KeptColumn;
 
 struct SavedState {
     std::vector<char> bytes;

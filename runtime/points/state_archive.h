@@ -109,6 +109,10 @@ template <class T>
 requires is_number_or_vector<T>
 void load(StateReader& from, T& value) { from.read(static_cast<void*>(&value), sizeof value); }
 
+// By its text: another process has other numbers.
+void save(StateWriter& to, const Token& token);
+void load(StateReader& from, Token& token);
+
 // A byte that is neither 0 nor 1 would be no bool.
 inline void save(StateWriter& to, const bool& value) { save(to, static_cast<std::uint8_t>(value)); }
 inline void load(StateReader& from, bool& value)

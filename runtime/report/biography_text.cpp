@@ -24,6 +24,7 @@ std::string text_of(const AttributeValue& value)
     if (const auto* x = std::get_if<Vec3f>(&value)) return text_of_vector(*x);
     if (const auto* x = std::get_if<std::int32_t>(&value)) return std::to_string(*x);
     if (const auto* x = std::get_if<std::int64_t>(&value)) return std::to_string(*x);
+    if (const auto* x = std::get_if<Token>(&value)) return fmt::format("\"{}\"", x->text());
     const Quatf& q = std::get<Quatf>(value);
     return fmt::format("({:.6g}, {:.6g}, {:.6g}, {:.6g})", q.x(), q.y(), q.z(), q.w());
 }
@@ -40,6 +41,7 @@ ordered_json json_of(const AttributeValue& value)
     if (const auto* x = std::get_if<Vec3f>(&value)) return json_of_vector(*x);
     if (const auto* x = std::get_if<std::int32_t>(&value)) return *x;
     if (const auto* x = std::get_if<std::int64_t>(&value)) return *x;
+    if (const auto* x = std::get_if<Token>(&value)) return std::string(x->text());
     const Quatf& q = std::get<Quatf>(value);
     return {q.x(), q.y(), q.z(), q.w()};
 }

@@ -140,6 +140,44 @@ TEST_CASE("what is offered in C is taken", "[c]")
     rapid_scene_close(scene, nullptr);
 }
 
+TEST_CASE("a column of texts is of tokens in C, in both directions", "[c]")
+{
+    const float P[] = {0, 0, 0, 1, 0, 0};
+    std::uint32_t tokens[] = {0, 0};
+    REQUIRE(rapid_text_token("leaf", &tokens[1], nullptr) == RAPID_OK);
+    rapid_column columns[] = {sized<rapid_column>(), sized<rapid_column>()};
+    columns[0].name = "P";
+    columns[0].type = RAPID_FLOAT_VEC3;
+    columns[0].data = P;
+    columns[1].name = "name";
+    columns[1].type = RAPID_STRING;
+    columns[1].data = tokens;
+    rapid_offers* offers = nullptr;
+    REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+    REQUIRE(rapid_offers_points(offers, "two", 2, columns, 2, nullptr) == RAPID_OK);
+    rapid_options options = RAPID_OPTIONS;
+    options.offers = offers;
+    rapid_scene* scene = nullptr;
+    const char* text =
+        "local rapid = require 'rapid' return rapid.create { points = rapid.host 'two' }"
+        ":points('fall', function(p) if p.name == 'leaf' then p.name = 'fallen leaf' end end) :solve {}";
+    REQUIRE(rapid_scene_open_text("two.lua", text, &options, &scene, nullptr) == RAPID_OK);
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance_to(scene, 2, &frame, nullptr) == RAPID_OK);
+    auto names = sized<rapid_column>();
+    REQUIRE(rapid_frame_column(frame, "name", &names, nullptr) == RAPID_OK);
+    REQUIRE((names.type == RAPID_STRING && names.components == 1 && names.count == 2 && names.stride == 4));
+    const auto* found = static_cast<const std::uint32_t*>(names.data);
+    const char* name = nullptr;
+    REQUIRE(rapid_token_text(found[0], &name, nullptr) == RAPID_OK);
+    CHECK(std::string(name) == "");
+    REQUIRE(rapid_token_text(found[1], &name, nullptr) == RAPID_OK);
+    CHECK(std::string(name) == "fallen leaf");
+    rapid_frame_release(frame, nullptr);
+    rapid_scene_close(scene, nullptr);
+    rapid_offers_release(offers, nullptr);
+}
+
 TEST_CASE("wrong offers in C are errors by name", "[c]")
 {
     rapid_offers* offers = nullptr;

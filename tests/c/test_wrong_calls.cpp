@@ -259,6 +259,16 @@ const std::vector<Function>& functions()
              auto column = sized<rapid_column>();
              return rapid_frame_expanded(h.frame, "heat", &column, e);
          }},
+        {"rapid_token_text", "",
+         [](const Handles&, rapid_error** e) {
+             const char* text = nullptr;
+             return rapid_token_text(0, &text, e);
+         }},
+        {"rapid_text_token", "",
+         [](const Handles&, rapid_error** e) {
+             std::uint32_t token = 0;
+             return rapid_text_token("leaf", &token, e);
+         }},
         {"rapid_frame_detail", "f",
          [](const Handles& h, rapid_error** e) {
              rapid_value value{};
@@ -432,6 +442,11 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
         CHECK_THAT(rapid_error_text(error), Contains(what));
         rapid_error_free(error);
     };
+    const char* text = nullptr;
+    std::uint32_t token = 0;
+    refused("no text has the number 4000000000",
+            [&](rapid_error** e) { return rapid_token_text(4000000000u, &text, e); });
+    refused("no UTF-8", [&](rapid_error** e) { return rapid_text_token("\xff", &token, e); });
     const auto setting = [&](const char* name, rapid_value to) {
         return [=, &h](rapid_error** e) {
             const rapid_setting wrong = {name, to};

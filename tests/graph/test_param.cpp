@@ -210,8 +210,9 @@ TEST_CASE("attribute values are refused by the attribute's name", "[param]")
 {
     using Values = std::map<std::string, AttributeValue>;
     CHECK(refusal<Values>(list({1.0})) == "x = {1} has the wrong type; it must be attributes");
-    CHECK(refusal<Values>(named({{"heat", "hot"}})) ==
-          "heat = \"hot\" has the wrong type; it must be a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}");
+    CHECK(refusal<Values>(named({{"heat", true}})) ==
+          "heat = true has the wrong type; it must be a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a "
+          "text");
     CHECK(refusal<Values>(named({{"mass", list({1.0, 2.0, 3.0})}})) ==
           "mass = {1, 2, 3} has the wrong type; it must be a number");
     CHECK(refusal<Values>(named({{"targetv", 1.0}})) ==

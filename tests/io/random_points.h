@@ -16,7 +16,8 @@ struct RandomPoints {
     unsigned seed = 1;
     float extent = 2;  // m
     std::int64_t first_id = 0;
-    bool wide = true;  // an int64 attribute beside id
+    bool wide = true;   // an int64 attribute beside id
+    bool texts = true;  // attributes that are texts
 };
 
 inline PointSet random_points(const RandomPoints& wanted)
@@ -53,6 +54,14 @@ inline PointSet random_points(const RandomPoints& wanted)
     std::span<std::uint8_t> hot = points.group("hot").write();
     for (std::uint8_t& member : hot) member = random() % 5 == 0;
     points.group("nobody");
+    if (wanted.texts) {
+        points.add({"material", token_of("bark")});  // uniform
+        points.add({"name", Token()});
+        const std::string_view texts[] = {
+            "", "leaf", "a \"quoted\", comma", "two\nlines", "C:\\tmp", "Gr\u00fc\u00dfe \U0001f33f", "7"};
+        for (Token& text : points.column<Token>("name").write()) text = token_of(texts[random() % std::size(texts)]);
+        if (wanted.size > 0) points.column<Token>("name").write()[0] = token_of("leaf");
+    }
     return points;
 }
 

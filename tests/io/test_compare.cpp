@@ -1,5 +1,7 @@
 #include "runtime/io/compare.h"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "runtime/io/describe.h"
@@ -180,6 +182,36 @@ TEST_CASE("an integer and a float of equal value are the same, a vector and a sc
     b.add({"Cd", 1.0f});
     CHECK_FALSE(compare(a, b).same);
     CHECK_THAT(to_text(compare(a, b)), Catch::Contains("vec3 / float  can't be compared"));
+}
+
+TEST_CASE("texts are equal or not, whatever the order in which they came", "[io][compare]")
+{
+    PointSet a = diagonal_points(), b = a;
+    a.add({"name", token_of("leaf")});
+    b.add({"name", token_of("leaf")});
+    CHECK(compare(a, b).same);
+    b.column<Token>("name").write()[4] = token_of("bark");
+    const Comparison comparison = compare(a, b, 1);
+    CHECK_FALSE(comparison.same);
+    CHECK_THAT(to_text(comparison), Catch::Contains("name  string 1 differ (id 104 first)"));
+    b.set("name", Column<float>(b.size(), 1.0f));
+    CHECK_THAT(to_text(compare(a, b)), Catch::Contains("string / float  can't be compared"));
+}
+
+TEST_CASE("a description shows the texts of an attribute, in order, and how many there are", "[io][describe]")
+{
+    PointSet points = diagonal_points();
+    points.add({"name", token_of("leaf")});
+    CHECK_THAT(to_text(describe(points)), Catch::Contains("  name        string  \"leaf\" everywhere\n"));
+    points.column<Token>("name").write()[4] = token_of("bark");
+    CHECK_THAT(to_text(describe(points)), Catch::Contains("  name        string  \"bark\" \"leaf\"\n"));
+    for (std::size_t i = 0; i < points.size(); ++i)
+        points.column<Token>("name").write()[i] = token_of(fmt::format("t{:02}", i));
+    CHECK_THAT(to_text(describe(points)),
+               Catch::Contains("\"t00\" \"t01\"") && Catch::Contains("\"t07\" ... of 20 texts"));
+    const auto json = to_json(describe(points))["attributes"][3];
+    CHECK(json["texts"] == 20);
+    CHECK(json["first_texts"][0] == "t00");
 }
 
 TEST_CASE("names in a description are shown without what a terminal would take for commands", "[io][describe]")

@@ -39,7 +39,9 @@ TEST_CASE("points come back from .csv with the same bits", "[io][csv]")
     CAPTURE(size, extent);
     const TemporaryFolder folder;
     PointSet points = random_points({.size = size, .extent = extent, .first_id = std::int64_t{1} << 50});
-    if (size == 0) {  // an empty table does not say that these are integers
+    if (size == 0) {  // an empty table does not say that these are integers, or texts
+        points.remove("material");
+        points.remove("name");
         points.remove("hitnum");
         points.remove("serial");
     }
@@ -98,9 +100,9 @@ TEST_CASE("a .csv that can't be understood is an error that names the line", "[i
         std::ofstream(folder / "a.csv", std::ios::binary) << text;
         return error_of([&] { read_points(folder / "a.csv"); });
     };
-    CHECK_THAT(error("Px,Py,Pz\n1,2,3\n1,2\n"), Catch::EndsWith("line 3: there are 2 numbers; there must be 3"));
+    CHECK_THAT(error("Px,Py,Pz\n1,2,3\n1,2\n"), Catch::EndsWith("line 3: there are 2 values; there must be 3"));
     CHECK_THAT(error("Px,Py,Pz\n1,2,x\n"), Catch::EndsWith("line 2: Pz is not a number"));
-    CHECK_THAT(error("Px,Py,Pz\n1,2,3,4\n"), Catch::EndsWith("line 2: what follows 3 numbers can't be understood"));
+    CHECK_THAT(error("Px,Py,Pz\n1,2,3,4\n"), Catch::EndsWith("line 2: what follows 3 values can't be understood"));
     CHECK_THAT(error("a,b,c\n"), Catch::EndsWith("line 1: there are no columns Px,Py,Pz; the first line must name the "
                                                  "columns"));
     CHECK_THAT(
@@ -111,6 +113,24 @@ TEST_CASE("a .csv that can't be understood is an error that names the line", "[i
     CHECK_THAT(error("idx,idy,idz,Px,Py,Pz\n1,2,3,1,2,3\n"), Catch::EndsWith("is vec3; it must be int64"));
     CHECK_THAT(error("id,Px,Py,Pz\nnan,1,2,3\n"), Catch::EndsWith("the column id holds numbers that are not whole"));
     CHECK_THAT(error("id,Px,Py,Pz\n1.5,1,2,3\n"), Catch::EndsWith("the column id holds numbers that are not whole"));
+}
+
+TEST_CASE("a .csv of another program has texts with quotes or without, told by the first line", "[io][csv]")
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "a.csv", std::ios::binary) << "name,Px,Py,Pz,kind,heat\r\nleaf,1,2,3,\"a, \"\"b\"\"\",1\r\n"
+                                                         "\"two\nlines\",4,5,6,7,2\r\n,7,8,9,,3\r\n";
+
+    const PointSet points = read_points(folder / "a.csv");
+
+    REQUIRE(points.size() == 3);
+    const auto text = [&](const char* name, std::size_t i) { return points.column<Token>(name)[i].text(); };
+    CHECK(text("name", 0) == "leaf");
+    CHECK(text("name", 1) == "two\nlines");
+    CHECK(text("name", 2) == "");
+    CHECK(text("kind", 0) == "a, \"b\"");
+    CHECK(text("kind", 1) == "7");
+    CHECK(points.column<float>("heat")[2] == 3);
 }
 
 TEST_CASE("attributes whose columns would have one name can't be written to .csv or .ply", "[io][csv][ply]")

@@ -18,7 +18,7 @@ namespace {
 // Point i has been i % 4 places long.
 PointSet with_trails(std::size_t size)
 {
-    PointSet points = random_points({.size = size, .wide = false});
+    PointSet points = random_points({.size = size, .wide = false, .texts = false});
     for (const AttributeSpec& column : trail_columns(3)) points.add(column);
     const std::span<std::int32_t> count = points.column<std::int32_t>(trail_count_name).write();
     for (std::size_t i = 0; i < size; ++i) count[i] = static_cast<std::int32_t>(i % 4);
@@ -32,7 +32,7 @@ PointSet with_trails(std::size_t size)
 // 0 0 0 -1 2 2 -1: two lines, of three points and of two.
 PointSet with_curves()
 {
-    PointSet points = random_points({.size = 7, .wide = false});
+    PointSet points = random_points({.size = 7, .wide = false, .texts = false});
     const std::vector<std::int32_t> curves = {0, 0, 0, -1, 2, 2, -1};
     points.set(curve_attribute, Column<std::int32_t>(std::span<const std::int32_t>(curves)));
     return points;

@@ -46,13 +46,15 @@ TEST_CASE("numpy.load reads a .npz: an array of its type and shape for each attr
     points.add({"orient", Quatf(1, 0, 0, 0)});
     points.add({"pscale", 0.25f});
     points.add({"kind", std::int32_t{-3}});
+    points.add({"name", token_of("leaf")});
+    points.column<Token>("name").write()[1] = token_of("Gr\u00fc\u00dfe \U0001f33f");
     points.group("hot").write()[1] = 1;
 
     write_points(folder / "a.npz", points);
 
     CHECK(python(folder, R"(
 a = np.load("a.npz", allow_pickle=False)
-assert sorted(a.files) == ["P", "group_hot", "id", "kind", "orient", "pscale", "v"], a.files
+assert sorted(a.files) == ["P", "group_hot", "id", "kind", "name", "orient", "pscale", "v"], a.files
 i = np.arange(5000)
 def same(name, type, expected):
     x = a[name]
@@ -96,7 +98,8 @@ np.)" + save +
     CHECK(points.column<std::int64_t>("serial")[2] == std::int64_t{1} << 40);
     CHECK(points.group_names() == std::vector<std::string>{"hot"});
     CHECK(points.find_group("hot")->read()[3] == 1);
-    CHECK(points.column_names() == std::vector<std::string>{"Cd", "P", "id", "serial", "uv0", "uv1", "v"});
+    CHECK(points.column_names() == std::vector<std::string>{"Cd", "P", "id", "name", "serial", "uv0", "uv1", "v"});
+    CHECK(points.column<Token>("name")[2].text() == "c");
 }
 
 TEST_CASE("a damaged .npz is an error that says how", "[io][npz]")

@@ -150,7 +150,10 @@ def Xform "world" (
     CHECK(points.column<float>("heat")[1] == 2);
     CHECK(points.column<std::int32_t>("kind")[1] == 7);
     CHECK(points.find_group("wet")->read()[1] == 1);
-    CHECK(points.column_names() == std::vector<std::string>{"P", "heat", "id", "kind", "pscale", "uv0", "uv1", "v"});
+    CHECK(points.column_names() ==
+          std::vector<std::string>{"P", "heat", "id", "kind", "label", "pscale", "uv0", "uv1", "v"});
+    CHECK(points.column<Token>("label")[0].text() == "a]");
+    CHECK(points.column<Token>("label")[1].text() == "b\"");
     CHECK(points.id()[1] == 1);
 }
 

@@ -1,6 +1,7 @@
 // What Rapid writes of a grid by itself, against a grid that OpenVDB makes and writes as a whole.
 #include <fmt/format.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/points/PointDataGrid.h>
@@ -40,8 +41,20 @@ struct Positions {
     void getPos(std::size_t i, vdb::Vec3d& position) const { position = vdb::Vec3d(P[i].x(), P[i].y(), P[i].z()); }
 };
 
+void fill_array(AttributeArray& array, const Column<Token>& column, const std::vector<vdb::PointIndex32>& indices,
+                const vdb::MetaMap& texts)
+{
+    vdb::points::StringAttributeWriteHandle handle(array, texts);
+    const auto text = [&](vdb::Index32 i) { return std::string(column[i].text()); };
+    if (std::all_of(indices.begin(), indices.end(), [&](vdb::Index32 i) { return text(i) == text(indices[0]); }))
+        return handle.collapse(text(indices[0]));
+    handle.expand();
+    for (vdb::Index k = 0; k < indices.size(); ++k) handle.set(k, text(indices[k]));
+}
+
 template <class T>
-void fill_array(AttributeArray& array, const Column<T>& column, const std::vector<vdb::PointIndex32>& indices)
+void fill_array(AttributeArray& array, const Column<T>& column, const std::vector<vdb::PointIndex32>& indices,
+                const vdb::MetaMap&)
 {
     using Value = typename VdbValue<T>::Type;
     auto& typed = vdb::points::TypedAttributeArray<Value>::cast(array);
@@ -74,21 +87,32 @@ PointDataGrid::Ptr grid_of(const PointSet& points)
     for (const auto& named : points.columns()) {
         if (named.first == "P") continue;
         std::visit(
-            [&](const auto& c) {
-                using Value = typename VdbValue<std::decay_t<decltype(c[0])>>::Type;
-                vdb::points::appendAttribute(tree, named.first,
-                                             vdb::points::TypedAttributeArray<Value>::attributeType());
+            [&]<class T>(const Column<T>&) {
+                if constexpr (std::is_same_v<T, Token>)
+                    vdb::points::appendAttribute(tree, named.first, vdb::points::StringAttributeArray::attributeType());
+                else
+                    vdb::points::appendAttribute(
+                        tree, named.first,
+                        vdb::points::TypedAttributeArray<typename VdbValue<T>::Type>::attributeType());
             },
             named.second);
     }
     vdb::points::appendGroups(tree, points.group_names());
+    vdb::MetaMap& texts = vdb::points::makeDescriptorUnique(tree)->getMetadata();
+    vdb::points::StringMetaInserter list(texts);
+    for (const auto& named : points.columns())
+        if (const auto* column = std::get_if<Column<Token>>(&named.second))
+            for (std::size_t i = 0; i < points.size(); ++i)
+                if (!(*column)[i].text().empty()) list.insert(std::string((*column)[i].text()));
     const auto& descriptor = tree.cbeginLeaf()->attributeSet().descriptor();
     for (auto leaf = tree.beginLeaf(); leaf; ++leaf) {
         const auto& order = indices->tree().probeConstLeaf(leaf->origin())->indices();
         for (const auto& named : points.columns())
             if (named.first != "P")
                 std::visit(
-                    [&](const auto& c) { fill_array(leaf->attributeArray(descriptor.find(named.first)), c, order); },
+                    [&](const auto& c) {
+                        fill_array(leaf->attributeArray(descriptor.find(named.first)), c, order, texts);
+                    },
                     named.second);
         for (const auto& [name, members] : points.groups()) fill_group(leaf->groupWriteHandle(name), members, order);
     }

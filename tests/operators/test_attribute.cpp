@@ -91,8 +91,10 @@ TEST_CASE("attribute refuses illegal names and values", "[attribute]")
         CHECK(refusal(own, 1.0) ==
               fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", own));
     CHECK(refusal("2nd", 1.0) == "attribute name \"2nd\" can't be used; take letters, digits and _, no digit first");
-    CHECK(refusal("heat", "hot") ==
-          "heat = \"hot\" has the wrong type; it must be a number, a vec3 or {x, y, z}, or a quaternion {x, y, z, w}");
+    CHECK(refusal("heat", true) ==
+          "heat = true has the wrong type; it must be a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a "
+          "text");
+    CHECK(refusal("mass", "heavy") == "mass = \"heavy\" has the wrong type; it must be a number");
     CHECK(refusal("pscale", list({1.0, 1.0, 1.0})) == "pscale = {1, 1, 1} has the wrong type; it must be a number");
     CHECK(refusal("heat", std::numeric_limits<double>::quiet_NaN()) == "heat = nan is out of range; it must be finite");
     CHECK(refusal("hitnum", 0.5) == "hitnum = 0.5 is not whole; it must be an integer");

@@ -71,6 +71,18 @@ class Frames(unittest.TestCase):
         self.assertEqual((heat.shape, heat.strides), ((16,), (0,)))
         self.assertTrue((heat == 2).all())
 
+    def test_texts_are_arrays_of_str_and_categories(self):
+        cloud = rapid.from_numpy(numpy.zeros((4, 3)), name=numpy.array(["leaf", "bark", "leaf", ""]))
+        text = """local rapid = require "rapid"
+return rapid.create { points = rapid.host "cloud" } :attribute { material = "wood" }
+  :points("fall", function(p) if p.name == "leaf" then p.name = "fallen " .. p.name end end) :solve {}"""
+        frame = rapid.Scene("texts.lua", text=text, objects={"cloud": cloud}).advance_to(2)
+        self.assertEqual(list(frame["name"]), ["fallen leaf", "bark", "fallen leaf", ""])
+        self.assertEqual(list(frame["material"]), ["wood"] * 4)
+        names, places = frame.categories("name")
+        self.assertEqual(names, ["", "bark", "fallen leaf"])
+        self.assertEqual(list(places), [2, 1, 2, 0])
+
     def test_groups_and_details(self):
         frame = fall().advance_to(2)
         self.assertEqual(frame.groups, ["even"])
@@ -133,7 +145,8 @@ class Offers(unittest.TestCase):
     def test_arrays_of_the_wrong_shape(self):
         for P, columns in (([1, 2, 3], {}), (numpy.zeros((3, 2)), {}), (numpy.zeros((3, 3)), {"heat": numpy.zeros(4)}),
                            (numpy.zeros((3, 3)), {"heat": numpy.zeros((3, 5))}),
-                           (numpy.zeros((3, 3)), {"heat": numpy.array(["a", "b", "c"])})):
+                           (numpy.zeros((3, 3)), {"name": numpy.array(["a", "b"])}),
+                           (numpy.zeros((3, 3)), {"name": numpy.array([b"a", b"b", b"c"])})):
             with self.assertRaises(TypeError):
                 rapid.from_numpy(P, **columns)
         with self.assertRaisesRegex(rapid.Error, "nan"):

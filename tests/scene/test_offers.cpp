@@ -354,6 +354,9 @@ TEST_CASE("wrong offers are errors by name", "[offers]")
     CHECK_THAT(refused("cloud", points), Contains("P is nan at place 0"));
     points.columns = {{"P", ColumnType::Float, values}};
     CHECK_THAT(refused("cloud", points), Contains("it must be of vec3"));
+    const std::uint32_t unknown[] = {4'000'000'000};
+    points.columns = {{"P", ColumnType::Vec3, values}, {"name", ColumnType::String, unknown}};
+    CHECK_THAT(refused("cloud", points), Contains("P is nan") || Contains("no text has the number 4000000000"));
     points.columns = {{"mass", ColumnType::Vec3, values}};
     CHECK_THAT(refused("cloud", points), Contains("mass"));
 

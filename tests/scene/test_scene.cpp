@@ -107,6 +107,22 @@ TEST_CASE("groups and detail values are read", "[scene]")
     CHECK(std::get<double>(frame.details().at("count")) > 0);
 }
 
+TEST_CASE("a column of texts is of tokens, whose texts are told", "[scene]")
+{
+    Scene scene = opened(
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}}, name = {'leaf', ''} } } :solve "
+        "{}");
+    const SceneFrame frame = good(scene.advance());
+    const SceneColumn name = *frame.column("name");
+    REQUIRE(name.type == ColumnType::String);
+    CHECK(good(SceneFrame::text_of(*name.at<std::uint32_t>(0))) == "leaf");
+    CHECK(*name.at<std::uint32_t>(0) == good(SceneFrame::token_of("leaf")));
+    CHECK(*name.at<std::uint32_t>(1) == 0);
+    CHECK(SceneFrame::text_of(4'000'000'000).error().kind == SceneError::WrongCall);
+    CHECK(SceneFrame::token_of("\xff").error().kind == SceneError::WrongCall);
+}
+
 TEST_CASE("a column is not copied, and stays as it is while the scene goes on", "[scene]")
 {
     Scene scene = opened(cloud);

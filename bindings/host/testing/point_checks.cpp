@@ -15,6 +15,15 @@ std::string text_of(const Numbers& numbers)
     return fmt::format("{{{}}}", fmt::join(numbers.x, numbers.x + numbers.count, ", "));
 }
 
+template <class T>
+std::string text_of_value(const T& value)
+{
+    if constexpr (std::is_same_v<T, Token>)
+        return fmt::format("\"{}\"", value.text());
+    else
+        return text_of(numbers_of(value));
+}
+
 std::string point_text(const TestedPoints& points, std::size_t place)
 {
     return fmt::format("{}, point {} (id {})", points.source, place + 1, points.set.id()[place]);
@@ -29,8 +38,8 @@ std::optional<std::string> first_difference(const TestedPoints& a, const std::st
             const auto& values_b = std::get<std::decay_t<decltype(values_a)>>(column_b);
             for (std::size_t i = 0; i < values_a.size(); ++i)
                 if (std::memcmp(&values_a[i], &values_b[i], sizeof values_a[i]) != 0)
-                    return fmt::format("{}: {} is {} and {}", point_text(a, i), name, text_of(numbers_of(values_a[i])),
-                                       text_of(numbers_of(values_b[i])));
+                    return fmt::format("{}: {} is {} and {}", point_text(a, i), name, text_of_value(values_a[i]),
+                                       text_of_value(values_b[i]));
             return std::nullopt;
         },
         column_a);

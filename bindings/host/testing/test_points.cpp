@@ -81,13 +81,17 @@ int names(lua_State* L) { return push_names(L, points_at(L, 1).set.column_names(
 
 int group_names(lua_State* L) { return push_names(L, points_at(L, 1).set.group_names()); }
 
-// value(points, place from 1, name): the numbers of the value.
+// value(points, place from 1, name): the numbers of the value, or its text.
 int value(lua_State* L)
 {
     const TestedPoints& points = points_at(L, 1);
     const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
-    return std::visit([&](const auto& column) { return push(L, numbers_of(column[place])); },
-                      column_of(points, text_at(L, 3)));
+    const AnyColumn& any = column_of(points, text_at(L, 3));
+    if (const auto* texts = std::get_if<Column<Token>>(&any)) {
+        const std::string_view text = (*texts)[place].text();
+        return lua_pushlstring(L, text.data(), text.size()), 1;
+    }
+    return std::visit([&](const auto& column) { return push(L, numbers_of(column[place])); }, any);
 }
 
 const Column<std::uint8_t>& group_of(const TestedPoints& points, const std::string& name)
@@ -140,7 +144,9 @@ double folded(const std::string& what, double so_far, double x)
 // reduce(points, name, "min" | "max" | "mean"), for each number of the values. Without points: inf, -inf and NaN.
 int reduce(lua_State* L)
 {
-    const std::string what = text_at(L, 3);
+    const std::string what = text_at(L, 3), name = text_at(L, 2);
+    if (type_of(column_of(points_at(L, 1), name)) == AttributeType::String)
+        throw Error(fmt::format("the attribute \"{}\" is a string, which has no {}", name, what));
     const double start = what == "min"   ? std::numeric_limits<double>::infinity()
                          : what == "max" ? -std::numeric_limits<double>::infinity()
                                          : 0;
@@ -156,7 +162,7 @@ int reduce(lua_State* L)
                 for (int k = 0; k < result.count; ++k) result.x[k] /= static_cast<double>(column.size());
             return push(L, result);
         },
-        column_of(points_at(L, 1), text_at(L, 2)));
+        column_of(points_at(L, 1), name));
 }
 
 int push_fault(lua_State* L, const std::optional<std::string>& fault)

@@ -23,7 +23,8 @@ from ._offers import Constraint, Edit, Force, Held, Mesh, Points, Shape, from_nu
 __all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy"]
 __version__ = library.rapid_version().decode()
 
-_types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8]
+_types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8, numpy.uint32]
+_string = 6
 
 
 class _Handle:
@@ -88,13 +89,22 @@ class Frame:
 
     def __getitem__(self, name):
         """The column: shape (points,) of numbers, (points, 3) of vec3, (points, 4) of quaternions. It can't be written:
-        the run shares it."""
+        the run shares it. Of texts it is an array of str, which is a copy; categories() does without."""
         if name not in self.columns:
             try:
                 call("frame_column", self._handle.value, name.encode(), byref(sized(Column)))
             except Error as error:
                 raise KeyError(error.message) from None
         return self._array("frame_column", name)
+
+    def categories(self, name):
+        """Of a column of texts: a list of the different ones, in order, and for each point the place of its own."""
+        tokens, places = numpy.unique(self._array("frame_column", name, texts=False), return_inverse=True)
+        texts = [get("token_text", int(token), c_char_p()).value.decode() for token in tokens]
+        order = sorted(range(len(texts)), key=texts.__getitem__)
+        rank = numpy.empty(len(texts), numpy.int32)
+        rank[order] = numpy.arange(len(texts), dtype=numpy.int32)
+        return [texts[k] for k in order], rank[places]
 
     def group(self, name):
         """Of each point, whether it is in the group."""
@@ -136,9 +146,12 @@ class Frame:
         call("frame_names", self._handle.value, what, byref(lines))
         return lines.value.decode().split("\n") if lines.value else []
 
-    def _array(self, function, name):
+    def _array(self, function, name, texts=True):
         column = sized(Column)
         call(function, self._handle.value, name.encode(), byref(column))
+        if column.type == _string and texts:
+            different, places = self.categories(name)
+            return numpy.array(different or [""])[places]
         dtype = numpy.dtype(_types[column.type])
         shape = (column.count,) if column.components == 1 else (column.count, column.components)
         if column.count == 0:

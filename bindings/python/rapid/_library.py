@@ -3,7 +3,7 @@ import ctypes
 import ctypes.util
 import os
 import pathlib
-from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint64, c_void_p
+from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
 
 NUMBER, BOOLEAN, TEXT, VEC3 = range(4)
 STATUS = {1: "wrong call", 2: "wrong scene", 3: "failed frame", 4: "cancelled", 5: "too long", 6: "out of memory",
@@ -148,6 +148,8 @@ for _name, _types in {
         "frame_column": [c_void_p, c_char_p, POINTER(Column)],
         "frame_group": [c_void_p, c_char_p, POINTER(Column)],
         "frame_expanded": [c_void_p, c_char_p, POINTER(Column)],
+        "token_text": [c_uint32, _text],
+        "text_token": [c_char_p, POINTER(c_uint32)],
         "frame_detail": [c_void_p, c_char_p, POINTER(Value)],
         "frame_write": [c_void_p, c_char_p],
         "offers_new": [_handle],

@@ -4,11 +4,21 @@ from ctypes import byref, c_void_p
 
 import numpy
 
-from ._library import (Column, Distance, NodeCall, NodeColumn, NodeParameter, NodeType, Shape as ShapeStruct, call, sized,
+from ._library import (Column, Distance, NodeCall, NodeColumn, NodeParameter, NodeType, Shape as ShapeStruct, call, get, sized,
                        to_value)
 
 _types = {numpy.dtype(numpy.float32): {1: 0, 3: 1, 4: 4}, numpy.dtype(numpy.int32): {1: 2},
           numpy.dtype(numpy.int64): {1: 3}}
+
+
+_string = 6
+
+
+def _tokens(array):
+    """The library's numbers of texts."""
+    texts, places = numpy.unique(array, return_inverse=True)
+    tokens = [get("text_token", str(text).encode(), ctypes.c_uint32()).value for text in texts]
+    return numpy.array(tokens, numpy.uint32)[places]
 
 
 def _array(pointer, shape):
@@ -28,10 +38,14 @@ class Points:
             array = numpy.asarray(array)
             if array.dtype == numpy.float64:
                 array = array.astype(numpy.float32)
+            if array.dtype.kind == "U" and array.ndim == 1 and len(array) == self._count:
+                self._arrays[name] = (_tokens(array), _string)
+                continue
             width = 1 if array.ndim == 1 else array.shape[-1]
             if array.ndim not in (1, 2) or len(array) != self._count or width not in _types.get(array.dtype, {}):
                 raise TypeError(f"{name} is of shape {array.shape} and {array.dtype}; it must be of ({self._count},), "
-                                f"({self._count}, 3) or ({self._count}, 4), of floats, int32 or int64")
+                                f"({self._count}, 3) or ({self._count}, 4), of floats, int32 or int64, or "
+                                f"({self._count},) of str")
             self._arrays[name] = (numpy.ascontiguousarray(array), _types[array.dtype][width])
 
     def offer(self, offers, name, _held):
@@ -43,7 +57,7 @@ class Points:
 
 def from_numpy(P, **columns):
     """Points for a scene: P of shape (points, 3), and any other columns: of shape (points,), (points, 3) or, quaternions,
-    (points, 4). They are copied when they are offered."""
+    (points, 4); of texts, (points,) of str. They are copied when they are offered."""
     return Points(P, columns)
 
 

@@ -35,6 +35,13 @@ bool is_range(const Table& table)
            (vector(table.list[0]) && vector(table.list[1]));
 }
 
+bool is_choice(const Table& table)
+{
+    const auto is_text = [](const Value& value) { return value.get<std::string>() != nullptr; };
+    return !table.list.empty() && table.numbered.empty() && table.named.empty() &&
+           std::all_of(table.list.begin(), table.list.end(), is_text);
+}
+
 AttributeValue read_one(const Param& param, const Value& value)
 {
     AttributeValue read;
@@ -50,6 +57,9 @@ BirthValue read_ramp(const Param& param, const Table& table)
         if (!(at >= 0 && at <= 1) || (!result.keys.empty() && at <= result.keys.back().at))
             throw Error(fmt::format("{}: a key of the ramp is at {}; keys rise from 0 to 1", param.name, at));
         result.keys.push_back({at, read_one(param, entry.table()->list[1])});
+        if (std::holds_alternative<Token>(result.first()))
+            throw Error(fmt::format("{}: nothing is between two texts; a choice of them is a list: {{\"a\", \"b\"}}",
+                                    param.name));
         if (result.keys.back().value.index() != result.first().index())
             throw Error(fmt::format("{}: the keys of the ramp have values of two types", param.name));
     }
@@ -60,6 +70,11 @@ BirthValue read_birth_value(const Param& param, const Value& value)
 {
     const Table* table = value.table();
     if (table && is_ramp(*table)) return read_ramp(param, *table);
+    if (table && is_choice(*table)) {
+        BirthValue result;
+        for (const Value& text : table->list) result.keys.push_back({0, read_one(param, text)});
+        return result;
+    }
     if (!table || !is_range(*table)) return {{{0, read_one(param, value)}}};
     BirthValue result{{{0, read_one(param, table->list[0])}, {1, read_one(param, table->list[1])}}};
     if (const auto* low = std::get_if<std::int32_t>(&result.first())) {

@@ -1,9 +1,10 @@
 // The values of newborn points, by attribute: one for all; at random between two, {min, max}; or at random on a ramp,
-// {{0, first}, ..., {1, last}}, linear between its keys.
+// {{0, first}, ..., {1, last}}, linear between its keys; of texts {"a", "b", ...}, each as likely.
 //
 // A birth draws one number for each attribute, of the attribute's name: others change none of them.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <string>
@@ -54,12 +55,18 @@ T BirthValue::at(double u) const
         const double low = value(0), high = value(keys.size() - 1);
         if (counts) return static_cast<T>(low + std::floor(u * (high - low + 1)));
     }
+    if constexpr (std::is_same_v<T, Token>) {
+        const auto choice = static_cast<std::size_t>(u * static_cast<double>(keys.size()));
+        return value(std::min(choice, keys.size() - 1));
+    }
     if (keys.size() == 1 || u <= keys.front().at) return value(0);
     for (std::size_t k = 1; k < keys.size(); ++k) {
         if (u >= keys[k].at) continue;
         const double part = (u - keys[k - 1].at) / (keys[k].at - keys[k - 1].at);
         if constexpr (std::is_same_v<T, Quatf>)
             return value(k - 1).slerp(static_cast<float>(part), value(k));
+        else if constexpr (std::is_same_v<T, Token>)
+            return value(k);
         else if constexpr (std::is_arithmetic_v<T>)
             return static_cast<T>(value(k - 1) + part * (double(value(k)) - double(value(k - 1))));
         else

@@ -66,6 +66,10 @@ private:
                 else if constexpr (std::is_same_v<T, Quatf>)
                     throw Error(
                         fmt::format("on: \"{}\" is a quaternion, which can't be compared", comparison_.attribute));
+                else if constexpr (std::is_same_v<T, Token>)
+                    throw Error(fmt::format(
+                        "on: \"{0}\" is a text; test it with a function: on = function(p) return p.{0} == \"a\" end",
+                        comparison_.attribute));
                 else if (comparison_.axis >= 0)
                     throw Error(fmt::format("on: \"{}\" is a number and has no components", comparison_.attribute));
                 else

@@ -1,0 +1,119 @@
+#include "runtime/points/token.h"
+
+#include <fmt/format.h>
+#include <tbb/concurrent_vector.h>
+
+#include <limits>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include "runtime/memory_budget.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::size_t bytes_an_entry = 128;                // of a text, besides its characters
+constexpr std::size_t bytes_between_checks = 64ull << 20;  // smaller amounts are not asked for
+
+// The bytes of a character that begins so: 1 to 4; 0 for one that begins none.
+std::size_t length_of(unsigned char first)
+{
+    if (first < 0x80) return 1;
+    if (first < 0xc2) return 0;
+    return first < 0xe0 ? 2 : first < 0xf0 ? 3 : first < 0xf5 ? 4 : 0;
+}
+
+// RFC 3629: no longer than it has to be, no surrogates, nothing above U+10FFFF.
+bool is_utf8(std::string_view text)
+{
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+    for (std::size_t i = 0; i < text.size();) {
+        const unsigned char first = byte(i);
+        const std::size_t length = length_of(first);
+        if (length == 0 || length > text.size() - i) return false;
+        for (std::size_t k = 1; k < length; ++k)
+            if ((byte(i + k) & 0xc0) != 0x80) return false;
+        if (length > 2) {
+            const unsigned char second = byte(i + 1);
+            if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second > 0x9f)) return false;
+            if ((first == 0xf0 && second < 0x90) || (first == 0xf4 && second > 0x8f)) return false;
+        }
+        i += length;
+    }
+    return true;
+}
+
+// The beginning, with \xNN for what no terminal shows.
+std::string shown(std::string_view text)
+{
+    std::string result;
+    for (const char c : text.substr(0, 40))
+        result += c >= ' ' && c <= '~' ? std::string(1, c) : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    return result + (text.size() > 40 ? "..." : "");
+}
+
+class Table {
+public:
+    Table() { add(""); }
+
+    Token add(std::string_view text)
+    {
+        const std::lock_guard lock(mutex_);
+        if (const auto found = numbers_.find(text); found != numbers_.end()) return {found->second};
+        take(text.size() + bytes_an_entry);
+        const auto entry = texts_.emplace_back(text);
+        const auto number = static_cast<std::uint32_t>(entry - texts_.begin());
+        numbers_.emplace(*entry, number);
+        return {number};
+    }
+
+    // Texts stay where they are while others are added.
+    std::string_view operator[](std::uint32_t number) const { return texts_[number]; }
+    std::size_t size() const { return texts_.size(); }
+
+private:
+    void take(std::size_t bytes)
+    {
+        if (texts_.size() > std::numeric_limits<std::uint32_t>::max())
+            throw Error("attributes have more than 2^32 different texts; numbers tell points apart: use them");
+        unchecked_ += bytes;
+        if (unchecked_ < bytes_between_checks) return;
+        const auto next = static_cast<double>(std::exchange(unchecked_, 0)) + bytes_between_checks;
+        if (!fits_in_memory(next))
+            throw beyond_memory(fmt::format("{} different texts of attributes", texts_.size()), next,
+                                "tell points apart by numbers");
+    }
+
+    std::mutex mutex_;
+    tbb::concurrent_vector<std::string> texts_;  // by number
+    std::unordered_map<std::string_view, std::uint32_t> numbers_;
+    std::size_t unchecked_ = 0;  // bytes since memory was last asked for
+};
+
+// Never destroyed: columns of other static objects may outlive it.
+Table& table()
+{
+    static Table& all = *new Table;
+    return all;
+}
+
+}  // namespace
+
+Token token_of(std::string_view text)
+{
+    if (text.empty()) return Token();
+    if (!is_utf8(text) || text.find('\0') != std::string_view::npos)
+        throw Error(fmt::format("the text \"{}\" of an attribute is no UTF-8 without zeros", shown(text)));
+    return table().add(text);
+}
+std::string_view Token::text() const { return number == 0 ? std::string_view("") : table()[number]; }
+Token token_of_number(std::uint32_t number)
+{
+    if (number >= table().size())
+        throw Error(fmt::format("no text has the number {}; rapid_text_token() gives those that there are", number));
+    return {number};
+}
+
+}  // namespace rapid

@@ -1,0 +1,60 @@
+#include "runtime/io/text_table.h"
+
+#include "runtime/io/format.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/io/random_points.h"
+#include "tests/test.h"
+
+using namespace rapid;
+using namespace rapid::test;
+
+namespace {
+
+Column<Token> column_of(const std::vector<std::string>& texts)
+{
+    std::vector<Token> tokens;
+    for (const std::string& text : texts) tokens.push_back(token_of(text));
+    return Column<Token>(std::span<const Token>(tokens));
+}
+
+}  // namespace
+
+TEST_CASE("a table of texts is in the order of the points, not in that in which texts came", "[io][texts]")
+{
+    for (const char* first : {"late", "middle", "early"}) token_of(first);
+    const TextTable table = text_table(column_of({"early", "middle", "early", "", "late"}));
+    std::vector<std::string> texts;
+    for (const Token text : table.texts) texts.emplace_back(text.text());
+    CHECK(texts == std::vector<std::string>{"early", "middle", "", "late"});
+    CHECK(same_bits(texts_at(table.texts, table.places), column_of({"early", "middle", "early", "", "late"})));
+    CHECK(text_table(Column<Token>(3, token_of("a"))).places.is_uniform());
+    CHECK(text_table(Column<Token>()).texts.empty());
+}
+
+TEST_CASE("a place of -1 is the empty text, and one beyond the table is an error", "[io][texts]")
+{
+    const std::vector<Token> texts = {token_of("leaf")};
+    const auto column = [&](const std::vector<std::int32_t>& places) {
+        return texts_at(texts, Column<std::int32_t>(std::span<const std::int32_t>(places)));
+    };
+    CHECK(same_bits(column({0, -1}), column_of({"leaf", ""})));
+    CHECK(error_of([&] { column({0, 1}); }) == "a point has the text 1; there are 1");
+    CHECK(error_of([&] { column({-2, 0}); }) == "a point has the text -2; there are 1");
+}
+
+TEST_CASE("each format that holds texts gives them back; the others leave them out, and all else is there",
+          "[io][texts]")
+{
+    const PointSet points = random_points({.size = 300, .wide = false});
+    int with_texts = 0;
+    for (const Format& format : formats()) {
+        if (!format.read || format.places_alone) continue;
+        CAPTURE(format.extension);
+        const TemporaryFolder folder;
+        const std::filesystem::path file = folder.path() / ("a" + format.extension);
+        write_points(file, points);
+        CHECK(differing_columns(format.holds_texts ? points : without_texts(points), read_points(file)) == "");
+        with_texts += format.holds_texts;
+    }
+    CHECK(with_texts == 6);
+}

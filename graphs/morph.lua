@@ -1,6 +1,6 @@
 -- morph: a ball of points becomes a knot.
 --
--- Shows:  :assign_goals by the nearest place, :goal with a stagger, and a node before it that leads points astray.
+-- Shows:  :goal to a mesh, each point at its own time, and a node before it that leads points astray.
 -- Proves: at 3.5 s each point is at rest at a place of its own on the knot (tests/graphs/test_morph.lua).
 -- Run:    rapid run graphs/morph.lua -f 1-108 -o /tmp/morph.mp4
 local rapid = require "rapid"
@@ -28,17 +28,14 @@ for k = 0, rows - 1 do
 end
 
 return rapid.create { fps = 24, seed = 9 }
-  :emit         { source = rapid.shape.sphere { radius = 0.7, center = {0, 1.08, 0} }, impulse = { [1] = count },
-                  attributes = { place = 0, Cd = {1, 1, 1}, pscale = 0.015 } }
-  :emit         { source = rapid.mesh.from { points = points, faces = faces }, impulse = { [2] = count },
-                  attributes = { place = 1 } }
-  :group        { name = "places", where = function(p) return p.place == 1 end }
-  :assign_goals { from = "places", by = "nearest" }
-  :wander       { speed = 0.5, size = 0.6, response = 0.3 }
-  :goal         { start = 1, time = 1.5, stagger = 1, group = "assigned" }
-  :points       ("colour", function(p)
+  :emit    { source = rapid.shape.sphere { radius = 0.7, center = {0, 1.08, 0} }, impulse = { [1] = count },
+             attributes = { Cd = {1, 1, 1}, pscale = 0.015 } }
+  :wander  { speed = 0.5, size = 0.6, response = 0.3 }
+  :goal    { to = rapid.mesh.from { points = points, faces = faces }, by = "random",
+             start = 1, time = 1.5, stagger = 1 }
+  :points  ("colour", function(p)
       local way = (p.goal - p.P):length()
       p.Cd = vec3(1, 0.55, 0.15):lerp(vec3(0.15, 0.5, 1), rapid.math.smoothstep(0, 0.8, way))
     end)
-  :solve        {}
-  :picture      { emitters = false, camera = rapid.camera { position = {0, 2.6, 4}, target = {0, 1.08, 0} } }
+  :solve   {}
+  :picture { emitters = false, camera = rapid.camera { position = {0, 2.6, 4}, target = {0, 1.08, 0} } }

@@ -1,6 +1,6 @@
 -- swarm: fireflies wind their way through pillars to a lamp, and there become a ring.
 --
--- Shows:  :look_ahead, :arrive, :assign_goals and :goal, in one chain; places to go to that are born on a mesh.
+-- Shows:  :look_ahead, :arrive and :goal, in one chain.
 -- Proves: nobody touches a pillar, and everybody is on the ring at 4.5 s (tests/graphs/test_swarm.lua).
 -- Run:    rapid run graphs/swarm.lua -f 1-120 -o /tmp/swarm.####.png
 local rapid = require "rapid"
@@ -11,9 +11,7 @@ local ring = rapid.mesh.torus { radius = 0.7, tube = 0.08, center = {3, 0.8, 0} 
 local swarm = rapid.create { fps = 24, seed = 9 }
   :emit       { source = rapid.shape.box { size = {0.6, 1.2, 2.4}, center = {-3.4, 0.8, 0} }, from = "volume",
                 impulse = { [1] = count }, velocity = {2, 0, 0}, spread = 15,
-                attributes = { place = 0, Cd = {0.5, 1, 0.4}, pscale = 0.012 } }
-  :emit       { source = ring, impulse = { [73] = count }, attributes = { place = 1 } } -- at 3 s
-  :group      { name = "places", where = function(p) return p.place == 1 end }
+                attributes = { Cd = {0.5, 1, 0.4}, pscale = 0.012 } }
   :arrive     { target = {3, 0.8, 0}, speed = 2.4, radius = 0.8, response = 1.2 }
 
 for k = 0, 8 do
@@ -25,7 +23,6 @@ for k = 0, 8 do
 end
 
 return swarm
-  :assign_goals { from = "places", by = "random" }
-  :goal         { group = "assigned", start = 3, time = 1, stagger = 0.5 }
-  :points       ("glow", function(p) p.Cd = vec3(0.5, 1, 0.4):lerp(vec3(1, 0.6, 0.2), (p.P.x + 3) / 6) end)
-  :solve        {}
+  :goal   { to = ring, by = "random", start = 3, time = 1, stagger = 0.5 }
+  :points ("glow", function(p) p.Cd = vec3(0.5, 1, 0.4):lerp(vec3(1, 0.6, 0.2), (p.P.x + 3) / 6) end)
+  :solve  {}

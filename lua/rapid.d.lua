@@ -706,17 +706,6 @@ function Node:align_to_velocity(params) end
 ---@return rapid.Node
 function Node:arrive(params) end
 
----@class rapid.params.assign_goals
----@field by? "id"|"nearest"|"random"|fun(frame: rapid.Frame): "id"|"nearest"|"random"  who gets which [string, one of id, nearest, random, default "id"]
----@field from string|fun(frame: rapid.Frame): string  the group of the points that are places [string, required]
----@field into? string  who has a place is put into this group [name of a group, default "assigned"]
----@field name? string  what the node is called in messages [string]
-
----Gives points places to go to: the points of a group, which it removes.
----@param params rapid.params.assign_goals
----@return rapid.Node
-function Node:assign_goals(params) end
-
 ---@class rapid.params.attract
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field center? rapid.Place|rapid.Attribute|fun(frame: rapid.Frame): rapid.Place  where to [vec3, m, default {0, 0, 0}, takes rapid.attr]
@@ -732,8 +721,9 @@ function Node:assign_goals(params) end
 function Node:attract(params) end
 
 ---@class rapid.params.attribute
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  those whose names are parameters of nodes: { name = "" } [attributes]
 ---@field name? string  what the node is called in messages [string]
----@field [string] number|number[]|rapid.Vec3  value of points that have none: a number is a float, {x, y, z} a vec3
+---@field [string] number|number[]|rapid.Vec3|string  value of points that have none: a number is a float, {x, y, z} a vec3, a text a string
 
 ---Gives attributes to points that do not have them; never overwrites.
 ---@param params? rapid.params.attribute
@@ -905,7 +895,7 @@ function Node:drag(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  turns velocity and speed together, uniformly in a cone of this half angle [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it they live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  the newborn join this group [string]
----@field attributes? table<string, number|rapid.Vec3|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they go before the source's own [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they go before the source's own [attributes]
 ---@field source_group? string  of a node: only its points in this group bear; of a mesh: only its faces in this group [string]
 ---@field on? string|fun(p: rapid.Point, frame: rapid.Frame): any  of a node: births at an event, count of each (1), not all the time: "hit", "death", "birth", when a comparison of an attribute with a number ("age > 0.5", "P.y < 0") begins to hold, or a function of a point begins to be true [event or function of a point]
 ---@field min_speed? number|fun(frame: rapid.Frame): number  with on = "hit": the least speed of approach [number, m/s, at least 0]
@@ -973,17 +963,18 @@ function Node:follow_curve(params) end
 function Node:follow_leader(params) end
 
 ---@class rapid.params.goal
----@field clock? "scene"|"age"|fun(frame: rapid.Frame): "scene"|"age"  what start is counted by [string, one of scene, age, default "scene"]
----@field hold? boolean|fun(frame: rapid.Frame): boolean  points stay at their places afterwards [boolean, default true]
----@field stagger? number|fun(frame: rapid.Frame): number  each begins by up to this later, at random [number, s, at least 0, default 0]
+---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
+---@field to rapid.Mesh|rapid.Shape|rapid.Points|rapid.Attribute|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Points|rapid.Attribute  a mesh, a shape or points, at rest or moving; or rapid.attr "NAME", a vec3 of each point's own [mesh, shape, points or rapid.attr, required]
+---@field by? "id"|"nearest"|"random"  which place a point gets: by its id (a point's, or a mesh's vertex), at random, or the nearest: of points one that is free [string, one of id, nearest, random, default "id"]
 ---@field start? number|fun(frame: rapid.Frame): number  when the way begins [number, s, default 0]
 ---@field time? number|fun(frame: rapid.Frame): number  that each point takes [number, s, at least 1e-06, default 1]
----@field to? string  a vec3: each point's place; :assign_goals gives them out [name of an attribute, default "goal"]
----@field group? string  acts on this group only [string]
+---@field stagger? number|fun(frame: rapid.Frame): number  each begins by up to this later, at random [number, s, at least 0, default 0]
+---@field clock? "scene"|"age"  what start is counted by [string, one of scene, age, default "scene"]
+---@field hold? boolean|fun(frame: rapid.Frame): boolean  points stay at their places afterwards [boolean, default true]
 ---@field name? string  what the node is called in messages [string]
 
 ---Takes points to places of their own in a given time.
----@param params? rapid.params.goal
+---@param params rapid.params.goal
 ---@return rapid.Node
 function Node:goal(params) end
 
@@ -1123,17 +1114,6 @@ function Node:look_ahead(params) end
 ---@param ... rapid.Node|rapid.params.merge
 ---@return rapid.Node
 function Node:merge(...) end
-
----@class rapid.params.nearest_place
----@field into? string  a vec3, for the place [name of an attribute, default "goal"]
----@field shape rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  a shape, a level set or a mesh, at rest, moving or deforming [shape at rest or moving, required]
----@field group? string  acts on this group only [string]
----@field name? string  what the node is called in messages [string]
-
----Writes the nearest place of a surface to an attribute.
----@param params rapid.params.nearest_place
----@return rapid.Node
-function Node:nearest_place(params) end
 
 ---@class rapid.params.picture
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]

@@ -57,6 +57,7 @@ std::string lua_type(const Param& param)
          "rapid.Place[]|rapid.Points|fun(frame: rapid.Frame): rapid.Place[]|rapid.Points"},
         {"mesh, level set, shape, fog, curve, points or node",
          "rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Node"},
+        {"mesh, shape, points or rapid.attr", "rapid.Mesh|rapid.Shape|rapid.Points|rapid.Attribute"},
         {"motion", "rapid.Motion"},
         {"camera", "rapid.Camera|table<integer, rapid.Camera>"},
         {"name of a group", "string"},

@@ -18,6 +18,16 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
           :delete { where = function(p) return p.P.y < -0.4 end }
           :attribute { pscale = 0.01 } :trail { places = 3 } :picture { shutter = 0.5 }
           :solve { substeps = 2 })"},
+    {"places that points have taken, and texts", R"(
+        return rapid.create { fps = 24, seed = 3 }
+          :emit { source = rapid.mesh.sphere {}, rate = 150, life = {0.2, 0.4}, attributes = { name = {"a", "b"} } }
+          :points("grow", function(p, frame) if p:rand(1, frame) < 0.2 then p.name = p.name .. frame.number end end)
+          :goal { to = rapid.points.grid { size = {1, 1, 1}, spacing = 0.25 }, by = "nearest", time = 0.5, stagger = 0.2,
+                  clock = "age" }
+          :goal { to = rapid.mesh.box {}:transform(function(frame) return rapid.rotate({0, 1, 0}, frame.number ^ 2) end),
+                  by = "random", group = "few" }
+          :group { name = "few", where = function(p) return p.name:sub(1, 1) == "b" end }
+          :solve {})"},
     {"sources that move, and sets of points that are another at each frame", R"(
         local moving = function(frame)
           local places = {}

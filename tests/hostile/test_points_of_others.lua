@@ -49,7 +49,9 @@ local moving = rapid.shape.sphere { radius = 0.5 }:transform { [1] = rapid.trans
         ":attract { shape = sheet }", ":attract { shape = turning }", ":attract { shape = ball }",
         ":spring { target = turning }", ":spring { target = ball }",
         ":collide { shape = moving, response = 'stick' }", ":collide { shape = ball, response = 'stick' }",
-        ":nearest_place { shape = turning }", ":curve_force { curve = {{0, 0, 0}, {1, 0, 0}} }",
+        ":goal { to = turning, by = 'nearest' }", ":goal { to = ball, by = 'nearest' }", ":goal { to = sheet }",
+        ":goal { to = rapid.points.from { P = {{0, 0, 0}} }, by = 'nearest' }",
+        ":curve_force { curve = {{0, 0, 0}, {1, 0, 0}} }",
         ":points('k', function(p) p.v = p.v * turning:distance(p.P) end)", ":trail { places = 3 } :picture {}" } do
         folder:write("scene.lua", shapes .. 'return rapid.create { points = rapid.points.read "points.csv" } ' ..
           node .. " :solve {}\n")

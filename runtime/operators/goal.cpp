@@ -1,0 +1,148 @@
+// goal: each point travels to a place, and is there, at rest, when its time is over.
+//
+//   P(u) = P + d (3u² - 2u³) + v T (u - 2u² + u³)            d = to - P;  T: the time that is left;  u = t / T
+//
+// The cubic from where the point is, at its velocity, to rest at its place, is made anew at each frame: with no other
+// force it is the same each time, and what another force did in a frame before the last is made good; a place that
+// moves is headed for as it is at the end of the frame. A kick and a constant acceleration take Solve to the cubic's
+// place and velocity at the frame's end. A force that acts in the last frame, or while the point is held, moves it by a
+// dt²/2.
+#include <algorithm>
+#include <optional>
+
+#include "runtime/graph/node.h"
+#include "runtime/operators/goal/goal_target.h"
+#include "runtime/parallel.h"
+#include "runtime/points/members.h"
+#include "runtime/points/per_point.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::uint64_t stagger_use = 26;
+
+struct Goal {
+    GoalTarget to;
+    std::string by, clock, group;
+    double start, time, stagger;
+    bool hold;
+
+    static NodeType declare()
+    {
+        return node<Goal>("goal", "Takes points to places of their own in a given time.")
+            .reads("P")
+            .writes("v")
+            .takes("mass")
+            .param(&Goal::to, "to", Value(), any_number(), "",
+                   "a mesh, a shape or points, at rest or moving; or rapid.attr \"NAME\", a vec3 of each point's own")
+            .required()
+            .param(&Goal::by, "by", "id", any_number(), "",
+                   "which place a point gets: by its id (a point's, or a mesh's vertex), at random, or the nearest: of "
+                   "points one that is free")
+            .choices({"id", "nearest", "random"})
+            .constant()
+            .param(&Goal::start, "start", 0.0, any_number(), "s", "when the way begins")
+            .param(&Goal::time, "time", 1.0, at_least(1e-6), "s", "that each point takes")
+            .param(&Goal::stagger, "stagger", 0.0, at_least(0), "s", "each begins by up to this later, at random")
+            .param(&Goal::clock, "clock", "scene", any_number(), "", "what start is counted by")
+            .choices({"scene", "age"})
+            .constant()
+            .param(&Goal::hold, "hold", true, any_number(), "", "points stay at their places afterwards");
+    }
+
+    void uses(Uses& uses) const
+    {
+        uses.reads.push_back("force");
+        uses.writes.push_back("force");
+        if (clock == "age") uses.reads.push_back("age");
+        if (!to.object) {
+            uses.reads.push_back(to.attribute);
+            return;
+        }
+        uses.makes.push_back({"goal", Vec3f(Vec3f::Zero())});
+        uses.reads.push_back("goal");
+        uses.writes.push_back("goal");
+        if (!to.is_taken(by)) return;
+        uses.makes.push_back({goal_number, std::int64_t{-1}});
+        uses.reads.push_back(goal_number);
+        uses.writes.push_back(goal_number);
+    }
+
+    void check() const
+    {
+        if (to.object) GoalPlaces(to, by);
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        Flow flow = std::move(inputs[0]);
+        PointSet& points = flow.points;
+        const Strided<std::uint8_t> members = members_of(points, group);
+        if (to.object) find_places(points, members, flow.simulation->clock(), now);
+        const Strided<Vec3f> goal = std::as_const(points).column<Vec3f>(to.object ? "goal" : to.attribute).read();
+        const Strided<std::int64_t> id = std::as_const(points).id().read();
+        const Strided<Vec3f> P = std::as_const(points).P().read();
+        const Strided<float> mass = masses_of(points);
+        const Column<float>* own = std::as_const(points).find<float>("dt");
+        const Column<float>* age = clock == "age" ? &std::as_const(points).column<float>("age") : nullptr;
+        const std::span<Vec3f> v = points.v().write(), force = points.column<Vec3f>("force").write();
+        for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                if (!members[i]) continue;
+                const double dt = own ? double{(*own)[i]} : now.frame.dt;
+                const double since = (age ? double{(*age)[i]} : now.frame.time - dt) - start -
+                                     stagger * uniform4(now.random, static_cast<std::uint64_t>(id[i]), stagger_use)[0];
+                const std::optional<double> left = time_left(since, dt);
+                if (left) go(goal[i].cast<double>() - P[i].cast<double>(), *left, dt, double{mass[i]}, v[i], force[i]);
+            }
+        });
+        return flow;
+    }
+
+private:
+    // s, from the beginning of the frame; a way that begins within it is begun with it, and ends in time. Nothing: the
+    // point is not on its way.
+    std::optional<double> time_left(double since, double dt) const
+    {
+        // dt is a float: a way that begins with the next frame is not begun.
+        if (!(dt > 0) || since + dt <= 1e-4 * dt) return std::nullopt;
+        const double left = time - std::max(since, 0.0);
+        if (left <= 1e-6 * time && !hold) return std::nullopt;
+        return left;
+    }
+
+    // d: from the point to its place.
+    static void go(const Vec3d& d, double left, double dt, double mass, Vec3f& v, Vec3f& force)
+    {
+        const double u = left > dt ? dt / left : 1;
+        const Vec3d before = v.cast<double>();
+        Vec3d way = d * (u * u * (3 - 2 * u)), after = Vec3d::Zero();
+        if (u < 1) {
+            way += before * (dt * (1 - u) * (1 - u));
+            after = d * (6 * u * (1 - u) / left) + before * ((1 - u) * (1 - 3 * u));
+        }
+        v = (way * (2 / dt) - after).cast<float>();
+        force += ((after - v.cast<double>()) * (mass / dt)).cast<float>();
+    }
+
+    void find_places(PointSet& points, Strided<std::uint8_t> members, const FrameClock& of, const Evaluation& now)
+    {
+        if (known_ != to.object) {
+            known_ = to.object;
+            places_ = GoalPlaces(to, by);
+        }
+        points.add({"goal", Vec3f(Vec3f::Zero())});
+        if (to.is_taken(by)) points.add({goal_number, std::int64_t{-1}});
+        Column<Vec3f> column = points.column<Vec3f>("goal");
+        places_->find(points, members, of, now, column.write());
+        points.set("goal", std::move(column));
+    }
+
+    // Of the target of the last frame; a cache.
+    ObjectPtr known_;
+    std::optional<GoalPlaces> places_;
+};
+RAPID_NODE(Goal);
+
+}  // namespace
+}  // namespace rapid

@@ -1,0 +1,284 @@
+#include "runtime/operators/goal/goal_target.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "runtime/operators/goal/free_places.h"
+#include "runtime/parallel.h"
+#include "runtime/points/id_index.h"
+#include "runtime/shapes/motion/mesh_surface.h"
+#include "runtime/shapes/motion/nearest_on_triangle.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::uint64_t shuffle_use = 25;  // those of places on surfaces are the scatter's
+
+std::uint64_t number_of(std::int64_t id) { return static_cast<std::uint64_t>(id); }
+
+template <class T>
+std::shared_ptr<const T> as(const ObjectPtr& object)
+{
+    return std::dynamic_pointer_cast<const T>(object);
+}
+
+}  // namespace
+
+bool GoalTarget::is_points() const { return as<PointsObject>(object) || as<AnimatedPoints>(object); }
+
+void read_value(const Param& param, const Value& value, GoalTarget& target)
+{
+    target = {};
+    if (const AttributeRef* attribute = value.get<AttributeRef>()) {
+        target.attribute = attribute->name;
+        return;
+    }
+    const ObjectPtr* object = value.get<ObjectPtr>();
+    if (!object || !*object) wrong_type(param, value);
+    target.object = *object;
+    const bool known = target.is_points() || as<Mesh>(*object) || as<AnimatedMesh>(*object) || as<Shape>(*object) ||
+                       as<AnimatedShape>(*object);
+    if (!known)
+        throw Error(fmt::format("{} = {} has no places to go to; it must be a mesh, a shape, points, or rapid.attr",
+                                param.name, describe(*object)));
+}
+
+class GoalPlaces::Kind {
+public:
+    virtual ~Kind() = default;
+    virtual void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
+                      std::span<Vec3f> places) = 0;
+
+protected:
+    // place(i) for each member.
+    template <class F>
+    static void for_each_member(Strided<std::uint8_t> members, std::span<Vec3f> places, const F& place)
+    {
+        for_each_chunk(places.size(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i)
+                if (members[i]) places[i] = place(i);
+        });
+    }
+};
+
+// A place is a point: that of the same id, or by the order of ids, again from the first where there are fewer.
+class GoalPlaces::OfPoints : public Kind {
+public:
+    OfPoints(const PointSet& points, MotionPtr motion, std::string by)
+        : of_(points), motion_(std::move(motion)), by_(std::move(by))
+    {
+        if (of_.empty()) throw Error("to: there are no points to go to");
+        for (std::size_t k = 0; k < of_.size(); ++k)
+            if (const Vec3f& P = std::as_const(of_).P()[k]; !P.allFinite())
+                throw Error(fmt::format("to: point {} is at {}; it must be finite", k + 1,
+                                        describe(Value(Vec3d(P.cast<double>())))));
+    }
+
+    void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock&, const Evaluation& now,
+              std::span<Vec3f> places) override
+    {
+        const Eigen::Affine3d pose = motion_ ? motion_->at(now.frame).affine() : Eigen::Affine3d::Identity();
+        const auto at = [&](std::uint32_t k) -> Vec3d { return pose * std::as_const(of_).P()[k].cast<double>(); };
+        const auto n = static_cast<std::uint32_t>(of_.size());
+        if (by_ == "nearest") {
+            take_nearest(points, members, at);
+            const Strided<std::int64_t> numbers = std::as_const(points).column<std::int64_t>(goal_number).read();
+            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+                return at(static_cast<std::uint32_t>(numbers[i])).cast<float>();
+            });
+        }
+        const Strided<std::int64_t> id = std::as_const(points).id().read();
+        const std::vector<std::uint32_t> order = by_ == "random" ? shuffled(now.random) : std::vector<std::uint32_t>();
+        const IdIndex index(std::as_const(of_).id());
+        for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            const auto k = static_cast<std::uint32_t>(number_of(id[i]) % n);
+            if (!order.empty()) return at(order[k]).cast<float>();
+            const std::uint32_t same = index[id[i]];
+            return at(same == IdIndex::none ? k : same).cast<float>();
+        });
+    }
+
+private:
+    std::vector<std::uint32_t> shuffled(RandomKey key) const
+    {
+        const auto n = static_cast<std::uint32_t>(of_.size());
+        std::vector<std::pair<double, std::uint32_t>> draws;
+        for (std::uint32_t k = 0; k < n; ++k) draws.emplace_back(uniform4(key, k, shuffle_use)[0], k);
+        std::sort(draws.begin(), draws.end());
+        std::vector<std::uint32_t> order;
+        for (const auto& [draw, k] : draws) order.push_back(k);
+        return order;
+    }
+
+    // Those that have none yet, by id.
+    template <class At>
+    void take_nearest(PointSet& points, Strided<std::uint8_t> members, const At& at) const
+    {
+        const Strided<std::int64_t> id = std::as_const(points).id().read();
+        const Strided<Vec3f> P = std::as_const(points).P().read();
+        const auto n = static_cast<std::int64_t>(of_.size());
+        const Strided<std::int64_t> known = std::as_const(points).column<std::int64_t>(goal_number).read();
+        std::vector<std::uint32_t> takers(of_.size()), open;
+        for (std::uint32_t i = 0; i < points.size(); ++i) {
+            if (!members[i]) continue;
+            if (known[i] >= 0 && known[i] < n)
+                ++takers[static_cast<std::size_t>(known[i])];
+            else
+                open.push_back(i);
+        }
+        if (open.empty()) return;
+        std::sort(open.begin(), open.end(), [&](std::uint32_t a, std::uint32_t b) { return id[a] < id[b]; });
+        std::vector<Vec3d> places;
+        for (std::uint32_t k = 0; k < of_.size(); ++k) places.push_back(at(k));
+        FreePlaces free(std::move(places), std::move(takers));
+        const std::span<std::int64_t> numbers = points.column<std::int64_t>(goal_number).write();
+        for (const std::uint32_t i : open) numbers[i] = free.take(P[i].cast<double>());
+    }
+
+    const PointSet of_;
+    const MotionPtr motion_;
+    const std::string by_;
+};
+
+// By id a place is a vertex, at random a place of the surface that each point has by its id, at any time.
+class GoalPlaces::OfMesh : public Kind {
+public:
+    OfMesh(MeshPtr rest, std::shared_ptr<const AnimatedMesh> moving, std::string by)
+        : rest_(std::move(rest)), moving_(std::move(moving)), by_(std::move(by))
+    {
+        if (rest_->positions.empty() || rest_->triangles.empty())
+            throw Error(fmt::format("to: the mesh \"{}\" has no faces to go to", rest_->name));
+        if (by_ == "random") scatter_ = scatter_on_surface(rest_);
+    }
+
+    void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
+              std::span<Vec3f> places) override
+    {
+        const MeshPtr mesh = mesh_at(clock, now.frame);
+        const Strided<std::int64_t> id = std::as_const(points).id().read();
+        if (by_ == "id")
+            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+                return mesh->positions[static_cast<std::size_t>(number_of(id[i]) % mesh->positions.size())];
+            });
+        if (by_ == "random")
+            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+                Birthplace place;
+                scatter_->place(now.random, number_of(id[i]), {&place, 1});
+                return on_face(*mesh, place.element, place.b1, place.b2);
+            });
+        const MovingBodyPtr surface = mesh_surface(mesh);
+        const Strided<Vec3f> P = std::as_const(points).P().read();
+        for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            const Vec3d from = P[i].cast<double>();
+            const std::int32_t face = surface->material_at(from, 0).face;
+            const auto corner = [&](int k) -> Vec3d { return corner_of(*mesh, face, k).cast<double>(); };
+            const auto [b1, b2] = nearest_weights(from, corner(0), corner(1), corner(2));
+            return on_face(*mesh, face, static_cast<float>(b1), static_cast<float>(b2));
+        });
+    }
+
+private:
+    // Rigid ones move as a whole, at sub-frames too; of a sequence the mesh is that of the frame.
+    MeshPtr mesh_at(const FrameClock& clock, const Frame& frame) const
+    {
+        if (!moving_) return rest_;
+        if (moving_->deforms()) return moving_->at(clock, static_cast<std::int64_t>(std::ceil(frame.number)));
+        auto placed = std::make_shared<Mesh>(*rest_);
+        const Eigen::Affine3d pose = moving_->motion()->at(frame).affine();
+        for (Vec3f& P : placed->positions) P = (pose * P.cast<double>()).cast<float>();
+        return placed;
+    }
+
+    static Vec3f corner_of(const Mesh& mesh, std::int32_t face, int k)
+    {
+        return mesh.positions[static_cast<std::size_t>(mesh.triangles[static_cast<std::size_t>(face)][k])];
+    }
+    static Vec3f on_face(const Mesh& mesh, std::int32_t face, float b1, float b2)
+    {
+        const Vec3d a = corner_of(mesh, face, 0).cast<double>(), b = corner_of(mesh, face, 1).cast<double>(),
+                    c = corner_of(mesh, face, 2).cast<double>();
+        return (a + double{b1} * (b - a) + double{b2} * (c - a)).cast<float>();
+    }
+
+    const MeshPtr rest_;
+    const std::shared_ptr<const AnimatedMesh> moving_;  // null: at rest
+    const std::string by_;
+    ScatterPtr scatter_;
+};
+
+class GoalPlaces::OfShape : public Kind {
+public:
+    OfShape(ShapePtr shape, MotionPtr motion, const std::string& by)
+        : shape_(std::move(shape)), motion_(std::move(motion))
+    {
+        if (by == "id")
+            throw Error(fmt::format("by = \"id\": {} has no points of its own; take \"random\" or \"nearest\"",
+                                    describe(ObjectPtr(shape_))));
+        if (by == "random") scatter_ = scatter_on_surface(shape_);
+    }
+
+    void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock&, const Evaluation& now,
+              std::span<Vec3f> places) override
+    {
+        const Eigen::Affine3d pose = motion_ ? motion_->at(now.frame).affine() : Eigen::Affine3d::Identity();
+        const Eigen::Affine3d to_rest = pose.inverse();
+        const Strided<std::int64_t> id = std::as_const(points).id().read();
+        const Strided<Vec3f> P = std::as_const(points).P().read();
+        for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            if (scatter_) {
+                Birthplace place;
+                scatter_->place(now.random, number_of(id[i]), {&place, 1});
+                return (pose * place.P.cast<double>()).cast<float>();
+            }
+            return (pose * nearest(to_rest * P[i].cast<double>())).cast<float>();
+        });
+    }
+
+private:
+    // P - φ ∇φ / |∇φ|², which is on the surface where φ is a distance; P where there is no gradient, beyond the band of
+    // a level set.
+    Vec3d nearest(const Vec3d& P) const
+    {
+        double phi = 0;
+        Vec3d gradient = Vec3d::Zero();
+        shape_->distance({&P, 1}, {&phi, 1}, {&gradient, 1});
+        const double slope2 = gradient.squaredNorm();
+        return slope2 > 0 ? Vec3d(P - phi / slope2 * gradient) : P;
+    }
+
+    const ShapePtr shape_;
+    const MotionPtr motion_;
+    ScatterPtr scatter_;
+};
+
+GoalPlaces::GoalPlaces(const GoalTarget& target, const std::string& by)
+{
+    if (const auto points = as<PointsObject>(target.object))
+        kind_ = std::make_unique<OfPoints>(points->points, nullptr, by);
+    else if (const auto moving_points = as<AnimatedPoints>(target.object))
+        kind_ = std::make_unique<OfPoints>(moving_points->rest(), moving_points->motion(), by);
+    else if (const auto mesh = as<Mesh>(target.object))
+        kind_ = std::make_unique<OfMesh>(mesh, nullptr, by);
+    else if (const auto moving_mesh = as<AnimatedMesh>(target.object))
+        kind_ = std::make_unique<OfMesh>(moving_mesh->rest(), moving_mesh, by);
+    else if (const auto shape = as<Shape>(target.object))
+        kind_ = std::make_unique<OfShape>(shape, nullptr, by);
+    else
+        kind_ = std::make_unique<OfShape>(as<AnimatedShape>(target.object)->rest(),
+                                          as<AnimatedShape>(target.object)->motion(), by);
+}
+
+GoalPlaces::~GoalPlaces() = default;
+GoalPlaces::GoalPlaces(GoalPlaces&&) noexcept = default;
+GoalPlaces& GoalPlaces::operator=(GoalPlaces&&) noexcept = default;
+
+void GoalPlaces::find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
+                      std::span<Vec3f> places)
+{
+    kind_->find(points, members, clock, now, places);
+}
+
+}  // namespace rapid

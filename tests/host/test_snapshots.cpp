@@ -228,4 +228,24 @@ TEST_CASE("a snapshot shares the columns that no frame has changed since", "[sna
     CHECK(heat_of(run.evaluator().advance()).shares_values_with(heat));
 }
 
+TEST_CASE("a run copies no column, but those that a snapshot of it holds", "[snapshot]")
+{
+    const test::TemporaryFolder folder;
+    Run run(folder.write("scene.lua", R"(local rapid = require "rapid"
+        return rapid.create {} :emit { source = rapid.mesh.sphere {}, impulse = { [1] = 1000 } }
+          :points("push", function(p) p.v = p.v * (1 - p.dt) end) :gravity {} :solve {})"));
+    const auto next = [&] {
+        const FrameResult frame = run.evaluator().advance();
+        const PointSet& points = frame.outputs.at("main");
+        return std::pair(points.P().read().data, points.v().read().data);
+    };
+    next();
+    const auto places = next();
+    for (int frame = 3; frame < 10; ++frame) CHECK(next() == places);
+    const Snapshot snapshot = run.evaluator().save();
+    const auto copied = next();
+    CHECK(copied.first != places.first);
+    CHECK(copied.second != places.second);
+}
+
 }  // namespace rapid

@@ -401,12 +401,14 @@ void Contacts::solve_velocities(Substep& step)
             sweep([&](ContactPack& pack) { solve_pack(pack, step, weights, none, impact_speed); });
         }
         backwards_ = !backwards_;
+        // Not where light points between heavy ones and a shape would be pushed to and fro.
+        const bool recovers_deep = !heavy_.any();
         deep_.resize(std::max(deep_.size(), blocks_.size()));
         blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
             deep_[b].clear();
             in_turn(packs_[b], [&](ContactPack& pack) {
                 const Doubles overlap = solve_pack(pack, step, weights, &part_recovered, impact_speed);
-                if (any(overlap > deep_part_of_reach * widen(pack.reach))) deep_[b].push_back(&pack);
+                if (recovers_deep && any(overlap > deep_part_of_reach * widen(pack.reach))) deep_[b].push_back(&pack);
                 store(pack);
                 if (step.forces) add_forces(pack, step);
                 if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
@@ -416,8 +418,7 @@ void Contacts::solve_velocities(Substep& step)
             });
             if (backwards_) std::reverse(deep_[b].begin(), deep_[b].end());
         });
-        if (heavy_.any()) return;  // light ones between heavy ones and a shape would be pushed to and fro
-        for (int k = 0; k < deep_sweeps; ++k) {
+        for (int k = 0; recovers_deep && k < deep_sweeps; ++k) {
             backwards_ = !backwards_;
             blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
                 in_turn(deep_[b], [&](const ContactPack* pack) {

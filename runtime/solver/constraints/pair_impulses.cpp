@@ -6,6 +6,21 @@
 #include "runtime/points/id_index.h"
 
 namespace rapid {
+namespace {
+
+// How many of these, which ascend, are less. Lists are short, mostly: counted, without a branch that is mispredicted.
+std::size_t count_below(std::span<const std::uint32_t> ascending, std::uint32_t value)
+{
+    constexpr std::size_t few = 32;
+    if (ascending.size() > few)
+        return static_cast<std::size_t>(std::lower_bound(ascending.begin(), ascending.end(), value) -
+                                        ascending.begin());
+    std::size_t below = 0;
+    for (const std::uint32_t x : ascending) below += x < value;
+    return below;
+}
+
+}  // namespace
 
 void PairImpulses::scale(float factor)
 {
@@ -61,12 +76,12 @@ void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std:
             if (!pressed && (resting.empty() || before.resting[k].isZero(0))) continue;
             const auto [i, j] = before.pairs[k];
             const auto here = list.of(i);
-            const auto found = std::lower_bound(here.begin(), here.end(), j);
-            if (found == here.end() || *found != j) {
+            const std::size_t at = count_below(here, j);
+            if (at == here.size() || here[at] != j) {
                 if (pressed && sleep) sleep->wake(i), sleep->wake(j);
                 continue;
             }
-            const std::uint32_t to = slot[list.begin[i] + static_cast<std::size_t>(found - here.begin())];
+            const std::uint32_t to = slot[list.begin[i] + at];
             normal[to] = before.normal[k];
             tangential[to] = before.tangential[k];
             if (!resting.empty()) resting[to] = before.resting[k];

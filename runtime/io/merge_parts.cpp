@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 #include "runtime/points/column_files.h"
 #include "runtime/points/subset.h"
@@ -151,7 +152,8 @@ void find_sources(const std::vector<std::int64_t>& ids, std::vector<std::uint32_
     }
     // Ids are dense, mostly: each has its own place.
     constexpr std::uint32_t none = UINT32_MAX;
-    thread_local std::vector<std::uint32_t> by_id;
+    thread_local OfThread<std::vector<std::uint32_t>> kept;
+    std::vector<std::uint32_t>& by_id = *kept;
     by_id.assign(range + 1, none);
     for (std::uint32_t i = 0; i < ids.size(); ++i) by_id[static_cast<std::size_t>(ids[i] - *least)] = i;
     for (const std::uint32_t i : by_id)
@@ -179,7 +181,8 @@ Gather gather_into(std::span<T> values, const std::vector<PointSet>& parts, cons
         if (const Column<T>* column = columns_of(part)) from.push_back(column->read());
     RAPID_ASSERT(from.size() == parts.size());
     return [values, from](const Bucket& bucket, const std::vector<std::uint32_t>& sources) {
-        thread_local std::vector<T> read, gathered;
+        thread_local OfThread<std::vector<T>> kept_read, kept_gathered;
+        std::vector<T>&read = *kept_read, &gathered = *kept_gathered;
         read_bucket(from, bucket, read);
         gathered.clear();
         for (const std::uint32_t source : sources) gathered.push_back(read[source]);
@@ -251,8 +254,10 @@ PointSet merge_parts(const std::vector<PointSet>& given, const std::vector<std::
     std::vector<Strided<std::int64_t>> ids_of_parts;
     for (const PointSet& part : parts) ids_of_parts.push_back(part.id().read());
     tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
-        thread_local std::vector<std::int64_t> ids;
-        thread_local std::vector<std::uint32_t> sources;
+        thread_local OfThread<std::vector<std::int64_t>> kept_ids;
+        thread_local OfThread<std::vector<std::uint32_t>> kept_sources;
+        std::vector<std::int64_t>& ids = *kept_ids;
+        std::vector<std::uint32_t>& sources = *kept_sources;
         read_bucket(ids_of_parts, buckets[b], ids);
         find_sources(ids, sources);
         for (const Gather& gather : gathers) gather(buckets[b], sources);

@@ -9,6 +9,7 @@
 #include <memory>
 #include <numeric>
 
+#include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 
 namespace rapid {
@@ -216,7 +217,8 @@ void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t poi
     // The records of a chunk, 32 to 128 bytes each, and their columns stay in the second-level cache.
     for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
         // A buffer per thread that is kept, so that its pages are touched once.
-        thread_local std::vector<unsigned char> records;
+        thread_local OfThread<std::vector<unsigned char>> kept;
+        std::vector<unsigned char>& records = *kept;
         records.resize((end - begin) * record_bytes_);
         interleave(begin, end, records.data());
         file.write_at(offset + begin * record_bytes_, records.data(), records.size());

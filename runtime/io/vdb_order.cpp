@@ -10,6 +10,7 @@
 #include <span>
 #include <utility>
 
+#include "runtime/of_thread.h"
 #include "runtime/points/column_files.h"
 
 namespace rapid {
@@ -118,7 +119,8 @@ std::int64_t entry(std::uint32_t voxel, std::size_t place)
 // Entries of one leaf, in order of their places, by voxel.
 void sort_leaf(std::span<std::int64_t> entries, VdbLeaf& leaf)
 {
-    thread_local std::vector<std::int64_t> sorted;
+    thread_local OfThread<std::vector<std::int64_t>> kept;
+    std::vector<std::int64_t>& sorted = *kept;
     std::array<std::uint32_t, 512> at{};
     for (const std::int64_t e : entries) ++at[static_cast<std::size_t>(e >> 32)];
     std::uint32_t first = 0;
@@ -255,14 +257,16 @@ MovedColumn moved(const Column<T>& column, Column<T>& into)
 {
     const std::span<T> to = into.append_for_writing(column.size());
     return {[from = column.read(), to](std::size_t begin, const Scatter& scatter) {
-                thread_local std::vector<T> read, values;
+                thread_local OfThread<std::vector<T>> kept_read, kept_values;
+                std::vector<T>&read = *kept_read, &values = *kept_values;
                 read_column(from, begin, scatter.order.size(), read);
                 values.clear();
                 for (const std::uint32_t i : scatter.order) values.push_back(read[i]);
                 for (const Run& run : scatter.runs) write_values(&to[run.to], &values[run.from], run.size * sizeof(T));
             },
             [to](std::size_t first, std::span<const std::int64_t> entries) {
-                thread_local std::vector<T> read, sorted;
+                thread_local OfThread<std::vector<T>> kept_read, kept_sorted;
+                std::vector<T>&read = *kept_read, &sorted = *kept_sorted;
                 read_column({to.data(), 1}, first, entries.size(), read);
                 sorted.clear();
                 for (const std::int64_t e : entries) sorted.push_back(read[static_cast<std::uint32_t>(e)]);

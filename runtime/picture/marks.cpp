@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 #include "runtime/points/members.h"
 #include "runtime/points/trail.h"
@@ -428,7 +429,8 @@ void draw_marks(const Marks& marks, const TileGrid& tiles, int tile, const Surfa
                 const Light& light, std::span<Vec3f> colour)
 {
     // Depths are positive: their bits are in their order.
-    thread_local std::vector<std::uint64_t> order;
+    thread_local OfThread<std::vector<std::uint64_t>> kept;
+    std::vector<std::uint64_t>& order = *kept;
     order.clear();
     for (std::uint32_t i = marks.first[tile]; i < marks.first[tile + 1]; ++i) {
         const std::uint32_t mark = marks.of_tiles[i];

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/of_thread.h"
 #include "runtime/picture/ground.h"
 #include "runtime/picture/screen_mesh.h"
 #include "runtime/picture/tone.h"
@@ -108,7 +109,8 @@ public:
     SurfaceTile draw(int tile) const
     {
         constexpr int across = tile_size * surface_samples;
-        thread_local std::vector<Sample> samples;
+        thread_local OfThread<std::vector<Sample>> kept;
+        std::vector<Sample>& samples = *kept;
         samples.resize(across * across);
         const RasterPart part{tiles_.left(tile) * surface_samples, tiles_.top(tile) * surface_samples,
                               tiles_.right(tile) * surface_samples, tiles_.bottom(tile) * surface_samples};

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/state_checks.h"
@@ -260,7 +261,8 @@ void Contacts::find_contacts(const Substep& step)
 {
     packs_.begin(step.size());
     blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
-        thread_local std::vector<std::uint32_t> near;
+        thread_local OfThread<std::vector<std::uint32_t>> kept;
+        std::vector<std::uint32_t>& near = *kept;
         const auto found = static_cast<std::ptrdiff_t>(find_near(b, step, near));  // first: it makes room
         const auto last = near.begin() + found;
         const auto end = std::remove_if(near.begin(), last, [&](std::uint32_t k) { return !may_touch(k, step); });

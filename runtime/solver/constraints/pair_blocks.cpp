@@ -3,6 +3,7 @@
 #include <array>
 #include <numeric>
 
+#include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 #include "runtime/points/state_checks.h"
 
@@ -98,7 +99,8 @@ void PairBlocks::begin_blocks()
 // and the processor need not wait for one to begin the next.
 void PairBlocks::take_turns(std::size_t block, const Pairs& pairs, std::span<ContactPair> ordered)
 {
-    thread_local std::vector<std::array<std::uint32_t, 2>> going;  // of each point, what is left of its pairs
+    thread_local OfThread<std::vector<std::array<std::uint32_t, 2>>> kept;
+    std::vector<std::array<std::uint32_t, 2>>& going = *kept;  // of each point, what is left of its pairs
     const std::uint32_t first = begin_[block], last = begin_[block + 1];
     going.clear();
     for (std::uint32_t t = first; t < last; ++t) {

@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/of_thread.h"
 #include "runtime/points/members.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/energy_bound.h"
@@ -186,7 +187,7 @@ public:
         schedule(step);
         if constexpr (in_trees)
             schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
-                thread_local TreeMotion<Function> motion;
+                TreeMotion<Function>& motion = motion_of_thread();
                 motion.begin(tree, first, rows_);
                 motion.advance(step);
             });
@@ -212,7 +213,7 @@ public:
     {
         if constexpr (in_trees)
             schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
-                thread_local TreeMotion<Function> motion;
+                TreeMotion<Function>& motion = motion_of_thread();
                 motion.begin(tree, first, rows_);
                 motion.project(step);
             });
@@ -231,7 +232,7 @@ public:
         if (step.is_shared || Traits::one_sided) {
             if constexpr (in_trees)
                 schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
-                    thread_local TreeMotion<Function> motion;
+                    TreeMotion<Function>& motion = motion_of_thread();
                     motion.begin(tree, first, rows_);
                     motion.solve_velocities(step);
                 });
@@ -274,6 +275,12 @@ private:
     using Traits = FunctionTraits<Function>;
     static constexpr int arity = Row::arity;
     static constexpr bool in_trees = arity == 2 && !Traits::one_sided;
+
+    static TreeMotion<Function>& motion_of_thread()
+    {
+        thread_local OfThread<TreeMotion<Function>> kept;
+        return *kept;
+    }
 
     // A sub-step of another length begins with the same forces.
     void keep_impulses(double dt)

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/solver/constraints/contact_forces.h"
@@ -163,7 +164,8 @@ void ShapeContacts::leave_parting(ShapeContact& contact, const Substep& step)
 void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free,
                          std::size_t begin, std::size_t end)
 {
-    thread_local ShapeQuery query;
+    thread_local OfThread<ShapeQuery> kept;
+    ShapeQuery& query = *kept;
     query.free = free;
     query.begin = begin;
     query.since = (step.index + 1) * step.dt;
@@ -291,8 +293,10 @@ void ShapeContacts::share_reactions(const Substep& step)
 void ShapeContacts::share_reaction(std::span<ShapeContact* const> contacts, std::uint32_t i, const Substep& step,
                                    Batch& missed) const
 {
-    thread_local std::vector<Vec3d> normals;
-    thread_local std::vector<double> parts;
+    thread_local OfThread<std::vector<Vec3d>> kept_normals;
+    thread_local OfThread<std::vector<double>> kept_parts;
+    std::vector<Vec3d>& normals = *kept_normals;
+    std::vector<double>& parts = *kept_parts;
     const Vec3d impulse = step.reaction[i] / step.inverse_mass[i];
     normals.clear();
     for (const ShapeContact* contact : contacts) normals.push_back(contact->n);
@@ -424,8 +428,12 @@ void ShapeContacts::solve_spinning(ShapeContact& contact, Substep& step)
 // Final penetration correction.
 void ShapeContacts::move_out(const Batch& contacts, Substep& step) const
 {
-    thread_local std::vector<Vec3d> P, gradient;
-    thread_local std::vector<double> phi, time;
+    struct Asked {
+        std::vector<Vec3d> P, gradient;
+        std::vector<double> phi, time;
+    };
+    thread_local OfThread<Asked> kept;
+    auto& [P, gradient, phi, time] = *kept;
     for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
         const Obstacle& obstacle = obstacles_[contacts[begin].obstacle];
         P.clear();

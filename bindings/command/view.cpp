@@ -21,6 +21,7 @@
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
 #include "runtime/files/output_file.h"
+#include "runtime/files/program_path.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
@@ -122,7 +123,7 @@ public:
         server.repeat(watch_interval, [&] { simulation.check_files(); });
         print(server.address() + '\n');
         std::fflush(stdout);
-        if (!no_open_ && !untrusted_.asked()) open(server.address());  // which starts a program
+        if (!no_open_ && !untrusted_.asked()) open(server.address_to_open());  // which starts a program
         server.run();
         return status_done;
     }
@@ -132,10 +133,10 @@ private:
     static void open(const std::string& address)
     {
         if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
-        const pid_t child = fork();
-        if (child != 0) return;
-        execlp("xdg-open", "xdg-open", address.c_str(), nullptr);
-        _exit(status_failed);  // without one the line that was printed has to do
+        const std::string program = program_path("xdg-open");
+        if (program.empty() || fork() != 0) return;  // the line that was printed has to do
+        execl(program.c_str(), program.c_str(), address.c_str(), nullptr);
+        _exit(status_failed);
     }
 
     static constexpr int inherited_socket = 3;  // of the process that restarts in the sandbox

@@ -21,6 +21,8 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t most_rows = 500;          // of the spreadsheet, at a time
 constexpr std::size_t most_figures = 500;       // frames, at a time
 constexpr std::size_t most_segments = 480'000;  // of trails
+constexpr std::size_t most_waiting = 1000;      // requests; a page has one
+constexpr int most_depth = 8;                   // of lists in a request: a copy of deeper ones would fill the stack
 
 Json json_of(const Value& value)
 {
@@ -146,7 +148,8 @@ ViewRequests::ViewRequests(ViewSimulation& simulation, std::string title,
 
 void ViewRequests::handle(const std::string& message, const Answer& answer)
 {
-    const Json json = Json::parse(message, nullptr, false);
+    const auto is_flat = [](int depth, Json::parse_event_t, Json&) { return depth <= most_depth; };
+    const Json json = Json::parse(message, is_flat, false);  // what is deeper is left out
     if (!json.is_object() || !json.contains("re") || !json["re"].is_number_unsigned()) return;
     const Ask ask{json["re"].get<std::uint32_t>(), answer};
     try {
@@ -155,6 +158,7 @@ void ViewRequests::handle(const std::string& message, const Answer& answer)
             const std::uint64_t since = json.value("since", std::uint64_t{0});
             const std::uint64_t graph = json.value("graph", std::uint64_t{0});
             if (simulation_.status().version > since) return tell_status(ask, graph);
+            if (waiting_.size() == most_waiting) waiting_.erase(waiting_.begin());
             waiting_.push_back({since, graph, ask});
         } else if (what == "frame") {
             tell_frame(json, ask);

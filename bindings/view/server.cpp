@@ -1,5 +1,6 @@
 #include "bindings/view/server.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -52,6 +53,9 @@ bool same_secret(std::string_view a, std::string_view b)
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) differ |= static_cast<unsigned char>(a[i] ^ b[i]);
     return differ == 0;
 }
+
+// Programs that are started from here, such as the browser, would keep it.
+void close_on_exec(int socket) { ::fcntl(socket, F_SETFD, FD_CLOEXEC); }
 
 bool is_own_host(std::string_view host)
 {
@@ -108,7 +112,8 @@ public:
         worker_.join();
     }
 
-    std::string address() const { return fmt::format("http://127.0.0.1:{}/?token={}", port_, token_); }
+    std::string address() const { return address_with(token_); }
+    std::string address_to_open() const { return address_with(token_to_open_); }
     asio::io_context& work() { return work_; }
 
     void run()
@@ -135,12 +140,20 @@ private:
 
     std::string cookie() const { return fmt::format("rapid_{}", port_); }
 
-    // Whether the cookie or the query has the token.
-    bool has_token(const Request& request) const
+    std::string address_with(const std::string& token) const
+    {
+        return fmt::format("http://127.0.0.1:{}/?token={}", port_, token);
+    }
+
+    // Whether the cookie or the query has the token, or the query that of the address to open, for the first time.
+    bool has_token(const Request& request)
     {
         const std::string target(request.target());
-        if (const std::size_t query = target.find("?token="); query != std::string::npos)
-            return same_secret(target.substr(query + 7), token_);
+        if (const std::size_t query = target.find("?token="); query != std::string::npos) {
+            const std::string told = target.substr(query + 7);
+            if (same_secret(told, token_)) return true;
+            if (!is_opened_ && same_secret(told, token_to_open_)) return is_opened_ = true;
+        }
         std::string_view cookies(request[http::field::cookie].data(), request[http::field::cookie].size());
         while (!cookies.empty()) {
             const std::size_t end = std::min(cookies.find(';'), cookies.size());
@@ -153,7 +166,7 @@ private:
     }
 
     // Empty, or why the request is refused.
-    std::string refusal(const Request& request) const
+    std::string refusal(const Request& request)
     {
         const std::string host(request[http::field::host]), origin(request[http::field::origin]);
         if (!is_own_host(host)) return "the Host is not this machine";
@@ -162,7 +175,7 @@ private:
         return "";
     }
 
-    Response answer(const Request& request) const
+    Response answer(const Request& request)
     {
         Response response(http::status::ok, request.version());
         response.keep_alive(request.keep_alive());
@@ -203,7 +216,8 @@ private:
 
     const std::filesystem::path folder_;
     const Handler handler_;
-    const std::string token_ = random_token();
+    const std::string token_ = random_token(), token_to_open_ = random_token();
+    bool is_opened_ = false;
     std::map<std::string, std::filesystem::path> files_;  // by the path of a request
     asio::io_context net_{1}, work_{1};
     Tcp::acceptor acceptor_;
@@ -233,29 +247,34 @@ private:
     void read()
     {
         stream_.async_read(buffer_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
-            if (error) return;
+            if (error) return self->close();
             std::string text = beast::buffers_to_string(self->buffer_.data());
             self->buffer_.consume(self->buffer_.size());
             asio::post(self->server_.work_, [self, text = std::move(text)] {
                 if (self->is_closed_) return;
-                self->server_.handler_(text, [self](std::string message, bool binary) {
-                    asio::post(self->server_.net_, [self, message = std::move(message), binary]() mutable {
-                        self->send(std::move(message), binary);
-                    });
+                // An answer may wait for long, and its page be gone.
+                self->server_.handler_(text, [page = std::weak_ptr(self)](std::string message, bool binary) {
+                    if (const auto open = page.lock())
+                        asio::post(open->server_.net_, [open, message = std::move(message), binary]() mutable {
+                            open->send(std::move(message), binary);
+                        });
                 });
+                asio::post(self->server_.net_, [self] { self->read(); });
             });
-            self->read();
         });
+    }
+
+    void close()
+    {
+        is_closed_ = true;
+        beast::get_lowest_layer(stream_).close();
     }
 
     void send(std::string message, bool binary)
     {
         if (is_closed_) return;
         bytes_ += message.size();
-        if (waiting_.size() >= most_waiting || (bytes_ > most_waiting_bytes && !waiting_.empty())) {
-            is_closed_ = true;
-            return beast::get_lowest_layer(stream_).close();
-        }
+        if (waiting_.size() >= most_waiting || (bytes_ > most_waiting_bytes && !waiting_.empty())) return close();
         waiting_.emplace_back(std::move(message), binary);
         if (waiting_.size() == 1) write();
     }
@@ -333,6 +352,7 @@ void ViewServer::Impl::accept()
         }
         beast::error_code none;
         socket.set_option(Tcp::no_delay(true), none);
+        close_on_exec(socket.native_handle());
         std::make_shared<Connection>(*this, std::move(socket))->read();
         accept();
     });
@@ -345,6 +365,7 @@ int ViewServer::listen(int port)
         Tcp::acceptor acceptor(none);
         const Tcp::endpoint here(asio::ip::address_v4::loopback(), static_cast<std::uint16_t>(port));
         acceptor.open(here.protocol());
+        close_on_exec(acceptor.native_handle());
         acceptor.set_option(asio::socket_base::reuse_address(true));
         acceptor.bind(here);
         acceptor.listen();
@@ -367,6 +388,7 @@ ViewServer::ViewServer(int socket, const std::filesystem::path& folder, Handler 
 ViewServer::~ViewServer() = default;
 
 std::string ViewServer::address() const { return impl_->address(); }
+std::string ViewServer::address_to_open() const { return impl_->address_to_open(); }
 void ViewServer::post(std::function<void()> f) { asio::post(impl_->work(), std::move(f)); }
 void ViewServer::repeat(int milliseconds, std::function<void()> f) { impl_->repeat(milliseconds, std::move(f)); }
 void ViewServer::run() { impl_->run(); }

@@ -2,7 +2,8 @@
 //
 // Closed: it listens on the loopback device; a request needs the token of the address that the command prints (the page
 // keeps it as a cookie), a Host of this machine and, where it has one, that host as its Origin. Names of files in
-// requests are looked up among those of the page; none is opened by what a request says.
+// requests are looked up among those of the page; none is opened by what a request says. A page that asks for more than
+// is answered waits, and one that is closed leaves nothing behind.
 #pragma once
 
 #include <filesystem>
@@ -31,6 +32,8 @@ public:
     ~ViewServer();
 
     std::string address() const;  // with the token
+    // The same with another token, which one request may have: arguments of a browser are no secret on this machine.
+    std::string address_to_open() const;
     // Calls f from the handler's thread: soon, or every so many milliseconds.
     void post(std::function<void()> f);
     void repeat(int milliseconds, std::function<void()> f);

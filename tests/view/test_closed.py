@@ -1,10 +1,14 @@
 """What the server refuses, hostile names, the sandbox."""
 import http.client
 import json
+import os
 import pathlib
+import re
+import signal
 import socket
 import subprocess
 import tempfile
+import time
 
 from bench import choose, SCENE, go, set_parameter, test, wait_for_run
 from browser import PATIENCE, View, wait_for
@@ -245,3 +249,91 @@ def damaged_requests_end_nothing(bench):
         assert kept == "refused", wish
     assert browser.promise("rapidView.ask('nothing').catch((e) => e.message)") == 'there is no request "nothing"'
     assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
+
+
+def descriptors(view):
+    return len(os.listdir(f"/proc/{view.process.pid}/fd"))
+
+
+@test
+def closed_pages_leave_nothing_behind(bench):
+    bench.ready()
+    before = descriptors(bench.view)
+    for k in range(400):
+        with open_socket(bench.view) as raw:  # waits for what does not come
+            raw.sendall(frame_of(json.dumps({"re": k, "do": "status", "since": 1 << 60})))
+    wait_for(lambda: descriptors(bench.view) < before + 20)
+
+
+@test
+def a_page_that_asks_for_more_than_is_answered_waits(bench):
+    browser = bench.ready()
+    before = bench.view.memory()
+    long = frame_of(json.dumps({"re": 1, "do": "nothing", "x": [1] * 340000}))  # which takes longer to read than to send
+    with open_socket(bench.view) as raw:
+        end = time.monotonic() + 5
+        while time.monotonic() < end:
+            raw.sendall(long)
+            assert bench.view.memory() - before < 64 << 20
+    assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
+
+
+@test
+def requests_nested_without_end_end_nothing(bench):
+    browser = bench.ready()
+    deep = "[" * 400000 + "]" * 400000
+    for request_of in ('{"re": 1, "do": "sheet", "frame": 5, "x": %s}', '{"re": 1, "do": "set", "values": {"count": %s}}',
+                       '{"re": 1, "do": "region", "frame": 5, "matrix": %s, "rectangle": []}', "%s"):
+        with open_socket(bench.view) as raw:
+            raw.sendall(frame_of(request_of % deep))
+            raw.sendall(frame_of("{}", opcode=9))
+            assert raw.recv(1)
+    assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
+
+
+@test
+def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
+    bench.ready()
+    told = bench.path / "told"
+    for folder, path in ((bench.path / "programs", str(bench.path / "programs")), (bench.path, ":.")):
+        folder.mkdir(exist_ok=True)
+        (folder / "xdg-open").write_text(
+            f"#!/bin/sh\nls -l /proc/$$/fd >{told}.new\necho \"$1\" >>{told}.new\nmv {told}.new {told}\n",
+            encoding="ascii")
+        (folder / "xdg-open").chmod(0o755)
+        told.unlink(missing_ok=True)
+        environment = {**os.environ, "DISPLAY": ":0", "PATH": path + ":/usr/bin:/bin"}
+        if folder == bench.path:  # the scene's
+            environment["PATH"] = ":."
+        view = subprocess.Popen([bench.rapid, "view", "scene.lua", "-f", "1"], cwd=bench.path, env=environment, text=True,
+                                stdout=subprocess.PIPE)
+        try:
+            port, token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\w+)\n", view.stdout.readline()).groups()
+            if folder == bench.path:
+                wait_for(lambda: answers(int(port)))
+                assert not told.exists(), "the program of the current folder was run"
+                continue
+            wait_for(told.exists)
+            *files, address = told.read_text(encoding="utf-8").splitlines()
+            assert "socket:" not in "".join(files), files
+            another = re.fullmatch(rf"http://127\.0\.0\.1:{port}/\?token=(\w+)", address)[1]
+            assert another != token
+            for status in (200, 403):
+                connection = http.client.HTTPConnection("127.0.0.1", int(port), timeout=PATIENCE)
+                connection.request("GET", f"/?token={another}")
+                answer = connection.getresponse()
+                assert answer.status == status, answer.status
+                connection.close()
+            cookie = {"Cookie": f"rapid_{port}={token}"}
+            connection = http.client.HTTPConnection("127.0.0.1", int(port), timeout=PATIENCE)
+            connection.request("GET", f"/?token={another}", headers=cookie)  # the page is loaded again
+            assert connection.getresponse().status == 200
+        finally:
+            view.send_signal(signal.SIGTERM)
+            view.wait()
+
+
+def answers(port):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
+    connection.request("GET", "/")
+    return connection.getresponse().status == 403

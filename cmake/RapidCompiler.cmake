@@ -38,6 +38,10 @@ target_compile_options(rapid_private INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(rapid_private INTERFACE -Wno-restrict -Wno-stringop-overflow -Wno-maybe-uninitialized)
 endif()
+# g++ tells that vectors wider than the processor's registers are returned by another ABI: within a file alone.
+if(NOT RAPID_ARCH STREQUAL "native")
+  target_compile_options(rapid_private INTERFACE -Wno-psabi)
+endif()
 # clang does not know g++'s optimisation pragmas, and advises && where a branch would cost more.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   target_compile_options(rapid_private INTERFACE -Wno-unknown-pragmas -Wno-bitwise-instead-of-logical -Wno-psabi)

@@ -23,7 +23,8 @@ function(rapid_level level)
   target_link_libraries(rapid_hot_${level} PRIVATE rapid_private)
   target_precompile_headers(rapid_hot_${level} PRIVATE ${rapid_common_headers})
   set_property(TARGET rapid_hot_${level} PROPERTY RAPID_LEVEL ${level})
-  target_compile_options(rapid_hot_${level} PRIVATE -U__AVX__ -U__AVX2__ -U__AVX512F__ -U__FMA__)
+  target_compile_options(rapid_hot_${level} PRIVATE -U__AVX__ -U__AVX2__ -U__AVX512F__ -U__FMA__
+    -Wno-psabi)  # vectors wider than its registers are returned within a file alone
 
   list(TRANSFORM rapid_hot_files REPLACE "\\.cpp$" "" OUTPUT_VARIABLE hot)
   list(JOIN hot "|" hot)

@@ -52,7 +52,8 @@ TEST_CASE("the values of a thread are destroyed when it ends, the latest first")
 {
     destroyed.clear();
     std::thread([] {
-        thread_local OfThread<Named> first, second, never;
+        thread_local OfThread<Named> first, second;
+        [[maybe_unused]] thread_local OfThread<Named> never;
         (*first).name = "1";
         (*second).name = "2";
     }).join();

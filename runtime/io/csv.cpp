@@ -18,6 +18,7 @@
 #include "runtime/io/id_order.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/point_file.h"
+#include "runtime/io/text_table.h"
 #include "runtime/memory_budget.h"
 #include "runtime/parallel.h"
 
@@ -262,6 +263,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
     std::vector<std::atomic<bool>> broken(names.size());  // columns with a number that is not an integer
     for_each_chunk(starts.size(), [&](std::size_t begin, std::size_t end) {
         std::string word;
+        TokensOfTexts token_of_word;
         for (std::size_t i = begin; i < end; ++i) {
             const char* at = text.data() + starts[i];
             const char* const stop = text.data() + text.size();
@@ -273,7 +275,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
                 }
                 if (columns[c].is_text) {
                     at = parse_text(at, stop, word);
-                    columns[c].texts[i] = token_of(word);
+                    columns[c].texts[i] = token_of_word(word);
                     continue;
                 }
                 double& number = columns[c].numbers[i];

@@ -283,6 +283,7 @@ Column<Token> texts_in(const Array& array)
     const std::size_t bytes = scalar_bytes(array.type.scalar);
     const unsigned char* at = array.bytes.data();
     std::string text;
+    TokensOfTexts token_of_row;
     for (Token& token : to) {
         text.clear();
         for (std::size_t k = 0; k < array.type.characters; ++k, at += bytes) {
@@ -294,7 +295,7 @@ Column<Token> texts_in(const Array& array)
                 throw Error(fmt::format("the text of a row has the character {}; there is none", c));
         }
         text.resize(text.find_last_not_of('\0') + 1);
-        token = token_of(text);
+        token = token_of_row(text);
     }
     return column;
 }

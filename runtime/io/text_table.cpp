@@ -34,6 +34,16 @@ TextTable text_table(const Column<Token>& column)
     return table;
 }
 
+Token TokensOfTexts::operator()(std::string_view text)
+{
+    constexpr std::size_t most = 65536;
+    if (const auto found = known_.find(text); found != known_.end()) return found->second;
+    const Token token = token_of(text);
+    if (known_.size() >= most) known_.clear();
+    known_.emplace(token.text(), token);
+    return token;
+}
+
 Column<Token> texts_at(const std::vector<Token>& texts, const Column<std::int32_t>& places)
 {
     const auto text = [&](std::int32_t place) {

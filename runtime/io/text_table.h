@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "runtime/points/point_set.h"
@@ -15,6 +16,16 @@ struct TextTable {
     Column<std::int32_t> places;  // of each point, among the texts
 };
 TextTable text_table(const Column<Token>& column);
+
+// token_of() for the texts of a file: the table of the process, which is locked, is asked once for each of the last
+// 65,536.
+class TokensOfTexts {
+public:
+    Token operator()(std::string_view text);
+
+private:
+    std::unordered_map<std::string_view, Token> known_;
+};
 
 // The column of a table that was read. -1: the empty text. Error: a place beyond the texts.
 Column<Token> texts_at(const std::vector<Token>& texts, const Column<std::int32_t>& places);

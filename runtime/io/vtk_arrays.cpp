@@ -12,6 +12,7 @@
 
 #include "runtime/error.h"
 #include "runtime/files/base64.h"
+#include "runtime/io/text_table.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
@@ -219,10 +220,11 @@ std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
             }
         }
         std::vector<Token> texts;
+        TokensOfTexts token_of_row;
         for (auto at = bytes.begin(); texts.size() < rows;) {
             const auto end = std::find(at, bytes.end(), 0);
             if (end == bytes.end()) throw ends_early();
-            texts.push_back(token_of(std::string(at, end)));
+            texts.push_back(token_of_row(std::string(at, end)));
             at = end + 1;
         }
         return texts;

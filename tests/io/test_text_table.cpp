@@ -1,5 +1,7 @@
 #include "runtime/io/text_table.h"
 
+#include <fmt/format.h>
+
 #include "runtime/io/format.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/io/random_points.h"
@@ -40,6 +42,20 @@ TEST_CASE("a place of -1 is the empty text, and one beyond the table is an error
     CHECK(same_bits(column({0, -1}), column_of({"leaf", ""})));
     CHECK(error_of([&] { column({0, 1}); }) == "a point has the text 1; there are 1");
     CHECK(error_of([&] { column({-2, 0}); }) == "a point has the text -2; there are 1");
+}
+
+TEST_CASE("texts of a file have the tokens of the process, also when more are met than are remembered", "[io][texts]")
+{
+    TokensOfTexts token_of_word;
+    for (int round = 0; round < 2; ++round)
+        for (int k = 0; k < 70000; ++k) {
+            std::string word = fmt::format("word {}", k);
+            const Token token = token_of_word(word);
+            word[0] = 'x';  // not kept
+            REQUIRE(token == token_of(fmt::format("word {}", k)));
+            REQUIRE(token_of_word(fmt::format("word {}", k)) == token);
+        }
+    CHECK(token_of_word("") == Token());
 }
 
 TEST_CASE("each format that holds texts gives them back; the others leave them out, and all else is there",

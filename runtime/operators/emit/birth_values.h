@@ -30,6 +30,10 @@ struct BirthValue {
     // u: uniform in [0, 1).
     template <class T>
     T at(double u) const;
+
+private:
+    template <class T>
+    T between_keys(double u) const;
 };
 
 struct BirthValues {
@@ -58,15 +62,21 @@ T BirthValue::at(double u) const
     if constexpr (std::is_same_v<T, Token>) {
         const auto choice = static_cast<std::size_t>(u * static_cast<double>(keys.size()));
         return value(std::min(choice, keys.size() - 1));
+    } else {
+        return between_keys<T>(u);
     }
+}
+
+template <class T>
+T BirthValue::between_keys(double u) const
+{
+    const auto value = [&](std::size_t k) { return std::get<T>(keys[k].value); };
     if (keys.size() == 1 || u <= keys.front().at) return value(0);
     for (std::size_t k = 1; k < keys.size(); ++k) {
         if (u >= keys[k].at) continue;
         const double part = (u - keys[k - 1].at) / (keys[k].at - keys[k - 1].at);
         if constexpr (std::is_same_v<T, Quatf>)
             return value(k - 1).slerp(static_cast<float>(part), value(k));
-        else if constexpr (std::is_same_v<T, Token>)
-            return value(k);
         else if constexpr (std::is_arithmetic_v<T>)
             return static_cast<T>(value(k - 1) + part * (double(value(k)) - double(value(k - 1))));
         else

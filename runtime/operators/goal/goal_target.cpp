@@ -227,26 +227,35 @@ public:
         const Eigen::Affine3d to_rest = pose.inverse();
         const Strided<std::int64_t> id = std::as_const(points).id().read();
         const Strided<Vec3f> P = std::as_const(points).P().read();
-        for_each_member(members, places, [&](std::size_t i) -> Vec3f {
-            if (scatter_) {
+        if (scatter_)
+            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
                 Birthplace place;
                 scatter_->place(now.random, number_of(id[i]), {&place, 1});
                 return (pose * place.P.cast<double>()).cast<float>();
+            });
+        for_each_chunk(places.size(), [&](std::size_t begin, std::size_t end) {
+            std::vector<std::size_t> which;
+            std::vector<Vec3d> at;
+            for (std::size_t i = begin; i < end; ++i) {
+                if (!members[i]) continue;
+                which.push_back(i);
+                at.push_back(to_rest * P[i].cast<double>());
             }
-            return (pose * nearest(to_rest * P[i].cast<double>())).cast<float>();
+            go_to_surface(at);
+            for (std::size_t k = 0; k < at.size(); ++k) places[which[k]] = (pose * at[k]).cast<float>();
         });
     }
 
 private:
     // P - φ ∇φ / |∇φ|², which is on the surface where φ is a distance; P where there is no gradient, beyond the band of
     // a level set.
-    Vec3d nearest(const Vec3d& P) const
+    void go_to_surface(std::span<Vec3d> P) const
     {
-        double phi = 0;
-        Vec3d gradient = Vec3d::Zero();
-        shape_->distance({&P, 1}, {&phi, 1}, {&gradient, 1});
-        const double slope2 = gradient.squaredNorm();
-        return slope2 > 0 ? Vec3d(P - phi / slope2 * gradient) : P;
+        std::vector<double> phi(P.size());
+        std::vector<Vec3d> gradient(P.size(), Vec3d::Zero());
+        shape_->distance(P, phi, gradient);
+        for (std::size_t k = 0; k < P.size(); ++k)
+            if (const double slope2 = gradient[k].squaredNorm(); slope2 > 0) P[k] -= phi[k] / slope2 * gradient[k];
     }
 
     const ShapePtr shape_;

@@ -261,9 +261,9 @@ local function distances(a, b)
   return list
 end
 
--- doubt: how far apart 16 and 64 times the sub-steps are, m.
+-- doubt: how far apart two references are, the finer of which is the truth, m.
 local function ratio(told, real, doubt)
-  assert(3 * doubt <= real, ("no truth: 16 and 64 times the sub-steps are %g m apart, the error is %g m")
+  assert(3 * doubt <= real, ("no truth: two references are %g m apart, the error is %g m")
     :format(doubt, real))
   return told / real
 end

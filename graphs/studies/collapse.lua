@@ -3,8 +3,8 @@
 -- Shows:  error = "residual": what is left of the constraints themselves, in metres, which needs no reference; and
 --         sub-steps before iterations (Macklin et al. 2019): as many sweeps leave less as sub-steps of one iteration
 --         each than as iterations of eight sub-steps.
--- Proves: sub-steps leave less than as many iterations do, from 64 on less than a tenth, and less with each doubling
---         (tests/graphs/test_studies.lua).
+-- Proves: sub-steps leave less than as many iterations do, from 32 on less than a third, from 64 on less than a
+--         tenth, and less with each doubling (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/collapse.lua -o /tmp/collapse
 local rapid = require "rapid"
 

@@ -403,8 +403,9 @@ void Contacts::solve_velocities(Substep& step)
             sweep([&](ContactPack& pack) { solve_pack(pack, step, weights, none, impact_speed); });
         }
         backwards_ = !backwards_;
-        // Not where light points between heavy ones and a shape would be pushed to and fro.
-        const bool recovers_deep = !heavy_.any();
+        // Not where light points between heavy ones and a shape would be pushed to and fro; nor, as over-relaxation,
+        // where points may sleep: some piles would not come to rest.
+        const bool recovers_deep = !heavy_.any() && !sleep_.sleep();
         deep_.resize(std::max(deep_.size(), blocks_.size()));
         blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
             deep_[b].clear();

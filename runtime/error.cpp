@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include "runtime/printable.h"
+
 namespace rapid {
 
 Error& Error::at(const Location& location)
@@ -31,17 +33,6 @@ Error& Error::with_trace(std::string trace)
 }
 
 namespace {
-
-// With its middle left out where a name or a value makes it endless.
-std::string shortened(std::string_view text, std::size_t most)
-{
-    if (text.size() <= most) return std::string(text);
-    const auto is_inside = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80; };
-    std::size_t head = most * 3 / 4, tail = text.size() - most / 4;  // whole characters of UTF-8
-    while (head > 0 && is_inside(head)) --head;
-    while (tail < text.size() && is_inside(tail)) ++tail;
-    return fmt::format("{} [... {} bytes ...] {}", text.substr(0, head), tail - head, text.substr(tail));
-}
 
 constexpr std::size_t most_of_message = 4000, most_of_name = 200;  // bytes
 constexpr std::size_t most_of_path = 4096;                         // longer ones name no file

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace rapid {
 
 std::string printable(std::string_view text)
@@ -22,5 +24,17 @@ std::string printable(std::string_view text)
     }
     return result;
 }
+
+std::string shortened(std::string_view text, std::size_t most)
+{
+    if (text.size() <= most) return std::string(text);
+    const auto is_inside = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80; };
+    std::size_t head = most * 3 / 4, tail = text.size() - most / 4;  // whole characters of UTF-8
+    while (head > 0 && is_inside(head)) --head;
+    while (tail < text.size() && is_inside(tail)) ++tail;
+    return fmt::format("{} [... {} bytes ...] {}", text.substr(0, head), tail - head, text.substr(tail));
+}
+
+std::size_t width_of(std::string_view text) { return std::min<std::size_t>(text.size(), 40); }
 
 }  // namespace rapid

@@ -56,7 +56,8 @@ void print_error(const Error& error, bool verbose)
 void print_warning(const std::string& warning)
 {
     std::fflush(stdout);
-    const std::string text = fmt::format("warning: {}\n", printable(warning));
+    constexpr std::size_t most = 4000;  // bytes, as of an error
+    const std::string text = fmt::format("warning: {}\n", printable(shortened(warning, most)));
     std::fwrite(text.data(), 1, text.size(), stderr);
 }
 

@@ -13,6 +13,7 @@
 #include "bindings/host/threads.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/explain.h"
+#include "runtime/printable.h"
 
 namespace rapid {
 namespace {
@@ -87,7 +88,8 @@ public:
     {
         if (rows_.empty()) return {};
         std::size_t name = 0, fact = 0;
-        for (const Row& row : rows_) name = std::max(name, row.name.size()), fact = std::max(fact, row.fact.size());
+        for (const Row& row : rows_)
+            name = std::max(name, width_of(row.name)), fact = std::max(fact, width_of(row.fact));
         std::string text = heading + '\n';
         for (const Row& row : rows_)
             text += fact == 0 ? fmt::format("  {:{}}  {}\n", row.name, name, row.why)

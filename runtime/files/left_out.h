@@ -10,6 +10,9 @@
 
 namespace rapid {
 
+// To such a list, once for the same, and no more than fit in a message: further ones are "more than these 20".
+void add_left_out(std::vector<std::string>& list, const std::string& what);
+
 class LeftOut {
 public:
     // Collects what is left out on this thread from now on, until it is destroyed.
@@ -18,7 +21,7 @@ public:
     LeftOut(const LeftOut&) = delete;
     LeftOut& operator=(const LeftOut&) = delete;
 
-    // Of a reader: once for the same. Lost where nobody collects.
+    // Of a reader, as add_left_out. Lost where nobody collects.
     static void add(const std::string& what);
 
     const std::vector<std::string>& list() const { return list_; }

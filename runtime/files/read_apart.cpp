@@ -79,7 +79,9 @@ void limit(__rlimit_resource resource, rlim_t most)
 {
     rlimit value;
     if (::getrlimit(resource, &value) != 0) ::_exit(1);
-    value.rlim_cur = value.rlim_max = std::min(value.rlim_max, most);
+    value.rlim_cur = std::min(value.rlim_max, most);
+    // Where the two are the same, the processor's limit is told by SIGKILL, which does not say which one it was.
+    value.rlim_max = std::min(value.rlim_max, resource == RLIMIT_CPU ? most + 1 : most);
     if (::setrlimit(resource, &value) != 0) ::_exit(1);
 }
 

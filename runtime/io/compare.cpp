@@ -288,8 +288,8 @@ std::string to_text(const Comparison& comparison)
                                    comparison.compared, comparison.tolerance, comparison.tolerance_P);
     text += missing_text(comparison.only_a, "A") + missing_text(comparison.only_b, "B");
     std::size_t width = 4;
-    for (const AttributeDifference& d : comparison.attributes) width = std::max(width, d.name.size());
-    for (const AttributeDifference& d : comparison.groups) width = std::max(width, d.name.size());
+    for (const AttributeDifference& d : comparison.attributes) width = std::max(width, width_of(d.name));
+    for (const AttributeDifference& d : comparison.groups) width = std::max(width, width_of(d.name));
     for (const AttributeDifference& d : comparison.attributes) text += attribute_text(d, width);
     for (const AttributeDifference& d : comparison.groups) text += group_text(d, width);
     return text;

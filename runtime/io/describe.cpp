@@ -110,8 +110,8 @@ std::string to_text(const PointSummary& summary)
         text += fmt::format("bounds      {}  to  {}\n", corner(summary.bounds.min()), corner(summary.bounds.max()));
     }
     std::size_t width = 10;
-    for (const AttributeSummary& a : summary.attributes) width = std::max(width, a.name.size());
-    for (const GroupSummary& g : summary.groups) width = std::max(width, g.name.size());
+    for (const AttributeSummary& a : summary.attributes) width = std::max(width, width_of(a.name));
+    for (const GroupSummary& g : summary.groups) width = std::max(width, width_of(g.name));
 
     text += "attributes\n";
     for (const AttributeSummary& a : summary.attributes) {

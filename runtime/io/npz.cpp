@@ -91,18 +91,25 @@ void write_texts(ZipWriter& zip, const std::string& name, const Column<Token>& c
     std::vector<std::u32string> texts;
     std::size_t longest = 1;
     for (const Token text : table.texts) longest = std::max(longest, texts.emplace_back(characters_of(text)).size());
-    for (std::u32string& text : texts) text.resize(longest, U'\0');
     const std::string header = npy_header(fmt::format("<U{}", longest), column.size(), 1);
     const std::size_t bytes = longest * sizeof(char32_t);
     zip.begin(name + std::string(suffix), header.size() + column.size() * bytes);
     zip.write(header.data(), header.size());
+    // Each is as long as the longest, in the file alone.
+    constexpr std::size_t most = std::size_t{1} << 20;
     std::string piece;
-    for (std::size_t begin = 0; begin < column.size(); begin += chunk_size) {
-        piece.clear();
-        for (std::size_t i = begin; i < std::min(column.size(), begin + chunk_size); ++i)
-            piece.append(reinterpret_cast<const char*>(texts[static_cast<std::size_t>(table.places[i])].data()), bytes);
-        zip.write(piece.data(), piece.size());
+    for (std::size_t i = 0; i < column.size(); ++i) {
+        const std::u32string& text = texts[static_cast<std::size_t>(table.places[i])];
+        piece.append(reinterpret_cast<const char*>(text.data()), text.size() * sizeof(char32_t));
+        for (std::size_t left = bytes - text.size() * sizeof(char32_t), some; left > 0; left -= some) {
+            some = std::min(left, most);
+            piece.append(some, '\0');
+            if (piece.size() < most) continue;
+            zip.write(piece.data(), piece.size());
+            piece.clear();
+        }
     }
+    zip.write(piece.data(), piece.size());
     zip.end();
 }
 

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <list>
+#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -90,7 +93,7 @@ public:
             read_properties();
         }
         if (!found) throw Error("there is no prim of the type Points");
-        return std::move(arrays_);
+        return {std::move_iterator(arrays_.begin()), std::move_iterator(arrays_.end())};
     }
 
 private:
@@ -241,7 +244,7 @@ private:
             if (!is_at('[')) return skip_value();  // None
             array->name = std::string(name);
             read_numbers(*array);
-            if (find(name) == arrays_.end()) arrays_.push_back(std::move(*array));
+            if (!by_name_.contains(name)) add(name, std::move(*array));
             return;
         }
         name.remove_suffix(samples.size());
@@ -264,12 +267,15 @@ private:
         }
         ++at_;
         array->name = std::string(name);
-        if (const auto before = find(name); before != arrays_.end()) arrays_.erase(before);
-        if (found) arrays_.push_back(std::move(*array));
+        if (const auto before = by_name_.find(name); before != by_name_.end()) {
+            arrays_.erase(before->second);
+            by_name_.erase(before);
+        }
+        if (found) add(name, std::move(*array));
     }
-    std::vector<UsdArray>::iterator find(std::string_view name)
+    void add(std::string_view name, UsdArray array)
     {
-        return std::find_if(arrays_.begin(), arrays_.end(), [&](const UsdArray& a) { return a.name == name; });
+        by_name_.emplace(name, arrays_.insert(arrays_.end(), std::move(array)));
     }
 
     // [1, 2], [(1, 2, 3), (4, 5, 6)]
@@ -337,8 +343,9 @@ private:
 
     std::string_view text_;
     std::size_t at_ = 0;
-    std::vector<UsdArray> arrays_;
-    std::set<std::string_view> names_;  // of arrays so far
+    std::list<UsdArray> arrays_;
+    std::map<std::string_view, std::list<UsdArray>::iterator> by_name_;
+    std::set<std::string_view> names_;  // of arrays so far, each with its time samples and without
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "runtime/files/read_apart.h"
 
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
@@ -85,6 +86,23 @@ TEST_CASE("the end of a reader is an error of its file", "[files]")
     CHECK(error_in([]() -> Numbers { ::_exit(0); }) == "can't be read: it ends its reader, and must be damaged");
     CHECK(error_in([]() -> Numbers { return Numbers(std::size_t{1} << 30); }) ==
           "can't be read: it takes more than 1024 MB of memory, and must be damaged");
+}
+
+TEST_CASE("a reader that takes too long is told from others that end by a signal", "[files]")
+{
+    const TemporaryFolder folder;
+    std::ofstream(folder / "file") << "bytes";
+    const Numbers seconds = read(folder / "file", [] {
+        rlimit limit{};
+        ::getrlimit(RLIMIT_CPU, &limit);
+        return Numbers{static_cast<std::int32_t>(limit.rlim_cur), static_cast<std::int32_t>(limit.rlim_max)};
+    });
+    // At the second one comes SIGKILL, which may come from elsewhere.
+    CHECK(seconds == Numbers{5, 6});
+    CHECK(error_in([]() -> Numbers {
+              ::raise(SIGXCPU);
+              return {};
+          }) == "can't be read: it takes its reader longer than 5 s, and must be damaged");
 }
 
 TEST_CASE("a message that promises more than it holds is an error", "[files]")

@@ -12,3 +12,16 @@ TEST_CASE("what a terminal would take for a command is shown as a number, and al
     CHECK(printable("\xc2\x9b"
                     "2J\xc2\xa0\xc2") == "\\x9b2J\xc2\xa0\xc2");
 }
+
+TEST_CASE("an endless text is shortened in its middle, between characters", "[printable]")
+{
+    CHECK(shortened("short", 5) == "short");
+    CHECK(shortened(std::string(50, 'a') + std::string(50, 'b'), 40) ==
+          std::string(30, 'a') + " [... 60 bytes ...] " + std::string(10, 'b'));
+    // 12 bytes, of which the characters in the middle are two each.
+    CHECK(shortened("a\xc3\xa9\xc3\xa9\xc3\xa9\xc3\xa9\xc3\xa9"
+                    "b",
+                    8) == "a\xc3\xa9\xc3\xa9 [... 6 bytes ...] b");
+    CHECK(width_of("name") == 4);
+    CHECK(width_of(std::string(1000, 'n')) == 40);
+}

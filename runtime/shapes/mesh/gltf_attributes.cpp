@@ -9,6 +9,7 @@
 #include "runtime/error.h"
 #include "runtime/files/base64.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/files/scalars.h"
 
 namespace rapid {
@@ -49,8 +50,9 @@ public:
     GltfAttributes attributes()
     {
         GltfAttributes all;
-        const json none = json::array();
-        for (const json& mesh : document_.value("meshes", none))
+        const auto meshes = document_.find("meshes");
+        if (meshes == document_.end()) return all;
+        for (const json& mesh : *meshes)  // not a copy: of lists within lists it would fill the stack
             for (const json& primitive : mesh.at("primitives")) {
                 GltfAttributes::Primitive& one = all.primitives.emplace_back();
                 const json& named = primitive.at("attributes");
@@ -61,7 +63,7 @@ public:
                     if (values)
                         one.values.emplace(name.substr(1), std::move(*values));
                     else
-                        all.left_out.push_back(fmt::format("the attribute \"{}\"", name));
+                        add_left_out(all.left_out, fmt::format("the attribute \"{}\"", name));
                 }
             }
         return all;

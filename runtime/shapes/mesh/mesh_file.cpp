@@ -17,17 +17,12 @@
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/shapes/mesh/gltf_attributes.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
 namespace rapid {
 namespace {
-
-void leave_out(const std::string& what, MeshFile& corners)
-{
-    if (std::find(corners.left_out.begin(), corners.left_out.end(), what) == corners.left_out.end())
-        corners.left_out.push_back(what);
-}
 
 template <class T>
 T zero()
@@ -44,7 +39,8 @@ void append_list(const std::string& name, const std::vector<T>& list, std::size_
 {
     Mesh::VertexValues& values = corners.values.try_emplace(name, std::vector<T>()).first->second;
     auto* known = std::get_if<std::vector<T>>(&values);
-    if (!known) return leave_out(fmt::format("\"{}\" of a part, which has another type in others", name), corners);
+    if (!known)
+        return add_left_out(corners.left_out, fmt::format("\"{}\" of a part, which has another type in others", name));
     known->resize(first, zero<T>());
     known->insert(known->end(), list.begin(), list.end());
 }
@@ -125,8 +121,8 @@ void append(const aiScene& scene, unsigned number, const std::string& node, cons
         if (material != AI_DEFAULT_MATERIAL_NAME) groups.insert(material);
     }
     for (const std::string& name : groups) join_group(name, first_face, corners);
-    if (part.HasBones()) leave_out("its skin", corners);
-    if (part.mNumAnimMeshes > 0) leave_out("its morph targets", corners);
+    if (part.HasBones()) add_left_out(corners.left_out, "its skin");
+    if (part.mNumAnimMeshes > 0) add_left_out(corners.left_out, "its morph targets");
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, bool with_normals,
@@ -170,19 +166,31 @@ PartValues further_values(const std::filesystem::path& path, const aiScene& scen
     const std::string extension = path.extension().string();
     if (extension.size() < 2 || std::string_view("gG").find(extension[1]) == std::string_view::npos) return values;
     GltfAttributes attributes = read_gltf_attributes(path);
-    for (const std::string& what : attributes.left_out) leave_out(what, corners);
+    for (const std::string& what : attributes.left_out) add_left_out(corners.left_out, what);
     for (std::size_t k = 0; k < attributes.primitives.size(); ++k) {
         GltfAttributes::Primitive& primitive = attributes.primitives[k];
         const bool is_part =
             attributes.primitives.size() == scene.mNumMeshes && primitive.vertices == scene.mMeshes[k]->mNumVertices;
         for (const char* taken : {"P", "v", "id", "N", "Cd", "Alpha", "uv"})
-            if (primitive.values.erase(taken) > 0) leave_out(fmt::format("the attribute \"_{}\"", taken), corners);
+            if (primitive.values.erase(taken) > 0)
+                add_left_out(corners.left_out, fmt::format("the attribute \"_{}\"", taken));
         if (!is_part)
             for (const auto& [name, list] : primitive.values)
-                leave_out(fmt::format("the attribute \"_{}\"", name), corners);
+                add_left_out(corners.left_out, fmt::format("the attribute \"_{}\"", name));
         values.push_back(is_part ? std::move(primitive.values) : std::map<std::string, Mesh::VertexValues>());
     }
     return values;
+}
+
+[[noreturn]] void refuse(const Assimp::Importer& importer)
+{
+    try {
+        if (const std::exception_ptr& cause = importer.GetException()) std::rethrow_exception(cause);
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (...) {
+    }
+    throw Error(fmt::format("{}; it must be an OBJ, STL or glTF file", importer.GetErrorString()));
 }
 
 MeshFile import(const std::filesystem::path& path)
@@ -190,15 +198,15 @@ MeshFile import(const std::filesystem::path& path)
     Assimp::Importer importer;
     importer.SetIOHandler(new RegularFiles);  // the importer's from here on
     const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
-    if (!scene) throw Error(fmt::format("{}; it must be an OBJ, STL or glTF file", importer.GetErrorString()));
+    if (!scene) refuse(importer);
     MeshFile corners;
     const bool with_normals = path.extension() != ".stl" && path.extension() != ".STL";
     const PartValues values = further_values(path, *scene, corners);
     if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), with_normals, values, corners);
     complete(corners);
-    if (scene->mNumAnimations > 0) leave_out("its animations", corners);
-    if (scene->mNumLights > 0) leave_out("its lights", corners);
-    if (scene->mNumCameras > 0) leave_out("its cameras", corners);
+    if (scene->mNumAnimations > 0) add_left_out(corners.left_out, "its animations");
+    if (scene->mNumLights > 0) add_left_out(corners.left_out, "its lights");
+    if (scene->mNumCameras > 0) add_left_out(corners.left_out, "its cameras");
     return corners;
 }
 

@@ -10,6 +10,7 @@
 
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/left_out.h"
 #include "runtime/files/ply_file.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 #include "runtime/shapes/mesh/polygon.h"
@@ -20,39 +21,61 @@ namespace {
 // A column of the vertices, as floats; colours of integers are parts of the largest.
 class Property {
 public:
-    Property(const PlyElement& vertex, const PlyRecords& records, std::string_view name, bool colour)
-        : records_(records)
+    Property() = default;  // none
+    Property(const PlyProperty& property, std::size_t offset, const PlyRecords& records, bool colour)
+        : records_(&records), offset_(offset), type_(property.type)
     {
-        for (const PlyProperty& property : vertex.properties) {
-            if (property.name == name) {
-                found_ = true;
-                type_ = property.type;
-                if (colour && !is_floating(property.type))
-                    scale_ = with_scalar(property.type, [](auto like) {
-                        return 1 / static_cast<double>(std::numeric_limits<decltype(like)>::max());
-                    });
-                return;
-            }
-            offset_ += scalar_bytes(property.type);
-        }
+        if (colour && !is_floating(type_))
+            scale_ = with_scalar(
+                type_, [](auto like) { return 1 / static_cast<double>(std::numeric_limits<decltype(like)>::max()); });
     }
 
-    explicit operator bool() const { return found_; }
+    explicit operator bool() const { return records_ != nullptr; }
     float operator[](std::size_t i) const
     {
         return with_scalar(type_, [&](auto like) {
-            const unsigned char* from = records_.bytes.data() + i * records_.stride + offset_;
-            const auto number = load_scalar<decltype(like)>(from, records_.order);
+            const unsigned char* from = records_->bytes.data() + i * records_->stride + offset_;
+            const auto number = load_scalar<decltype(like)>(from, records_->order);
             return static_cast<float>(scale_ * static_cast<double>(number));
         });
     }
 
 private:
-    const PlyRecords& records_;
-    bool found_ = false;
+    const PlyRecords* records_ = nullptr;
     std::size_t offset_ = 0;  // in a record
     ScalarType type_ = ScalarType::Float;
     double scale_ = 1;
+};
+
+// Those of an element without lists, by their places in it.
+class Properties {
+public:
+    Properties(const PlyElement& element, const PlyRecords& records) : element_(element), records_(records)
+    {
+        std::size_t offset = 0;
+        for (const PlyProperty& property : element.properties) {
+            offsets_.push_back(offset);
+            offset += scalar_bytes(property.type);
+        }
+    }
+
+    Property operator[](std::size_t place) const { return at(place, false); }
+    Property find(std::string_view name, bool colour = false) const
+    {
+        for (std::size_t place = 0; place < offsets_.size(); ++place)
+            if (element_.properties[place].name == name) return at(place, colour);
+        return {};
+    }
+
+private:
+    Property at(std::size_t place, bool colour) const
+    {
+        return {element_.properties[place], offsets_[place], records_, colour};
+    }
+
+    const PlyElement& element_;
+    const PlyRecords& records_;
+    std::vector<std::size_t> offsets_;
 };
 
 // What is read apart from the others, or is none of a vertex alone.
@@ -76,23 +99,20 @@ std::string vec3_name(const std::vector<PlyProperty>& properties, std::size_t at
     return stem == "n" ? "N" : stem;
 }
 
-void read_values(const PlyElement& vertex, const PlyRecords& records, MeshFile& mesh)
+void read_values(const PlyElement& vertex, const Properties& values_of, MeshFile& mesh)
 {
     const std::vector<PlyProperty>& properties = vertex.properties;
     for (std::size_t p = 0; p < properties.size(); ++p) {
         if (is_known(properties[p].name)) continue;
-        const auto values_of = [&](std::size_t property) {
-            return Property(vertex, records, properties[property].name, false);
-        };
         if (const std::string name = vec3_name(properties, p); !name.empty()) {
-            const Property x = values_of(p), y = values_of(p + 1), z = values_of(p + 2);
+            const Property x = values_of[p], y = values_of[p + 1], z = values_of[p + 2];
             std::vector<Vec3f> values;
             values.reserve(vertex.count);
             for (std::size_t i = 0; i < vertex.count; ++i) values.emplace_back(x[i], y[i], z[i]);
             mesh.values.emplace(name, std::move(values));
             p += 2;
         } else {
-            const Property number = values_of(p);
+            const Property number = values_of[p];
             std::vector<float> values(vertex.count);
             for (std::size_t i = 0; i < vertex.count; ++i) values[i] = number[i];
             mesh.values.emplace(properties[p].name, std::move(values));
@@ -106,17 +126,15 @@ void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
     if (vertex.count > std::numeric_limits<std::int32_t>::max())
         throw Error(fmt::format("{} vertices are more than a mesh can have", vertex.count));
     const PlyRecords records = file.read_records(vertex);
-    const auto property = [&](std::string_view name, bool colour = false) {
-        return Property(vertex, records, name, colour);
-    };
-    const Property x = property("x"), y = property("y"), z = property("z");
+    const Properties properties(vertex, records);
+    const Property x = properties.find("x"), y = properties.find("y"), z = properties.find("z");
     if (!x || !y || !z) throw Error("the vertices have no x y z");
     mesh.positions.reserve(vertex.count);
     for (std::size_t i = 0; i < vertex.count; ++i) mesh.positions.emplace_back(x[i], y[i], z[i]);
-    read_values(vertex, records, mesh);
+    read_values(vertex, properties, mesh);
 
-    const Property red = property("red", true), green = property("green", true), blue = property("blue", true),
-                   alpha = property("alpha", true);
+    const Property red = properties.find("red", true), green = properties.find("green", true),
+                   blue = properties.find("blue", true), alpha = properties.find("alpha", true);
     if (!red || !green || !blue) return;
     mesh.alphas.assign(vertex.count, 1);
     mesh.colours.reserve(vertex.count);
@@ -137,7 +155,7 @@ public:
         for (std::size_t p = 0; p < face.properties.size(); ++p) {
             const PlyProperty& property = face.properties[p];
             if (p != indices && property.list)
-                mesh.left_out.push_back(fmt::format("the list \"{}\" of its faces", property.name));
+                add_left_out(mesh.left_out, fmt::format("the list \"{}\" of its faces", property.name));
             if (property.list) continue;
             numbers.push_back(property);
             places.push_back(p);
@@ -226,7 +244,7 @@ void leave_out_others(const std::vector<PlyElement>& elements, MeshFile& mesh)
 {
     for (const PlyElement& element : elements)
         if (element.name != "vertex" && element.name != "face" && element.count > 0)
-            mesh.left_out.push_back(fmt::format("the {} elements \"{}\"", element.count, element.name));
+            add_left_out(mesh.left_out, fmt::format("the {} elements \"{}\"", element.count, element.name));
 }
 
 }  // namespace

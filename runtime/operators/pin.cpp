@@ -49,7 +49,7 @@ void read_value(const Param& param, const Value& value, PinTarget& target)
 struct Pin {
     Vec3d from = Vec3d::Zero(), to = Vec3d::Zero();  // at the frame's beginning and end, m
     MaterialPoint on;                                // of a body that moves
-    Vec3d now = Vec3d::Zero();
+    Vec3d now = Vec3d::Zero(), v = Vec3d::Zero();    // in this sub-step: m, m/s
     bool taken = false;
 
     template <class Archive>
@@ -77,6 +77,7 @@ struct Along {
         gradient[0] = Vec3d::Unit(axis);
         return P[0][axis] - pin->now[axis];
     }
+    double rate() const { return -pin->v[axis]; }
 };
 
 struct Pins {
@@ -197,7 +198,7 @@ public:
         if (!rigid_) return;
         for (const auto& [i, pin] : held_) {
             step.points[i] = {pin->now, 0};
-            step.v[i] = velocity(*pin, since);
+            step.v[i] = pin->v;
         }
     }
     void advance(Substep& step) override { pins_->springs.advance(step); }
@@ -273,6 +274,7 @@ private:
             const Vec3d target = place(*pin, since);
             if (!rigid_ && target != pin->now) driven_.push_back(static_cast<std::uint32_t>(i));
             pin->now = target;
+            pin->v = velocity(*pin, since);
         }
     }
     Vec3d place(const Pin& pin, double since) const

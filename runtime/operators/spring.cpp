@@ -2,11 +2,12 @@
 //
 //   F = -stiffness (P - target) - damping v        accelerates a point by its mass; both parts are exact at any step
 //
-// The target on a shape is the nearest position, wherever the point goes: exact on planes, of second order on curved
-// surfaces, and at any step without a gain of energy (solver/surface_springs.h). On a shape that moves, and on a mesh,
-// it is the position nearest to the point in the middle of the sub-step, where that is then.
+// The target on a shape is the nearest position, wherever the point and the shape go: exact on planes at rest, of
+// second order on curved surfaces, and at any step without a gain of energy but by a shape that moves
+// (solver/surface_springs.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/step_shape.h"
+#include "runtime/shapes/motion/mesh_surface.h"
 
 namespace rapid {
 namespace {
@@ -47,16 +48,14 @@ struct Spring {
         const Strided<Vec3f> place = chunk.read(target.position);
         const Strided<float> k = chunk.read(stiffness), d = chunk.read(damping);
         const Strided<float> mass = masses_of(chunk.points);
-        std::vector<double> phi(target.shape.step ? chunk.size() : 0);
-        std::vector<Vec3d> gradient(phi.size());
-        if (target.shape.step) target.shape.distance(chunk, phi, gradient);
+        const StepShape* step = target.shape.step.get();
+        const Shape* shape = step ? &step->shape() : target.shape.shape.get();
+        const bool is_two_sided = step && is_mesh_surface(*shape);
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             const double m = mass[chunk.first + i];
-            if (target.shape.step) {
-                if (const double slope2 = gradient[i].squaredNorm(); slope2 > 0)
-                    forces.add_spring(i, k[i] / m, chunk.P[i] - phi[i] / slope2 * gradient[i]);
-            } else if (target.shape)
-                forces.add_surface_spring(i, k[i] / m, *target.shape.shape);
+            const double begin = step ? chunk.time[i] - 0.5 * chunk.dt[i] - step->begin() : 0;
+            if (shape)
+                forces.add_surface_spring(i, {k[i] / m, shape, begin, is_two_sided});
             else
                 forces.add_spring(i, k[i] / m, place[i].cast<double>());
             forces.add_drag(i, d[i] / m, Vec3d::Zero());

@@ -123,7 +123,7 @@ void BlockStep::add_surface_springs(const StepForce& local)
     own_linear();
     for (std::size_t i = 0; i < block.size(); ++i)
         if (local.all || local.members[block.places[i]])
-            surface_springs_.add(i, one_.surface_spring(i), block.P[i], block.own_linear[i]);
+            surface_springs_.add(i, one_.surface_spring(i), block.P[i], block.dt[i], block.own_linear[i]);
 }
 
 // Gives each point a linear part of its own.

@@ -191,8 +191,8 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         // had been born there.
         for (const auto& [k, by] : collisions.displacements()) start_[block.places[k]] += by;
         for (std::size_t k = 0; k < block.size(); ++k) {
-            if (block.linear.data) add_drag(block, k, collisions.contact_work(k), changes);
             if (!surface_springs_.empty()) surface_springs_[block.places[k]] = step.surface_spring(k);
+            if (block.linear.data) add_drag(block, k, collisions.contact_work(k), changes);
             take_point(block, k);
         }
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
@@ -227,7 +227,10 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     if (!paths_.empty()) paths_[i] = free_path(block, k);
     if (!mobility_.empty() && inverse_mass_[i] > 0) {
         mobility_[i] = mobility_of(block, k);
-        energy_[i] = 0.5 * v_[i].squaredNorm() / inverse_mass_[i] + potential_energy(now_, i, start_[i]);
+        // What a shape that moves has done by a spring is nothing that drag has taken.
+        const bool is_driven = surface_springs_[i].w2 > 0 && surface_springs_[i].shape->moves();
+        const Vec3d &P = is_driven ? block.P[k] : start_[i], &v = is_driven ? block.v[k] : v_[i];
+        energy_[i] = 0.5 * v.squaredNorm() / inverse_mass_[i] + potential_energy(now_, i, P);
     }
     if (sleep_ && !skips_sleepers_) {
         const bool asleep = sleep_->asleep(i);
@@ -264,10 +267,13 @@ void CoupledStep::add_drag(const PointBlock& block, std::size_t k, double contac
 {
     const std::uint32_t i = block.places[k];
     const Linear& linear = block.linear[k];
+    const SurfaceSpring& surface = surface_springs_[i];
     if (!(inverse_mass_[i] > 0) || !(block.dt[k] > 0) || (linear.k == 0 && linear.c == 0)) return;
+    if (surface.w2 > 0 && surface.shape->moves()) return;  // what the shape does is not known apart
     const Vec3d &from = start_[i], &to = block.P[k], way = to - from;
     const double kinetic = 0.5 * (block.v[k] - v_[i]).dot(block.v[k] + v_[i]);
-    const double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(way);
+    double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(way);
+    if (surface.w2 > 0) springs += potential_energy(surface, to) - potential_energy(surface, from);
     changes.drag += (kinetic - block.a[k].dot(way) + springs - contacts) / inverse_mass_[i];
 }
 
@@ -347,12 +353,15 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
             block.dt.assign(size, 0);
             collisions.begin(block.places);
             collisions.advance(block.P, block.v, {{&context_.scene.uniform.a, 0}, block.dt, block.dt, {}});
+            std::vector<std::size_t> displaced;  // out of shapes, or back to where they stick
+            for (std::size_t i = 0; i < size; ++i)
+                if (block.P[i] != at_[first + i].P) displaced.push_back(i);
             deepest = std::max(deepest, collisions.round(block.P, block.rounded));
-            for (const auto& displacements : {collisions.displacements(), collisions.corrections()})
-                for (const Ejection::Displacement& one : displacements) {
-                    const std::scoped_lock lock(mutex_);
-                    if (!holds_still(first + one.i)) displaced_[first + one.i] = block.P[one.i];
-                }
+            for (const Ejection::Displacement& one : collisions.corrections()) displaced.push_back(one.i);
+            for (const std::size_t i : displaced) {
+                const std::scoped_lock lock(mutex_);
+                if (!holds_still(first + i)) displaced_[first + i] = block.P[i];
+            }
             // Contacts found here do not count: the constraints have treated them.
             for (std::size_t i = 0; i < size; ++i) {
                 block.v[i] = v_[first + i];
@@ -367,7 +376,8 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
     context_.count_penetration(deepest);
 }
 
-// What it takes to put points out of shapes that constraints have pushed them into, against forces and rows.
+// What it takes to put points out of shapes that constraints have pushed them into, and back to where they stick,
+// against forces and rows.
 void CoupledStep::add_displacements(const Projection& projection)
 {
     std::vector<Vec3d> P(at_.size());
@@ -385,7 +395,8 @@ void CoupledStep::add_displacements(const Projection& projection)
     if (!result.ledger) return;
     result.ledger->potential += by_acceleration;
     result.ledger->elastic += elastic;
-    result.ledger->by.contacts += by_acceleration + elastic;
+    result.ledger->by.contacts += by_forces + elastic;
+    result.ledger->by_motion += by_acceleration - by_forces;
 }
 
 // Whether a constraint prescribes its position, or it has slept: no shape moves it from there.

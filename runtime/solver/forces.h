@@ -56,8 +56,10 @@ struct Linear {
 
 // A spring to the surface of a shape: -w2 φ ∇φ (solver/surface_springs.h).
 struct SurfaceSpring {
-    double w2 = 0;  // 1/s²; 0: none
-    const Shape* shape = nullptr;
+    double w2 = 0;                 // 1/s²; 0: none
+    const Shape* shape = nullptr;  // outlives the step
+    double time = 0;               // of the shape, s (Shape::distance_at): when the point sets out
+    bool two_sided = false;        // the distance is above 0 on both sides of the surface
 };
 
 // A force that is the same for all points at all times of the frame: an acceleration (m/s²) and a linear part.
@@ -95,11 +97,10 @@ public:
         linear.w2 += w2;
         linear.w2q += w2 * q;
     }
-    // Towards the surface of the shape, which outlives the step; w2 (1/s²) per metre of distance.
-    void add_surface_spring(std::size_t i, double w2, const Shape& shape)
+    void add_surface_spring(std::size_t i, const SurfaceSpring& spring)
     {
         if (surface_springs_.empty()) surface_springs_.resize(size_);
-        surface_springs_[i] = {w2, &shape};
+        surface_springs_[i] = spring;
     }
     bool has_linear() const { return !linear_.empty(); }
     const Linear& linear(std::size_t i) const { return linear_[i]; }

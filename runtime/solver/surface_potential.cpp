@@ -1,5 +1,7 @@
 #include "runtime/solver/surface_potential.h"
 
+#include <cmath>
+
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
@@ -8,9 +10,10 @@ double potential_energy(const SurfaceSpring& spring, const Vec3d& P)
 {
     double phi = 0;
     Vec3d gradient = Vec3d::Zero();
-    spring.shape->distance({&P, 1}, {&phi, 1}, {&gradient, 1});
+    spring.shape->distance_at({&P, 1}, {&spring.time, 1}, {&phi, 1}, {&gradient, 1});
     const double slope2 = gradient.squaredNorm();
-    return slope2 > 0 ? 0.5 * spring.w2 * phi * phi / slope2 : 0;
+    if (slope2 > 0) return 0.5 * spring.w2 * phi * phi / slope2;
+    return std::isinf(spring.shape->band()) ? 0.5 * spring.w2 * phi * phi : 0;
 }
 
 }  // namespace rapid

@@ -5,7 +5,8 @@
 
 namespace rapid {
 
-// J/kg, of a point at P: w2 φ²/2, with the distance φ of the shape as far as its gradient tells it.
+// J/kg, of a point at P: w2 φ²/2, with the distance φ of the shape at the spring's time, as far as its gradient tells
+// it.
 double potential_energy(const SurfaceSpring& spring, const Vec3d& P);
 
 }  // namespace rapid

@@ -16,7 +16,7 @@ Vec3d nearest(const Vec3d& P, double phi, const Vec3d& gradient)
 
 }  // namespace
 
-void SurfaceSprings::add(std::size_t i, const SurfaceSpring& spring, const Vec3d& P, Linear& linear)
+void SurfaceSprings::add(std::size_t i, const SurfaceSpring& spring, const Vec3d& P, double dt, Linear& linear)
 {
     if (!(spring.w2 > 0)) return;
     if (indices_.empty()) springs_.assign(size_, {});
@@ -28,9 +28,11 @@ void SurfaceSprings::add(std::size_t i, const SurfaceSpring& spring, const Vec3d
     if (!weaker.shape) return;
     double phi = 0;
     Vec3d gradient = Vec3d::Zero();
-    weaker.shape->distance({&P, 1}, {&phi, 1}, {&gradient, 1});
+    weaker.shape->distance_at({&P, 1}, {&weaker.time, 1}, {&phi, 1}, {&gradient, 1});
+    Vec3d place = nearest(P, phi, gradient);
+    if (weaker.shape->moves()) place += 0.5 * dt * weaker.shape->velocity_at(place, weaker.time);
     linear.w2 += weaker.w2;
-    linear.w2q += weaker.w2 * nearest(P, phi, gradient);
+    linear.w2q += weaker.w2 * place;
 }
 
 void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
@@ -38,6 +40,7 @@ void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
     Responder responder;
     motions_.clear();
     at_.clear();
+    times_.clear();
     for (const std::uint32_t i : indices_) {
         const Linear& linear = block.linear[i];
         SurfaceMotion motion;
@@ -48,35 +51,56 @@ void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
         motion.w2 = linear.w2;
         motion.G = acceleration_at_rest(block.P[i], block.a[i], linear);
         motion.k = respond(block.v[i], motion.G, linear, t[i], responder).rate;
+        motion.two_sided = springs_[i].two_sided;
         motions_.push_back(motion);
         at_.push_back(motion.P0);
+        times_.push_back(springs_[i].time);
+        springs_[i].time += t[i];
     }
-    query(at_);
-    for (std::size_t m = 0; m < motions_.size(); ++m) at_[m] = motions_[m].begin(phi_[m], gradient_[m]);
-    query(at_);
+    query();
+    for (std::size_t m = 0; m < motions_.size(); ++m) {
+        const Vec3d V = shape_velocity(m);
+        // In the middle of a ball any direction is one in which the distance grows.
+        if (gradient_[m].isZero(0) && std::isinf(springs_[indices_[m]].shape->band()))
+            gradient_[m] = (motions_[m].v0 - V).normalized();
+        at_[m] = motions_[m].begin(phi_[m], gradient_[m], V);
+    }
+    for (std::size_t m = 0; m < motions_.size(); ++m) times_[m] = springs_[indices_[m]].time;
+    query();
     for (std::size_t m = 0; m < motions_.size(); ++m)
-        if (motions_[m].t > 0) at_[m] = motions_[m].go(gradient_[m]);
-    query(at_);
+        if (motions_[m].t > 0) at_[m] = motions_[m].go(gradient_[m], shape_velocity(m));
+    query();
     for (std::size_t m = 0; m < motions_.size(); ++m)
         if (motions_[m].t > 0) motions_[m].end(phi_[m], gradient_[m]);
 }
 
-// The distances and gradients of all points with springs, each of its own shape.
-void SurfaceSprings::query(std::span<const Vec3d> at)
+// m/s, of the shape of a motion where it is asked.
+Vec3d SurfaceSprings::shape_velocity(std::size_t m) const
 {
-    phi_.assign(at.size(), 0);
-    gradient_.assign(at.size(), Vec3d::Zero());
-    std::vector<std::uint8_t> done(at.size());
-    for (std::size_t first = 0; first < at.size(); ++first) {
+    const Shape& shape = *springs_[indices_[m]].shape;
+    return shape.moves() ? shape.velocity_at(at_[m], times_[m]) : Vec3d(Vec3d::Zero());
+}
+
+// The distances and gradients of all points with springs, each of its own shape at its time.
+void SurfaceSprings::query()
+{
+    phi_.assign(at_.size(), 0);
+    gradient_.assign(at_.size(), Vec3d::Zero());
+    std::vector<std::uint8_t> done(at_.size());
+    for (std::size_t first = 0; first < at_.size(); ++first) {
         if (done[first]) continue;
         const Shape* shape = springs_[indices_[first]].shape;
         asked_.clear();
-        for (std::size_t m = first; m < at.size(); ++m)
-            if (springs_[indices_[m]].shape == shape) asked_.push_back(at[m]);
+        asked_times_.clear();
+        for (std::size_t m = first; m < at_.size(); ++m) {
+            if (springs_[indices_[m]].shape != shape) continue;
+            asked_.push_back(at_[m]);
+            asked_times_.push_back(times_[m]);
+        }
         asked_phi_.resize(asked_.size());
         asked_gradient_.resize(asked_.size());
-        shape->distance(asked_, asked_phi_, asked_gradient_);
-        for (std::size_t m = first, k = 0; m < at.size(); ++m) {
+        shape->distance_at(asked_, asked_times_, asked_phi_, asked_gradient_);
+        for (std::size_t m = first, k = 0; m < at_.size(); ++m) {
             if (springs_[indices_[m]].shape != shape) continue;
             done[m] = 1;
             phi_[m] = asked_phi_[k];
@@ -110,6 +134,7 @@ void SurfaceSprings::bend(std::span<Damped> paths) const
         path.path_v = motion.path_v();
         path.path_a = (path.travel - t * path.path_v) * (2 / (t * t));
         path.pull.surface = springs_[indices_[m]];
+        path.pull.surface.time -= t;
     }
 }
 

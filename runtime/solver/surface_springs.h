@@ -22,11 +22,12 @@ public:
     // That of point i of the block which is not in its `linear`.
     SurfaceSpring of(std::size_t i) const { return indices_.empty() ? SurfaceSpring() : springs_[i]; }
 
-    // Of point i of the block. Of several the stiffest is taken as above, the others as springs to the nearest place,
-    // which are added to `linear`: they are of order 1, and give no energy either.
-    void add(std::size_t i, const SurfaceSpring& spring, const Vec3d& P, Linear& linear);
+    // Of point i of the block, at P. Of several the stiffest is taken as above, the others as springs to the nearest
+    // place, half a step of dt (s) on where that moves, which are added to `linear`: they are of order 1, and give no
+    // energy either.
+    void add(std::size_t i, const SurfaceSpring& spring, const Vec3d& P, double dt, Linear& linear);
 
-    // The states of these points after the times t (s) from where the block has them.
+    // The states of these points after the times t (s) from where the block has them. Springs are then at that time.
     void advance(const PointBlock& block, std::span<const double> t);
     // Moves the points there.
     void move(PointBlock& block) const;
@@ -34,17 +35,18 @@ public:
     void bend(std::span<Damped> paths) const;
 
 private:
-    void query(std::span<const Vec3d> at);
+    void query();
+    Vec3d shape_velocity(std::size_t m) const;
 
     std::size_t size_ = 0;
     std::vector<SurfaceSpring> springs_;  // by point of the block, once one has any
     std::vector<std::uint32_t> indices_;  // points that have one, in order
     std::vector<SurfaceMotion> motions_;  // of these
     std::vector<Vec3d> at_, gradient_;
-    std::vector<double> phi_;
+    std::vector<double> phi_, times_;  // times_: of the shape, s
 
     std::vector<Vec3d> asked_, asked_gradient_;  // of one shape
-    std::vector<double> asked_phi_;
+    std::vector<double> asked_phi_, asked_times_;
 };
 
 }  // namespace rapid

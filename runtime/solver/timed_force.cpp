@@ -19,8 +19,7 @@ void add_part(const Forces& part, std::size_t size, std::size_t begin, Forces& t
             if (linear.c > 0) to.add_quadratic_drag(begin + i, linear.c);
         }
         if (!part.has_surface_springs()) continue;
-        const SurfaceSpring& spring = part.surface_spring(i);
-        if (spring.w2 > 0) to.add_surface_spring(begin + i, spring.w2, *spring.shape);
+        if (part.surface_spring(i).w2 > 0) to.add_surface_spring(begin + i, part.surface_spring(i));
     }
 }
 

@@ -59,6 +59,23 @@ describe("the ledger", function()
     check({ by_drag = -mass * k * (g / k) ^ 2 * fall }, sums, 1e-4)
   end)
 
+  it("has the energy of a spring to a surface, which its damping takes, as drag", function()
+    local sums = ledger [[rapid.points.from { P = {{1.4, 0, 0}} } } :attribute { mass = 1.5 }
+  :spring { target = rapid.shape.sphere { radius = 1 }, stiffness = 2000, damping = 60 }
+  :contact { radius = 0.1 } :solve { substeps = 3 }]]
+    local stored = 2000 / 2 * 0.4 ^ 2
+    check({ by_drag = -stored, by_motion = stored }, sums, 1e-3 * stored)
+  end)
+
+  it("has m g h of what sticks to a shape that jumps", function()
+    local sums = ledger([[rapid.points.from { P = {{0, 0.1, 0}} } } :attribute { mass = 3 } :gravity {}
+  :collide { response = "stick", bounce = 0, cut = {9},
+    shape = rapid.shape.box { size = {2, 2, 2}, center = {0, -1, 0} },
+    transform = function(frame) return rapid.translate(0, frame.number >= 9 and 0.7 or 0, 0) end }
+  :contact { radius = 0.1 } :solve { substeps = 4 }]], 4)
+    check({ by_contacts = 3 * g * 0.7 }, sums, 1e-4 * 3 * g)
+  end)
+
   it("has no more of drag than drag takes, where a method puts a point back after the step", function()
     for _, method in ipairs { "project", "backtrack" } do
       local sums = ledger(([[rapid.points.from { P = {{0, 0.5, 0}}, v = {{1, -4, 0}} } }

@@ -2,6 +2,8 @@
 local scene = require "testing.scene"
 local lehmer = require "tests.lehmer"
 
+local scenes, seed = tonumber(os.getenv "SPRING_SCENES") or 60, tonumber(os.getenv "SPRING_SEED") or 1
+
 local function run(text, last, every)
   local frames = every and {1, last} or {last, last}
   return scene.run(text, { frames = frames })
@@ -157,6 +159,82 @@ return rapid.create { fps = 24, seed = 5, points = rapid.points.grid { size = {1
         local start = energy(result[1][i], distance, k, 0) + 6 -- of at most 12^(1/2) m/s
         for f = 3, 73 do
           assert.truthy(energy(result[f][i], distance, k, 0) <= start * 1.001, ("k = %g, frame %d"):format(k, f))
+        end
+      end
+    end
+  end)
+
+  -- Where shapes move uniformly energy is that which is seen from them. A constant force does the work F·ΔP in a frame.
+  it("gives no energy beside other forces, or by moving uniformly, in random scenes", function()
+    local meshes = { ["rapid.mesh.box { size = {2, 1, 1.5} }"] = distances["rapid.shape.box { size = {2, 1, 1.5} }"] }
+    local targets = {}
+    for _, known in ipairs { distances, meshes } do
+      for shape, distance in pairs(known) do targets[#targets + 1] = { shape = shape, distance = distance } end
+    end
+    table.sort(targets, function(a, b) return a.shape < b.shape end)
+    for number = 1, scenes do
+      draw.start(seed, number)
+      local magnitude, pick, chance = draw.magnitude, draw.pick, draw.chance
+      local speed = pick { 0, magnitude(-2, 1) }
+      local V = vec3(speed * random(), speed * random(), speed * random())
+      local along = speed > 0 and (":transform(function(f) local t = f.time return rapid.translate(%.9g * t, %.9g * t,"
+        .. " %.9g * t) end)"):format(V.x, V.y, V.z) or ""
+      local springs, nodes = {}, {}
+      for k = 1, pick { 1, 1, 2, 3 } do
+        local target = pick(targets)
+        springs[k] = { k = tonumber(("%.6g"):format(magnitude(0, 8))), distance = target.distance }
+        nodes[#nodes + 1] = (":spring { target = %s%s, stiffness = %.9g }"):format(target.shape, along, springs[k].k)
+      end
+      local g, place = pick { 0, -9.81 }, speed == 0 and chance(0.3) and magnitude(0, 6) or 0
+      nodes[#nodes + 1] = (":gravity { g = {0, %.9g, 0} } :spring { stiffness = %.9g }"):format(g, place)
+      if chance(0.3) then
+        nodes[#nodes + 1] = (":wind { velocity = %s, drag = %.6g }"):format(vector(V.x, V.y, V.z), magnitude(-1, 3))
+      end
+      if speed == 0 and chance(0.3) then
+        nodes[#nodes + 1] = (":drag { quadratic = %.6g }"):format(magnitude(-2, 2))
+      end
+      local P, v, F, push = {}, {}, {}, pick { 0, magnitude(0, 3) }
+      for i = 1, 20 do
+        local fast = magnitude(-1.5, 1.5)
+        P[i] = vector(1.5 * random(), 1.5 * random(), 1.5 * random())
+        v[i] = vector(fast * random() + V.x, fast * random() + V.y, fast * random() + V.z)
+        F[i] = vector(push * random(), push * random(), push * random())
+      end
+      local text = ([[
+return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, F = %s } }
+  :points("push", function(p) p.force = p.F end)
+  %s
+  :solve { substeps = %d }]]):format(list(P), list(v), list(F), table.concat(nodes, "\n  "), pick { 1, 1, 2, 4 })
+      local result, time = run(text, 25, true), 0
+      local function all(p)
+        local Q, u = p.P - V * time, p.v - V
+        local sum, slack = u:dot(u) / 2 - g * Q.y + place / 2 * Q:dot(Q), 0
+        -- Places and velocities are rounded to single precision.
+        local ulp = 2 ^ -23 * (math.abs(p.P.x) + math.abs(p.P.y) + math.abs(p.P.z) + 1)
+        local turned = 2 ^ -23 * (math.abs(p.v.x) + math.abs(p.v.y) + math.abs(p.v.z))
+        for _, spring in ipairs(springs) do
+          local d = spring.distance(Q)
+          sum, slack = sum + spring.k / 2 * d ^ 2, slack + spring.k * (math.abs(d) + ulp) * ulp
+        end
+        return sum, slack + (turned + ulp) * u:length() + place * Q:length() * ulp
+      end
+      local before, work, most = {}, {}, {}
+      for f = 1, 25 do
+        time = (f - 1) / 24
+        for i = 1, 20 do
+          local p = result[f][i]
+          local now, slack = all(p)
+          local Q = p.P - V * time
+          if f == 1 then
+            before[i], work[i], most[i] = { E = now, Q = Q, slack = slack }, 0, math.abs(now)
+          else
+            work[i] = work[i] + p.F:dot(Q - before[i].Q)
+            before[i].Q, before[i].slack = Q, before[i].slack + slack
+            most[i] = math.max(most[i], math.abs(now), math.abs(work[i]))
+            assert.truthy(now <= before[i].E + work[i] + 1e-4 * most[i] + before[i].slack,
+              ("scene %d, point %d, frame %d: %.9g of %.9g and %.9g\n%s"):format(number, i, f, now, before[i].E,
+                work[i], text))
+          end
         end
       end
     end

@@ -7,12 +7,16 @@
 --   mechanical_energy.gain(scene, result)      the largest gain over the first frame, above rounding: as a part of the
 --                                              most that is lively in the run; its frame; in J. nil where there is none
 --
+-- A scene that is seen from where its shapes are (stability/driven_scenes.lua) has points with their `far`, m, and
+-- `fast`, m/s, from the origin, which are what is rounded.
+--
 -- Gravity's potential is 0 at the lowest place that a point reaches, so that a point that dies takes energy away.
 local mechanical_energy = {}
 
 local ulp = 2 ^ -23 -- of single precision, relative
 
 local function length(P) return math.sqrt(P:dot(P)) end
+local function far(scene, p) return scene.motion and p.far or length(p.P) end
 
 -- The energy that a stretch of so much stores, and what rounding at that distance from the origin makes of it.
 local function stored(stiffness, stretch, size)
@@ -27,29 +31,30 @@ function stretches.spring(node, scene, by_id, add)
     local p = by_id[id]
     if p then
       local stretch = node.radius and length(p.P) - node.radius or length(p.P - vec3(unpack(node.target)))
-      add(node.stiffness, stretch, length(p.P) + (node.radius or 1))
+      add(node.stiffness, stretch, far(scene, p) + (node.radius or 1))
     end
   end
 end
-function stretches.distance(node, _, by_id, add, place_of)
+function stretches.distance(node, scene, by_id, add, place_of)
   if node.compliance == 0 then return end
   for _, pair in ipairs(node.pairs) do
     local a, b = by_id[place_of[pair[1]] - 1], by_id[place_of[pair[2]] - 1]
     if a and b then
       local first = length(vec3(unpack(pair[1].P)) - vec3(unpack(pair[2].P)))
-      add(1 / node.compliance, length(a.P - b.P) - (node.rest or first), length(a.P) + length(b.P))
+      add(1 / node.compliance, length(a.P - b.P) - (node.rest or first), far(scene, a) + far(scene, b))
     end
   end
 end
-function stretches.pin(node, _, by_id, add, place_of)
+function stretches.pin(node, scene, by_id, add, place_of, t)
   if node.compliance == 0 then return end
   for _, point in ipairs(node.points) do
     local p = by_id[place_of[point] - 1]
-    if p then add(1 / node.compliance, length(p.P - vec3(unpack(point.P))), 2 * length(p.P)) end
+    local target = vec3(unpack(point.P)) + (node.way and node.way(t) or vec3(0, 0, 0))
+    if p then add(1 / node.compliance, length(p.P - target), 2 * far(scene, p)) end
   end
 end
 
-local function of_frame(scene, points, lowest, place_of)
+local function of_frame(scene, points, lowest, place_of, t)
   local by_id, moving, height, elastic, rounding = {}, 0, 0, 0, 0
   for i = 1, #points do
     local p = points[i]
@@ -57,15 +62,16 @@ local function of_frame(scene, points, lowest, place_of)
     local mass, speed2 = scene.points[p.id + 1].mass, p.v:dot(p.v)
     moving = moving + mass * speed2 / 2
     height = height + mass * scene.g * (p.P.y - lowest)
-    local slip = ulp * (length(p.P) + p.pscale) * scene.fps * scene.substeps -- of P, as a speed
-    rounding = rounding + mass * (ulp * (speed2 + scene.g * length(p.P)) + slip * (math.sqrt(speed2) + slip))
+    local slip = ulp * (far(scene, p) + p.pscale) * scene.fps * scene.substeps -- of P, as a speed
+    if scene.motion then slip = slip + ulp * p.fast end
+    rounding = rounding + mass * (ulp * (speed2 + scene.g * far(scene, p)) + slip * (math.sqrt(speed2) + slip))
   end
   for _, node in ipairs(scene.nodes) do
     if stretches[node.kind] then
       stretches[node.kind](node, scene, by_id, function(stiffness, stretch, size)
         local energy, error = stored(stiffness, stretch, size)
         elastic, rounding = elastic + energy, rounding + error
-      end, place_of)
+      end, place_of, t)
     end
   end
   return { total = moving + height + elastic, lively = moving + elastic, rounding = rounding }
@@ -77,7 +83,9 @@ function mechanical_energy.of(scene, result)
   for _, points in result:frames() do
     if #points > 0 then lowest = math.min(lowest, points:min("P").y) end
   end
-  for frame, points in result:frames() do energies[frame] = of_frame(scene, points, lowest, place_of) end
+  for frame, points in result:frames() do
+    energies[frame] = of_frame(scene, points, lowest, place_of, (frame - 1) / scene.fps)
+  end
   return energies
 end
 

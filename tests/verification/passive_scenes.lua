@@ -162,7 +162,8 @@ end
 
 -- Parameters of a node that its text has, in this order; those that are words.
 local params = { "stiffness", "damping", "linear", "quadratic", "strength", "shape", "bounce", "friction", "radius",
-  "response", "method", "within", "rest", "compliance", "mass_scaling", "drag", "alignment", "target" }
+  "response", "method", "within", "rest", "compliance", "mass_scaling", "drag", "alignment", "target", "transform",
+  "record" }
 local words = { response = true, method = true }
 
 local function node_text(node, place_of)
@@ -175,7 +176,8 @@ local function node_text(node, place_of)
   for _, name in ipairs(params) do
     local value = node[name]
     if node.kind == "spring" and name == "radius" then
-      if value then texts[#texts + 1] = ("target = rapid.shape.sphere { radius = %.9g }"):format(value) end
+      local along = node.along and (":transform(%s)"):format(node.along) or ""
+      if value then texts[#texts + 1] = ("target = rapid.shape.sphere { radius = %.9g }%s"):format(value, along) end
     elseif value then
       texts[#texts + 1] = ("%s = %s"):format(name, words[name] and ("%q"):format(value) or written(value))
     end

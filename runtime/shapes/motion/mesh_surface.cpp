@@ -23,6 +23,8 @@ MovingBodyPtr still_surface(const Mesh& mesh, const MeshPtr& rest)
 
 MovingBodyPtr mesh_surface(const MeshPtr& mesh) { return still_surface(*mesh, mesh); }
 
+bool is_mesh_surface(const Shape& shape) { return shape.kind() == "mesh"; }
+
 MovingBodyPtr mesh_surface_at_start(const AnimatedMesh& mesh, const FrameClock& clock)
 {
     return still_surface(*mesh.at(clock, clock.start), mesh.rest());

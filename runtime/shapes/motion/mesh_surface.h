@@ -10,6 +10,8 @@ namespace rapid {
 using MovingBodyPtr = std::shared_ptr<const MovingBody>;
 
 MovingBodyPtr mesh_surface(const MeshPtr& mesh);
+// Whether a shape is one: its distance is above 0 on both sides.
+bool is_mesh_surface(const Shape& shape);
 
 // As it is at the start; and through a step: times are in seconds since the step began, and distance() is that at its
 // end. Vertices of a sequence follow the curves of body_path.h. On one thread: the motion may be a script.

@@ -56,34 +56,45 @@ void Collisions::limit_energy(std::size_t displaced)
         Vec3d &P = block_.P[i], &v = block_.v[i], by = Vec3d::Zero();
         for (const Ejection::Displacement& one : moved)
             if (one.i == i) by += one.by;
-        const Vec3d from = motion_.initial_P(i) + by, v0 = motion_.initial_v(i);
+        // As it is seen from the shape that a spring draws the point to, which goes with V.
+        const Vec3d from = motion_.initial_P(i) + by, V = motion_.frame_velocity(i, from), way = block_.dt[i] * V;
+        const Vec3d v0 = motion_.initial_v(i) - V;
         const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from);
-        const double speed = speed_of_shapes(i, from);
+        const double speed = speed_of_shapes(i, from, V);
         const double most = speed > 0 ? driven_energy(i, energy, speed) : energy;
-        double potential = motion_.potential(i, P);
+        double potential = motion_.potential(i, P - way);
         if (most - potential < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
-            P = from;
-            potential = motion_.potential(i, P);
-            if (!(speed > 0)) v = v0;
+            P = from + way;
+            potential = motion_.potential(i, from);
+            if (!(speed > 0)) v = v0 + V;
         }
         const double kinetic = std::max(0.0, most - potential);
-        if (0.5 * v.squaredNorm() > kinetic) v *= std::sqrt(2 * kinetic / v.squaredNorm());
-        const double work = 0.5 * v.squaredNorm() + potential - energy;
+        Vec3d u = v - V;
+        if (0.5 * u.squaredNorm() > kinetic) {
+            u *= std::sqrt(2 * kinetic / u.squaredNorm());
+            v = V + u;
+        }
+        const double work = 0.5 * u.squaredNorm() + potential - energy;
         audit_.set_work(i, motion_.is_dragged(i) ? std::max(audit_.work_now(i), work) : work);
     }
 }
 
-// m/s: the fastest that a shape which moves goes where a spring may take the point, between where it is and as far
-// behind the place that draws it.
-double Collisions::speed_of_shapes(std::size_t i, const Vec3d& from) const
+// m/s: the fastest that a shape goes, as it is seen from what goes with V, where a spring may take the point, between
+// where it is and as far behind the place that draws it.
+double Collisions::speed_of_shapes(std::size_t i, const Vec3d& from, const Vec3d& V) const
 {
+    constexpr double rounding = 1e-9;
     const Damped::Pull& pull = motion_.pull(i);
     const Vec3d to = pull.w2 > 0 ? Vec3d(from + 2 / pull.w2 * pull.G) : from;
     double fastest = 0;
     for (const Obstacle& obstacle : block_.obstacles) {
-        if (!obstacle.moves || !block_.has_member(obstacle, i)) continue;
-        for (const Vec3d& P : {from, to})
-            fastest = std::max(fastest, obstacle.shape->velocity_at(P, block_.frame_time(i, 0)).norm());
+        if (!block_.has_member(obstacle, i)) continue;
+        for (const Vec3d& P : {from, to}) {
+            Vec3d vc = Vec3d::Zero();
+            if (obstacle.moves) vc = obstacle.shape->velocity_at(P, block_.frame_time(i, 0));
+            const double speed = (vc - V).norm();
+            if (speed > rounding * V.norm()) fastest = std::max(fastest, speed);
+        }
     }
     return fastest;
 }

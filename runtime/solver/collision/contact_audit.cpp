@@ -51,7 +51,9 @@ void ContactAudit::add_carried(const StuckPoints& stuck, const FreeMotion& motio
     for (const StuckPoints::Carried& at : stuck.carried()) {
         const double mass = block_.context.mass[block_.indices[at.i]];
         if (std::isinf(mass)) continue;
-        const double work = 0.5 * (at.to_v - at.v).dot(at.to_v + at.v) - motion.acceleration(at.i).dot(at.to_P - at.P);
+        const double work = 0.5 * (at.to_v - at.v).dot(at.to_v + at.v) +
+                            (motion.is_damped() ? motion.potential_change(at.i, at.P, at.to_P)
+                                                : -motion.acceleration(at.i).dot(at.to_P - at.P));
         counts_.energy.take(mass * work);
         if (motion.is_damped()) all_work_[at.i] += work;
     }

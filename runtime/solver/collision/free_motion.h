@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "runtime/shapes/shape.h"
 #include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/motion/damped_motion.h"
 #include "runtime/solver/motion/free_paths.h"
@@ -39,6 +40,22 @@ public:
         const Vec3d d = P - initial_P(i);
         const double surface = pull.surface.w2 > 0 ? potential_energy(pull.surface, P) : 0;
         return 0.5 * pull.w2 * d.squaredNorm() - pull.G.dot(d) + surface;
+    }
+    // m/s, at P: of the shape that a spring draws the point to.
+    Vec3d frame_velocity(std::size_t i, const Vec3d& P) const
+    {
+        const SurfaceSpring& spring = damped_[i].pull.surface;
+        if (!(spring.w2 > 0) || !spring.shape->moves()) return Vec3d::Zero();
+        return spring.shape->velocity_at(P, spring.time + 0.5 * block_.dt[i]);
+    }
+    // J/kg: by how much that changes between two places, of which `from` is where the sub-step began.
+    double potential_change(std::size_t i, const Vec3d& from, const Vec3d& to) const
+    {
+        const Damped::Pull& pull = damped_[i].pull;
+        const Vec3d d = to - from;
+        double change = 0.5 * pull.w2 * d.squaredNorm() - pull.G.dot(d);
+        if (pull.surface.w2 > 0) change += potential_energy(pull.surface, to) - potential_energy(pull.surface, from);
+        return change;
     }
     bool is_dragged(std::size_t i) const { return damped_[i].k > 0; }
     // What draws a damped point.

@@ -119,6 +119,7 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
     const Obstacle& obstacle = obstacle_at(o);
     const std::uint32_t index = block_.indices[i];
     const double now = block_.frame_time(i, block_.dt[i]), radius = block_.radius(obstacle, i);
+    const Vec3d P = block_.P[i], v = block_.v[i];
     const bool begins = begins_frame(i), moved = begins && columns_->P[index] != block_.P[i].cast<float>();
     const MaterialPoint at = material(i, o);
     if (moved || (begins && at.face == MaterialPoint::rigid)) {
@@ -136,7 +137,6 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
     const MovingBody::State here = state(i, o, now);
     const Vec3d kick = kick_on(i, given_[i].value_or(here.v));
     const double torn = time_of_tearing(i, o, kick, now);
-    const Vec3d P = block_.P[i], v = block_.v[i];
     touched_.set_only_plane(i, -1);
     touched_.add(i);
     if (!(torn < block_.dt[i])) {
@@ -175,6 +175,7 @@ void StuckPoints::advance_sliding(std::uint32_t i, int o, const Gap& gap)
     // What is not kicked the slide takes off the surface, as it knows how that turns.
     const bool is_kicked = (given - vc).dot(n) > velocity_tolerance * (1 + given.norm());
     if (is_kicked && (kick_on(i, vc) + motion_.acceleration(i) - on.ac).dot(n) > adhesion) return let_go(i);
+    carried_.push_back({i, block_.P[i], block_.v[i], P, v});
     block_.P[i] = P;
     block_.v[i] = v;
     touched_.set_only_plane(i, -1);

@@ -57,6 +57,7 @@ void Projection::advance(Substep& step)
     if (constraints_.empty() || !(step.dt > 0) || (sleep_ && sleep_->all())) return;
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
+    add_displacements(step);
     move_kinematic(step);
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
@@ -129,6 +130,18 @@ double Projection::credited()
     return std::accumulate(credit.begin(), credit.end(), 0.0);
 }
 
+// What it took to put points out of shapes in their free motion, against rows as they were before.
+void Projection::add_displacements(const Substep& step)
+{
+    if (!has_forces_ || step.born.empty()) return;
+    std::vector<double> stored(step.size());
+    add_stored(step, step.start, 1, stored);
+    add_stored(step, step.born, -1, stored);
+    const double work = std::accumulate(stored.begin(), stored.end(), 0.0);
+    energy_.added += std::max(0.0, work);
+    changes_.contacts += work;
+}
+
 // What pins move gains what they do, and so do the rows that they stretch, before these act.
 void Projection::move_kinematic(Substep& step)
 {
@@ -158,14 +171,6 @@ double Projection::driven_energy(const Substep& step) const
 // Rods and springs act.
 void Projection::advance_linked(Substep& step)
 {
-    if (!step.born.empty()) {
-        std::vector<double> stored(step.size());
-        add_stored(step, step.start, 1, stored);
-        add_stored(step, step.born, -1, stored);
-        const double work = std::accumulate(stored.begin(), stored.end(), 0.0);
-        energy_.added += std::max(0.0, work);
-        changes_.contacts += work;
-    }
     stored_.assign(step.size(), 0.0);
     add_stored(step, begun_, 1, stored_);
     bound_.begin(step, [&](double factor, std::span<double> energy) {
@@ -177,8 +182,8 @@ void Projection::advance_linked(Substep& step)
         if (coupling.has_forces()) require_finite(step);
     });
     const ContactEnergy change = close_bound(step, true);
-    energy_.added += change.added;
     const double driven = may_gain_ ? bound_.driven() : 0;
+    energy_.added += std::max(0.0, change.added - std::max(0.0, driven));
     changes_.pins += driven;
     changes_.rods += change.added - change.lost + credited() - driven;
 }

@@ -46,6 +46,7 @@ public:
 private:
     template <class F>
     void each(const F& f);
+    void add_displacements(const Substep& step);
     void advance_linked(Substep& step);
     void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;
     double driven_energy(const Substep& step) const;

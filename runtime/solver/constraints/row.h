@@ -135,10 +135,11 @@ struct Row {
         for (int k = 0; k < arity; ++k) step.v[points[k]] += step.points[points[k]].w * change * gradient[k];
     }
 
-    // The rate of the residual, 1/s.
+    // The rate of the residual: by the points' motion, and by that of what the function holds them to.
     double rate(const Substep& step, const Vectors& gradient) const
     {
         double sum = 0;
+        if constexpr (requires { function.rate(); }) sum = function.rate();
         for (int k = 0; k < arity; ++k) sum += gradient[k].dot(step.v[points[k]]);
         return sum;
     }

@@ -197,11 +197,13 @@ void scan_surface(const SurfaceSpring& spring, const Sample& sample, std::size_t
     const double dt = sample.dt[i];
     if (spring.shape->half_space()) return found.add(Stiffness::Spring, i, std::sqrt(spring.w2) * dt);
     const std::array<Vec3d, 2> at = {sample.P[i], sample.P[i] + dt * sample.v[i]};
+    const std::array<double, 2> time = {spring.time, spring.time + dt};
     std::array<double, 2> phi;
     std::array<Vec3d, 2> gradient;
-    spring.shape->distance(at, phi, gradient);
+    spring.shape->distance_at(at, time, phi, gradient);
+    const double cosine = gradient[0].dot(gradient[1]);
     found.add(Stiffness::Oscillation, i,
-              std::atan2(gradient[0].cross(gradient[1]).norm(), gradient[0].dot(gradient[1])));
+              std::atan2(gradient[0].cross(gradient[1]).norm(), spring.two_sided ? std::abs(cosine) : cosine));
 }
 
 StiffnessScan scan(const Force& force, const Sample& sample)

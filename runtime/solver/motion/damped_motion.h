@@ -73,7 +73,7 @@ struct Damped {
     Vec3d path_v, path_a;
 
     // What draws the point: G and w2, and the spring to a surface beside them (surface_springs.h), for whose bent path
-    // G is a mean and w2 is 0.
+    // G is a mean and w2 is 0; of a shape that moves, as that is where the path begins.
     struct Pull {
         Vec3d G;
         double w2;

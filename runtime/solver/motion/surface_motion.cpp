@@ -26,7 +26,7 @@ double integral_of_x_of_G(const Propagator& r, double k, double w2, double t)
 }  // namespace
 
 // Returns where the motion would end if the surface were flat.
-Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient)
+Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient, const Vec3d& V)
 {
     const double slope = gradient.norm();
     acts_ = slope > 0;
@@ -36,47 +36,60 @@ Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient)
         v = v0 * along.v_of_v + G * along.v_of_G;
         return P;
     }
-    n0_ = gradient / slope;
+    n_ = n0_ = gradient / slope;
     d0_ = phi / slope;
+    V0_ = V1_ = V;
+    u0_ = v0 - V0_;
+    pull_ = G - (k + 0.5 * t * w2) * V0_;
     const Propagator through = respond(k, w2 + s, t);
-    const double way = v0.dot(n0_) * through.x_of_v + (G.dot(n0_) - s * d0_) * through.x_of_G;
-    return P0 + across(v0, n0_) * along.x_of_v + across(G, n0_) * along.x_of_G + way * n0_;
+    const double way = u0_.dot(n0_) * through.x_of_v + (pull_.dot(n0_) - s * d0_) * through.x_of_G;
+    return P0 + t * V0_ + across(u0_, n0_) * along.x_of_v + across(pull_, n0_) * along.x_of_G + way * n0_;
 }
 
 // The normal of the middle is the mean of both ends. Returns the end, but for the curvature of the surface.
-Vec3d SurfaceMotion::go(const Vec3d& gradient)
+Vec3d SurfaceMotion::go(const Vec3d& gradient, const Vec3d& V)
 {
     if (!acts_) return P;
-    const Vec3d n1 = gradient.squaredNorm() > 0 ? Vec3d(gradient.normalized()) : n0_;
+    V1_ = V;
+    pull_ = G - (V1_ - V0_) / t - (k + 0.5 * t * w2) * mean_V();
+    Vec3d n1 = gradient.squaredNorm() > 0 ? Vec3d(gradient.normalized()) : n0_;
+    if (turns_away(n1)) n1 = -n1;
     n_ = 1 + n0_.dot(n1) > 1e-9 ? Vec3d((n0_ + n1).normalized()) : n0_;
     const Propagator along = respond(k, w2, t), through = respond(k, w2 + s, t);
-    const Vec3d from = turned(across(v0, n0_), n0_, n_), pull = across(G, n_);
+    const Vec3d from = turned(across(u0_, n0_), n0_, n_), pull = across(pull_, n_);
     const Vec3d turning = across(n1 - n0_, n_) / t;  // n'
-    const double speed = v0.dot(n0_), integral = integral_of_x_of_G(through, k, w2 + s, t);
+    const double speed = u0_.dot(n0_), integral = integral_of_x_of_G(through, k, w2 + s, t);
     const Vec3d straight = from * along.x_of_v + pull * along.x_of_G;
     Vec3d way = straight;
     double at_rest = 0;
     for (int iteration = 0; iteration < 2; ++iteration) {
-        at_rest = G.dot(n_) + way.dot(turning) / t - s * d0_;
+        at_rest = pull_.dot(n_) + way.dot(turning) / t - s * d0_;
         way = straight - turning * (speed * through.x_of_G + at_rest * integral);
     }
     d1_ = d0_ + speed * through.x_of_v + at_rest * through.x_of_G;
     normal_v_ = speed * through.v_of_v + at_rest * through.v_of_G;
     tangential_ = from * along.v_of_v + pull * along.v_of_G - turning * ((d1_ - d0_) * std::exp(-0.5 * k * t));
-    return at_ = P0 + way + (d1_ - d0_) * n_;
+    return at_ = P0 + t * mean_V() + way + (d1_ - d0_) * n_;
 }
 
 // Puts the point at the distance d1, and gives it the energy that it has there.
 void SurfaceMotion::end(double phi, const Vec3d& gradient)
 {
     if (!acts_) return;
-    const double slope = gradient.norm();
-    const Vec3d n1 = slope > 0 ? Vec3d(gradient / slope) : n_;
-    const double d = slope > 0 ? phi / slope : d1_;
+    const double slope = turns_away(gradient) ? -gradient.norm() : gradient.norm();
+    const Vec3d n1 = slope != 0 ? Vec3d(gradient / slope) : n_;
+    const double d = slope != 0 ? phi / slope : d1_;
     P = at_ + (d1_ - d) * n1;
     double left = energy_left(P, d1_);
     if (left < 0) {  // the oscillator has gone farther than the energy carries it: more than a radian in the step
-        d1_ *= std::sqrt(std::max(0.0, 1 + left / (s * d1_ * d1_)));
+        const std::optional<double> reached = distance_reached(at_ - d * n1, n1);
+        if (!reached) {  // nor along the surface: it turns back
+            d1_ = d0_;
+            P = P0 + t * mean_V();
+            v = V1_ - u0_;
+            return;
+        }
+        d1_ = *reached;
         P = at_ + (d1_ - d) * n1;
         left = std::max(0.0, energy_left(P, d1_));
     }
@@ -84,16 +97,28 @@ void SurfaceMotion::end(double phi, const Vec3d& gradient)
     left = std::max(0.0, left - normal_v_ * normal_v_);
     const double size2 = tangential_.squaredNorm();
     const double wanted = k > 0 ? std::min(size2, left) : left;
-    v = normal_v_ * n1;
+    v = V1_ + normal_v_ * n1;
     if (size2 > 0) v += std::sqrt(wanted / size2) * turned(tangential_, n_, n1);
 }
 
-Vec3d SurfaceMotion::path_v() const { return acts_ ? Vec3d(across(v0, n0_) + (d1_ - d0_) / t * n0_) : v0; }
+// The distance nearest to d1 from `surface` along n at which energy is left: the energy left there is
+// c + 2 b d - (s + w2) d².
+std::optional<double> SurfaceMotion::distance_reached(const Vec3d& surface, const Vec3d& n) const
+{
+    const Vec3d way = surface - P0 - t * mean_V();
+    const double a = s + w2, b = (pull_ - w2 * way).dot(n), c = energy_left(surface, 0);
+    const double root2 = b * b + a * c;
+    if (!(root2 >= 0)) return std::nullopt;
+    const double root = std::sqrt(root2);
+    return std::clamp(d1_, (b - root) / a, (b + root) / a);
+}
+
+Vec3d SurfaceMotion::path_v() const { return acts_ ? Vec3d(V0_ + across(u0_, n0_) + (d1_ - d0_) / t * n0_) : v0; }
 
 double SurfaceMotion::energy_left(const Vec3d& place, double distance) const
 {
-    const Vec3d way = place - P0;
-    return v0.squaredNorm() + s * (d0_ - distance) * (d0_ + distance) + 2 * G.dot(way) - w2 * way.squaredNorm();
+    const Vec3d way = place - P0 - t * mean_V();
+    return u0_.squaredNorm() + s * (d0_ - distance) * (d0_ + distance) + 2 * pull_.dot(way) - w2 * way.squaredNorm();
 }
 
 }  // namespace rapid

@@ -11,40 +11,51 @@
 // point is put at the distance d, and u gets the length that the energy leaves it: without drag
 // ½v² + ½ s d² - G·x is kept to rounding at any s dt², with drag it never grows. Exact for planes; of second order
 // else. A fixed nearest point in place of this would pull points back that move along the surface.
+//
+// A shape that moves is at rest in the frame that goes from V0 to V1, its velocities where the point sets out and where
+// it arrives: there u and d' are velocities, and G - (V1 - V0)/t - k V - w2 V t/2 with the mean V stands for G.
 #pragma once
+
+#include <optional>
 
 #include "runtime/vec.h"
 
 namespace rapid {
 
 struct SurfaceMotion {
-    Vec3d P0, v0;  // at the beginning
-    double t;      // s
-    double k;      // 1/s
-    double w2, s;  // 1/s²: of other springs, and of this one, above 0
-    Vec3d G;       // m/s², of all but the surface spring, at rest at P0
+    Vec3d P0, v0;            // at the beginning
+    double t;                // s
+    double k;                // 1/s
+    double w2, s;            // 1/s²: of other springs, and of this one, above 0
+    Vec3d G;                 // m/s², of all but the surface spring, at rest at P0
+    bool two_sided = false;  // the distance is above 0 on both sides of the surface
 
     Vec3d P, v;  // at the end
 
     // In this order, each with the distance and its gradient where the call before it said; the first ones at P0. The
-    // gradient is zero where the shape gives no direction: the spring then does not act.
-    Vec3d begin(double phi, const Vec3d& gradient);
-    Vec3d go(const Vec3d& gradient);
+    // gradient is zero where the shape gives no direction: the spring then does not act. V: the shape's velocity there.
+    Vec3d begin(double phi, const Vec3d& gradient, const Vec3d& V);
+    Vec3d go(const Vec3d& gradient, const Vec3d& V);
     void end(double phi, const Vec3d& gradient);
 
     // The parabola that stands for the path: it sets out along the surface.
     Vec3d path_v() const;
 
+private:
     // Twice the kinetic energy, J/kg, that is left at a place of this distance: below 0 where the energy does not
     // reach.
     double energy_left(const Vec3d& place, double distance) const;
+    std::optional<double> distance_reached(const Vec3d& surface, const Vec3d& n) const;
+    Vec3d mean_V() const { return 0.5 * (V0_ + V1_); }
+    bool turns_away(const Vec3d& gradient) const { return two_sided && gradient.dot(n_) < 0; }
 
-private:
-    Vec3d at_ = Vec3d::Zero();                      // where the distance is asked last
-    Vec3d n0_ = Vec3d::Zero(), n_ = Vec3d::Zero();  // unit normals, at the beginning and of the middle
-    double d0_ = 0, d1_ = 0;                        // m
-    double normal_v_ = 0;                           // m/s, d' at the end
-    Vec3d tangential_ = Vec3d::Zero();              // m/s, at the end, perpendicular to n_
+    Vec3d at_ = Vec3d::Zero();                         // where the distance is asked last
+    Vec3d n0_ = Vec3d::Zero(), n_ = Vec3d::Zero();     // unit normals, at the beginning and of the middle
+    double d0_ = 0, d1_ = 0;                           // m
+    double normal_v_ = 0;                              // m/s, d' at the end
+    Vec3d tangential_ = Vec3d::Zero();                 // m/s, at the end, perpendicular to n_
+    Vec3d V0_ = Vec3d::Zero(), V1_ = Vec3d::Zero();    // m/s, of the shape
+    Vec3d u0_ = Vec3d::Zero(), pull_ = Vec3d::Zero();  // v0 and G in the shape's frame
     bool acts_ = true;
 };
 

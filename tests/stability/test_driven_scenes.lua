@@ -1,0 +1,102 @@
+-- Random scenes of coupled points among shapes and on pins that move (driven_scenes.lua).
+--
+-- Where all of these move alike and uniformly, energy does not grow as it is seen from them. Where each moves by
+-- itself, points have the energy that the ledger says: what they had, and what contacts, pins, rods and drag have
+-- changed it by. In the suite some are run; STABILITY_SCENES=1000 STABILITY_SEED=7 rapid test tests/stability runs
+-- more, and others. Of a scene that is wrong, the simplest that still is so is shown, ready to run.
+local scene = require "testing.scene"
+local json = require "dkjson"
+local driven_scenes = require "tests.stability.driven_scenes"
+local passive_scenes = require "tests.verification.passive_scenes"
+local mechanical_energy = require "tests.verification.mechanical_energy"
+local simplest = require "tests.verification.simplest"
+
+local scenes = tonumber(os.getenv "STABILITY_SCENES") or 50
+local seed = tonumber(os.getenv "STABILITY_SEED") or 1
+local allowed = 0.01 -- of the most energy that is in motion or stored in springs
+
+
+-- What --stats has of each frame.
+local function statistics(description)
+  local told = scene.command("run", passive_scenes.text(description),
+    ("-f 1-%d --quiet --stats stats.json"):format(description.frames))
+  assert(told.status == 0, told.stderr)
+  return json.decode(scene.folder:read "stats.json").frames
+end
+
+-- A fault of a scene, of fault(description, result), and of one that does not run.
+local function fault_of(fault)
+  return function(description)
+    local ok, result = pcall(scene.run, passive_scenes.text(description), { frames = {1, description.frames},
+      threads = 1 })
+    if not ok then return tostring(result), math.huge end
+    local text, size = fault(description, result)
+    collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+    return text, size
+  end
+end
+
+-- Of a scene that corrections of positions give energy, as where points overlap at birth or rods contradict shapes, no
+-- bound is known: where the run of the scene at rest tells of these it is passed over.
+local gains = fault_of(function(description, result)
+  local part, frame, gain = mechanical_energy.gain(driven_scenes.seen(description, result))
+  if not part or part <= allowed then return end
+  local added = 0
+  for _, one in ipairs(statistics(driven_scenes.at_rest(description))) do
+    if one.frame <= frame then added = added + one.contact_energy.added end
+  end
+  if added > allowed * gain / part then return end
+  return ("seen from its shapes, %.3g J more in frame %d, %.3g of what is in motion or stored"):format(gain, frame,
+    part), part
+end)
+
+local by = { "by_contacts", "by_friction", "by_shapes", "by_rods", "by_pins", "by_drag" }
+
+local is_off = fault_of(function(description, result)
+  local energy, told, lively, rounding = mechanical_energy.of(description, result), 0, 0, 0
+  for _, one in ipairs(energy) do lively = math.max(lively, one.lively) end
+  for _, one in ipairs(statistics(description)) do
+    if one.frame > 1 and not one.ledger then return end -- nothing couples the points
+    for _, name in ipairs(by) do told = told + (one.ledger and one.ledger[name] or 0) end
+    rounding = rounding + energy[one.frame].rounding
+    local off = energy[one.frame].total - energy[1].total - told
+    if math.abs(off) > allowed * lively + rounding then
+      return ("in frame %d points have %.3g J more than the ledger says, %.3g of what is in motion or stored"):format(
+        one.frame, off, off / lively), math.abs(off) / lively
+    end
+  end
+end)
+
+-- Of the scenes that draw(seed, number) gives and that are wanted. All that are wrong are told.
+local function none(fault, draw, wanted)
+  local faults, number, count = {}, 0, 0
+  while count < scenes do
+    number = number + 1
+    local description = draw(seed, number)
+    if wanted(description) then
+      count = count + 1
+      if fault(description) then
+        local simpler, text = simplest(description, fault)
+        faults[#faults + 1] = ('scene %d of seed %d: %s\nlocal rapid = require "rapid"\n%s'):format(number, seed, text,
+          passive_scenes.text(simpler))
+      end
+    end
+  end
+  assert.equal("", table.concat(faults, "\n\n"))
+end
+
+describe(("random scenes of coupled points (%d of seed %d)"):format(scenes, seed), function()
+  it("gain no energy among shapes and pins that go along together", function()
+    none(gains, driven_scenes.together, function() return true end)
+  end)
+
+  -- What interacts is not told apart, nor is what dies.
+  it("have the energy that the ledger says, among shapes and pins that move", function()
+    none(is_off, driven_scenes.apart, function(description)
+      for _, node in ipairs(description.nodes) do
+        if node.kind == "interact" or node.response == "die" then return false end
+      end
+      return true
+    end)
+  end)
+end)

@@ -1,0 +1,27 @@
+-- The simplest scene found that is still wrong, of those of passive_scenes.
+--
+--   local simplest = require "tests.verification.simplest"
+--   scene, fault = simplest(scene, fault_of)
+--
+-- fault_of(scene): what is wrong with it, as a text, and by how much; nil where nothing is. A scene counts as wrong
+-- still where it is so by at least a hundredth as much.
+local passive_scenes = require "tests.verification.passive_scenes"
+
+local most_tries = 300
+
+return function(scene, fault_of)
+  local fault, size = fault_of(scene)
+  local least, tries, found = size / 100, 0, true
+  while found and tries < most_tries do
+    found = false
+    for _, simpler in ipairs(passive_scenes.simpler(scene)) do
+      tries = tries + 1
+      local other, other_size = fault_of(simpler)
+      if other and other_size >= least then
+        scene, fault, found = simpler, other, true
+        break
+      end
+    end
+  end
+  return scene, fault
+end

@@ -28,7 +28,12 @@ std::string unknown(const NodeType& type, const std::string& name)
     if (type.find("attributes") && (known_attribute(name) || conventional_attribute(name)))
         return fmt::format("unknown parameter \"{}\"; it is an attribute of points: attributes = {{ {} }}", name,
                            text_of_making(name));
-    return fmt::format("unknown parameter \"{}\"{}", name, did_you_mean(name, type.param_names()));
+    const std::vector<std::string> names = type.param_names();
+    if (const std::string near = did_you_mean(name, names); !near.empty())
+        return fmt::format("unknown parameter \"{}\"{}", name, near);
+    constexpr std::size_t most = 12;  // in a message
+    if (names.size() > most) return fmt::format("unknown parameter \"{}\"; rapid nodes {} lists them", name, type.name);
+    return fmt::format("unknown parameter \"{}\"; {} has {}", name, type.name, fmt::join(names, ", "));
 }
 
 // Calls a function of the frame; its Errors name the frame.

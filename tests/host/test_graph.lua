@@ -83,9 +83,9 @@ end)
 
 describe("a node", function()
   it("is named by its type and number, or by `name`", function()
-    assert.equal('scene.lua:1: node "gravity2": unknown parameter "x"',
+    assert.equal('scene.lua:1: node "gravity2": unknown parameter "x"; gravity has group, g',
       scene.error "return rapid.create {} :gravity {} :gravity { x = 1 }")
-    assert.equal('scene.lua:1: node "down": unknown parameter "x"',
+    assert.equal('scene.lua:1: node "down": unknown parameter "x"; gravity has group, g',
       scene.error "return rapid.create {} :gravity { name = 'down', x = 1 }")
     assert.equal('scene.lua:1: node "gravity1": name = 5; it must be a string',
       scene.error "return rapid.create {} :gravity { name = 5 }")

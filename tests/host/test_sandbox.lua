@@ -140,7 +140,7 @@ local make = coroutine.wrap(function(points)
 end)
 return make(two):solve {}]]
     assert.near({2, 1, 0}, result[2][2].P, 1e-6)
-    assert.equal('scene.lua:1: node "gravity1": unknown parameter "x"',
+    assert.equal('scene.lua:1: node "gravity1": unknown parameter "x"; gravity has group, g',
       scene.error "return coroutine.wrap(function() return rapid.create {} :gravity { x = 1 } end)()")
   end)
 end)

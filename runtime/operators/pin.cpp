@@ -188,13 +188,17 @@ public:
     void link(EnergyIslands& islands) const override
     {
         pins_->springs.link(islands);
-        for (const std::uint32_t i : driven_) islands.drive(i);
+        for (const auto& [i, by] : drives_)
+            if (rigid_)
+                islands.move(i, by);
+            else
+                islands.drive(i, by);
     }
     void move_kinematic(Substep& step) override
     {
         pins_->springs.move_kinematic(step);  // with the targets of before
         const double since = (step.index + 1) * step.dt;
-        aim(since);
+        aim(since, step.dt);
         if (!rigid_) return;
         for (const auto& [i, pin] : held_) {
             step.points[i] = {pin->now, 0};
@@ -267,14 +271,14 @@ private:
         f();
         for (const Load& load : loads_) step.points[load.i].w = load.held;
     }
-    void aim(double since)
+    void aim(double since, double dt)
     {
-        driven_.clear();
+        drives_.clear();
         for (const auto& [i, pin] : held_) {
-            const Vec3d target = place(*pin, since);
-            if (!rigid_ && target != pin->now) driven_.push_back(static_cast<std::uint32_t>(i));
-            pin->now = target;
+            const Vec3d v_before = velocity(*pin, since - dt);
+            pin->now = place(*pin, since);
             pin->v = velocity(*pin, since);
+            drives_.emplace_back(static_cast<std::uint32_t>(i), Drive::of(v_before, pin->v, dt));
         }
     }
     Vec3d place(const Pin& pin, double since) const
@@ -297,7 +301,7 @@ private:
     std::vector<Load> loads_;
     std::vector<std::pair<std::size_t, Pin*>> held_;
     std::vector<std::uint32_t> awake_;
-    std::vector<std::uint32_t> driven_;  // by springs whose ends have moved in the sub-step
+    std::vector<std::pair<std::uint32_t, Drive>> drives_;  // in the sub-step
 };
 
 class PinConstraint : public RememberingConstraint<PinConstraint, Pins>, public Placed {

@@ -71,16 +71,14 @@ function driven_scenes.together(seed, number)
   local scene = passive(seed, number)
   draw.start(seed, number)
   scene.motion = going()
-  local nodes, text, has_pins = {}, text_of(scene.motion), false
-  for _, node in ipairs(scene.nodes) do has_pins = has_pins or node.kind == "pin" end
+  local nodes, text = {}, text_of(scene.motion)
   for _, node in ipairs(scene.nodes) do
     if node.kind == "collide" or node.kind == "pin" then node.transform = text end
     if node.kind == "spring" then -- to a sphere that goes along; its damping would be that of the world
       node.radius, node.target, node.damping = node.radius or 2 * scene.spacing, nil, 0
       node.along = text
     end
-    -- Islands that pins drive have no bound: beside springs that no step resolves rods may give them energy.
-    if node.kind ~= "drag" and not (has_pins and node.kind == "spring") then nodes[#nodes + 1] = node end
+    if node.kind ~= "drag" then nodes[#nodes + 1] = node end
   end
   scene.nodes = nodes
   return scene

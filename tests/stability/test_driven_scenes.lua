@@ -37,15 +37,16 @@ local function fault_of(fault)
 end
 
 -- Of a scene that corrections of positions give energy, as where points overlap at birth or rods contradict shapes, no
--- bound is known: where the run of the scene at rest tells of these it is passed over.
+-- bound is known: where the run of the scene at rest tells of any, beside what it begins with, it is passed over.
 local gains = fault_of(function(description, result)
-  local part, frame, gain = mechanical_energy.gain(driven_scenes.seen(description, result))
+  local seen, run = driven_scenes.seen(description, result)
+  local part, frame, gain = mechanical_energy.gain(seen, run)
   if not part or part <= allowed then return end
   local added = 0
   for _, one in ipairs(statistics(driven_scenes.at_rest(description))) do
     if one.frame <= frame then added = added + one.contact_energy.added end
   end
-  if added > allowed * gain / part then return end
+  if added > allowed * mechanical_energy.of(seen, run)[1].lively then return end
   return ("seen from its shapes, %.3g J more in frame %d, %.3g of what is in motion or stored"):format(gain, frame,
     part), part
 end)

@@ -48,34 +48,53 @@ double available_work(const Substep& step, std::size_t i)
 
 }  // namespace
 
-// A point that does not move separates those that are linked to it, as a wall does, and drives them where it has a
-// velocity.
+// A point that does not move separates those that are linked to it, as a wall does, and drives them.
 void EnergyIslands::link(std::span<const std::uint32_t> points)
 {
     const auto moves = [&](std::uint32_t i) { return step_.points[i].w > 0; };
-    const auto drives = [&](std::uint32_t i) {
-        return !moves(i) && (!step_.v[i].isZero(0) || (!step_.spins.empty() && !step_.spins[i].s.isZero(0)));
-    };
-    const bool driven = std::any_of(points.begin(), points.end(), drives);
-    const bool anchored = points.size() == 1 || !std::all_of(points.begin(), points.end(), moves);
     const auto first = std::find_if(points.begin(), points.end(), moves);
-    for (auto i = first; i != points.end(); ++i) {
-        if (!moves(*i)) continue;
-        sets_.join(*first, *i);
-        if (driven) drive(*i);
-        if (anchored) anchored_[*i] = 1;
+    if (first == points.end()) return;
+    for (const std::uint32_t i : points)
+        if (moves(i))
+            sets_.join(*first, i);
+        else
+            drivers_.push_back({*first, i, Drive::of(step_.v[i], step_.v[i], step_.dt),
+                                step_.spins.empty() ? 0 : step_.spins[i].s.norm()});
+}
+
+void EnergyIslands::close()
+{
+    driven_.assign(step_.size(), {});
+    for (Driver& driver : drivers_) {
+        if (const auto known = kinematic_.find(driver.point); known != kinematic_.end()) driver.by = known->second;
+        Driven& island = driven_[root(driver.i)];
+        island.mean.v += driver.by.v, island.mean.way += driver.by.way;
+        island.moves |= !driver.by.v.isZero(0) || !driver.by.way.isZero(0) || driver.rolling > 0;
+        any_moves_ |= island.moves;
+        ++island.drivers;
+    }
+    for (Driven& island : driven_)
+        if (island.drivers > 1) island.mean.v /= island.drivers, island.mean.way /= island.drivers;
+    for (const Driver& driver : drivers_) {
+        Driven& island = driven_[root(driver.i)];
+        if (!island.moves) continue;
+        island.spread = std::max({island.spread, (driver.by.v - island.mean.v).norm() + driver.rolling,
+                                  (driver.by.way - island.mean.way).norm() / step_.dt});
     }
 }
 
-void EnergyBound::keep(const Substep& step)
+void EnergyBound::keep(const Substep& step, bool follows)
 {
     v_.resize(step.size());
     change_.assign(step.size(), 0.0);
     stored_.assign(step.size(), 0.0);
+    stored_in_frame_.clear();
     credit_.assign(step.energy.size(), 0.0);
+    P_.resize(follows ? step.size() : 0);
     s_.resize(step.spins.size());
     for_each_moving(step, [&](std::size_t i) {
         v_[i] = step.v[i];
+        if (follows) P_[i] = step.points[i].P;
         if (!s_.empty()) s_[i] = step.spins[i].s;
         change_[i] = -potential_energy(step, i, step.points[i].P);
         if (!credit_.empty())
@@ -109,26 +128,60 @@ ContactEnergy EnergyBound::change(const Substep& step) const
 void EnergyBound::sum_islands(const Substep& step, EnergyIslands& islands)
 {
     islands_.assign(step.size(), {});
+    seen_.assign(islands.any_moves() ? step.size() : 0, {});
     for (std::uint32_t i = 0; i < step.size(); ++i) {
         if (!(step.points[i].w > 0) || !(step.inverse_mass[i] > 0)) continue;
-        Island& island = islands_[islands.root(i)];
-        const Vec3d change = step.v[i] - v_[i];
-        const double mass = 1 / step.inverse_mass[i];
-        island.slope += mass * v_[i].dot(change);
-        island.curvature += 0.5 * mass * change.squaredNorm();
-        island.change += change_[i];
-        island.size += mass * (v_[i].squaredNorm() + step.v[i].squaredNorm()) + std::abs(change_[i]);
-        island.available += 0.5 * mass * v_[i].squaredNorm() + stored_[i] + available_work(step, i);
-        if (!credit_.empty()) island.credit += credit_[i];
-        island.driven |= islands.is_driven(i);
-        island.anchored |= islands.is_anchored(i);
-        if (s_.empty() || !(step.spins[i].k > 0)) continue;
-        const Vec3d turned = step.spins[i].s - s_[i];
-        const double inertia = mass / step.spins[i].k;
-        island.slope += inertia * s_[i].dot(turned);
-        island.curvature += 0.5 * inertia * turned.squaredNorm();
-        island.size += inertia * (s_[i].squaredNorm() + step.spins[i].s.squaredNorm());
+        const std::uint32_t root = islands.root(i);
+        add(step, i, islands_[root]);
+        if (const EnergyIslands::Driven& by = islands.driven(root); by.moves) add_seen(step, i, by, seen_[root]);
     }
+}
+
+void EnergyBound::add(const Substep& step, std::uint32_t i, Island& island) const
+{
+    const Vec3d change = step.v[i] - v_[i];
+    const double mass = 1 / step.inverse_mass[i];
+    island.slope += mass * v_[i].dot(change);
+    island.curvature += 0.5 * mass * change.squaredNorm();
+    island.change += change_[i];
+    island.size += mass * (v_[i].squaredNorm() + step.v[i].squaredNorm()) + std::abs(change_[i]);
+    island.available += 0.5 * mass * v_[i].squaredNorm() + stored_[i] + available_work(step, i);
+    if (!credit_.empty()) island.credit += credit_[i];
+    add_turning(step, i, island);
+}
+
+// The same as it is seen from the frame of what drives it.
+void EnergyBound::add_seen(const Substep& step, std::uint32_t i, const EnergyIslands::Driven& by, Island& island) const
+{
+    const Vec3d change = step.v[i] - v_[i], seen = v_[i] - by.mean.v, moved = step.points[i].P - P_[i];
+    const double mass = 1 / step.inverse_mass[i], stored = stored_in_frame_.empty() ? stored_[i] : stored_in_frame_[i];
+    const Vec3d A = by.mean.acceleration(step.dt);
+    const double potential = change_[i] + stored_[i] - stored + mass * A.dot(moved);
+    island.slope += mass * seen.dot(change);
+    island.curvature += 0.5 * mass * change.squaredNorm();
+    island.change += potential;
+    island.size += mass * (v_[i].squaredNorm() + step.v[i].squaredNorm() + by.mean.v.squaredNorm()) +
+                   std::abs(change_[i]) + mass * std::abs(A.dot(moved));
+    island.given += 2 * mass * by.spread * (seen.norm() + by.spread);
+    if (!step.mobility.empty()) {
+        const Mobility& mobility = step.mobility[i];
+        const double w2 = mobility.stiffness + step.surface_springs[i].w2;
+        const double held = 0.5 * step.dt * w2 + 2 / step.dt * std::abs(1 - mobility.v / step.dt);  // 1/s
+        island.given += mass * held * by.mean.v.norm() * moved.norm();
+    }
+    island.available +=
+        0.5 * mass * (seen.squaredNorm() + step.dt * step.dt * A.squaredNorm()) + stored + available_work(step, i);
+    add_turning(step, i, island);
+}
+
+void EnergyBound::add_turning(const Substep& step, std::uint32_t i, Island& island) const
+{
+    if (s_.empty() || !(step.spins[i].k > 0)) return;
+    const Vec3d turned = step.spins[i].s - s_[i];
+    const double inertia = 1 / (step.inverse_mass[i] * step.spins[i].k);
+    island.slope += inertia * s_[i].dot(turned);
+    island.curvature += 0.5 * inertia * turned.squaredNorm();
+    island.size += inertia * (s_[i].squaredNorm() + step.spins[i].s.squaredNorm());
 }
 
 ContactEnergy EnergyBound::limit(Substep& step, EnergyIslands& islands, const RigidFallback* fallback)
@@ -137,17 +190,23 @@ ContactEnergy EnergyBound::limit(Substep& step, EnergyIslands& islands, const Ri
     ContactEnergy energy;
     driven_ = 0;
     bool limits = false, stalls = false;
-    for (Island& island : islands_) {
-        island.change -= std::max(island.credit, 0.0);
-        const double gain = island.change_at(1);
-        if (!(std::abs(gain) > rounding * island.size)) continue;
-        if (gain > 0 && !island.driven) island.part = largest_part(island.slope, island.curvature, island.change);
+    for (std::uint32_t root = 0; root < islands_.size(); ++root) {
+        Island& island = islands_[root];
+        const bool driven = islands.driven(root).moves;
+        Island& seen = driven ? seen_[root] : island;
+        const double credit = std::max(island.credit, 0.0);
+        island.change -= credit;
+        if (driven) seen.change -= credit + seen.given;
+        if (const double gain = seen.change_at(1); gain > rounding * seen.size)
+            island.part = largest_part(seen.slope, seen.curvature, seen.change);
         limits |= island.part < 1;
-        const double limited = island.change_at(island.part);
-        island.stalled = fallback && !island.driven && !(limited <= largest_gain * island.available);
+        island.stalled = fallback && seen.change_at(1) > rounding * seen.size &&
+                         !(seen.change_at(island.part) <= largest_gain * seen.available);
         stalls |= island.stalled;
-        if (!island.stalled && std::abs(limited) > rounding * island.size) energy.take(limited);
-        if (island.driven) driven_ += limited + std::max(island.credit, 0.0);
+        const double limited = island.change_at(island.part);
+        if (island.stalled || !(std::abs(limited) > rounding * island.size)) continue;
+        energy.take(limited);
+        if (driven) driven_ += limited + credit;
     }
     for (std::size_t i = 0; i < credit_.size(); ++i)
         credit_[i] = islands_[i].stalled ? 0 : std::max(islands_[i].credit, 0.0);
@@ -174,7 +233,12 @@ ContactEnergy EnergyBound::move_stalled(Substep& step, EnergyIslands& islands, c
         stalled_[i] = 1;
     }
     ContactEnergy energy;
-    for (const auto& [root, of_island] : points) energy.take(fallback.apply(step, of_island, islands_[root].anchored));
+    for (const auto& [root, of_island] : points) {
+        const EnergyIslands::Driven& by = islands.driven(root);
+        const double change = fallback.apply(step, of_island, by.drivers > 0 ? &by.mean : nullptr);
+        energy.take(change);
+        if (by.moves) driven_ += change;
+    }
     return energy;
 }
 

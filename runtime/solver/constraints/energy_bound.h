@@ -10,10 +10,20 @@
 // have lifted a point or stretched a spring, the one that gives least is taken, and the rest is told. Rods and springs
 // whose rest is of the size of the energy that there was have found no solution: their island moves as a rigid body
 // (rigid_fallback.h), and is told.
+//
+// What moves by itself, as pins and shapes do, gives energy. Seen from the frame that goes along with it, at V with the
+// acceleration A, it gives none: there the same holds of Σ m |v - V|²/2, and of U + Σ m A·P. Where an island has several
+// drivers, V is their mean, and what they may give besides is what a wall at the greatest difference from it would,
+//
+//   Σ 2 m s (|v - V| + s),   s = max |V_k - V|
+//
+// Drag and springs to places are at rest in the world, and give points that they hold back otherwise than in their free
+// motion the energy |V| times the difference of their impulses at most.
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "runtime/solver/collision/contact_energy.h"
@@ -35,38 +45,72 @@ inline double potential_energy(const Substep& step, std::size_t i, const Vec3d& 
     return energy / step.inverse_mass[i];
 }
 
-// The points that rows link in a sub-step; those that something drives which moves by itself, and those that are linked
-// to a place or to a point that does not move.
+// What drives points: its velocity at the end of the sub-step, m/s, and its way in it, m, jumps aside.
+struct Drive {
+    Vec3d v = Vec3d::Zero(), way = Vec3d::Zero();
+
+    static Drive of(const Vec3d& v_before, const Vec3d& v, double dt) { return {v, 0.5 * dt * (v_before + v)}; }
+
+    Vec3d acceleration(double dt) const { return 2 / (dt * dt) * (dt * v - way); }
+};
+
+// The points that rows link in a sub-step; and what they are linked to that no row moves, at rest or not.
 class EnergyIslands {
 public:
-    explicit EnergyIslands(const Substep& step)
-        : sets_(step.size()), driven_(step.size()), anchored_(step.size()), step_(step)
-    {
-    }
+    explicit EnergyIslands(const Substep& step) : sets_(step.size()), step_(step) {}
 
     void link(std::span<const std::uint32_t> points);
-    void drive(std::uint32_t i) { driven_[i] = 1; }
+    // rolling: m/s, what turns a point gives its surface besides.
+    void drive(std::uint32_t i, const Drive& by, double rolling = 0) { drivers_.push_back({i, none, by, rolling}); }
+    // How a point goes that no row moves, where not at its velocity throughout.
+    void move(std::uint32_t i, const Drive& by) { kinematic_[i] = by; }
+    // Once all are linked.
+    void close();
+
+    struct Driven {
+        Drive mean;
+        double spread = 0;          // m/s, of the drivers about it
+        std::uint32_t drivers = 0;  // 0: none; nothing holds the island, either
+        bool moves = false;         // one of them does
+    };
 
     std::uint32_t root(std::uint32_t i) { return sets_.root(i); }
-    bool is_driven(std::uint32_t i) const { return driven_[i] != 0; }
-    bool is_anchored(std::uint32_t i) const { return anchored_[i] != 0; }
+    // Of the island of a root.
+    const Driven& driven(std::uint32_t root) const { return driven_[root]; }
+    bool any_moves() const { return any_moves_; }
 
 private:
+    static constexpr std::uint32_t none = ~0u;
+    struct Driver {
+        std::uint32_t i, point;  // of the island; that drives it, or none
+        Drive by;
+        double rolling;
+    };
+
     DisjointSets sets_;
-    std::vector<std::uint8_t> driven_, anchored_;
     const Substep& step_;
+    std::vector<Driver> drivers_;
+    std::unordered_map<std::uint32_t, Drive> kinematic_;
+    std::vector<Driven> driven_;
+    bool any_moves_ = false;
 };
 
 class EnergyBound {
 public:
     // What the points have now. add_stored(sign, energy): adds what rows store, times the sign, to the points'
-    // energies.
+    // energies. follows: whether something may drive points.
     template <class F>
-    void begin(const Substep& step, const F& add_stored)
+    void begin(const Substep& step, const F& add_stored, bool follows)
     {
-        keep(step);
+        keep(step, follows);
         add_stored(1.0, std::span<double>(stored_));
         for (std::size_t i = 0; i < stored_.size(); ++i) change_[i] -= stored_[i];
+    }
+    // J: what rows store at first, seen from what drives them, where that differs. Valid once it has begun.
+    std::span<double> stored_in_frame()
+    {
+        stored_in_frame_.assign(stored_.size(), 0.0);
+        return stored_in_frame_;
     }
     // J, where drag and springs act: by how much the points had more at the beginning of the sub-step. They may have it
     // back, as what acts against their motion leaves drag less to take. Rows are to be added. Once it is closed: what
@@ -91,6 +135,7 @@ public:
         add_stored(1.0, std::span<double>(change_));
         EnergyIslands islands(step);
         link(islands);
+        islands.close();
         return limit(step, islands, fallback);
     }
     // By point: whether its island had no solution; empty where none has stalled.
@@ -103,27 +148,33 @@ private:
         double credit = 0;                // J, what drag has taken
         double size = 0;                  // J: of what these are differences
         double available = 0;             // J, in motion, in rows, and what forces can give in the sub-step
+        double given = 0;                 // J: what drivers, drag and springs to places give at most, in the frame
         double part = 1;                  // t
-        bool driven = false, anchored = false, stalled = false;
+        bool stalled = false;
 
         double change_at(double t) const { return t * (slope + t * curvature) + change; }
     };
 
-    void keep(const Substep& step);
+    void keep(const Substep& step, bool follows);
     void add_potential(const Substep& step);
     ContactEnergy change(const Substep& step) const;
     ContactEnergy limit(Substep& step, EnergyIslands& islands, const RigidFallback* fallback);
     void sum_islands(const Substep& step, EnergyIslands& islands);
+    void add(const Substep& step, std::uint32_t i, Island& island) const;
+    void add_seen(const Substep& step, std::uint32_t i, const EnergyIslands::Driven& by, Island& island) const;
+    void add_turning(const Substep& step, std::uint32_t i, Island& island) const;
     ContactEnergy move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback);
 
     std::vector<Vec3d> v_;        // m/s, before
+    std::vector<Vec3d> P_;        // m, before; empty where nothing drives points
     std::vector<Vec3d> s_;        // m/s, of spins; empty where there are none
     std::vector<double> change_;  // J, of the potential energy of each point and of the rows that are counted with it
     std::vector<double> stored_;  // J, in rows at first
+    std::vector<double> stored_in_frame_;  // J; empty where that is the same
     std::vector<double> credit_;  // J
     double driven_ = 0;           // J
     std::vector<std::uint8_t> stalled_;
-    std::vector<Island> islands_;
+    std::vector<Island> islands_, seen_;  // in the world; from drivers that move, empty where none does
 };
 
 }  // namespace rapid

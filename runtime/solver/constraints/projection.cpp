@@ -13,6 +13,14 @@ namespace {
 // In a cradle an impact takes one; in a gas two or three.
 constexpr std::uint32_t most_impact_sweeps = 32;
 
+// Whether some point moves that no row does.
+bool has_kinematic(const Substep& step)
+{
+    for (std::size_t i = 0; i < step.size(); ++i)
+        if (!(step.inverse_mass[i] > 0) && !step.v[i].isZero(0)) return true;
+    return false;
+}
+
 }  // namespace
 
 Projection::Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles,
@@ -26,6 +34,7 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
                              [](const LocalConstraint& local) { return local.coupling->only_dissipates(); })),
       is_driven_(std::any_of(constraints.begin(), constraints.end(),
                              [](const LocalConstraint& local) { return local.coupling->is_driven(); })),
+      follows_(is_driven_ || has_kinematic(step)),
       free_(step.size())
 {
     // Rods and springs keep what they have come to before contacts push their points, whichever node comes first.
@@ -87,7 +96,9 @@ void Projection::advance(Substep& step)
     else
         keep_positions(free_);
     if (shapes_) shapes_->detect(step, free_);
-    bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); });
+    bound_.begin(
+        step, [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); },
+        follows_ || shapes_);
     if (has_forces_ && !step.energy.empty()) {
         const std::span<double> credit = bound_.credit();
         for (std::size_t i = 0; i < credit.size(); ++i) credit[i] += stored_[i];
@@ -173,9 +184,13 @@ void Projection::advance_linked(Substep& step)
 {
     stored_.assign(step.size(), 0.0);
     add_stored(step, begun_, 1, stored_);
-    bound_.begin(step, [&](double factor, std::span<double> energy) {
-        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
-    });
+    bound_.begin(
+        step,
+        [&](double factor, std::span<double> energy) {
+            for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
+        },
+        follows_);
+    if (follows_) store_in_frame(step);
     fallback_.begin(step);
     each([&](Coupling& coupling) {
         coupling.advance(step);
@@ -186,6 +201,22 @@ void Projection::advance_linked(Substep& step)
     energy_.added += std::max(0.0, change.added - std::max(0.0, driven));
     changes_.pins += driven;
     changes_.rods += change.added - change.lost + credited() - driven;
+}
+
+// What rows store at first, where their points have gone along with what drives them.
+void Projection::store_in_frame(const Substep& step)
+{
+    EnergyIslands islands(step);
+    link(islands, step, true);
+    islands.close();
+    if (!islands.any_moves()) return;
+    std::vector<Vec3d> at(begun_);
+    for (std::uint32_t i = 0; i < at.size(); ++i)
+        if (step.points[i].w > 0)
+            at[i] += islands.driven(islands.root(i)).mean.way;
+        else
+            at[i] = step.points[i].P;
+    add_stored(step, at, 1, bound_.stored_in_frame());
 }
 
 double Projection::elastic_energy(const Substep& step, std::span<const Vec3d> at) const
@@ -213,17 +244,20 @@ ContactEnergy Projection::close_bound(Substep& step, bool of_rods)
 {
     const auto stored = [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); };
     if (!may_gain_) return bound_.measure(step, stored);
-    const auto link = [&](EnergyIslands& islands) {
-        for (const LocalConstraint& local : constraints_)
-            if (!of_rods || local.coupling->has_forces()) local.coupling->link(islands);
-        if (shapes_ && !of_rods) shapes_->drive(islands, step);
-    };
-    ContactEnergy change = bound_.close(step, stored, link, of_rods ? &fallback_ : nullptr);
+    ContactEnergy change = bound_.close(
+        step, stored, [&](EnergyIslands& islands) { link(islands, step, of_rods); }, of_rods ? &fallback_ : nullptr);
     if (bound_.stalled().empty()) return change;
     const double before = energy_of_places(step);
     each([&](Coupling& coupling) { coupling.yield(step, bound_.stalled()); });
     change.take(energy_of_places(step) - before);
     return change;
+}
+
+void Projection::link(EnergyIslands& islands, const Substep& step, bool of_rods) const
+{
+    for (const LocalConstraint& local : constraints_)
+        if (!of_rods || local.coupling->has_forces()) local.coupling->link(islands);
+    if (shapes_ && !of_rods) shapes_->drive(islands, step);
 }
 
 // J: what rows store, and the potential energy of points that have yielded.
@@ -289,8 +323,7 @@ void Projection::follow_rods(const Substep& step)
     rods_.clear();
     if (has_forces_) {
         EnergyIslands islands(step);
-        for (const LocalConstraint& local : constraints_)
-            if (local.coupling->has_forces()) local.coupling->link(islands);
+        link(islands, step, true);
         rods_.resize(step.size());
         for (std::uint32_t i = 0; i < rods_.size(); ++i) rods_[i] = islands.root(i);
     }

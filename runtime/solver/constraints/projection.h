@@ -52,7 +52,9 @@ private:
     double driven_energy(const Substep& step) const;
     double credited();
     void move_kinematic(Substep& step);
+    void store_in_frame(const Substep& step);
     ContactEnergy close_bound(Substep& step, bool of_rods);
+    void link(EnergyIslands& islands, const Substep& step, bool of_rods) const;
     double energy_of_places(const Substep& step) const;
     void require_finite(const Substep& step) const;
     void begin_support(Substep& step);
@@ -66,10 +68,11 @@ private:
     const PointErrors& errors_;
     bool has_forces_;  // some constraint (Coupling::has_forces)
     bool may_gain_;    // some constraint does not only take energy, or springs draw points
+    bool is_driven_;  // some constraint moves points by itself
+    bool follows_;    // or some point that no row moves has a velocity
     EnergyBound bound_;
     RigidFallback fallback_;
     ContactEnergy energy_;
-    bool is_driven_;  // some constraint moves points by itself
     EnergyChanges changes_;
     std::optional<ShapeContacts> shapes_;
     std::vector<Vec3d> free_;                           // where the points' free motion has ended

@@ -34,13 +34,13 @@ void RigidFallback::begin(const Substep& step)
     });
 }
 
-double RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, bool anchored) const
+double RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const
 {
-    anchored |= std::any_of(points.begin(), points.end(), [&](std::uint32_t i) {
+    const bool is_drawn = std::any_of(points.begin(), points.end(), [&](std::uint32_t i) {
         return !step.mobility.empty() && (step.mobility[i].stiffness > 0 || step.surface_springs[i].w2 > 0);
     });
-    if (anchored)
-        hold(step, points);
+    if (driver || is_drawn)
+        carry(step, points, driver ? *driver : Drive{});
     else
         move(step, points);
     double change = 0;
@@ -50,9 +50,9 @@ double RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points
     return change;
 }
 
-void RigidFallback::hold(Substep& step, std::span<const std::uint32_t> points) const
+void RigidFallback::carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const
 {
-    for (const std::uint32_t i : points) place(step, i, start_[i], Vec3d::Zero());
+    for (const std::uint32_t i : points) place(step, i, start_[i] + driver.way, driver.v);
 }
 
 void RigidFallback::move(Substep& step, std::span<const std::uint32_t> points) const

@@ -7,7 +7,7 @@
 // with d the mean displacement of their free motion, X and V their middle and mean velocity by mass, ω that of their
 // angular momentum. Both momenta stay; what rows store stays, as no distance changes; of the energy of motion all that
 // is not of a rigid body is lost. The body does not turn within the sub-step, which would change one of these. Points
-// that are linked to what does not move, or drawn to places, stay where they are.
+// that are linked to what no row moves go along with that; those that are drawn to places stay where they are.
 #pragma once
 
 #include <cstdint>
@@ -18,16 +18,18 @@
 
 namespace rapid {
 
+struct Drive;
+
 class RigidFallback {
 public:
     // Keeps where points begin the sub-step, and where their free motion has taken them.
     void begin(const Substep& step);
-    // Moves the points given, which rows link, in place of what these have done. anchored: some of them is linked to a
-    // point that does not move. Returns the change of their energy since begin(), J.
-    double apply(Substep& step, std::span<const std::uint32_t> points, bool anchored) const;
+    // Moves the points given, which rows link, in place of what these have done. driver: what holds some of them, null
+    // where nothing does. Returns the change of their energy since begin(), J.
+    double apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const;
 
 private:
-    void hold(Substep& step, std::span<const std::uint32_t> points) const;
+    void carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const;
     void move(Substep& step, std::span<const std::uint32_t> points) const;
     void place(Substep& step, std::uint32_t i, const Vec3d& P, const Vec3d& v) const;
 

@@ -261,11 +261,22 @@ void ShapeContacts::solve_velocities(Substep& step)
 
 void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
 {
+    const double now = (step.index + 1) * step.dt;
     for (const Batch& contacts : contacts_)
-        for (const ShapeContact& contact : contacts)
-            if ((contact.normal_impulse > 0 || (turns(step, contact.i) && contact.free_impulse > 0)) &&
-                !(contact.vc.isZero(0) && contact.turning.isZero(0)))
-                islands.drive(contact.i);
+        for (const ShapeContact& contact : contacts) {
+            const std::uint32_t i = contact.i;
+            if (!(contact.normal_impulse > 0) && !(turns(step, i) && contact.free_impulse > 0)) continue;
+            const Obstacle& obstacle = obstacles_[contact.obstacle];
+            Drive by;
+            double rolling = 0;
+            if (obstacle.moves) {
+                const Vec3d before = obstacle.shape->velocity_at(step.points[i].P, now - step.dt);
+                const Vec3d after = obstacle.shape->velocity_at(step.points[i].P, now);
+                by = Drive::of(contact.vc - (after - before), contact.vc, step.dt);
+                rolling = obstacle.radius[i] * contact.turning.norm();
+            }
+            islands.drive(i, by, rolling);
+        }
 }
 
 // What shapes did to points in their free motion, among the contacts that they are found in at its end.

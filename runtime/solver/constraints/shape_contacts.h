@@ -51,7 +51,7 @@ public:
     void solve_velocities(Substep& step);
     // To step.forces: with what shapes did to points in their free motion.
     void add_forces(const Substep& step) const;
-    // Shapes that move drive the points that they bear.
+    // Shapes drive the points that they bear.
     void drive(EnergyIslands& islands, const Substep& step) const;
 
 private:

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <random>
 
+#include "runtime/solver/constraints/energy_bound.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -83,7 +84,7 @@ TEST_CASE("a rigid fallback keeps distances and momenta, and gives no energy", "
         const double before = body.kinetic();
         for (ProjectedPoint& point : body.points) point.P += 1e3 * body.any();
         for (Vec3d& v : body.v) v = 1e3 * body.any();
-        const double change = fallback.apply(body.step, body.all, false);
+        const double change = fallback.apply(body.step, body.all, nullptr);
         const std::vector<Vec3d> P = body.places();
         for (const std::uint32_t i : body.all)
             for (const std::uint32_t j : body.all)
@@ -103,7 +104,7 @@ TEST_CASE("a rigid fallback loses nothing of a body that turns", "[rigid_fallbac
     RigidFallback fallback;
     fallback.begin(body.step);
     const std::vector<Vec3d> v = body.v;
-    CHECK(fallback.apply(body.step, body.all, false) == Approx(0).margin(1e-12 * body.kinetic()));
+    CHECK(fallback.apply(body.step, body.all, nullptr) == Approx(0).margin(1e-12 * body.kinetic()));
     for (const std::uint32_t i : body.all) CHECK((body.v[i] - v[i]).norm() <= 1e-12);
 }
 
@@ -121,9 +122,24 @@ TEST_CASE("what is linked to a point at rest, or drawn to a place, stays where i
     RigidFallback fallback;
     fallback.begin(body.step);
     const std::vector<Vec3d> start = body.start;
-    fallback.apply(body.step, body.all, !drawn);
+    const Drive at_rest;
+    fallback.apply(body.step, body.all, drawn ? nullptr : &at_rest);
     CHECK(body.places() == start);
     CHECK(body.kinetic() == 0);
+}
+
+TEST_CASE("a body without a solution goes along with what drives it", "[rigid_fallback]")
+{
+    Body body(3, 5, false);
+    RigidFallback fallback;
+    fallback.begin(body.step);
+    const std::vector<Vec3d> start = body.start;
+    const Drive by{{1, 2, 3}, {0.1, 0, -0.2}};
+    fallback.apply(body.step, body.all, &by);
+    for (const std::uint32_t i : body.all) {
+        CHECK(body.places()[i] == start[i] + by.way);
+        CHECK(body.v[i] == by.v);
+    }
 }
 
 }  // namespace

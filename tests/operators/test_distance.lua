@@ -97,6 +97,32 @@ return rapid.create { fps = 24, points = rapid.points.from { P = places } }
     assert.truthy(worst < 1e-3, worst)
   end)
 
+  it("lets a net fall and swing, however stiff its springs are to the sub-steps", function()
+    local function lowest(compliance, substeps)
+      local result = scene.run(([[
+        local P, pairs = {}, {}
+        for k = 0, 143 do
+          local i, j = k %% 12, math.floor(k / 12)
+          P[k + 1] = {0.1 * i, 0, 0.1 * j}
+          if i > 0 then pairs[#pairs + 1] = {k, k + 1} end
+          if j > 0 then pairs[#pairs + 1] = {k - 11, k + 1} end
+        end
+        return rapid.create { fps = 24, points = rapid.points.from { P = P } } :gravity {}
+          :group { name = "held", where = function(p) return p.id == 0 or p.id == 11 end } :pin { group = "held" }
+          :distance { pairs = pairs, compliance = %g } :solve { substeps = %d, sleep = math.huge }]])
+        :format(compliance, substeps), { frames = {1, 16} })
+      return result[12]:min("P").y, result[16]:min("P").y
+    end
+    local rods = lowest(0, 16)
+    assert.near(-1.03, rods, 0.02) -- almost as far as it falls freely
+    for _, compliance in ipairs { 1e-8, 1e-7, 1e-6, 1e-5 } do
+      assert.near(rods, lowest(compliance, 4), 0.03, ("%g"):format(compliance))
+      local _, coarse = lowest(compliance, 16)
+      local _, fine = lowest(compliance, 64)
+      assert.near(fine, coarse, 0.06, ("%g, on its way up"):format(compliance))
+    end
+  end)
+
   it("ties all that are near at first, to the distance that is asked for", function()
     local p = points_of(scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {3, 0, 0}} } }

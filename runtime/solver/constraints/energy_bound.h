@@ -12,8 +12,9 @@
 // (rigid_fallback.h), and is told.
 //
 // What moves by itself, as pins and shapes do, gives energy. Seen from the frame that goes along with it, at V with the
-// acceleration A, it gives none: there the same holds of Σ m |v - V|²/2, and of U + Σ m A·P. Where an island has several
-// drivers, V is their mean, and what they may give besides is what a wall at the greatest difference from it would,
+// acceleration A, it gives none: there the same holds of Σ m |v - V|²/2, and of U + Σ m A·P. Where an island has
+// several drivers, V is their mean, and what they may give besides is what a wall at the greatest difference from it
+// would,
 //
 //   Σ 2 m s (|v - V| + s),   s = max |V_k - V|
 //
@@ -171,8 +172,8 @@ private:
     std::vector<double> change_;  // J, of the potential energy of each point and of the rows that are counted with it
     std::vector<double> stored_;  // J, in rows at first
     std::vector<double> stored_in_frame_;  // J; empty where that is the same
-    std::vector<double> credit_;  // J
-    double driven_ = 0;           // J
+    std::vector<double> credit_;           // J
+    double driven_ = 0;                    // J
     std::vector<std::uint8_t> stalled_;
     std::vector<Island> islands_, seen_;  // in the world; from drivers that move, empty where none does
 };

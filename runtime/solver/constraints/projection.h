@@ -68,8 +68,8 @@ private:
     const PointErrors& errors_;
     bool has_forces_;  // some constraint (Coupling::has_forces)
     bool may_gain_;    // some constraint does not only take energy, or springs draw points
-    bool is_driven_;  // some constraint moves points by itself
-    bool follows_;    // or some point that no row moves has a velocity
+    bool is_driven_;   // some constraint moves points by itself
+    bool follows_;     // or some point that no row moves has a velocity
     EnergyBound bound_;
     RigidFallback fallback_;
     ContactEnergy energy_;

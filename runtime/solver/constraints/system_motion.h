@@ -33,6 +33,7 @@ public:
         }
         solve_velocities();
         correct_positions();
+        correct_together();
         for (const std::uint32_t i : points_)
             if (step.points[i].w > 0) step.displacement[i] += step.dt * (step.v[i] - free_v_[i]);
     }
@@ -44,6 +45,10 @@ private:
     // A small net is solved whatever its masses: in exact arithmetic n rows take n iterations.
     static constexpr std::size_t small = 100;
     static constexpr int rounds = 4;
+    // Of the energy of motion, what springs that are off their length may store.
+    static constexpr double enough = 1e-2;
+    static constexpr double coarse = 0.1;  // accuracy of a step of Newton's, of its iterations
+    static constexpr int newton_steps = 20, halvings = 6;
     // Compliance of a rigid row, as a part of its points' inverse mass: rows that contradict each other get a finite
     // load.
     static constexpr double least_compliance = 1e-9;
@@ -148,7 +153,11 @@ private:
         });
         solve();
         for (const std::uint32_t i : points_) moved_[i] = system_.shift(i);
-        each_row([&](std::size_t r, Row& row) { row.impulse = step.dt * system_.lambda[r]; });
+        stretch_.resize(system_.size());
+        each_row([&](std::size_t r, Row& row) {
+            row.impulse = step.dt * system_.lambda[r];
+            stretch_[r] = -row.compliance * system_.lambda[r];
+        });
     }
 
     // Takes off the velocities along rigid rows.
@@ -170,8 +179,8 @@ private:
         each_row([&](std::size_t r, Row& row) { row.impulse += system_.lambda[r]; });
     }
 
-    // Moves the points to where the rigid rows have C = 0, row by row: a step of Newton's for all at once would throw a
-    // net that is nearly flat. Not where a spring draws a point, which would take energy from it.
+    // Moves the points to where rigid rows have C = 0, and springs that no sub-step resolves the length that goes with
+    // their force, row by row. Not where a spring draws a point, which would take energy from it.
     void correct_positions()
     {
         Substep& step = *step_;
@@ -179,15 +188,80 @@ private:
             schedule_->for_each_coloured([&](std::uint32_t r) {
                 const Row& row = rows_[schedule_->others()[r]];
                 typename Row::Vectors gradient;
-                const double C = row.residual(step, gradient), W = inverse_mass(row, gradient);
-                if (row.compliance > 0 || !(W > 0) || is_drawn(row)) return;
-                for (int l = 0; l < arity; ++l) {
-                    const std::uint32_t i = row.points[l];
-                    const Vec3d shift = -inverse_mass_[i] * (C / W) * gradient[l];
-                    step.points[i].P += shift;
-                    step.start[i] += shift;
-                }
+                const double C = off(r, row, gradient), W = inverse_mass(row, gradient);
+                if (!(W > 0) || !row.is_stiff(W, step.dt) || is_drawn(row)) return;
+                for (int l = 0; l < arity; ++l)
+                    shift(row.points[l], -inverse_mass_[row.points[l]] * (C / W) * gradient[l]);
             });
+    }
+    // m, how far a row is from the length that goes with its force.
+    double off(std::size_t r, const Row& row, typename Row::Vectors& gradient) const
+    {
+        return row.residual(*step_, gradient) - stretch_[r];
+    }
+    void shift(std::uint32_t i, const Vec3d& by)
+    {
+        step_->points[i].P += by;
+        step_->start[i] += by;
+    }
+
+    // What springs are still off stores energy, the more the stiffer they are: Newton's steps for all rows at once,
+    // each as far as it brings them nearer, since a net that is nearly flat would be thrown.
+    void correct_together()
+    {
+        for (int n = 0; n < newton_steps; ++n) {
+            const Off before = read_off();
+            if (!(before.energy > enough * kinetic_energy())) return;
+            system_.solve(*schedule_, coarse, iterations);
+            double farthest = 0;
+            for (const std::uint32_t i : points_) farthest = std::max(farthest, system_.shift(i).norm());
+            const double most = 2 * before.sum;
+            double part = farthest > most ? most / farthest : 1;
+            for (const std::uint32_t i : points_) moved_[i] = system_.shift(i), to_[i] = step_->points[i].P;
+            double squares = before.squares;
+            for (int k = 0; k < halvings && !(squares < before.squares); ++k, part *= 0.5) {
+                for (const std::uint32_t i : points_) step_->points[i].P = to_[i] + part * moved_[i];
+                squares = read_off().squares;
+            }
+            const bool is_nearer = squares < before.squares;
+            for (const std::uint32_t i : points_) {
+                const Vec3d by = is_nearer ? Vec3d(step_->points[i].P - to_[i]) : Vec3d::Zero();
+                step_->points[i].P = to_[i];
+                shift(i, by);
+            }
+            if (!is_nearer) return;
+        }
+    }
+    // Of what rows are off, to be corrected by masses: the sum, m, that of the squares, m², and the energy in springs,
+    // J.
+    struct Off {
+        double sum = 0, squares = 0, energy = 0;
+    };
+    Off read_off()
+    {
+        weigh_by_mass();
+        each_row([&](std::size_t r, Row& row) {
+            typename Row::Vectors gradient;
+            const double C = off(r, row, gradient), W = inverse_mass(row, gradient);
+            if (W > 0 && row.is_stiff(W, step_->dt) && !is_drawn(row))
+                set(r, gradient, C, least_compliance * W);
+            else
+                leave_out(r);
+        });
+        Off all;
+        for (std::size_t r = 0; r < system_.size(); ++r) {
+            const double C = system_.e[r], compliance = rows_[schedule_->others()[r]].compliance;
+            all.sum += std::abs(C), all.squares += C * C;
+            if (compliance > 0) all.energy += 0.5 * C * C / compliance;
+        }
+        return all;
+    }
+    double kinetic_energy() const
+    {
+        double sum = 0;
+        for (const std::uint32_t i : points_)
+            if (inverse_mass_[i] > 0) sum += 0.5 * step_->v[i].squaredNorm() / inverse_mass_[i];
+        return sum;
     }
     bool is_drawn(const Row& row) const
     {
@@ -202,6 +276,7 @@ private:
     std::vector<std::uint32_t> points_;              // of the rows, ascending
     std::vector<Vec3d> from_, to_, moved_, free_v_;  // by point: beginning, estimate of the end, m; m/s
     std::vector<double> inverse_mass_;               // by point, 1/kg
+    std::vector<double> stretch_;                    // by row, m: that goes with its force
 };
 
 }  // namespace rapid

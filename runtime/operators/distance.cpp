@@ -33,6 +33,9 @@ namespace {
 
 constexpr double bytes_a_tie = 256;  // of a row, and of the search for it
 
+// m: below it the square of a length is no number any more of which one may divide by the root.
+constexpr double no_length = 1e-150;
+
 struct Tie {
     static constexpr int points = 2;
     static constexpr bool rests = true;
@@ -51,7 +54,7 @@ struct Tie {
         const Vec3d d = P[0] - P[1];
         const double length = d.norm();
         // Any direction parts two points in one place.
-        gradient[0] = length > 0 ? Vec3d(d / length) : Vec3d(Vec3d::UnitY());
+        gradient[0] = length > no_length ? Vec3d(d / length) : Vec3d(Vec3d::UnitY());
         gradient[1] = -gradient[0];
         return length - rest;
     }
@@ -61,7 +64,8 @@ struct Tie {
     {
         const Vec3d d = from[0] - from[1], e = to[0] - to[1], sum = d + e;
         const double lengths = d.norm() + e.norm();
-        if (!(sum.squaredNorm() > 1e-6 * lengths * lengths)) return void(residual(from, gradient));
+        if (!(lengths > no_length) || !(sum.squaredNorm() > 1e-6 * lengths * lengths))
+            return void(residual(from, gradient));
         gradient[0] = sum / lengths;
         gradient[1] = -gradient[0];
     }

@@ -66,8 +66,12 @@ void Projection::advance(Substep& step)
     if (constraints_.empty() || !(step.dt > 0) || (sleep_ && sleep_->all())) return;
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
-    add_displacements(step);
+    const double displacing = work_of_displacements(step);
     move_kinematic(step);
+    const double put_back = return_kinematic(step);
+    energy_.added += std::max(0.0, displacing + put_back);
+    changes_.contacts += displacing + put_back;
+    changes_.pins -= put_back;
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) f(i);
@@ -141,16 +145,30 @@ double Projection::credited()
     return std::accumulate(credit.begin(), credit.end(), 0.0);
 }
 
-// What it took to put points out of shapes in their free motion, against rows as they were before.
-void Projection::add_displacements(const Substep& step)
+// J: what it took to put points out of shapes in their free motion, against rows as they were before.
+double Projection::work_of_displacements(const Substep& step) const
 {
-    if (!has_forces_ || step.born.empty()) return;
+    if (!has_forces_ || step.born.empty()) return 0;
     std::vector<double> stored(step.size());
     add_stored(step, step.start, 1, stored);
     add_stored(step, step.born, -1, stored);
-    const double work = std::accumulate(stored.begin(), stored.end(), 0.0);
-    energy_.added += std::max(0.0, work);
-    changes_.contacts += work;
+    return std::accumulate(stored.begin(), stored.end(), 0.0);
+}
+
+// J: what rows store more where pins have put points back that shapes had put out. The pins have not moved for it.
+double Projection::return_kinematic(const Substep& step) const
+{
+    if (!has_forces_ || !is_driven_ || step.born.empty()) return 0;
+    std::vector<Vec3d> at(step.start.begin(), step.start.end());
+    bool any = false;
+    for (std::size_t i = 0; i < at.size(); ++i)
+        if (!(step.points[i].w > 0) && step.inverse_mass[i] > 0 && at[i] != step.born[i])
+            at[i] = step.born[i], any = true;
+    if (!any) return 0;
+    std::vector<double> stored(step.size());
+    add_stored(step, at, 1, stored);
+    add_stored(step, step.start, -1, stored);
+    return std::accumulate(stored.begin(), stored.end(), 0.0);
 }
 
 // What pins move gains what they do, and so do the rows that they stretch, before these act.

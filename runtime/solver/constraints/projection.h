@@ -46,7 +46,8 @@ public:
 private:
     template <class F>
     void each(const F& f);
-    void add_displacements(const Substep& step);
+    double work_of_displacements(const Substep& step) const;
+    double return_kinematic(const Substep& step) const;
     void advance_linked(Substep& step);
     void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;
     double driven_energy(const Substep& step) const;

@@ -1,11 +1,13 @@
 #include "runtime/deferred.h"
 
 #include <dlfcn.h>
+#include <execinfo.h>
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <new>
 #include <string>
 
 #include "runtime/error.h"
@@ -38,6 +40,10 @@ std::filesystem::path library() { return library_folder() / RAPID_DEFERRED_LIBRA
 
 void load_deferred()
 {
+    // glibc finds the unwinder when an exception first passes through its own code, as it does through std::call_once
+    // here and in OpenVDB, and ends the process where there is no memory for that. This finds it, or is told.
+    void* frame;
+    if (::backtrace(&frame, 1) == 0) throw std::bad_alloc();
     static std::once_flag once;
     std::call_once(once, [] {
         if (!dlopen(library().c_str(), RTLD_NOW | RTLD_LOCAL))

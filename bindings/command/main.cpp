@@ -213,10 +213,13 @@ int main(int argc, char** argv)
 {
     std::set_terminate(end_without_exception);
     std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
+    int status = rapid::status_failed;
     try {
-        return rapid::run({argv + 1, argv + argc});
+        status = rapid::run({argv + 1, argv + argc});
     } catch (const std::bad_alloc&) {  // to tell it as any other error takes memory
         std::fputs("out of memory\n", stderr);
-        return rapid::status_failed;
     }
+    // Libraries take memory to end (log4cplus, of OpenVDB), and end the process otherwise where there is none.
+    std::fflush(nullptr);
+    std::_Exit(status);
 }

@@ -1,5 +1,6 @@
 #include "runtime/io/vdb_order.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,15 +9,21 @@
 #include <functional>
 #include <numeric>
 #include <span>
+#include <tuple>
 #include <utility>
+#include <variant>
 
-#include "runtime/of_thread.h"
 #include "runtime/points/column_files.h"
 
 namespace rapid {
 namespace {
 
 using openvdb::Coord;
+
+// Buffers of the threads, for as long as they write one file. Not thread_local: of a library that is loaded later glibc
+// takes these when a thread first comes there, and ends the process where there is no memory.
+template <class T>
+using OfThreads = tbb::enumerable_thread_specific<T>;
 
 // Points that are looked up together: at most 64 parts, each with a list of its leaves.
 constexpr std::size_t least_block = 65536, most_blocks = 64;
@@ -116,11 +123,9 @@ std::int64_t entry(std::uint32_t voxel, std::size_t place)
     return static_cast<std::int64_t>(std::uint64_t{voxel} << 32 | place);
 }
 
-// Entries of one leaf, in order of their places, by voxel.
-void sort_leaf(std::span<std::int64_t> entries, VdbLeaf& leaf)
+// Entries of one leaf, in order of their places, by voxel. sorted: room for as many.
+void sort_leaf(std::span<std::int64_t> entries, VdbLeaf& leaf, std::vector<std::int64_t>& sorted)
 {
-    thread_local OfThread<std::vector<std::int64_t>> kept;
-    std::vector<std::int64_t>& sorted = *kept;
     std::array<std::uint32_t, 512> at{};
     for (const std::int64_t e : entries) ++at[static_cast<std::size_t>(e >> 32)];
     std::uint32_t first = 0;
@@ -201,9 +206,10 @@ Column<std::int64_t> sorted_entries(const Strided<Vec3f>& P, const Voxels& voxel
         for (std::size_t i = block.begin; i < block.end; ++i)
             entries[block.counts[static_cast<std::size_t>(numbers[i])]++] = entry(place_in_leaf(voxels.of(P[i])), i);
     });
+    OfThreads<std::vector<std::int64_t>> sorted;
     tbb::parallel_for(std::size_t{0}, lookup.leaves.size(), [&](std::size_t k) {
         VdbLeaf& leaf = lookup.leaves[k];
-        sort_leaf(entries.subspan(leaf.first, leaf.size), leaf);
+        sort_leaf(entries.subspan(leaf.first, leaf.size), leaf, sorted.local());
     });
     return result;
 }
@@ -252,21 +258,34 @@ struct MovedColumn {
     std::function<void(std::size_t first, std::span<const std::int64_t> entries)> sort;
 };
 
+// What a thread has of a column at a time, as it is read and in its new order.
 template <class T>
-MovedColumn moved(const Column<T>& column, Column<T>& into)
+struct Stretch {
+    std::vector<T> read, moved;
+};
+
+// One for each type of values.
+template <class Any>
+struct StretchesOf;
+template <class... T>
+struct StretchesOf<std::variant<Column<T>...>> {
+    using Type = std::tuple<Stretch<T>..., Stretch<std::uint8_t>>;
+};
+using Stretches = OfThreads<StretchesOf<AnyColumn>::Type>;
+
+template <class T>
+MovedColumn moved(const Column<T>& column, Column<T>& into, Stretches& stretches)
 {
     const std::span<T> to = into.append_for_writing(column.size());
-    return {[from = column.read(), to](std::size_t begin, const Scatter& scatter) {
-                thread_local OfThread<std::vector<T>> kept_read, kept_values;
-                std::vector<T>&read = *kept_read, &values = *kept_values;
+    return {[from = column.read(), to, &stretches](std::size_t begin, const Scatter& scatter) {
+                auto& [read, values] = std::get<Stretch<T>>(stretches.local());
                 read_column(from, begin, scatter.order.size(), read);
                 values.clear();
                 for (const std::uint32_t i : scatter.order) values.push_back(read[i]);
                 for (const Run& run : scatter.runs) write_values(&to[run.to], &values[run.from], run.size * sizeof(T));
             },
-            [to](std::size_t first, std::span<const std::int64_t> entries) {
-                thread_local OfThread<std::vector<T>> kept_read, kept_sorted;
-                std::vector<T>&read = *kept_read, &sorted = *kept_sorted;
+            [to, &stretches](std::size_t first, std::span<const std::int64_t> entries) {
+                auto& [read, sorted] = std::get<Stretch<T>>(stretches.local());
                 read_column({to.data(), 1}, first, entries.size(), read);
                 sorted.clear();
                 for (const std::int64_t e : entries) sorted.push_back(read[static_cast<std::uint32_t>(e)]);
@@ -313,13 +332,14 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
 {
     PointSet result;
     result.append(points.size());
+    Stretches stretches;
     std::vector<MovedColumn> columns;
     for (const auto& [name, column] : points.columns())
         std::visit(
             [&, &key = name]<class T>(const Column<T>& c) {
                 if (c.is_uniform()) return result.set(key, c);
                 Column<T> into(0, c.fallback());
-                columns.push_back(moved(c, into));
+                columns.push_back(moved(c, into, stretches));
                 result.set(key, std::move(into));
             },
             column);
@@ -329,7 +349,7 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
             continue;
         }
         Column<std::uint8_t> into(0);
-        columns.push_back(moved(members, into));
+        columns.push_back(moved(members, into, stretches));
         result.group(name) = std::move(into);
     }
 
@@ -346,6 +366,7 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
         }
 
     const Strided<Vec3f> P = std::as_const(result).P().read();
+    OfThreads<std::vector<std::int64_t>> sorted;
     tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t c) {
         const Cell& cell = cells[c];
         LeafNumbers numbers_of;
@@ -363,7 +384,7 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
         }
         for (std::size_t k = cell.first_leaf; k < cell.end_leaf; ++k) {
             VdbLeaf& leaf = lookup.leaves[k];
-            sort_leaf(std::span(entries).subspan(leaf.first - cell.first, leaf.size), leaf);
+            sort_leaf(std::span(entries).subspan(leaf.first - cell.first, leaf.size), leaf, sorted.local());
         }
         for (const MovedColumn& column : columns) column.sort(cell.first, entries);
         trim_columns();

@@ -29,6 +29,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -53,24 +54,32 @@ std::atomic<bool> armed{false}, began{false};
 using Main = int (*)(int, char**, char**);
 Main program_main;
 
-// libgcc registers the code that LuaJIT compiles, in memory that it does not check (gcc 12): it can't report a fault.
-// Where it is loaded:
-std::uintptr_t unwinder_begin = 0, unwinder_end = 0;
+// Libraries that take memory and do not check whether they got it can't report a fault: libgcc, which registers the
+// code that LuaJIT compiles (gcc 12), and Blosc. Where they are loaded:
+struct Careless {
+    const char* name;
+    std::atomic<std::uintptr_t> begin, end;
+};
+Careless careless[] = {{"libgcc_s", 0, 0}, {"libblosc", 0, 0}};
 
-int find_unwinder(dl_phdr_info* library, std::size_t, void*)
+int find_careless(dl_phdr_info* library, std::size_t, void*)
 {
-    if (!std::strstr(library->dlpi_name, "libgcc_s")) return 0;
-    unwinder_begin = unwinder_end = library->dlpi_addr;
-    for (int k = 0; k < library->dlpi_phnum; ++k)
-        unwinder_end =
-            std::max(unwinder_end, unwinder_begin + library->dlpi_phdr[k].p_vaddr + library->dlpi_phdr[k].p_memsz);
-    return 1;
+    for (Careless& one : careless) {
+        if (!std::strstr(library->dlpi_name, one.name)) continue;
+        std::uintptr_t end = library->dlpi_addr;
+        for (int k = 0; k < library->dlpi_phnum; ++k)
+            end = std::max(end, library->dlpi_addr + library->dlpi_phdr[k].p_vaddr + library->dlpi_phdr[k].p_memsz);
+        one.begin = library->dlpi_addr;
+        one.end = end;
+    }
+    return 0;
 }
 
-bool is_unwinder(void* caller)
+bool is_careless(void* caller)
 {
     const auto at = reinterpret_cast<std::uintptr_t>(caller);
-    return at >= unwinder_begin && at < unwinder_end;
+    return std::any_of(std::begin(careless), std::end(careless),
+                       [at](const Careless& one) { return at >= one.begin && at < one.end; });
 }
 
 void arm_with(const char* text)
@@ -79,14 +88,16 @@ void arm_with(const char* text)
     if (!text || std::sscanf(text, "%15[^:]:%ld:%15s", fault.call, &fault.nth, error) != 3) return;
     fault.lasting = std::strchr(error, '+') != nullptr;
     fault.error = std::strncmp(error, "short", 5) == 0 ? short_count : std::atoi(error);
-    ::dl_iterate_phdr(find_unwinder, nullptr);
+    ::dl_iterate_phdr(find_careless, nullptr);
     armed = true;
 }
 
 // At the first call after the libraries are there.
 struct Arm {
     Arm() { arm_with(std::getenv("RAPID_FAULT")); }
-    ~Arm()
+    ~Arm() { end(); }
+
+    void end()
     {
         armed = false;
         const char* path = std::getenv("RAPID_FAULT_COUNT");
@@ -114,7 +125,7 @@ thread_local bool makes_state __attribute__((tls_model("initial-exec"))) = false
 // Whether this request of memory, by `caller`, is to fail.
 bool fails(void* caller)
 {
-    if (!armed || !began || loading > 0 || is_unwinder(caller)) return false;
+    if (!armed || !began || loading > 0 || is_careless(caller)) return false;
     if (!makes_state || error_of("state") == 0) return error_of("alloc") > 0;
     makes_state = false;
     return true;
@@ -268,6 +279,13 @@ void* __libc_realloc(void* block, std::size_t bytes) noexcept;
 void* __libc_memalign(std::size_t alignment, std::size_t bytes) noexcept;
 void __libc_free(void* block) noexcept;
 
+static void* aligned(std::size_t alignment, std::size_t bytes, void* caller) noexcept
+{
+    if (fails(caller)) return errno = ENOMEM, nullptr;
+    void* const guarded = guard::take(alignment, bytes);
+    return guarded ? guarded : __libc_memalign(alignment, bytes);
+}
+
 void* malloc(std::size_t bytes) noexcept
 {
     if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
@@ -308,16 +326,17 @@ std::size_t malloc_usable_size(void* block) noexcept
 
 void* memalign(std::size_t alignment, std::size_t bytes) noexcept
 {
-    if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
-    void* const guarded = guard::take(alignment, bytes);
-    return guarded ? guarded : __libc_memalign(alignment, bytes);
+    return aligned(alignment, bytes, __builtin_return_address(0));
 }
 
-void* aligned_alloc(std::size_t alignment, std::size_t bytes) noexcept { return memalign(alignment, bytes); }
+void* aligned_alloc(std::size_t alignment, std::size_t bytes) noexcept
+{
+    return aligned(alignment, bytes, __builtin_return_address(0));
+}
 
 int posix_memalign(void** block, std::size_t alignment, std::size_t bytes) noexcept
 {
-    void* const found = memalign(alignment, bytes);
+    void* const found = aligned(alignment, bytes, __builtin_return_address(0));
     if (!found) return ENOMEM;
     *block = found;
     return 0;
@@ -329,6 +348,7 @@ void* dlopen(const char* file, int mode) noexcept
     ++loading;
     void* const library = original(file, mode);
     --loading;
+    ::dl_iterate_phdr(find_careless, nullptr);
     return library;
 }
 
@@ -348,6 +368,13 @@ lua_State* lua_newstate(void* (*allocate)(void*, void*, std::size_t, std::size_t
         collect(state, set_step, 1000);
     }
     return state;
+}
+
+// The process ends without its destructors.
+[[noreturn]] void _Exit(int status)
+{
+    arm.end();
+    ::_exit(status);
 }
 
 // Starts main(), from which on allocations are counted: before it nobody could report one that fails.

@@ -15,4 +15,13 @@ describe("a library of Rapid", function()
       assert.is_nil(undefined.stdout:find "__cxa_thread_atexit", name)
     end
   end)
+
+  it("has no variables of threads at all, where it is loaded later", function()
+    -- glibc takes the memory for these when a thread first comes there.
+    local folder = command.quoted(library:match "^(.*)/")
+    local segments = command.shell("cd " .. folder .. " && readelf -lW librapid_deferred.so")
+    assert.equal(0, segments.status, segments.stderr)
+    assert.truthy(segments.stdout:find(" LOAD ", 1, true))
+    assert.is_nil(segments.stdout:find(" TLS ", 1, true))
+  end)
 end)

@@ -57,7 +57,27 @@ if(RAPID_SANITIZE)
     target_compile_options(rapid_private INTERFACE
       -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/sanitizer_ignore.txt)
   endif()
+  # How its programs run (rapid_sanitized_program), and what a limit of the address space can't hold there: terabytes are
+  # mapped when such a program starts.
+  if(RAPID_SANITIZE MATCHES "address")
+    target_compile_definitions(rapid_private INTERFACE RAPID_ADDRESS_SANITIZER)
+    add_library(rapid_asan_options OBJECT ${PROJECT_SOURCE_DIR}/tests/asan/options.cpp)
+    add_library(rapid_asan_leaks OBJECT ${PROJECT_SOURCE_DIR}/tests/asan/leaks.cpp)
+    foreach(part rapid_asan_options rapid_asan_leaks)
+      target_link_libraries(${part} PRIVATE rapid_private)
+    endforeach()
+  endif()
 endif()
+
+# rapid_sanitized_program(TARGET [LUA]): a program of ours, with Lua or without, as the address sanitizer is to run it.
+function(rapid_sanitized_program target)
+  if(TARGET rapid_asan_options)
+    target_link_libraries(${target} PRIVATE rapid_asan_options)
+    if("LUA" IN_LIST ARGN)
+      target_link_libraries(${target} PRIVATE rapid_asan_leaks)
+    endif()
+  endif()
+endfunction()
 
 # ccache where it is installed. What a precompiled header defines, and __TIME__, are invisible to it unless told so. Two
 # checkouts share nothing (no CCACHE_BASEDIR): a precompiled header holds the absolute paths of the one it was made in,

@@ -156,7 +156,9 @@ void complete_sandbox(Processes processes, Connections connections)
     const File root(open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; nothing was run");
     limit(RLIMIT_CORE, 0);
+#ifndef RAPID_ADDRESS_SANITIZER  // which has mapped more
     limit(RLIMIT_DATA, static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)));
+#endif
     // What a hostile file may take over has no rights but to read: whoever forks such a copy, it forks none.
     confine_copies([] { restrict_system_calls(Processes::None); });
     if (processes == Processes::None) start_reader_process([] { restrict_system_calls(Processes::Copies); });

@@ -177,8 +177,9 @@ void check_ids_differ(const PointSet& points, const char* set)
 IdMatch match_by_id(const PointSet& a, const PointSet& b)
 {
     const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
+    // Also behind the last one; without an order each has its own place.
     const auto index = [](const std::vector<std::size_t>& order, std::size_t i) {
-        return order.empty() ? i : order[i];
+        return i < order.size() ? order[i] : i;
     };
     IdMatch match;
     std::size_t i = 0, j = 0;

@@ -4,20 +4,21 @@
 --   local judged = require "tests.hostile.judged"
 --   local result = judged.run(folder, text, { seconds = 10, arguments = "--script-timeout 2" })
 --   result.status, result.stderr; result.complaint where it did not end so
+local address_space = require "tests.address_space"
 local command = require "testing.command"
 
 local judged = {}
 
-local address_space = 3 * 2 ^ 20 -- KiB: --memory, and what libraries and threads map and never touch
+local most_address_space = 3 * 2 ^ 20 -- KiB: --memory, and what libraries and threads map and never touch
 local longest_message = 10000
 
--- seconds: of the processor, the same on a machine that has other work. environment: further variables. address_space:
--- KiB, or "unlimited".
+-- seconds: of the processor, the same on a machine that has other work. environment: further variables. any_address:
+-- whether the address space has no limit.
 function judged.run(folder, text, limits)
   folder:write("scene.lua", text)
-  local result = command.shell(('ulimit -t %d; ulimit -v %s; timeout -k 1 120 "$RAPID" run scene.lua -f 1-3 --quiet ' ..
-    "--memory 1G --threads 2 %s"):format(limits.seconds, limits.address_space or address_space,
-    limits.arguments), {
+  local result = command.shell(('ulimit -t %d; %s timeout -k 1 120 "$RAPID" run scene.lua -f 1-3 --quiet ' ..
+    "--memory 1G --threads 2 %s"):format(limits.seconds,
+    limits.any_address and "" or address_space(most_address_space), limits.arguments), {
     cwd = folder.path, environment = limits.environment })
   if result.status > 2 then
     result.complaint = "ended with " .. result.status

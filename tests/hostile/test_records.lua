@@ -1,12 +1,13 @@
 -- Records of others, which merge, wedge, farm and --cache find in folders: whatever is in them, they are read or
 -- refused, at once and in a few lines.
+local address_space = require "tests.address_space"
 local command = require "testing.command"
 
 local longest_message = 10000
 
 -- Runs a line of the shell; `complaint` is what is wrong with its end.
 local function ended(folder, line, environment)
-  local result = command.shell("ulimit -v 4194304; ulimit -t 10; timeout -k 1 60 " .. line,
+  local result = command.shell(address_space(4194304) .. " ulimit -t 10; timeout -k 1 60 " .. line,
     { cwd = folder.path, environment = environment })
   if result.status > 2 then
     result.complaint = "ended with " .. result.status

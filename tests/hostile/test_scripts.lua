@@ -1,12 +1,14 @@
 -- Scripts that mean harm, or nonsense: whatever they do, a run ends by itself, with a status of its own.
 --
--- HOSTILE_SCRIPTS is how many are tried, HOSTILE_SEED the first one's seed.
+-- HOSTILE_SCRIPTS is how many are tried, HOSTILE_STRESSED how many of them with Lua's collector at work all the time (a
+-- fifth), HOSTILE_SEED the first one's seed.
 local command = require "testing.command"
 local library = require "tests.faults.library"
 local judged = require "tests.hostile.judged"
 local scripts = require "tests.hostile.scripts"
 
 local count = tonumber(os.getenv "HOSTILE_SCRIPTS" or 100)
+local many_stressed = tonumber(os.getenv "HOSTILE_STRESSED" or math.ceil(count / 5))
 local first = tonumber(os.getenv "HOSTILE_SEED" or 1)
 
 -- The limit of time is for each stretch of script, of which a run has a few dozen.
@@ -14,7 +16,7 @@ local limits = { seconds = 20, arguments = "--script-timeout 0.5 --script-memory
 
 -- Lua collects garbage all the time, and each block of memory has a wall behind it, and is one when it was freed.
 local stressed = {
-  seconds = 60, arguments = "--script-timeout 1 --script-memory 48M", address_space = "unlimited",
+  seconds = 60, arguments = "--script-timeout 1 --script-memory 48M", any_address = true,
   environment = { LD_PRELOAD = library, RAPID_STRESS = "collector,guard" },
 }
 
@@ -29,7 +31,7 @@ end
 describe("a hostile script", function()
   it("ends with a status, neither by a signal nor never", function() try(count, limits) end)
 
-  it("touches no memory that is not its own", function() try(math.ceil(count / 5), stressed) end)
+  it("touches no memory that is not its own", function() try(many_stressed, stressed) end)
 
   it("is the same text for the same seed, and mostly a legal program", function()
     local legal = 0

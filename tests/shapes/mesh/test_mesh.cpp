@@ -340,7 +340,7 @@ TEST_CASE("files that are not meshes are refused with their name and the fault",
                    Catch::Matchers::EndsWith("; it must be an OBJ, STL or glTF file"));
 }
 
-TEST_CASE("a small file of parts without number is refused for its memory", "[mesh][read]")
+TEST_CASE("a small file of parts without number is refused for its memory or its time", "[mesh][read]")
 {
     // Each node has the next one twice: 2^40 times the mesh.
     std::string nodes;
@@ -354,7 +354,10 @@ TEST_CASE("a small file of parts without number is refused for its memory", "[me
         "bufferViews": [{"buffer": 0, "byteLength": 36}],
         "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,)" +
                                                        std::string(48, 'A') + "\"}]}");
-    CHECK_THAT(message_of([&] { read_mesh(path); }), Catch::Matchers::Contains("it takes more than 1024 MB of memory"));
+    // With the address sanitizer, which maps more than any limit, it is refused for its time.
+    using Catch::Matchers::Contains;
+    CHECK_THAT(message_of([&] { read_mesh(path); }),
+               Contains("it takes more than 1024 MB of memory") || Contains("it takes its reader longer than 5 s"));
 }
 
 TEST_CASE("a scanned mesh and an animated one are read as their makers describe them", "[mesh][read]")

@@ -52,13 +52,15 @@ double available_work(const Substep& step, std::size_t i)
 void EnergyIslands::link(std::span<const std::uint32_t> points)
 {
     const auto moves = [&](std::uint32_t i) { return step_.points[i].w > 0; };
+    // As sleepers do, whatever velocity they have fallen asleep with.
+    const auto rests = [&](std::uint32_t i) { return step_.points[i].P == step_.start[i]; };
     const auto first = std::find_if(points.begin(), points.end(), moves);
     if (first == points.end()) return;
     for (const std::uint32_t i : points)
         if (moves(i))
             sets_.join(*first, i);
         else
-            drivers_.push_back({*first, i, Drive::of(step_.v[i], step_.v[i], step_.dt),
+            drivers_.push_back({*first, i, rests(i) ? Drive{} : Drive::of(step_.v[i], step_.v[i], step_.dt),
                                 step_.spins.empty() ? 0 : step_.spins[i].s.norm()});
 }
 
@@ -83,18 +85,18 @@ void EnergyIslands::close()
     }
 }
 
-void EnergyBound::keep(const Substep& step, bool follows)
+void EnergyBound::keep(const Substep& step)
 {
     v_.resize(step.size());
     change_.assign(step.size(), 0.0);
     stored_.assign(step.size(), 0.0);
     stored_in_frame_.clear();
     credit_.assign(step.energy.size(), 0.0);
-    P_.resize(follows ? step.size() : 0);
+    P_.resize(step.size());
     s_.resize(step.spins.size());
     for_each_moving(step, [&](std::size_t i) {
         v_[i] = step.v[i];
-        if (follows) P_[i] = step.points[i].P;
+        P_[i] = step.points[i].P;
         if (!s_.empty()) s_[i] = step.spins[i].s;
         change_[i] = -potential_energy(step, i, step.points[i].P);
         if (!credit_.empty())

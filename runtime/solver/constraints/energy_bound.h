@@ -99,11 +99,11 @@ private:
 class EnergyBound {
 public:
     // What the points have now. add_stored(sign, energy): adds what rows store, times the sign, to the points'
-    // energies. follows: whether something may drive points.
+    // energies.
     template <class F>
-    void begin(const Substep& step, const F& add_stored, bool follows)
+    void begin(const Substep& step, const F& add_stored)
     {
-        keep(step, follows);
+        keep(step);
         add_stored(1.0, std::span<double>(stored_));
         for (std::size_t i = 0; i < stored_.size(); ++i) change_[i] -= stored_[i];
     }
@@ -156,7 +156,7 @@ private:
         double change_at(double t) const { return t * (slope + t * curvature) + change; }
     };
 
-    void keep(const Substep& step, bool follows);
+    void keep(const Substep& step);
     void add_potential(const Substep& step);
     ContactEnergy change(const Substep& step) const;
     ContactEnergy limit(Substep& step, EnergyIslands& islands, const RigidFallback* fallback);
@@ -167,7 +167,7 @@ private:
     ContactEnergy move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback);
 
     std::vector<Vec3d> v_;        // m/s, before
-    std::vector<Vec3d> P_;        // m, before; empty where nothing drives points
+    std::vector<Vec3d> P_;        // m, before
     std::vector<Vec3d> s_;        // m/s, of spins; empty where there are none
     std::vector<double> change_;  // J, of the potential energy of each point and of the rows that are counted with it
     std::vector<double> stored_;  // J, in rows at first

@@ -100,9 +100,7 @@ void Projection::advance(Substep& step)
     else
         keep_positions(free_);
     if (shapes_) shapes_->detect(step, free_);
-    bound_.begin(
-        step, [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); },
-        follows_ || shapes_);
+    bound_.begin(step, [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); });
     if (has_forces_ && !step.energy.empty()) {
         const std::span<double> credit = bound_.credit();
         for (std::size_t i = 0; i < credit.size(); ++i) credit[i] += stored_[i];
@@ -202,12 +200,9 @@ void Projection::advance_linked(Substep& step)
 {
     stored_.assign(step.size(), 0.0);
     add_stored(step, begun_, 1, stored_);
-    bound_.begin(
-        step,
-        [&](double factor, std::span<double> energy) {
-            for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
-        },
-        follows_);
+    bound_.begin(step, [&](double factor, std::span<double> energy) {
+        for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
+    });
     if (follows_) store_in_frame(step);
     fallback_.begin(step);
     each([&](Coupling& coupling) {

@@ -68,7 +68,7 @@ void EnergyIslands::close()
 {
     driven_.assign(step_.size(), {});
     for (Driver& driver : drivers_) {
-        if (const auto known = kinematic_.find(driver.point); known != kinematic_.end()) driver.by = known->second;
+        if (driver.point < kinematic_.size() && kinematic_[driver.point]) driver.by = *kinematic_[driver.point];
         Driven& island = driven_[root(driver.i)];
         island.mean.v += driver.by.v, island.mean.way += driver.by.way;
         island.moves |= !driver.by.v.isZero(0) || !driver.by.way.isZero(0) || driver.rolling > 0;

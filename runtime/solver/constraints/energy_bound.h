@@ -23,8 +23,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "runtime/solver/collision/contact_energy.h"
@@ -64,7 +64,11 @@ public:
     // rolling: m/s, what turns a point gives its surface besides.
     void drive(std::uint32_t i, const Drive& by, double rolling = 0) { drivers_.push_back({i, none, by, rolling}); }
     // How a point goes that no row moves, where not at its velocity throughout.
-    void move(std::uint32_t i, const Drive& by) { kinematic_[i] = by; }
+    void move(std::uint32_t i, const Drive& by)
+    {
+        kinematic_.resize(step_.size());
+        kinematic_[i] = by;
+    }
     // Once all are linked.
     void close();
 
@@ -91,7 +95,7 @@ private:
     DisjointSets sets_;
     const Substep& step_;
     std::vector<Driver> drivers_;
-    std::unordered_map<std::uint32_t, Drive> kinematic_;
+    std::vector<std::optional<Drive>> kinematic_;  // by point; empty where none is told
     std::vector<Driven> driven_;
     bool any_moves_ = false;
 };

@@ -146,11 +146,7 @@ double Projection::credited()
 // J: what it took to put points out of shapes in their free motion, against rows as they were before.
 double Projection::work_of_displacements(const Substep& step) const
 {
-    if (!has_forces_ || step.born.empty()) return 0;
-    std::vector<double> stored(step.size());
-    add_stored(step, step.start, 1, stored);
-    add_stored(step, step.born, -1, stored);
-    return std::accumulate(stored.begin(), stored.end(), 0.0);
+    return has_forces_ && !step.born.empty() ? stored_change(step, step.born, step.start) : 0;
 }
 
 // J: what rows store more where pins have put points back that shapes had put out. The pins have not moved for it.
@@ -162,10 +158,15 @@ double Projection::return_kinematic(const Substep& step) const
     for (std::size_t i = 0; i < at.size(); ++i)
         if (!(step.points[i].w > 0) && step.inverse_mass[i] > 0 && at[i] != step.born[i])
             at[i] = step.born[i], any = true;
-    if (!any) return 0;
+    return any ? stored_change(step, step.start, at) : 0;
+}
+
+// J: what rows store more at some places than at others.
+double Projection::stored_change(const Substep& step, std::span<const Vec3d> from, std::span<const Vec3d> to) const
+{
     std::vector<double> stored(step.size());
-    add_stored(step, at, 1, stored);
-    add_stored(step, step.start, -1, stored);
+    add_stored(step, to, 1, stored);
+    add_stored(step, from, -1, stored);
     return std::accumulate(stored.begin(), stored.end(), 0.0);
 }
 

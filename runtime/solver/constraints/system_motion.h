@@ -209,6 +209,9 @@ private:
     // each as far as it brings them nearer, since a net that is nearly flat would be thrown.
     void correct_together()
     {
+        const std::span<const std::uint32_t> others = schedule_->others();
+        const auto gives = [&](std::uint32_t r) { return rows_[r].compliance > 0; };
+        if (std::none_of(others.begin(), others.end(), gives)) return;
         for (int n = 0; n < newton_steps; ++n) {
             const Off before = read_off();
             if (!(before.energy > enough * kinetic_energy())) return;

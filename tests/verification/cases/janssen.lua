@@ -1,6 +1,6 @@
 -- What a column of grain rests on the floor of a square silo of rough walls: Janssen's law. The floor is of grains that
 -- compliant pins hold, so that their give is the load; it goes down by half a grain a second, so that the friction of
--- the walls is all upwards (Bertho, Giorgiutti-Dauphiné, Hulin 2003).
+-- the walls is all upwards (Bertho, Giorgiutti-Dauphiné, Hulin 2003). The grains turn, as those of the law do.
 local scene = require "testing.scene"
 
 local give, sinking, friction = 1e-3, 0.01, 0.3 -- m/N; m/s, from 3 s on; of the walls
@@ -37,7 +37,7 @@ end
 return chain
   :pin { group = "floor", compliance = give,
     transform = function(f) return rapid.translate(0, -sinking * math.max(0, f.time - 3), 0) end }
-  :contact { friction = 0.3 }
+  :contact { friction = 0.3, spin = true }
   :solve { substeps = 12, iterations = 4, sleep = math.huge }]]
 
 -- The height, the weight and the load on the floor, of so many layers: means of the fifth second. In m and N.

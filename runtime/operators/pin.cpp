@@ -180,6 +180,11 @@ public:
     }
     bool has_forces() const override { return !rigid_; }
     bool is_driven() const override { return true; }
+    void prescribe(std::span<std::uint8_t> points) const override
+    {
+        for (const auto& [i, pin] : held_)
+            if (rigid_) points[i] = 1;
+    }
     void add_stored_energy(const Substep& step, std::span<const Vec3d> at, double factor,
                            std::span<double> energy) const override
     {

@@ -24,6 +24,7 @@ void CoupledStep::run()
     const StepScene& scene = context_.scene;
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { read_points(begin, end); });
     begin_substeps();
+    begin_held();
     begin_forces();
     begin_spins();
     if (options.sleep_records && std::isfinite(options.sleep) && context_.points.has("still")) {
@@ -118,6 +119,13 @@ void CoupledStep::begin_substeps()
     }
 }
 
+void CoupledStep::begin_held()
+{
+    held_.assign(at_.size(), 0);
+    for (const LocalConstraint& local : context_.scene.constraints) local.coupling->prescribe(held_);
+    prescribed_ = held_;
+}
+
 void CoupledStep::begin_forces()
 {
     for (const LocalConstraint& local : context_.scene.constraints) {
@@ -165,7 +173,9 @@ void CoupledStep::interact(int kicks, double time)
 void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
 {
     const StepScene& scene = context_.scene;
-    Collisions collisions(spin_ ? smooth_ : scene.obstacles, context_.collision_context());
+    CollisionContext context = context_.collision_context();
+    context.held = held_.data();
+    Collisions collisions(spin_ ? smooth_ : scene.obstacles, context);
     BlockStep step(context_);
     const PointBlock& block = step.block;
     std::vector<std::uint32_t> places;
@@ -189,10 +199,11 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         step.advance(collisions, now_.index);
         // A point that was put out of a shape gets no velocity from that towards those that it is put into, as if it
         // had been born there.
-        for (const auto& [k, by] : collisions.displacements()) start_[block.places[k]] += by;
+        for (const auto& [k, by] : collisions.displacements())
+            if (!held_[block.places[k]]) start_[block.places[k]] += by;
         for (std::size_t k = 0; k < block.size(); ++k) {
             if (!surface_springs_.empty()) surface_springs_[block.places[k]] = step.surface_spring(k);
-            if (block.linear.data) add_drag(block, k, collisions.contact_work(k), changes);
+            if (block.linear.data && !held_[block.places[k]]) add_drag(block, k, collisions.contact_work(k), changes);
             take_point(block, k);
         }
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
@@ -214,7 +225,9 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
         const std::uint32_t i = places[k];
         block.P[k] = at_[i].P;
         block.v[k] = v_[i];
-        if (sleep_ && sleep_->asleep(i)) block.moved_dt[k] = 0;
+        const bool asleep = sleep_ && sleep_->asleep(i);
+        if (asleep) block.moved_dt[k] = 0;
+        held_[i] = asleep || prescribed_[i];
     }
 }
 
@@ -232,13 +245,10 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
         const Vec3d &P = is_driven ? block.P[k] : start_[i], &v = is_driven ? block.v[k] : v_[i];
         energy_[i] = 0.5 * v.squaredNorm() / inverse_mass_[i] + potential_energy(now_, i, P);
     }
-    if (sleep_ && !skips_sleepers_) {
-        const bool asleep = sleep_->asleep(i);
-        sleep_->check_acceleration(i, acceleration_of(block, k, asleep));
-        if (asleep) {
-            at.w = 0;
-            return;
-        }
+    if (sleep_ && !skips_sleepers_) sleep_->check_acceleration(i, acceleration_of(block, k, sleep_->asleep(i)));
+    if (held_[i]) {
+        at.w = 0;
+        return;
     }
     if (!(at.w > 0)) {  // moved by its own velocity alone
         if (context_.advances(i)) at.P += block.dt[k] * v_[i];

@@ -27,6 +27,7 @@ public:
 private:
     void read_points(std::size_t begin, std::size_t end);
     void begin_substeps();
+    void begin_held();
     void begin_forces();
     void begin_spins();
     bool is_isolated(const Projection& projection) const;
@@ -53,6 +54,9 @@ private:
     std::vector<double> inverse_mass_;  // 1/kg
     std::vector<Mobility> mobility_;    // empty where no force has a linear part
     std::vector<SurfaceSpring> surface_springs_;
+    // By point: whether a constraint prescribes its motion in the frame; whether that is so or it is asleep, and its
+    // free motion is not taken.
+    std::vector<std::uint8_t> prescribed_, held_;
     std::vector<Vec3d> born_;          // Substep::born
     std::vector<double> energy_;       // Substep::energy
     std::vector<Vec3d> displacement_;  // Substep::displacement; empty where no constraint needs it

@@ -72,6 +72,15 @@ void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
     query();
     for (std::size_t m = 0; m < motions_.size(); ++m)
         if (motions_[m].t > 0) motions_[m].end(phi_[m], gradient_[m]);
+    bool far = false;
+    for (std::size_t m = 0; m < motions_.size(); ++m) {
+        at_[m] = motions_[m].P;
+        far |= motions_[m].t > 0 && motions_[m].far_from_asked();
+    }
+    if (!far) return;
+    query();
+    for (std::size_t m = 0; m < motions_.size(); ++m)
+        if (motions_[m].t > 0 && motions_[m].far_from_asked()) motions_[m].settle(phi_[m], gradient_[m]);
 }
 
 // m/s, of the shape of a motion where it is asked.

@@ -76,6 +76,18 @@ describe("the ledger", function()
     check({ by_contacts = 3 * g * 0.7 }, sums, 1e-4 * 3 * g)
   end)
 
+  it("has nothing of shapes that rigid pins hold points against, awake or asleep", function()
+    for _, sleep in ipairs { 0.1, math.huge } do
+      local sums = ledger(([[rapid.points.from { P = {{0, 0.2, 0}, {1, 0.2, 0}}, held = {1, 0} } }
+  :group { name = "held", where = function(p) return p.held == 1 end }
+  :pin { group = "held" } :distance { pairs = {{1, 2}}, compliance = 1e-6 } :contact { radius = 0.01 }
+  :collide { shape = rapid.shape.sphere { radius = 0.5 }, group = "held",
+    transform = function(f) return rapid.translate(0, f.number > 12 and 0.1 or (12 - f.number) / 12, 0) end }
+  :solve { substeps = 4, sleep = %g }]]):format(sleep))
+      check({}, sums, 1e-9)
+    end
+  end)
+
   it("has no more of drag than drag takes, where a method puts a point back after the step", function()
     for _, method in ipairs { "project", "backtrack" } do
       local sums = ledger(([[rapid.points.from { P = {{0, 0.5, 0}}, v = {{1, -4, 0}} } }

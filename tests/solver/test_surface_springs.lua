@@ -51,6 +51,17 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v 
     end
   end)
 
+  it("keeps the energy of a point that it pulls through the middle of a ball, at any stiffness", function()
+    for _, k in ipairs { 1e2, 1e4, 1e6, 1e8 } do
+      local result = run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 3, 0}}, v = {{-1, 0.3, 2}} } }
+  :spring { target = rapid.shape.sphere { radius = 1 }, stiffness = %g } :solve {}]]):format(k), 49, true)
+      local distance = distances["rapid.shape.sphere { radius = 1 }"]
+      local first = energy(result[1][1], distance, k, 0)
+      for f = 2, 49 do assert.near(first, energy(result[f][1], distance, k, 0), 1e-4 * first) end
+    end
+  end)
+
   it("gives no energy to points anywhere, about shapes with edges, with gravity and damping", function()
     for shape, distance in pairs(distances) do
       for _, case in ipairs { {0, 0}, {-9.81, 0}, {0, 3}, {-9.81, 30} } do

@@ -1,7 +1,9 @@
 // A block of points in one sub-step, as all parts of Collisions see it.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "runtime/solver/collision/hits.h"
@@ -22,6 +24,9 @@ struct CollisionContext {
     StepLog* log = nullptr;         // of all contacts and deaths; null where nobody asks
     StuckColumns* stuck = nullptr;  // null where no collider holds points
     int drifts = 1;                 // a sub-step
+    // By point of the set: 1 where it stays whatever contacts do to it, and so gets no energy from them; null where all
+    // can go.
+    const std::uint8_t* held = nullptr;
 
     // A collider kills a point. time: s since the start.
     void kill(std::size_t point, double at) const
@@ -42,6 +47,14 @@ struct CollisionBlock {
     std::span<const double> after = {};  // s, from its end to the end of the frame
 
     std::size_t size() const { return indices.size(); }
+    // kg; none where contacts give no energy.
+    std::optional<double> moved_mass(std::size_t i) const
+    {
+        const std::uint32_t index = indices[i];
+        const double mass = context.mass[index];
+        if (std::isinf(mass) || (context.held && context.held[index])) return {};
+        return mass;
+    }
     double radius(const Obstacle& obstacle, std::size_t i) const { return obstacle.radius[indices[i]]; }
     bool has_member(const Obstacle& obstacle, std::size_t i) const { return obstacle.members[indices[i]]; }
 

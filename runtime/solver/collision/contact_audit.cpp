@@ -1,6 +1,5 @@
 #include "runtime/solver/collision/contact_audit.h"
 
-#include <cmath>
 #include <map>
 
 namespace rapid {
@@ -36,12 +35,12 @@ void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
 void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion)
 {
     for (const std::uint32_t i : touched.list()) {
-        const double mass = block_.context.mass[block_.indices[i]];
-        if (stuck.has(i) || std::isinf(mass)) continue;
+        const std::optional<double> mass = block_.moved_mass(i);
+        if (stuck.has(i) || !mass) continue;
         const Vec3d P = motion.initial_P(i), v = motion.initial_v(i);
         const double change =
             0.5 * (block_.v[i] - v).dot(block_.v[i] + v) - motion.acceleration(i).dot(block_.P[i] - P);
-        counts_.energy.take(mass * change);
+        counts_.energy.take(*mass * change);
     }
 }
 
@@ -49,12 +48,12 @@ void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& s
 void ContactAudit::add_carried(const StuckPoints& stuck, const FreeMotion& motion)
 {
     for (const StuckPoints::Carried& at : stuck.carried()) {
-        const double mass = block_.context.mass[block_.indices[at.i]];
-        if (std::isinf(mass)) continue;
+        const std::optional<double> mass = block_.moved_mass(at.i);
+        if (!mass) continue;
         const double work = 0.5 * (at.to_v - at.v).dot(at.to_v + at.v) +
                             (motion.is_damped() ? motion.potential_change(at.i, at.P, at.to_P)
                                                 : -motion.acceleration(at.i).dot(at.to_P - at.P));
-        counts_.energy.take(mass * work);
+        counts_.energy.take(*mass * work);
         if (motion.is_damped()) all_work_[at.i] += work;
     }
 }
@@ -68,9 +67,9 @@ void ContactAudit::begin_work()
 void ContactAudit::count_work(const TouchedPoints& touched)
 {
     for (const std::uint32_t i : touched.list()) {
-        const double mass = block_.context.mass[block_.indices[i]];
-        if (work_[i] == 0 || std::isinf(mass)) continue;
-        counts_.energy.take(mass * work_[i]);
+        const std::optional<double> mass = block_.moved_mass(i);
+        if (work_[i] == 0 || !mass) continue;
+        counts_.energy.take(*mass * work_[i]);
         all_work_[i] += work_[i];
     }
 }
@@ -78,21 +77,21 @@ void ContactAudit::count_work(const TouchedPoints& touched)
 void ContactAudit::add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion)
 {
     for (const auto& [i, by] : by_point(displacements)) {
-        const double mass = block_.context.mass[block_.indices[i]];
-        if (!std::isinf(mass))
+        const std::optional<double> mass = block_.moved_mass(i);
+        if (mass)
             counts_.energy.take(
-                mass * (motion.potential(i, motion.initial_P(i) + by) - motion.potential(i, motion.initial_P(i))));
+                *mass * (motion.potential(i, motion.initial_P(i) + by) - motion.potential(i, motion.initial_P(i))));
     }
 }
 
 void ContactAudit::add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion)
 {
     for (std::size_t i = 0; i < P.size(); ++i) {
-        const double mass = block_.context.mass[block_.indices[i]];
-        if (std::isinf(mass) || (P[i] == block_.P[i] && v[i] == block_.v[i])) continue;
+        const std::optional<double> mass = block_.moved_mass(i);
+        if (!mass || (P[i] == block_.P[i] && v[i] == block_.v[i])) continue;
         const double kinetic = 0.5 * (block_.v[i] - v[i]).dot(block_.v[i] + v[i]);
         const double work = kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i]);
-        counts_.energy.take(mass * work);
+        counts_.energy.take(*mass * work);
         all_work_[i] += work;
     }
 }
@@ -102,11 +101,11 @@ void ContactAudit::add_final_corrections(std::span<const Vec3d> P,
                                          const FreeMotion& motion)
 {
     for (const auto& [i, by] : by_point(displacements)) {
-        const double mass = block_.context.mass[block_.indices[i]];
-        if (std::isinf(mass)) continue;
+        const std::optional<double> mass = block_.moved_mass(i);
+        if (!mass) continue;
         const double work = motion.is_damped() ? motion.potential(i, P[i]) - motion.potential(i, P[i] - by)
                                                : -motion.acceleration(i).dot(by);
-        counts_.energy.take(mass * work);
+        counts_.energy.take(*mass * work);
     }
 }
 

@@ -72,7 +72,7 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
         v = contact_response(v0, vc, n, bounce, friction);
         position_error_[i] = std::max(position_error_[i], (1 + bounce) * depth);
     } else {
-        backtrack(i, obstacle, vc, n, depth);
+        backtrack(i, obstacle, vc, query_.time[j], n, depth);
         query_.P[j] = P;
         backtracked = true;
     }
@@ -80,14 +80,17 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
     return backtracked;
 }
 
-// Back along the velocity to the surface, and on from there with the velocity after the contact.
-void DiscreteMethods::backtrack(std::size_t i, const Obstacle& obstacle, const Vec3d& vc, const Vec3d& n, double depth)
+// Back along the velocity to the surface, and on from there with the velocity after the contact. vc, time: of the
+// surface, at the end of the step.
+void DiscreteMethods::backtrack(std::size_t i, const Obstacle& obstacle, const Vec3d& vc, double time, const Vec3d& n,
+                                double depth)
 {
     Vec3d &P = block_.P[i], &v = block_.v[i];
     const double bounce = obstacle.restitution(block_.indices[i]), friction = obstacle.friction[block_.indices[i]];
     const double back = std::min(depth / -(v - vc).dot(n), block_.dt[i]);
     const Vec3d& a = motion_.acceleration(i);
-    const Vec3d after = contact_response(v - back * a, vc, n, bounce, friction);
+    const Vec3d vc_then = obstacle.shape->velocity_at(P, time - back);
+    const Vec3d after = contact_response(v - back * a, vc_then, n, bounce, friction);
     P += back * (after - v + back * a);
     position_error_[i] = std::max(position_error_[i], 0.5 * (1 + bounce) * back * back * a.norm());
     v = after + back * a;

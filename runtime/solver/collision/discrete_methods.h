@@ -40,7 +40,7 @@ private:
     void ask_about(const Obstacle& obstacle);
     void correct(int obstacle);
     bool move_out(std::size_t j, int obstacle);
-    void backtrack(std::size_t i, const Obstacle& obstacle, const Vec3d& vc, const Vec3d& n, double depth);
+    void backtrack(std::size_t i, const Obstacle& obstacle, const Vec3d& vc, double time, const Vec3d& n, double depth);
     void lift(const Obstacle& obstacle);
 
     const CollisionBlock& block_;

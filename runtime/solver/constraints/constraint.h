@@ -117,6 +117,8 @@ public:
     virtual bool only_dissipates() const { return false; }
     // Whether it moves points, or the ends of springs, by itself.
     virtual bool is_driven() const { return false; }
+    // Marks points whose motion it prescribes in the frame: nothing else moves them.
+    virtual void prescribe(std::span<std::uint8_t>) const {}
     // Whether what it does to points are impulses between them alone.
     virtual bool keeps_momentum() const { return false; }
     // Adds the energy that its rows have stored, J times the factor, to that of one of their points each; at the

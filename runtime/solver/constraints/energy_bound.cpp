@@ -221,25 +221,37 @@ ContactEnergy EnergyBound::limit(Substep& step, EnergyIslands& islands, const Ri
             step.v[i] = v_[i] + part * (step.v[i] - v_[i]);
             if (!s_.empty()) step.spins[i].s = s_[i] + part * (step.spins[i].s - s_[i]);
         }
-    if (stalls) energy += move_stalled(step, islands, *fallback);
+    if (stalls) stalled_.assign(step.size(), 0);
     return energy;
 }
 
-ContactEnergy EnergyBound::move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback)
+void EnergyBound::move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback)
 {
     std::map<std::uint32_t, std::vector<std::uint32_t>> points;
-    stalled_.assign(step.size(), 0);
     for (std::uint32_t i = 0; i < step.size(); ++i) {
         if (!(step.points[i].w > 0) || !(step.inverse_mass[i] > 0) || !islands_[islands.root(i)].stalled) continue;
         points[islands.root(i)].push_back(i);
         stalled_[i] = 1;
     }
-    ContactEnergy energy;
     for (const auto& [root, of_island] : points) {
         const EnergyIslands::Driven& by = islands.driven(root);
-        const double change = fallback.apply(step, of_island, by.drivers > 0 ? &by.mean : nullptr);
+        fallback.apply(step, of_island, by.drivers > 0 ? &by.mean : nullptr);
+        for (const std::uint32_t i : of_island)
+            change_[i] = 0.5 * (step.v[i].squaredNorm() - v_[i].squaredNorm()) / step.inverse_mass[i] +
+                         potential_energy(step, i, step.points[i].P) - potential_energy(step, i, P_[i]) - stored_[i];
+    }
+}
+
+// What drives them may have moved what it holds by a jump, and stretched rows that this restores.
+ContactEnergy EnergyBound::stalled_change(EnergyIslands& islands)
+{
+    std::map<std::uint32_t, double> changes;
+    for (std::uint32_t i = 0; i < stalled_.size(); ++i)
+        if (stalled_[i]) changes[islands.root(i)] += change_[i];
+    ContactEnergy energy;
+    for (const auto& [root, change] : changes) {
         energy.take(change);
-        if (by.moves) driven_ += change;
+        if (islands.driven(root).moves) driven_ += change;
     }
     return energy;
 }

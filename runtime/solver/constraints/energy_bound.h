@@ -141,7 +141,11 @@ public:
         EnergyIslands islands(step);
         link(islands);
         islands.close();
-        return limit(step, islands, fallback);
+        ContactEnergy energy = limit(step, islands, fallback);
+        if (stalled_.empty()) return energy;
+        move_stalled(step, islands, *fallback);
+        add_stored(1.0, std::span<double>(change_));
+        return energy += stalled_change(islands);
     }
     // By point: whether its island had no solution; empty where none has stalled.
     std::span<const std::uint8_t> stalled() const { return stalled_; }
@@ -168,7 +172,9 @@ private:
     void add(const Substep& step, std::uint32_t i, Island& island) const;
     void add_seen(const Substep& step, std::uint32_t i, const EnergyIslands::Driven& by, Island& island) const;
     void add_turning(const Substep& step, std::uint32_t i, Island& island) const;
-    ContactEnergy move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback);
+    // Moves stalled islands; change_ then has what their points have gained, without rows.
+    void move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback);
+    ContactEnergy stalled_change(EnergyIslands& islands);
 
     std::vector<Vec3d> v_;        // m/s, before
     std::vector<Vec3d> P_;        // m, before

@@ -67,11 +67,9 @@ void Projection::advance(Substep& step)
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
     const double displacing = work_of_displacements(step);
+    energy_.added += std::max(0.0, displacing);
+    changes_.contacts += displacing;
     move_kinematic(step);
-    const double put_back = return_kinematic(step);
-    energy_.added += std::max(0.0, displacing + put_back);
-    changes_.contacts += displacing + put_back;
-    changes_.pins -= put_back;
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) f(i);
@@ -147,18 +145,6 @@ double Projection::credited()
 double Projection::work_of_displacements(const Substep& step) const
 {
     return has_forces_ && !step.born.empty() ? stored_change(step, step.born, step.start) : 0;
-}
-
-// J: what rows store more where pins have put points back that shapes had put out. The pins have not moved for it.
-double Projection::return_kinematic(const Substep& step) const
-{
-    if (!has_forces_ || !is_driven_ || step.born.empty()) return 0;
-    std::vector<Vec3d> at(step.start.begin(), step.start.end());
-    bool any = false;
-    for (std::size_t i = 0; i < at.size(); ++i)
-        if (!(step.points[i].w > 0) && step.inverse_mass[i] > 0 && at[i] != step.born[i])
-            at[i] = step.born[i], any = true;
-    return any ? stored_change(step, step.start, at) : 0;
 }
 
 // J: what rows store more at some places than at others.

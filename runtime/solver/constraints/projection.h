@@ -47,7 +47,6 @@ private:
     template <class F>
     void each(const F& f);
     double work_of_displacements(const Substep& step) const;
-    double return_kinematic(const Substep& step) const;
     double stored_change(const Substep& step, std::span<const Vec3d> from, std::span<const Vec3d> to) const;
     void advance_linked(Substep& step);
     void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;

@@ -34,7 +34,7 @@ void RigidFallback::begin(const Substep& step)
     });
 }
 
-double RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const
+void RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const
 {
     const bool is_drawn = std::any_of(points.begin(), points.end(), [&](std::uint32_t i) {
         return !step.mobility.empty() && (step.mobility[i].stiffness > 0 || step.surface_springs[i].w2 > 0);
@@ -43,11 +43,6 @@ double RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points
         carry(step, points, driver ? *driver : Drive{});
     else
         move(step, points);
-    double change = 0;
-    for (const std::uint32_t i : points)
-        change += 0.5 * (step.v[i].squaredNorm() - v_[i].squaredNorm()) / step.inverse_mass[i] +
-                  potential_energy(step, i, step.points[i].P) - potential_energy(step, i, P_[i]);
-    return change;
 }
 
 void RigidFallback::carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const

@@ -25,8 +25,8 @@ public:
     // Keeps where points begin the sub-step, and where their free motion has taken them.
     void begin(const Substep& step);
     // Moves the points given, which rows link, in place of what these have done. driver: what holds some of them, null
-    // where nothing does. Returns the change of their energy since begin(), J.
-    double apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const;
+    // where nothing does.
+    void apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const;
 
 private:
     void carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const;

@@ -93,12 +93,22 @@ void SurfaceMotion::end(double phi, const Vec3d& gradient)
         P = at_ + (d1_ - d) * n1;
         left = std::max(0.0, energy_left(P, d1_));
     }
+    moved_ = d1_ - d;
     if (normal_v_ * normal_v_ > left) normal_v_ = std::copysign(std::sqrt(left), normal_v_);
     left = std::max(0.0, left - normal_v_ * normal_v_);
     const double size2 = tangential_.squaredNorm();
     const double wanted = k > 0 ? std::min(size2, left) : left;
     v = V1_ + normal_v_ * n1;
     if (size2 > 0) v += std::sqrt(wanted / size2) * turned(tangential_, n_, n1);
+}
+
+void SurfaceMotion::settle(double phi, const Vec3d& gradient)
+{
+    const double slope = gradient.norm(), d = slope > 0 ? phi / slope : phi;
+    if (std::abs(d) >= std::abs(d1_)) return;
+    const double had = (v - V1_).squaredNorm(),
+                 freed = s * (std::abs(d1_) - std::abs(d)) * (std::abs(d1_) + std::abs(d));
+    if (had > 0) v = V1_ + std::sqrt(1 + freed / had) * (v - V1_);
 }
 
 // The distance nearest to d1 from `surface` along n at which energy is left: the energy left there is

@@ -16,6 +16,7 @@
 // it arrives: there u and d' are velocities, and G - (V1 - V0)/t - k V - w2 V t/2 with the mean V stands for G.
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "runtime/vec.h"
@@ -37,6 +38,10 @@ struct SurfaceMotion {
     Vec3d begin(double phi, const Vec3d& gradient, const Vec3d& V);
     Vec3d go(const Vec3d& gradient, const Vec3d& V);
     void end(double phi, const Vec3d& gradient);
+    // Whether the end may be past where the distance turns round, as the middle of a ball. Asked there, settle() gives
+    // the energy of the distance that the shape has.
+    bool far_from_asked() const { return acts_ && std::abs(moved_) > 0.1 * std::abs(d1_ - d0_); }
+    void settle(double phi, const Vec3d& gradient);
 
     // The parabola that stands for the path: it sets out along the surface.
     Vec3d path_v() const;
@@ -52,6 +57,7 @@ private:
     Vec3d at_ = Vec3d::Zero();                         // where the distance is asked last
     Vec3d n0_ = Vec3d::Zero(), n_ = Vec3d::Zero();     // unit normals, at the beginning and of the middle
     double d0_ = 0, d1_ = 0;                           // m
+    double moved_ = 0;                                 // m, along the normal, from where the distance was asked last
     double normal_v_ = 0;                              // m/s, d' at the end
     Vec3d tangential_ = Vec3d::Zero();                 // m/s, at the end, perpendicular to n_
     Vec3d V0_ = Vec3d::Zero(), V1_ = Vec3d::Zero();    // m/s, of the shape

@@ -84,7 +84,7 @@ TEST_CASE("a rigid fallback keeps distances and momenta, and gives no energy", "
         const double before = body.kinetic();
         for (ProjectedPoint& point : body.points) point.P += 1e3 * body.any();
         for (Vec3d& v : body.v) v = 1e3 * body.any();
-        const double change = fallback.apply(body.step, body.all, nullptr);
+        fallback.apply(body.step, body.all, nullptr);
         const std::vector<Vec3d> P = body.places();
         for (const std::uint32_t i : body.all)
             for (const std::uint32_t j : body.all)
@@ -93,7 +93,6 @@ TEST_CASE("a rigid fallback keeps distances and momenta, and gives no energy", "
         RC_ASSERT((body.mean(body.v) - velocity).norm() <= 1e-12);
         RC_ASSERT((body.turning(P) - turning).norm() <= 1e-9 * (1 + turning.norm()));
         RC_ASSERT(body.kinetic() <= before * (1 + 1e-12));
-        RC_ASSERT(std::abs(body.kinetic() - before - change) <= 1e-12 * before);
     });
 }
 
@@ -104,7 +103,7 @@ TEST_CASE("a rigid fallback loses nothing of a body that turns", "[rigid_fallbac
     RigidFallback fallback;
     fallback.begin(body.step);
     const std::vector<Vec3d> v = body.v;
-    CHECK(fallback.apply(body.step, body.all, nullptr) == Approx(0).margin(1e-12 * body.kinetic()));
+    fallback.apply(body.step, body.all, nullptr);
     for (const std::uint32_t i : body.all) CHECK((body.v[i] - v[i]).norm() <= 1e-12);
 }
 

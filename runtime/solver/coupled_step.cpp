@@ -124,6 +124,9 @@ void CoupledStep::begin_held()
     held_.assign(at_.size(), 0);
     for (const LocalConstraint& local : context_.scene.constraints) local.coupling->prescribe(held_);
     prescribed_ = held_;
+    carried_.assign(at_.size(), 0);
+    if (!context_.scene.obstacles.empty()) carried_v_.assign(at_.size(), Vec3d::Zero());
+    now_.carried_v = carried_v_;
 }
 
 void CoupledStep::begin_forces()
@@ -204,7 +207,7 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         for (std::size_t k = 0; k < block.size(); ++k) {
             if (!surface_springs_.empty()) surface_springs_[block.places[k]] = step.surface_spring(k);
             if (block.linear.data && !held_[block.places[k]]) add_drag(block, k, collisions.contact_work(k), changes);
-            take_point(block, k);
+            take_point(block, k, !scene.obstacles.empty() && collisions.is_carried(k));
         }
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
             max_acceleration = std::max(max_acceleration, block.a[k].norm());
@@ -231,10 +234,12 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
     }
 }
 
-// The end of the free motion of a point: where the projection begins.
-void CoupledStep::take_point(const PointBlock& block, std::size_t k)
+// The end of the free motion of a point: where the projection begins. is_carried: a shape prescribes it.
+void CoupledStep::take_point(const PointBlock& block, std::size_t k, bool is_carried)
 {
     const std::uint32_t i = block.places[k];
+    carried_[i] = is_carried && !held_[i];
+    if (!carried_v_.empty()) carried_v_[i] = carried_[i] ? v_[i] : Vec3d(Vec3d::Zero());
     ProjectedPoint& at = at_[i];
     at.w = inverse_mass_[i];
     if (!paths_.empty()) paths_[i] = free_path(block, k);
@@ -256,6 +261,10 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k)
     }
     at.P = block.P[k];
     v_[i] = block.v[k];
+    if (carried_[i]) {
+        at.w = 0;
+        return;
+    }
     if (!reaction_.empty()) reaction_[i] = block.reaction[k];
     if (!displacement_.empty())
         displacement_[i] =
@@ -410,7 +419,7 @@ void CoupledStep::add_displacements(const Projection& projection)
 }
 
 // Whether a constraint prescribes its position, or it has slept: no shape moves it from there.
-bool CoupledStep::holds_still(std::size_t i) const { return !(at_[i].w > 0) && inverse_mass_[i] > 0; }
+bool CoupledStep::holds_still(std::size_t i) const { return !(at_[i].w > 0) && inverse_mass_[i] > 0 && !carried_[i]; }
 
 double CoupledStep::inverse_mass(std::size_t i) const
 {

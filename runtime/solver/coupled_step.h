@@ -34,7 +34,7 @@ private:
     void interact(int kicks, double time);
     void advance_freely(std::size_t begin, std::size_t end);
     void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
-    void take_point(const PointBlock& block, std::size_t k);
+    void take_point(const PointBlock& block, std::size_t k, bool is_carried);
     void add_drag(const PointBlock& block, std::size_t k, double contacts, EnergyChanges& changes) const;
     EnergyChanges changes(const Projection& projection);
     bool leaves_out(std::size_t i);
@@ -57,10 +57,12 @@ private:
     // By point: whether a constraint prescribes its motion in the frame; whether that is so or it is asleep, and its
     // free motion is not taken.
     std::vector<std::uint8_t> prescribed_, held_;
-    std::vector<Vec3d> born_;          // Substep::born
-    std::vector<double> energy_;       // Substep::energy
-    std::vector<Vec3d> displacement_;  // Substep::displacement; empty where no constraint needs it
-    std::vector<FreePath> paths_;      // empty where nothing bounces
+    std::vector<std::uint8_t> carried_;  // by point: by a shape, in the sub-step
+    std::vector<Vec3d> carried_v_;       // Substep::carried_v
+    std::vector<Vec3d> born_;            // Substep::born
+    std::vector<double> energy_;         // Substep::energy
+    std::vector<Vec3d> displacement_;    // Substep::displacement; empty where no constraint needs it
+    std::vector<FreePath> paths_;        // empty where nothing bounces
 
     std::vector<Vec3d> reaction_;  // Substep::reaction
 

@@ -107,6 +107,14 @@ describe("the ledger", function()
     check({ by_contacts = normal, by_friction = friction, by_shapes = 0 }, sums, 1e-5)
   end)
 
+  it("has what a shape puts into the spring of a point that sticks to it", function()
+    local sums = ledger [[rapid.points.from { P = {{0, 0, 0}, {0, 2, 0}} } } :group { name = "held",
+  where = function(p) return p.id == 1 end } :pin { group = "held" } :distance { pairs = {{1, 2}}, compliance = 2e-4 }
+  :collide { shape = rapid.shape.plane {}, bounce = 0, response = "stick",
+    transform = function(frame) return rapid.translate(0, -0.5 * frame.time ^ 2, 0) end } :solve { substeps = 4 }]]
+    check({ by_contacts = 5000 / 2 * 0.25 + 0.5 }, sums, 0.01)
+  end)
+
   it("has m g h of a floor that lifts, as the work of shapes", function()
     local sums = ledger([[rapid.points.from { P = {{0, 0.1, 0}}, v = {{0, 0.5, 0}} } } :attribute { mass = 3 }
   :gravity {} :contact { radius = 0.1, record = true } :collide { bounce = 0, shape = rapid.shape.plane {},

@@ -48,9 +48,11 @@ public:
     double round(std::span<Vec3d> P, std::span<Vec3f> rounded);
 
     // Since begin(), of points of the block: whether one has met a shape; how far off a discrete method may have put
-    // it, m; those that were taken out of a shape at once, and by round().
+    // it, m; whether it has gone along with a shape that holds it for good; those that were taken out of a shape at
+    // once, and by round().
     bool has_met(std::size_t i) const { return touched_.has(i); }
     double position_error(std::size_t i) const { return discrete_.position_error(i); }
+    bool is_carried(std::size_t i) const { return stuck_.holds_for_good(i); }
     std::span<const Ejection::Displacement> displacements() const { return ejection_.displacements(); }
     std::span<const Ejection::Displacement> corrections() const { return correction_.displacements(); }
 

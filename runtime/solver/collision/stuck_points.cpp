@@ -78,9 +78,9 @@ void StuckPoints::ask(std::size_t o, const std::vector<std::uint32_t>& points)
     for (const std::uint32_t i : points) {
         const double now = block_.frame_time(i, block_.dt[i]);
         const bool slides = columns_->face[block_.indices[i]] == StuckColumns::sliding;
-        const bool moved = begins_frame(i) && columns_->P[block_.indices[i]] != block_.P[i].cast<float>();
         const int obstacle = static_cast<int>(o);
-        query_.add(i, slides || moved ? block_.P[i] : state(i, obstacle, now).P, now);
+        const bool here = slides || is_elsewhere(i, obstacle, now);
+        query_.add(i, here ? block_.P[i] : state(i, obstacle, now).P, now);
     }
     if (!query_.empty()) query_.find_gradients_at_times(*block_.obstacles[o].shape);
 }
@@ -113,14 +113,14 @@ void StuckPoints::find_resting()
     }
 }
 
-// The gap is that of the place that holds the point; of the point itself where a script has moved it.
+// The gap is that of the place that holds the point; of the point itself where that is elsewhere.
 void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
 {
     const Obstacle& obstacle = obstacle_at(o);
     const std::uint32_t index = block_.indices[i];
     const double now = block_.frame_time(i, block_.dt[i]), radius = block_.radius(obstacle, i);
     const Vec3d P = block_.P[i], v = block_.v[i];
-    const bool begins = begins_frame(i), moved = begins && columns_->P[index] != block_.P[i].cast<float>();
+    const bool begins = begins_frame(i), moved = is_elsewhere(i, o, now);
     const MaterialPoint at = material(i, o);
     if (moved || (begins && at.face == MaterialPoint::rigid)) {
         // Of another size, or the surface is another: the point stays where that is within its reach.
@@ -241,6 +241,25 @@ MovingBody::State StuckPoints::state(std::uint32_t i, int o, double time) const
 bool StuckPoints::begins_frame(std::uint32_t i) const
 {
     return first_ && block_.frame_time(i, block_.dt[i]) <= 1e-9 * block_.context.h;
+}
+
+// Whether a script has moved the point between two frames; or rows in the sub-step in which it hit the surface: they
+// have reached their balance with it there, and from then on they do not move what holds for good.
+bool StuckPoints::is_elsewhere(std::uint32_t i, int o, double now) const
+{
+    if (begins_frame(i)) return columns_->P[block_.indices[i]] != block_.P[i].cast<float>();
+    if (!bond_is_endless(i, o)) return false;
+    const Obstacle& obstacle = obstacle_at(o);
+    const double tolerance = obstacle.contact_tolerance(block_.P[i], block_.radius(obstacle, i));
+    return (state(i, o, now).P - block_.P[i]).norm() > tolerance;
+}
+
+bool StuckPoints::holds_for_good(std::size_t i) const
+{
+    if (!has(i)) return false;
+    for (std::size_t o = 0; o < block_.obstacles.size(); ++o)
+        if (block_.obstacles[o].key == columns_->to[block_.indices[i]]) return bond_is_endless(i, static_cast<int>(o));
+    return false;
 }
 
 // By which a script, an action or a neighbour has changed the velocity of the point since it was that of the surface,

@@ -6,6 +6,7 @@
 // the place and velocity of a point alone.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -50,8 +51,9 @@ public:
     };
     const std::vector<Carried>& carried() const { return carried_; }  // in this sub-step
 
-    // Whether a point is glued; and whether it is that, or released to go on.
+    // Whether a point is glued; whether nothing can tear it off, either; whether it is glued, or released to go on.
     bool has(std::size_t i) const { return taken_[i] == Glued; }
+    bool holds_for_good(std::size_t i) const;
     bool takes(std::size_t i) const { return taken_[i] != Free; }
     const std::vector<std::uint32_t>& list() const { return list_; }  // of the glued
     const std::vector<Loose>& loose() const { return loose_; }
@@ -85,6 +87,11 @@ private:
     MaterialPoint material(std::uint32_t i, int obstacle) const;
     MovingBody::State state(std::uint32_t i, int obstacle, double time) const;
     bool begins_frame(std::uint32_t i) const;
+    bool is_elsewhere(std::uint32_t i, int obstacle, double now) const;
+    bool bond_is_endless(std::size_t i, int obstacle) const
+    {
+        return std::isinf(obstacle_at(obstacle).adhesion[block_.indices[i]]);
+    }
     Vec3d kick_on(std::uint32_t i, const Vec3d& v) const;
     const Obstacle& obstacle_at(int o) const { return block_.obstacles[static_cast<std::size_t>(o)]; }
 

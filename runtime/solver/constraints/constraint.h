@@ -54,6 +54,8 @@ struct Substep {
     // m: of each point that moves, by its acceleration up to its velocity at the end; collisions aside. Empty unless
     // some constraint has forces.
     std::span<Vec3d> displacement;
+    // m/s, of points that shapes carry, where the sub-step began; 0 of others. Empty where there is no shape.
+    std::span<const Vec3d> carried_v;
     std::span<FreePath> paths;  // empty where nothing bounces
     // m/s: what shapes have changed the velocity of each point by in its free motion. Empty where nobody asks.
     std::span<Vec3d> reaction;

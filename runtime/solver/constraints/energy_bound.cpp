@@ -54,13 +54,17 @@ void EnergyIslands::link(std::span<const std::uint32_t> points)
     const auto moves = [&](std::uint32_t i) { return step_.points[i].w > 0; };
     // As sleepers do, whatever velocity they have fallen asleep with.
     const auto rests = [&](std::uint32_t i) { return step_.points[i].P == step_.start[i]; };
+    const auto v_before = [&](std::uint32_t i) {
+        const bool is_carried = !step_.carried_v.empty() && !step_.carried_v[i].isZero(0);
+        return is_carried ? step_.carried_v[i] : step_.v[i];
+    };
     const auto first = std::find_if(points.begin(), points.end(), moves);
     if (first == points.end()) return;
     for (const std::uint32_t i : points)
         if (moves(i))
             sets_.join(*first, i);
         else
-            drivers_.push_back({*first, i, rests(i) ? Drive{} : Drive::of(step_.v[i], step_.v[i], step_.dt),
+            drivers_.push_back({*first, i, rests(i) ? Drive{} : Drive::of(v_before(i), step_.v[i], step_.dt),
                                 step_.spins.empty() ? 0 : step_.spins[i].s.norm()});
 }
 

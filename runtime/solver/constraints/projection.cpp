@@ -66,9 +66,10 @@ void Projection::advance(Substep& step)
     if (constraints_.empty() || !(step.dt > 0) || (sleep_ && sleep_->all())) return;
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
-    const double displacing = work_of_displacements(step);
-    energy_.added += std::max(0.0, displacing);
-    changes_.contacts += displacing;
+    if (has_forces_ || is_driven_) begin_rows(step);
+    const double by_shapes = work_of_displacements(step) + work_of_carrying(step);
+    energy_.added += std::max(0.0, by_shapes);
+    changes_.contacts += by_shapes;
     move_kinematic(step);
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
@@ -147,6 +148,22 @@ double Projection::work_of_displacements(const Substep& step) const
     return has_forces_ && !step.born.empty() ? stored_change(step, step.born, step.start) : 0;
 }
 
+// Where rows begin: with what shapes carry at the end of its way.
+void Projection::begin_rows(const Substep& step)
+{
+    begun_.assign(step.start.begin(), step.start.end());
+    carries_ = false;
+    for (std::size_t i = 0; i < begun_.size(); ++i)
+        if (!(step.points[i].w > 0) && step.inverse_mass[i] > 0 && begun_[i] != step.points[i].P)
+            begun_[i] = step.points[i].P, carries_ = true;
+}
+
+// J: what rows store more as shapes carry points that are glued to them.
+double Projection::work_of_carrying(const Substep& step) const
+{
+    return has_forces_ && carries_ ? stored_change(step, step.start, begun_) : 0;
+}
+
 // J: what rows store more at some places than at others.
 double Projection::stored_change(const Substep& step, std::span<const Vec3d> from, std::span<const Vec3d> to) const
 {
@@ -159,7 +176,6 @@ double Projection::stored_change(const Substep& step, std::span<const Vec3d> fro
 // What pins move gains what they do, and so do the rows that they stretch, before these act.
 void Projection::move_kinematic(Substep& step)
 {
-    if (has_forces_ || is_driven_) begun_.assign(step.start.begin(), step.start.end());
     const double before = is_driven_ ? driven_energy(step) : 0;
     each([&](Coupling& coupling) { coupling.move_kinematic(step); });
     if (!is_driven_) return;
@@ -190,7 +206,7 @@ void Projection::advance_linked(Substep& step)
     bound_.begin(step, [&](double factor, std::span<double> energy) {
         for (std::size_t i = 0; i < energy.size(); ++i) energy[i] += factor * stored_[i];
     });
-    if (follows_) store_in_frame(step);
+    if (follows_ || carries_) store_in_frame(step);
     fallback_.begin(step);
     each([&](Coupling& coupling) {
         coupling.advance(step);

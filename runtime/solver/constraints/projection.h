@@ -52,6 +52,8 @@ private:
     void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;
     double driven_energy(const Substep& step) const;
     double credited();
+    void begin_rows(const Substep& step);
+    double work_of_carrying(const Substep& step) const;
     void move_kinematic(Substep& step);
     void store_in_frame(const Substep& step);
     ContactEnergy close_bound(Substep& step, bool of_rods);
@@ -67,10 +69,11 @@ private:
     std::vector<CarriedImpulses*> carrying_;  // of the constraints
     Sleep* sleep_;
     const PointErrors& errors_;
-    bool has_forces_;  // some constraint (Coupling::has_forces)
-    bool may_gain_;    // some constraint does not only take energy, or springs draw points
-    bool is_driven_;   // some constraint moves points by itself
-    bool follows_;     // or some point that no row moves has a velocity
+    bool has_forces_;       // some constraint (Coupling::has_forces)
+    bool may_gain_;         // some constraint does not only take energy, or springs draw points
+    bool is_driven_;        // some constraint moves points by itself
+    bool carries_ = false;  // shapes do, points that are glued to them
+    bool follows_;          // or some point that no row moves has a velocity
     EnergyBound bound_;
     RigidFallback fallback_;
     ContactEnergy energy_;

@@ -35,6 +35,32 @@ describe("what sticks", function()
   end)
 
   -- With an angular acceleration of 1 the bond has to bear sqrt((t² r)² + r²).
+  it("goes with its surface, whatever neighbours, rods and springs do to it", function()
+    for name, pull in pairs {
+      ["overlapping neighbours"] = ":attribute { pscale = 0.2 } :contact {}",
+      ["a stretched rod"] = ":distance { pairs = {{1, 2}}, rest = 0.1, compliance = 1e-6 }",
+      ["a rigid rod"] = ":distance { pairs = {{1, 2}, {2, 3}}, rest = 0.1 }",
+      ["a weight on a rod"] = ":distance { pairs = {{1, 3}}, compliance = 1e-5 }",
+      ["springs to a place"] = ":spring { target = {3, 3, 3}, stiffness = 1e5 } :distance { pairs = {{1, 2}} }",
+    } do
+      for _, substeps in ipairs { 1, 4 } do
+        local y = name == "overlapping neighbours" and 0.3 or 0.1
+        local result = run(disc "2 * frame.time", ("P = {{1.5, %g, 0}, {1.4, %g, 0.1}, {1.5, 1, 0}}, " ..
+          "v = {{0, 0, -3}, {0.2, 0, -2.8}, {0, 0, -3}}, mass = {1, 1, 0.1}"):format(y, y), 49, substeps, pull)
+        for frame = 2, 49 do
+          local angle = 2 * (frame - 1) / 24
+          local c, s = math.cos(angle), math.sin(angle)
+          for i, at in ipairs { {1.5, 0}, {1.4, 0.1} } do
+            local P = vec3(c * at[1] + s * at[2], y, -s * at[1] + c * at[2])
+            local p = result[frame][i]
+            assert.near(P, p.P, 1e-4, name)
+            assert.near(vec3(2 * P.z, 0, -2 * P.x), p.v, 1e-3, name)
+          end
+        end
+      end
+    end
+  end)
+
   it("is torn off at the moment at which the disc's acceleration exceeds the adhesion", function()
     local adhesion, r = 20, 1.5
     local torn = math.sqrt(math.sqrt(adhesion ^ 2 - r ^ 2) / r)

@@ -225,6 +225,7 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
     std::vector<std::int32_t> corners;
     const auto place = static_cast<std::size_t>(indices - face.properties.begin());
     FaceValues values(face, place, mesh);
+    PolygonCutter cutter;
     file.read_lists(face, place, [&](std::span<const std::int64_t> list) {
         corners.clear();
         for (const std::int64_t corner : list) {
@@ -234,7 +235,11 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
         }
         // Of one or two corners it is a point or a line, which has no surface.
         const std::size_t before = mesh.triangles.size();
-        if (corners.size() >= 3) append_polygon(mesh.positions, corners, mesh.triangles);
+        if (corners.size() >= 3 && !cutter.append(mesh.positions, corners, mesh.triangles))
+            throw Error(
+                fmt::format("face {} has {} corners, too many in too winding a line to be cut into triangles; "
+                            "divide it",
+                            row, corners.size()));
         values.append(file, mesh.triangles.size() - before);
         ++row;
     });

@@ -104,6 +104,72 @@ TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[
     }
 }
 
+namespace {
+
+// A path of so many corners that winds inwards at right angles, and back beside itself, which is 0.5 m wide: its area,
+// and its outline from the corner `first` on, as a file of one face so many times.
+struct Spiral {
+    explicit Spiral(int corners) : half(corners / 2)
+    {
+        Vec3d P = Vec3d::Zero();
+        double length = half;
+        for (int k = 0; k < half; ++k) {
+            const Vec3d along = direction(k), before = direction(k + 3), across(-along.y(), along.x(), 0),
+                        across_before(-before.y(), before.x(), 0);
+            outer.push_back(P);
+            inner.push_back(P + 0.5 * (k == 0          ? across
+                                       : k + 1 == half ? across_before
+                                                       : Vec3d(across + across_before)));
+            P += length * along;
+            if (k % 2 == 1) length -= 2;
+        }
+        for (int k = 0; k + 1 < half; ++k)
+            area += 0.25 * ((outer[k + 1] - outer[k]).norm() + (inner[k + 1] - inner[k]).norm());
+    }
+    std::string file(int first, int times) const
+    {
+        std::vector<Vec3d> outline = outer;
+        outline.insert(outline.end(), inner.rbegin(), inner.rend());
+        std::rotate(outline.begin(), outline.begin() + first, outline.end());
+        std::string text = fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n", outline.size()) + xyz +
+                           fmt::format("element face {}\nproperty list int int vertex_indices\nend_header\n", times);
+        std::string face = std::to_string(outline.size());
+        for (std::size_t k = 0; k < outline.size(); ++k) {
+            text += fmt::format("{} {} 0\n", outline[k].x(), outline[k].y());
+            face += fmt::format(" {}", k);
+        }
+        for (int k = 0; k < times; ++k) text += face + "\n";
+        return text;
+    }
+
+    int half;
+    double area = 0;
+    std::vector<Vec3d> outer, inner;
+
+private:
+    static Vec3d direction(int k) { return k % 4 < 2 ? Vec3d::Unit(k % 2) : Vec3d(-Vec3d::Unit(k % 2)); }
+};
+
+}  // namespace
+
+// What is cubic in the corners takes ten seconds for the thousand and all day for the long one.
+TEST_CASE("polygons that wind are cut, whichever corner is first, many of them and long ones", "[mesh][ply]")
+{
+    const PlyFolder folder;
+    const auto [corners, times] = GENERATE(table<int, int>({{256, 1000}, {4000, 1}}));
+    const Spiral spiral(corners);
+    const MeshPtr mesh = folder.read(spiral.file(GENERATE_COPY(0, corners / 3, corners / 2 + 1), times));
+    CHECK(mesh->triangles.size() == static_cast<std::size_t>(times * (corners - 2)));
+    CHECK(mesh->area() == Approx(times * spiral.area).epsilon(1e-9));
+}
+
+TEST_CASE("a polygon whose cutting takes too long is an error that names the face", "[mesh][ply]")
+{
+    const PlyFolder folder;
+    CHECK(folder.error(Spiral(100000).file(0, 1)) ==
+          "face 0 has 100000 corners, too many in too winding a line to be cut into triangles; divide it");
+}
+
 TEST_CASE("every number of the vertices of a PLY is a value of the mesh; three that belong together are a vec3",
           "[mesh][ply]")
 {

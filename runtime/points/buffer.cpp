@@ -90,6 +90,9 @@ SparePages::Block new_pages(std::size_t bytes)
     return block;
 }
 
+// Where no bytes are: what copies none takes no null pointer for their place either (C, memcpy).
+alignas(line) std::byte no_bytes[line];
+
 }  // namespace
 
 Buffer::Buffer(Buffer&& other) noexcept
@@ -112,6 +115,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept
 
 void Buffer::reserve(std::size_t bytes)
 {
+    if (!data_) data_ = no_bytes;
     if (bytes <= capacity_) return;
     if (bytes > max_bytes) throw std::bad_alloc();
     // Growth by half: untouched pages are free, and a column that is appended to every frame is remapped seldom.

@@ -84,6 +84,16 @@ TEST_CASE("every block starts on a cache line", "[buffer]")
     for (int i = 0; i < 100; ++i) CHECK(address(Buffer(bytes)) % 64 == 0);
 }
 
+TEST_CASE("no bytes have a place as well, and are let go as others are", "[buffer]")
+{
+    Buffer none(0);
+    CHECK(none.data() != nullptr);
+    CHECK(none.capacity() == 0);
+    Buffer moved = std::move(none);
+    moved.reserve(3);
+    CHECK(moved.capacity() >= 3);
+}
+
 TEST_CASE("large blocks start at different places of their pages", "[buffer]")
 {
     std::set<std::uintptr_t> offsets;

@@ -47,6 +47,21 @@ TEST_CASE("a value that all points share is held once", "[column]")
     CHECK(column.read().stride == 0);
 }
 
+TEST_CASE("a shared column that all points have left is written, and takes others", "[column]")
+{
+    // Under the sanitizer of undefined behaviour this fails when no values are copied from nowhere.
+    Column<float> column = column_of({1, 2, 3});
+    const Column<float> before = column;
+    column.keep(Compaction::from_mask(std::vector<std::uint8_t>(3, 0)));
+    const Column<float> left = column;
+    CHECK(column.write().empty());
+    const std::vector<float> added = {4};
+    column.append(std::span(added));
+    CHECK(values_of(column) == added);
+    CHECK(left.size() == 0);
+    CHECK(values_of(before) == std::vector{1.0f, 2.0f, 3.0f});
+}
+
 TEST_CASE("writing expands a uniform column into its value, everywhere", "[column]")
 {
     Column<float> column(3, 0.02f);

@@ -72,13 +72,19 @@ void remove_abandoned_files(const fs::path& folder)
         if (is_hidden_name(entry->path().filename().native())) remove_if_abandoned(entry->path());
 }
 
-// What tells a file that this process wrote from any that took its place or that another has changed.
-using Identity = std::array<std::int64_t, 5>;
+// What tells a file that this process wrote from any that took its place or that another has changed: the last time of
+// a change too, which nobody can set.
+using Identity = std::array<std::int64_t, 7>;
 
 Identity identity_of(const struct stat& status)
 {
-    return {static_cast<std::int64_t>(status.st_dev), static_cast<std::int64_t>(status.st_ino), status.st_size,
-            status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+    return {static_cast<std::int64_t>(status.st_dev),
+            static_cast<std::int64_t>(status.st_ino),
+            status.st_size,
+            status.st_mtim.tv_sec,
+            status.st_mtim.tv_nsec,
+            status.st_ctim.tv_sec,
+            status.st_ctim.tv_nsec};
 }
 
 // The last ones: a run that reads what it wrote does so soon.

@@ -1,6 +1,8 @@
 #include "runtime/files/output_file.h"
 
+#include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -241,6 +243,28 @@ TEST_CASE("what a file can't be made of is an error: a folder, a device, a folde
     OutputFile file(folder / "gone/a", unfinished);
     std::filesystem::remove_all(folder / "gone");
     CHECK(error_of([&] { file.finish(); }) == "can't be named when complete: No such file or directory");
+}
+
+// What a process has written it reads without a sandbox (read_apart.h).
+TEST_CASE("a file that another has changed in place is not its writer's, with all the times that can be set as before",
+          "[files]")
+{
+    const TemporaryFolder folder;
+    const std::filesystem::path path = folder / "a.vdb";
+    write(path, "own");
+    REQUIRE(is_own_file(path));
+    struct stat before = {}, after = {};
+    REQUIRE(::stat(path.c_str(), &before) == 0);
+    const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    do {  // the clock of files ticks some hundred times a second
+        CHECK(::pwrite(file, "bad", 3, 0) == 3);
+        const timespec times[] = {before.st_atim, before.st_mtim};
+        CHECK(::futimens(file, times) == 0);
+        REQUIRE(::stat(path.c_str(), &after) == 0);
+    } while (after.st_ctim.tv_sec == before.st_ctim.tv_sec && after.st_ctim.tv_nsec == before.st_ctim.tv_nsec);
+    ::close(file);
+    CHECK((after.st_size == before.st_size && after.st_mtim.tv_nsec == before.st_mtim.tv_nsec));
+    CHECK_FALSE(is_own_file(path));
 }
 
 TEST_CASE("a durable file is written as any other", "[files]")

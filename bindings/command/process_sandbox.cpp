@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/capability.h>
 #include <linux/landlock.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -124,6 +125,23 @@ void close_inherited(int first)
     if (nothing < 0 || dup2(nothing, STDIN_FILENO) < 0) throw refused("standard input can't be closed", errno);
 }
 
+// Root's privileges lift limits and reach all of the machine. What remains of them opens files of other users, of which
+// Landlock leaves those that it leaves to all.
+void give_up_privileges()
+{
+    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+    __user_cap_data_struct own[_LINUX_CAPABILITY_U32S_3];
+    if (syscall(SYS_capget, &header, own) != 0) throw refused("privileges can't be asked for", errno);
+    for (__user_cap_data_struct& word : own) word.inheritable = 0;
+    if (syscall(SYS_capset, &header, own) != 0) throw refused("privileges can't be given up", errno);
+    if (getuid() != 0 && geteuid() != 0) return;  // others have none once the process has restarted
+    for (unsigned long one = 0; prctl(PR_CAPBSET_READ, one, 0, 0, 0) >= 0; ++one) {
+        const bool is_kept = one == CAP_DAC_OVERRIDE || one == CAP_DAC_READ_SEARCH || one == CAP_FOWNER;
+        if (is_kept || prctl(PR_CAPBSET_READ, one, 0, 0, 0) == 0) continue;
+        if (prctl(PR_CAPBSET_DROP, one, 0, 0, 0) != 0) throw refused("privileges can't be given up", errno);
+    }
+}
+
 void limit(__rlimit_resource resource, rlim_t most)
 {
     const rlimit value{most, most};
@@ -146,6 +164,7 @@ void enter_sandbox(const SandboxAccess& access)
     const std::string program = std::filesystem::read_symlink("/proc/self/exe");
 
     close_inherited(access.first_closed);
+    give_up_privileges();
     restrict_files(access);
     execv(program.c_str(), arguments.data());
     throw refused("can't restart in the sandbox", errno);

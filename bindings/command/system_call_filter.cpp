@@ -31,15 +31,14 @@ constexpr int allowed[] = {
     SCMP_SYS(unlink), SCMP_SYS(unlinkat), SCMP_SYS(link), SCMP_SYS(linkat), SCMP_SYS(rename), SCMP_SYS(renameat),
     SCMP_SYS(renameat2), SCMP_SYS(umask),
     // memory
-    SCMP_SYS(brk), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(mprotect), SCMP_SYS(madvise), SCMP_SYS(mincore),
-    SCMP_SYS(membarrier),
+    SCMP_SYS(brk), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(mprotect), SCMP_SYS(mincore), SCMP_SYS(membarrier),
     // threads and signals of the process
-    SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(get_robust_list), SCMP_SYS(rseq), SCMP_SYS(set_tid_address),
-    SCMP_SYS(arch_prctl), SCMP_SYS(gettid), SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(getpgrp), SCMP_SYS(exit),
-    SCMP_SYS(exit_group), SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity), SCMP_SYS(sched_getparam),
-    SCMP_SYS(sched_getscheduler), SCMP_SYS(sched_get_priority_min), SCMP_SYS(sched_get_priority_max), SCMP_SYS(getcpu),
-    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(rt_sigtimedwait),
-    SCMP_SYS(rt_sigpending), SCMP_SYS(rt_sigsuspend), SCMP_SYS(sigaltstack), SCMP_SYS(restart_syscall), SCMP_SYS(pause),
+    SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(rseq), SCMP_SYS(set_tid_address), SCMP_SYS(arch_prctl),
+    SCMP_SYS(gettid), SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(getpgrp), SCMP_SYS(exit), SCMP_SYS(exit_group),
+    SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity), SCMP_SYS(sched_getparam), SCMP_SYS(sched_getscheduler),
+    SCMP_SYS(sched_get_priority_min), SCMP_SYS(sched_get_priority_max), SCMP_SYS(getcpu), SCMP_SYS(rt_sigaction),
+    SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(rt_sigtimedwait), SCMP_SYS(rt_sigpending),
+    SCMP_SYS(rt_sigsuspend), SCMP_SYS(sigaltstack), SCMP_SYS(restart_syscall), SCMP_SYS(pause),
     // time, and what the system tells of itself
     SCMP_SYS(clock_gettime), SCMP_SYS(clock_getres), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
     SCMP_SYS(gettimeofday), SCMP_SYS(time), SCMP_SYS(times), SCMP_SYS(getrusage), SCMP_SYS(uname), SCMP_SYS(sysinfo),
@@ -58,6 +57,11 @@ public:
     void allow_commands(int call, std::initializer_list<unsigned> commands)
     {
         for (const unsigned command : commands) allow_if(call, {SCMP_A1_32(SCMP_CMP_EQ, command)});
+    }
+    // The same of the third.
+    void allow_advice(int call, std::initializer_list<unsigned> advices)
+    {
+        for (const unsigned advice : advices) allow_if(call, {SCMP_A2_32(SCMP_CMP_EQ, advice)});
     }
     void fail(int call, int error) { add(SCMP_ACT_ERRNO(static_cast<std::uint32_t>(error)), call, {}); }
     int load() { return status_ == 0 ? seccomp_load(context_.get()) : status_; }
@@ -79,10 +83,16 @@ void add_by_arguments(Filter& filter, Processes processes)
 {
     const auto own = static_cast<scmp_datum_t>(getpid());
 
-    // Shared memory without a file is outside of the limits of memory; between copies results go through it.
-    const scmp_datum_t kind = MAP_SHARED | MAP_ANONYMOUS;
+    // Outside of the limits of memory are shared memory without a file, through which results of copies go, and what
+    // grows downwards, as stacks do.
+    const scmp_datum_t shared = MAP_SHARED | MAP_ANONYMOUS, kind = shared | MAP_GROWSDOWN;
     for (const scmp_datum_t allowed_kind : {scmp_datum_t{0}, scmp_datum_t{MAP_SHARED}, scmp_datum_t{MAP_ANONYMOUS}})
         filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, allowed_kind)});
+
+    // What is advised of memory is of this process alone: pages are neither taken from the machine, nor merged with
+    // those of others.
+    filter.allow_advice(SCMP_SYS(madvise), {MADV_NORMAL, MADV_RANDOM, MADV_SEQUENTIAL, MADV_WILLNEED, MADV_DONTNEED,
+                                            MADV_FREE, MADV_HUGEPAGE, MADV_NOHUGEPAGE, MADV_DONTDUMP});
 
     // No owner of a descriptor's signals, no leases, no notification.
     filter.allow_commands(SCMP_SYS(fcntl), {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_GETLK,
@@ -90,26 +100,27 @@ void add_by_arguments(Filter& filter, Processes processes)
     filter.allow_commands(SCMP_SYS(ioctl), {TCGETS, TIOCGWINSZ});  // whether it is a terminal, and how wide
 
     for (const int call : {SCMP_SYS(kill), SCMP_SYS(tgkill)}) filter.allow_if(call, {SCMP_A0(SCMP_CMP_EQ, own)});
-    filter.allow_if(SCMP_SYS(prlimit64), {SCMP_A0(SCMP_CMP_EQ, 0)});  // its own limits, which it can only lower
     filter.allow_if(SCMP_SYS(sched_setaffinity), {SCMP_A0(SCMP_CMP_EQ, 0)});
     for (const int option : {PR_SET_NAME, PR_GET_NAME})
         filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, static_cast<scmp_datum_t>(option))});
 
     // A filter can't see the flags of clone3; the C library then takes clone.
     filter.fail(SCMP_SYS(clone3), ENOSYS);
+    constexpr scmp_datum_t spaces =
+        CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNET;
     if (processes == Processes::Copies) {
-        constexpr scmp_datum_t spaces =
-            CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNET;
+        filter.allow_if(SCMP_SYS(prlimit64), {SCMP_A0(SCMP_CMP_EQ, 0)});  // of a copy, which lowers its own
         filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, spaces, 0)});
         filter.allow(SCMP_SYS(wait4));
         filter.allow(SCMP_SYS(memfd_create));  // the frames of a reference, for all copies
-        filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, kind)});
+        filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, shared)});
         filter.allow(SCMP_SYS(alarm));  // of a copy that reads a file
         for (const int option : {PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS})
             filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, static_cast<scmp_datum_t>(option))});
         filter.allow(SCMP_SYS(seccomp));  // a further filter only forbids
     } else {
-        filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD)});
+        filter.allow_if(SCMP_SYS(prlimit64), {SCMP_A0(SCMP_CMP_EQ, 0), SCMP_A2(SCMP_CMP_EQ, 0)});  // are asked for
+        filter.allow_if(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD | spaces, CLONE_THREAD)});
     }
 }
 

@@ -104,6 +104,12 @@ TEST_CASE("in the sandbox no other process is reached", "[untrusted]")
         {"signals of a descriptor", [=] { return fcntl(STDOUT_FILENO, F_SETOWN, other); }},
         {"typing on a terminal", [] { return ioctl(STDOUT_FILENO, TIOCSTI, "x"); }},
         {"setpgid", [=] { return setpgid(0, 0); }},
+        {"locks of threads",
+         [=] {
+             void* head = nullptr;
+             std::size_t size = 0;
+             return syscall(SYS_get_robust_list, other, &head, &size);
+         }},
     };
     for (const Processes processes : {Processes::None, Processes::Copies})
         for (const auto& [name, call] : calls) {
@@ -180,10 +186,35 @@ TEST_CASE("in the sandbox there is no memory outside of the limits", "[untrusted
             mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
     };
     CHECK(error_in_sandbox(Processes::None, map_shared) == EPERM);
+    // Counts as a stack, of which the limits hold when it grows alone.
+    const auto map_downwards = [] {
+        return reinterpret_cast<long>(
+            mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0));
+    };
+    for (const Processes processes : {Processes::None, Processes::Copies})
+        CHECK(error_in_sandbox(processes, map_downwards) == EPERM);
     CHECK(error_in_sandbox(Processes::None, [] { return memfd_create("x", 0); }) == EPERM);
     CHECK(error_in_sandbox(Processes::None, [] { return shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600); }) == EPERM);
     CHECK(error_in_sandbox(Processes::None, [] { return semget(IPC_PRIVATE, 1, IPC_CREAT | 0600); }) == EPERM);
     CHECK(error_in_sandbox(Processes::None, [] { return msgget(IPC_PRIVATE, IPC_CREAT | 0600); }) == EPERM);
+}
+
+// Each would be an error without the filter, too, but another one: no page of the machine is lost where it fails.
+TEST_CASE("in the sandbox no limit is set, no page is taken from the machine, and no thread is elsewhere",
+          "[untrusted]")
+{
+    const rlimit inverse{2, 1};
+    CHECK(error_in_sandbox(Processes::None, [&] { return setrlimit(RLIMIT_DATA, &inverse); }) == EPERM);
+    rlimit asked{};
+    CHECK(error_in_sandbox(Processes::None, [&] { return getrlimit(RLIMIT_DATA, &asked); }) == 0);
+    const auto nowhere = reinterpret_cast<void*>(1);
+    for (const Processes processes : {Processes::None, Processes::Copies})
+        for (const int advice : {MADV_HWPOISON, 101 /* soft offline */, MADV_MERGEABLE, MADV_REMOVE})
+            CHECK(error_in_sandbox(processes, [&] { return syscall(SYS_madvise, nowhere, 4096, advice); }) == EPERM);
+    for (const int space : {CLONE_NEWNET, CLONE_NEWIPC, CLONE_NEWUTS, CLONE_NEWNS})
+        CHECK(error_in_sandbox(Processes::None, [&] {
+                  return syscall(SYS_clone, CLONE_THREAD | space, nullptr, nullptr, nullptr, nullptr);
+              }) == EPERM);
 }
 
 TEST_CASE("in the sandbox there is no socket, no program, and no way around the filter", "[untrusted]")

@@ -94,7 +94,7 @@ return rapid.create { points = two } :solve {}]]
     assert.match("two = rapid.points", folder:read "inside/scene.lua")
   end)
 
-  it("has the system's filter around every thread, and no privileges to gain", function()
+  it("has the system's filter around every thread, and no privileges to gain, or of root's", function()
     local folder = new_folder("local n = 0 for i = 1, 3e8 do n = n + i % 7 end " .. plain)
     local seen = command.shell([[
 "$RAPID" run inside/scene.lua --untrusted --quiet -f 1 & pid=$!
@@ -102,14 +102,22 @@ for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
   grep -qs 'Seccomp:.2' /proc/$pid/status && break
   sleep 0.05
 done
-grep -h -E '^(Seccomp|NoNewPrivs):' /proc/$pid/task/*/status
+grep -h -E '^(Seccomp|NoNewPrivs|Cap(Inh|Prm|Eff|Amb)):' /proc/$pid/task/*/status
 kill -9 $pid]], { cwd = folder.path }).stdout
+    -- CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_FOWNER: files of other users.
+    local sets = 0
+    for set in seen:gmatch "Cap%w+:%s*(%x+)" do
+      assert.equal(0, bit.band(tonumber(set:sub(-8), 16), bit.bnot(0xe)), set)
+      assert.match("^0+$", set:sub(1, -9))
+      sets = sets + 1
+    end
     local threads = 0
-    for name, value in seen:gmatch "(%w+):%s*(%d+)" do
+    for name, value in seen:gmatch "([SN]%w+):%s*(%d+)" do
       assert.equal(name == "Seccomp" and "2" or "1", value, name)
       threads = threads + (name == "Seccomp" and 1 or 0)
     end
     assert.truthy(threads >= 2)
+    assert.equal(4 * threads, sets)
   end)
 
   it("closes the descriptors that it inherits, and standard input", function()

@@ -35,12 +35,14 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     move_along_free_paths();
     rounds_.run();
     stuck_.finish(contacts_.found());
-    if (motion_.is_damped()) limit_energy(displaced), audit_.count_work(touched_);
     if (discrete_.is_used()) correct();
-    if (motion_.is_damped())
+    if (motion_.is_damped()) {
+        limit_energy(displaced);
+        audit_.count_work(touched_);
         audit_.add_displacements(ejection_.displacements().subspan(displaced), motion_);
-    else
+    } else {
         audit_.add_energy(touched_, stuck_, motion_);
+    }
 }
 
 // Between contacts the mean acceleration stands for springs: where these turn a point several times in the sub-step it

@@ -87,12 +87,9 @@ void ContactAudit::add_displacements(std::span<const Ejection::Displacement> dis
 void ContactAudit::add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion)
 {
     for (std::size_t i = 0; i < P.size(); ++i) {
-        const std::optional<double> mass = block_.moved_mass(i);
-        if (!mass || (P[i] == block_.P[i] && v[i] == block_.v[i])) continue;
+        if (P[i] == block_.P[i] && v[i] == block_.v[i]) continue;
         const double kinetic = 0.5 * (block_.v[i] - v[i]).dot(block_.v[i] + v[i]);
-        const double work = kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i]);
-        counts_.energy.take(*mass * work);
-        all_work_[i] += work;
+        work_[i] += kinetic + motion.potential(i, block_.P[i]) - motion.potential(i, P[i]);
     }
 }
 

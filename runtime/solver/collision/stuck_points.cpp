@@ -9,6 +9,9 @@ namespace {
 // A point that is found on a surface has its velocity to single precision: relative, and absolute in m/s.
 constexpr double velocity_tolerance = 1e-6;
 
+// Of a distance: where it is flatter, as in the middle of a shape, it does not lead to the surface.
+constexpr double least_slope = 0.5;
+
 // Into how many parts a sub-step is divided to find when a point is torn off; the moment is then bisected.
 constexpr int parts_of_step = 8, bisections = 40;
 
@@ -125,8 +128,9 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
     if (moved || (begins && at.face == MaterialPoint::rigid)) {
         // Of another size, or the surface is another: the point stays where that is within its reach.
         const double tolerance = obstacle.contact_tolerance(block_.P[i], radius), slope2 = gap.gradient.squaredNorm();
+        const bool off = std::abs(gap.f) > tolerance;
         if (std::abs(gap.f) > std::max({tolerance, radius, 2 * obstacle.feature})) return let_go(i);
-        const bool off = std::abs(gap.f) > tolerance && slope2 > 0;
+        if (off && slope2 < least_slope * least_slope) return let_go(i);
         if (!moved) block_.P[i] = state(i, o, now).P;
         if (off) block_.P[i] -= gap.f / slope2 * gap.gradient;
         if (moved || off) glue(i, o, now);

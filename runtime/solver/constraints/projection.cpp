@@ -67,9 +67,9 @@ void Projection::advance(Substep& step)
     if (sleep_) sleep_->wake_islands_now(step);
     step.is_shared = shapes_ || constraints_.size() > 1;
     if (has_forces_ || is_driven_) begin_rows(step);
-    const double by_shapes = work_of_displacements(step) + work_of_carrying(step);
-    energy_.added += std::max(0.0, by_shapes);
-    changes_.contacts += by_shapes;
+    const double displacing = work_of_displacements(step), carrying = work_of_carrying(step);
+    energy_.added += std::max(0.0, displacing);
+    changes_.contacts += displacing + carrying;
     move_kinematic(step);
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
@@ -86,7 +86,7 @@ void Projection::advance(Substep& step)
     if (has_forces_) {
         free_.resize(step.size());
         each_point([&](std::size_t i) { free_[i] = step.points[i].P - step.start[i]; });
-        advance_linked(step);
+        advance_linked(step, carrying);
         each_point([&](std::size_t i) { free_[i] += step.start[i]; });
         keep_positions(linked_);
     }
@@ -198,8 +198,8 @@ double Projection::driven_energy(const Substep& step) const
     return sum;
 }
 
-// Rods and springs act.
-void Projection::advance_linked(Substep& step)
+// Rods and springs act. carrying: J, what shapes have stored in them, which drive them where no pin does.
+void Projection::advance_linked(Substep& step, double carrying)
 {
     stored_.assign(step.size(), 0.0);
     add_stored(step, begun_, 1, stored_);
@@ -215,7 +215,9 @@ void Projection::advance_linked(Substep& step)
     const ContactEnergy change = close_bound(step, true);
     const double driven = may_gain_ ? bound_.driven() : 0;
     energy_.added += std::max(0.0, change.added - std::max(0.0, driven));
-    changes_.pins += driven;
+    const bool by_shapes = carries_ && !is_driven_;
+    energy_.take(by_shapes ? carrying + driven : std::max(0.0, carrying));
+    (by_shapes ? changes_.contacts : changes_.pins) += driven;
     changes_.rods += change.added - change.lost + credited() - driven;
 }
 

@@ -48,7 +48,7 @@ private:
     void each(const F& f);
     double work_of_displacements(const Substep& step) const;
     double stored_change(const Substep& step, std::span<const Vec3d> from, std::span<const Vec3d> to) const;
-    void advance_linked(Substep& step);
+    void advance_linked(Substep& step, double carrying);
     void add_stored(const Substep& step, std::span<const Vec3d> at, double factor, std::span<double> energy) const;
     double driven_energy(const Substep& step) const;
     double credited();

@@ -5,6 +5,10 @@
 # ours, or Assimp are compiled apart (rapid_NAME_deferred), with OpenVDB's headers precompiled: they take seconds, each
 # time. They are the part of the library that is loaded when it is first needed (runtime/deferred.h).
 #
+# rapid_in_batches(TARGET), behind what the target links, has its sources compiled eight at a time, as one, where
+# RAPID_BATCHES is on: what they include takes most of their time. So no two files of a target may give different things
+# one name, in anonymous namespaces either.
+#
 # rapid_link_layers(TARGET NAME...) links layers into a target, with both parts; rapid_link_parts(TARGET PART...) links
 # parts.
 
@@ -41,6 +45,19 @@ function(rapid_split_deferred with without)
   set(${without} ${result_without} PARENT_SCOPE)
 endfunction()
 
+# What is no fault of a file that is included: anonymous namespaces outside of the main file (g++), and a local name that
+# another file has.
+add_library(rapid_batched INTERFACE)
+target_compile_options(rapid_batched INTERFACE
+  -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+
+function(rapid_in_batches target)
+  if(RAPID_BATCHES)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    target_link_libraries(${target} PRIVATE rapid_batched)
+  endif()
+endfunction()
+
 function(rapid_layer name)
   rapid_split_deferred(with without ${ARGN})
   set(parts "")
@@ -48,12 +65,14 @@ function(rapid_layer name)
     add_library(rapid_${name} OBJECT ${without})
     target_link_libraries(rapid_${name} PRIVATE rapid_private)
     target_precompile_headers(rapid_${name} REUSE_FROM rapid_precompiled)
+    rapid_in_batches(rapid_${name})
     list(APPEND parts rapid_${name})
   endif()
   if(with)
     add_library(rapid_${name}_deferred OBJECT ${with})
     target_link_libraries(rapid_${name}_deferred PRIVATE rapid_private OpenVDB::openvdb)
     target_precompile_headers(rapid_${name}_deferred REUSE_FROM rapid_precompiled_openvdb)
+    rapid_in_batches(rapid_${name}_deferred)
     list(APPEND parts rapid_${name}_deferred)
   endif()
   set_property(GLOBAL PROPERTY rapid_parts_of_${name} ${parts})

@@ -17,6 +17,9 @@ set(rapid_hot_files
   solver/constraints/neighbour_list.cpp solver/constraints/pair_blocks.cpp solver/motion/ballistic_batch.cpp
   solver/motion/damped_motion.cpp solver/motion/free_paths.cpp)
 
+# Each an object of its own, which a level replaces.
+set_source_files_properties(${rapid_hot_files} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+
 # rapid_level(LEVEL PART...): the library for processors of this level. Parts: all of the library.
 function(rapid_level level)
   add_library(rapid_hot_${level} OBJECT ${rapid_hot_files})

@@ -8,7 +8,8 @@
 //
 // and defined in a source that includes OpenVDB or Assimp, and so belongs to the deferred part (RapidLayer.cmake):
 //
-//   const bool defined = level_set_sphere.define([](double radius) -> LevelSetPtr { ... });
+//   LevelSetPtr sphere(double radius) { ... }
+//   RAPID_DEFINE(level_set_sphere, sphere);
 #pragma once
 
 #include <atomic>
@@ -63,5 +64,6 @@ private:
 };
 
 #define RAPID_DEFERRED(name, ...) inline constinit ::rapid::Deferred<__VA_ARGS__> name(#name)
+#define RAPID_DEFINE(name, function) const bool name##_defined = name.define(function)
 
 }  // namespace rapid

@@ -65,10 +65,10 @@ build() {
         fi
     fi
 
-    # A translation unit with OpenVDB takes most of a gigabyte.
+    # Eight sources with OpenVDB take 2 GB to compile, others half of that.
     local jobs memory
     jobs=$(nproc)
-    memory=$(awk '/^MemAvailable/ { print int($2 / 1000000) }' /proc/meminfo)
+    memory=$(awk '/^MemAvailable/ { print int($2 / 1800000) }' /proc/meminfo)
     ((memory >= jobs)) || jobs=$((memory > 0 ? memory : 1))
 
     [[ -t 2 ]] || say "building build/$preset"

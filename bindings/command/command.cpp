@@ -13,7 +13,7 @@ namespace rapid {
 namespace {
 
 // Static in a function, so that it exists before the first registration, in whichever file that is.
-std::vector<std::unique_ptr<Command> (*)()>& makers()
+std::vector<std::unique_ptr<Command> (*)()>& command_makers()
 {
     static std::vector<std::unique_ptr<Command> (*)()> all;
     return all;
@@ -29,12 +29,12 @@ bool parse(std::string_view text, T& value)
 
 }  // namespace
 
-CommandRegistration::CommandRegistration(std::unique_ptr<Command> (*make)()) { makers().push_back(make); }
+CommandRegistration::CommandRegistration(std::unique_ptr<Command> (*make)()) { command_makers().push_back(make); }
 
 std::vector<std::unique_ptr<Command>> make_commands()
 {
     std::vector<std::unique_ptr<Command>> commands;
-    for (const auto make : makers()) commands.push_back(make());
+    for (const auto make : command_makers()) commands.push_back(make());
     std::sort(commands.begin(), commands.end(), [](const auto& a, const auto& b) { return a->name() < b->name(); });
     return commands;
 }

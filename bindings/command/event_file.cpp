@@ -15,12 +15,12 @@
 namespace rapid {
 namespace {
 
-enum Kind : std::int32_t { Birth, Hit, Death };
+enum EventKind : std::int32_t { Birth, Hit, Death };
 
 struct Event {
     double time;  // s since the start
     std::int32_t chain;
-    Kind kind;
+    EventKind kind;
     std::int64_t id;
     Vec3f P, v;
     Vec3f N = Vec3f::Zero();

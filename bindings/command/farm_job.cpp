@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr int format_version = 1;
+constexpr int job_version = 1;
 
 std::string shell_words(const std::vector<std::string>& words)
 {
@@ -123,8 +123,8 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
 {
     try {
         const ordered_json json = ordered_json::parse(InputFile(file).text());
-        if (const int version = json.at("rapid_farm").get<int>(); version != format_version)
-            throw Error(fmt::format("is of version {}; it must be {}", version, format_version));
+        if (const int version = json.at("rapid_farm").get<int>(); version != job_version)
+            throw Error(fmt::format("is of version {}; it must be {}", version, job_version));
         SubmittedJob submitted;
         FarmJob& job = submitted.job;
         job.name = json.at("name");
@@ -152,7 +152,7 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
 
 void SubmittedJob::write() const
 {
-    ordered_json json = {{"rapid_farm", format_version},
+    ordered_json json = {{"rapid_farm", job_version},
                          {"name", job.name},
                          {"folder", job.folder.string()},
                          {"outputs", job.outputs.string()},

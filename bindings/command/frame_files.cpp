@@ -64,7 +64,7 @@ int frame_number(std::int64_t number)
     return static_cast<int>(number);
 }
 
-std::string absolute(const std::string& path) { return std::filesystem::absolute(path).lexically_normal(); }
+std::string full_path(const std::string& path) { return std::filesystem::absolute(path).lexically_normal(); }
 
 std::string key_of(const OutputTarget& to)
 {
@@ -324,7 +324,7 @@ const FrameFiles::WholeFiles::File* FrameFiles::whole_file(std::int64_t frame, c
 {
     const auto of_frame = whole_.frames.find(frame);
     if (of_frame == whole_.frames.end()) return nullptr;
-    const auto found = of_frame->second.find(absolute(path));
+    const auto found = of_frame->second.find(full_path(path));
     return found != of_frame->second.end() && found->second.how == how ? &found->second : nullptr;
 }
 
@@ -334,7 +334,7 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     const std::string key = key_of(to);
     const FramePattern pattern(to.pattern);
     const std::string path = pattern.expand(info.number, output), how = how_of(to, selection_);
-    const auto film = whole_.films.empty() ? whole_.films.end() : whole_.films.find(absolute(path));
+    const auto film = whole_.films.empty() ? whole_.films.end() : whole_.films.find(full_path(path));
     if (whole_file(info.number, path, how) || (film != whole_.films.end() && film->second == how)) return;
     std::shared_ptr<const PictureFit> before;
     if (const std::int64_t last = info.number - selection_.step; pattern.has_frame() && last >= selection_.first)

@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int format_version = 1;
+constexpr int record_version = 1;
 
 }  // namespace
 
@@ -31,8 +31,8 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
     PartRecord record;
     try {
         const ordered_json json = ordered_json::parse(InputFile(file).text());
-        if (const int version = json.at("rapid_part").get<int>(); version != format_version)
-            throw Error(fmt::format("is a record of version {}; it must be {}", version, format_version));
+        if (const int version = json.at("rapid_part").get<int>(); version != record_version)
+            throw Error(fmt::format("is a record of version {}; it must be {}", version, record_version));
         const auto number = json.at("part").get<std::int64_t>(), count = json.at("parts").get<std::int64_t>();
         if (number < 1 || number > count || count > most_parts) throw Error("is no record of a part");
         record.part = {static_cast<int>(number), static_cast<int>(count)};
@@ -60,7 +60,7 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
 
 void PartRecord::write(const std::filesystem::path& file) const
 {
-    const ordered_json json = {{"rapid_part", format_version},
+    const ordered_json json = {{"rapid_part", record_version},
                                {"part", part.number},
                                {"parts", part.count},
                                {"sample", sample ? ordered_json(*sample) : ordered_json()},

@@ -14,12 +14,12 @@ using nlohmann::ordered_json;
 
 constexpr int frames_row = 1, passes_row = 2, files_row = 3;  // "threads" of the trace
 
-std::string text_of(const ordered_json& event)
+std::string event_text(const ordered_json& event)
 {
     return event.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-const char* name_of(NodeWork::Stage stage)
+const char* stage_name(NodeWork::Stage stage)
 {
     switch (stage) {
         case NodeWork::Stage::Graph:
@@ -56,9 +56,9 @@ ProfileFile::ProfileFile(std::string path) : path_(std::move(path))
     } catch (const Error& error) {
         error_ = error;
     }
-    append(text_of({{"name", "process_name"}, {"ph", "M"}, {"pid", 1}, {"args", {{"name", "rapid"}}}}));
-    append(text_of(row_name(frames_row, "frames")));
-    append(text_of(row_name(passes_row, "nodes")));
+    append(event_text({{"name", "process_name"}, {"ph", "M"}, {"pid", 1}, {"args", {{"name", "rapid"}}}}));
+    append(event_text(row_name(frames_row, "frames")));
+    append(event_text(row_name(passes_row, "nodes")));
 }
 
 double ProfileFile::microseconds(Clock::time_point moment) const
@@ -90,19 +90,20 @@ void ProfileFile::add(const FrameResult& result)
                      {"points_per_second", rate(points, result.total_seconds)},
                      {"substeps", result.figures.substeps},
                      {"collisions", result.figures.collisions}};
-    append(text_of(frame));
+    append(event_text(frame));
     for (const NodeWork& work : result.work) {
-        ordered_json pass = complete(fmt::format("{}", fmt::join(work.nodes, " + ")), name_of(work.stage), passes_row,
-                                     begin + 1e6 * work.begin, 1e6 * work.seconds);
+        ordered_json pass = complete(fmt::format("{}", fmt::join(work.nodes, " + ")), stage_name(work.stage),
+                                     passes_row, begin + 1e6 * work.begin, 1e6 * work.seconds);
         pass["args"] = {{"frame", result.frame},
                         {"nodes", work.nodes},
                         {"points", work.points},
                         {"bytes", work.bytes},
                         {"points_per_second", rate(work.points, work.seconds)}};
-        append(text_of(pass));
+        append(event_text(pass));
     }
     for (const auto& [name, value] : {std::pair("points", points), std::pair("bytes of points", bytes)})
-        append(text_of({{"name", name}, {"ph", "C"}, {"pid", 1}, {"ts", begin}, {"args", {{"all outputs", value}}}}));
+        append(
+            event_text({{"name", name}, {"ph", "C"}, {"pid", 1}, {"ts", begin}, {"args", {{"all outputs", value}}}}));
 }
 
 void ProfileFile::add(const FrameWriter::Written& file)
@@ -112,12 +113,12 @@ void ProfileFile::add(const FrameWriter::Written& file)
     const int row = files_row + static_cast<int>(lane - lanes_.begin());
     if (lane == lanes_.end()) {
         lane = lanes_.insert(lane, end);
-        append(text_of(row_name(row, lanes_.size() == 1 ? "files" : fmt::format("files {}", lanes_.size()))));
+        append(event_text(row_name(row, lanes_.size() == 1 ? "files" : fmt::format("files {}", lanes_.size()))));
     }
     *lane = end;
     ordered_json written = complete("write " + file.path, "write", row, begin, 1e6 * file.seconds);
     written["args"] = {{"frame", file.frame}, {"bytes", file.bytes}};
-    append(text_of(written));
+    append(event_text(written));
 }
 
 void ProfileFile::finish()

@@ -36,7 +36,7 @@ struct KeptRun {
     }
 };
 
-fs::path absolute(const std::string& path) { return fs::absolute(path).lexically_normal(); }
+fs::path absolute_path(const std::string& path) { return fs::absolute(path).lexically_normal(); }
 
 std::string list_of(std::vector<std::string> differences)
 {
@@ -221,7 +221,7 @@ void RunCache::find_due(const Plan& plan, FrameFiles& files)
         if (!known_.frames.contains(frame) || torn.contains(frame)) return true;
         if (!frames_.contains(frame)) return false;
         for (const FrameFiles::FrameFile& file : files.files_of(frame, frames_)) {
-            const std::string path = absolute(file.path);
+            const std::string path = absolute_path(file.path);
             if (file.film ? !whole.films.contains(path) || whole.films.at(path) != file.how
                           : !whole.frames[frame].contains(path) || whole.frames[frame].at(path).how != file.how)
                 return true;
@@ -246,7 +246,7 @@ void RunCache::leave_waiting_pictures(FrameFiles::WholeFiles& whole, const Frame
         for (std::int64_t frame = frames_.first; frame <= frames_.last; frame += frames_.step) {
             const FrameFiles::FrameFile file = files.files_of(frame, frames_)[k];
             if (file.film || fs::path(file.path).extension() != ".png") break;
-            const std::string path = absolute(file.path);
+            const std::string path = absolute_path(file.path);
             const auto found = whole.frames[frame].find(path);
             waited.emplace_back(frame, path);
             is_whole &= found != whole.frames[frame].end();
@@ -340,7 +340,7 @@ void RunCache::computed(const FrameStatistics& frame, const std::vector<Stiffnes
 void RunCache::written(const FrameFiles::Written& file)
 {
     WrittenFile one;
-    one.path = absolute(file.path);
+    one.path = absolute_path(file.path);
     one.how = file.how;
     one.of_node = file.of_node;
     if (file.film) {

@@ -17,10 +17,10 @@ namespace {
 
 constexpr std::string_view magic = "\x89RAPIDJ\n";
 
-enum class Kind : std::uint8_t { Head, Frame, Film };
+enum class EntryKind : std::uint8_t { Head, Frame, Film };
 
 template <class T>
-SavedState entry_of(Kind kind, const T& value)
+SavedState entry_of(EntryKind kind, const T& value)
 {
     StateWriter writer;
     writer(static_cast<std::uint8_t>(kind), value);
@@ -76,14 +76,14 @@ RunJournal::Contents RunJournal::read(const std::filesystem::path& file, const s
             StateReader reader(entry);
             std::uint8_t number = 0;
             reader(number);
-            const Kind kind{number};
-            if ((kind == Kind::Head) != (&entry == &entries.front())) StateReader::fail();
-            if (kind == Kind::Head) {
+            const EntryKind kind{number};
+            if ((kind == EntryKind::Head) != (&entry == &entries.front())) StateReader::fail();
+            if (kind == EntryKind::Head) {
                 reader(contents.fingerprint);
                 if (hash_of(contents.fingerprint) != hash) return contents;
             } else if (contents.fingerprint.empty()) {
                 return contents;
-            } else if (kind == Kind::Frame) {
+            } else if (kind == EntryKind::Frame) {
                 FrameRecord record;
                 reader(record);
                 for (const auto& [name, hash_then] : record.read) StateReader::expect(InputContents::is_content(name));
@@ -109,16 +109,16 @@ void RunJournal::begin(const std::filesystem::path& file, const Contents& conten
         const std::string text = framed(entry);
         output.append(text.data(), text.size());
     };
-    append(entry_of(Kind::Head, contents.fingerprint));
-    for (const auto& [frame, record] : contents.frames) append(entry_of(Kind::Frame, record));
-    for (const auto& [path, film] : contents.films) append(entry_of(Kind::Film, film));
+    append(entry_of(EntryKind::Head, contents.fingerprint));
+    for (const auto& [frame, record] : contents.frames) append(entry_of(EntryKind::Frame, record));
+    for (const auto& [path, film] : contents.films) append(entry_of(EntryKind::Film, film));
     output.finish();
     file_ = Descriptor(::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
     if (!file_) throw file_error("can't be written", errno);
 }
 
-void RunJournal::add(const FrameRecord& record) { add(entry_of(Kind::Frame, record)); }
-void RunJournal::add(const WrittenFile& film) { add(entry_of(Kind::Film, film)); }
+void RunJournal::add(const FrameRecord& record) { add(entry_of(EntryKind::Frame, record)); }
+void RunJournal::add(const WrittenFile& film) { add(entry_of(EntryKind::Film, film)); }
 
 void RunJournal::add(const SavedState& entry)
 {

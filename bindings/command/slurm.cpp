@@ -80,7 +80,7 @@ std::int64_t submit(const FarmJob& job, const fs::path& script, std::vector<std:
     return id;
 }
 
-std::string list_of(const std::vector<std::int64_t>& jobs)
+std::string list_of_jobs(const std::vector<std::int64_t>& jobs)
 {
     const std::set<std::int64_t> each(jobs.begin(), jobs.end());
     return fmt::format("{}", fmt::join(each, ","));
@@ -134,7 +134,7 @@ Queue queued(const std::vector<std::int64_t>& jobs)
     if (known.empty()) return queue;
     // Of a job that Slurm has forgotten squeue complains; it is not queued.
     const Output output =
-        output_of({"squeue", "--noheader", "--array", "--format=%F|%K|%T|%r", "--jobs", list_of(known)});
+        output_of({"squeue", "--noheader", "--array", "--format=%F|%K|%T|%r", "--jobs", list_of_jobs(known)});
     if (output.status != 0 && output.errors.find("Invalid job id") == std::string::npos)
         throw Error(fmt::format("squeue failed with status {}: {}", output.status, output.errors));
     std::istringstream lines(output.out);

@@ -3,7 +3,6 @@
 #include <tbb/info.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -17,33 +16,12 @@
 #include "bindings/command/wedge_report.h"
 #include "bindings/command/wedge_rows.h"
 #include "runtime/files/content_hash.h"
-#include "runtime/files/file_error.h"
+#include "runtime/files/temporary_folder.h"
 
 namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A folder for the statistics of rows; removed in the end.
-class TemporaryFolder {
-public:
-    TemporaryFolder() : path_((fs::temp_directory_path() / "rapid-wedge-XXXXXX").string())
-    {
-        if (!mkdtemp(path_.data())) throw file_error("no folder for the statistics of rows", errno);
-    }
-    ~TemporaryFolder()
-    {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-    fs::path file(std::size_t row) const { return fs::path(path_) / fmt::format("{}.json", row); }
-
-private:
-    std::string path_;
-};
 
 class WedgeCommand : public Command, public Confined {
 public:
@@ -104,11 +82,12 @@ public:
         if (!collect_.empty()) return collect(rows, report);
         check(rows.front(), common);
         if (farm_.asked()) return submit(rows, folder, common);
-        const TemporaryFolder statistics;
+        const TemporaryFolder statistics("wedge");
+        const auto statistics_of = [&](std::size_t row) { return statistics.path() / fmt::format("{}.json", row); };
         const int signal = run_processes(
             rows.size(), static_cast<int>(jobs_),
-            [&](std::size_t row) { return words_of(rows[row], statistics.file(row), folder, common); },
-            [&](std::size_t row, const EndedProcess& ended) { report.ended(row, ended, statistics.file(row)); });
+            [&](std::size_t row) { return words_of(rows[row], statistics_of(row), folder, common); },
+            [&](std::size_t row, const EndedProcess& ended) { report.ended(row, ended, statistics_of(row)); });
         if (signal != 0) return signal;
         return report.finish() ? status_done : status_failed;
     }

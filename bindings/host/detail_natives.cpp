@@ -12,12 +12,12 @@
 namespace rapid {
 namespace {
 
-constexpr char current[] = "rapid.detail";  // in the registry: the run that goes on
+constexpr char run_in_registry[] = "rapid.detail";  // in the registry: the run that goes on
 
 DetailRun& detail_run_of(State& state)
 {
     lua_State* L = state.lua();
-    lua_getfield(L, LUA_REGISTRYINDEX, current);
+    lua_getfield(L, LUA_REGISTRYINDEX, run_in_registry);
     auto* run = static_cast<DetailRun*>(lua_touserdata(L, -1));
     lua_pop(L, 1);
     if (!run) throw Error("points can't be used outside the :detail function that they were given to");
@@ -185,7 +185,7 @@ DetailRun::DetailRun(State& state, PointSet& of, const StepRecord* of_step)
 {
     ++state_.detail_serial;
     lua_pushlightuserdata(state_.lua(), this);
-    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, current);
+    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, run_in_registry);
 }
 
 DetailRun::~DetailRun()
@@ -193,7 +193,7 @@ DetailRun::~DetailRun()
     ++state_.detail_serial;
     lua_settop(state_.lua(), top_);
     lua_pushnil(state_.lua());
-    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, current);
+    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, run_in_registry);
 }
 
 void push_detail_natives(State& state)

@@ -5,11 +5,8 @@
 #include <algorithm>
 #include <lua.hpp>
 
+#include "bindings/host/chunk.h"
 #include "bindings/host/lua_text.h"
-
-extern "C" {
-#include "lua/chunk.h"
-}
 
 namespace rapid {
 namespace {

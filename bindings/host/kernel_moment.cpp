@@ -3,21 +3,22 @@
 namespace rapid {
 namespace {
 
-thread_local const KernelMoment* current = nullptr;
+thread_local const KernelMoment* moment_of_thread = nullptr;
 
 }  // namespace
 
-KernelMoment::KernelMoment(const double* times, const std::int32_t* at) : times_(times), at_(at), outer_(current)
+KernelMoment::KernelMoment(const double* times, const std::int32_t* at)
+    : times_(times), at_(at), outer_(moment_of_thread)
 {
-    current = this;
+    moment_of_thread = this;
 }
 
-KernelMoment::~KernelMoment() { current = outer_; }
+KernelMoment::~KernelMoment() { moment_of_thread = outer_; }
 
 std::optional<double> KernelMoment::time()
 {
-    if (!current || !current->times_ || *current->at_ < 0) return std::nullopt;
-    return current->times_[*current->at_];
+    if (!moment_of_thread || !moment_of_thread->times_ || *moment_of_thread->at_ < 0) return std::nullopt;
+    return moment_of_thread->times_[*moment_of_thread->at_];
 }
 
 double KernelMoment::since_begin(const StepShape& shape)

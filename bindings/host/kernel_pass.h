@@ -6,13 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "bindings/host/chunk.h"
 #include "bindings/host/kernel.h"
 #include "bindings/host/kernel_layout.h"
 #include "runtime/graph/node.h"
-
-extern "C" {
-#include "lua/chunk.h"
-}
 
 namespace rapid {
 

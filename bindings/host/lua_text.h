@@ -16,6 +16,14 @@ inline std::string text_at(lua_State* L, int index)
     return text ? std::string(text, size) : std::string();
 }
 
+// Raises an error of Lua where it is neither a string nor a number.
+inline std::string checked_text_at(lua_State* L, int index)
+{
+    std::size_t size = 0;
+    const char* text = luaL_checklstring(L, index, &size);
+    return {text, size};
+}
+
 inline void push_text(lua_State* L, std::string_view text) { lua_pushlstring(L, text.data(), text.size()); }
 
 }  // namespace rapid

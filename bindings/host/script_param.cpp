@@ -93,7 +93,7 @@ const std::map<std::string, DeclaredType>& declared_types()
 
 // The functions below read parts of a declaration; what: the parameter, for errors.
 
-void check_fields(const Table& table, const std::string& what)
+void check_param_fields(const Table& table, const std::string& what)
 {
     const std::vector<std::string> known = {"default", "min", "max", "unit", "doc", "choices", "required"};
     for (const auto& [field, value] : table.named)
@@ -149,7 +149,7 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     const Table* table = declared.table();
     const std::string* type = table && !table->list.empty() ? table->list.front().get<std::string>() : nullptr;
     if (!type) throw Error(what + ": declare it as { \"float\", default = 1, doc = \"...\" }");
-    check_fields(*table, what);
+    check_param_fields(*table, what);
 
     Param param;
     param.name = name;

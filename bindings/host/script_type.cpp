@@ -34,7 +34,7 @@ std::string_view role_of(lua_State* L, int index)
     return functions == 1 ? role : std::string_view();
 }
 
-void check_fields(const Table& definition, const std::string& what)
+void check_type_fields(const Table& definition, const std::string& what)
 {
     std::vector<std::string> known = {"name", "doc", "params", "makes"};
     known.insert(known.end(), std::begin(roles), std::end(roles));
@@ -93,7 +93,7 @@ NodeType read_type(const Table& definition, std::string_view role)
     const std::string what = fmt::format("rapid.node \"{}\"", type.name);
     type.doc = text_field(definition, "doc", what);
     if (type.doc.empty()) throw Error(what + ": say what it does, doc = \"...\"");
-    check_fields(definition, what);
+    check_type_fields(definition, what);
     if (role.empty())
         throw Error(what +
                     ": give it one of points = function(p, frame, params), action = function(p, step, params), "

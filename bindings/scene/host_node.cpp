@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-using Declaration = std::shared_ptr<const HostNode>;
+using DeclaredNode = std::shared_ptr<const HostNode>;
 
 // The arguments of a node: its numbers, vectors as three.
 struct HostFields {
@@ -59,7 +59,7 @@ std::string title_of(const HostNode& node) { return fmt::format("node \"{}\"", n
 
 class HostForce final : public rapid::Force {
 public:
-    HostForce(Declaration declared, HostFields fields, const Frame& frame, bool guarded)
+    HostForce(DeclaredNode declared, HostFields fields, const Frame& frame, bool guarded)
         : declared_(std::move(declared)), fields_(std::move(fields)), frame_(frame), guarded_(guarded)
     {
     }
@@ -91,7 +91,7 @@ public:
     }
 
 private:
-    const Declaration declared_;
+    const DeclaredNode declared_;
     const HostFields fields_;
     const Frame frame_;
     const bool guarded_;
@@ -196,7 +196,7 @@ private:
 
 class HostOperator final : public Operator {
 public:
-    HostOperator(Declaration declared, bool guarded) : declared_(std::move(declared)), guarded_(guarded)
+    HostOperator(DeclaredNode declared, bool guarded) : declared_(std::move(declared)), guarded_(guarded)
     {
         for (const HostParameter& parameter : declared_->parameters)
             fields_.values.resize(fields_.values.size() + (parameter.fallback.index() == 0 ? 1 : 3));
@@ -224,7 +224,7 @@ public:
     void check() const override {}
 
 private:
-    const Declaration declared_;
+    const DeclaredNode declared_;
     const bool guarded_;
     HostFields fields_;
 };

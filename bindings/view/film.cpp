@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <utility>
 
+#include "runtime/files/temporary_folder.h"
 #include "runtime/io/film.h"
 #include "runtime/io/frame_writer.h"
 
@@ -15,29 +15,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Of one film, until it has been read.
-class TemporaryFolder {
-public:
-    TemporaryFolder()
-    {
-        std::string name = (fs::temp_directory_path() / "rapid-film-XXXXXX").string();
-        if (!mkdtemp(name.data())) throw Error(fmt::format("no folder for the film can be made in {}", name));
-        path_ = name;
-    }
-    ~TemporaryFolder()
-    {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-    const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-};
 
 }  // namespace
 
@@ -94,7 +71,7 @@ void ViewFilm::run()
 
 std::string ViewFilm::draw()
 {
-    const TemporaryFolder folder;
+    const TemporaryFolder folder("film");  // until the film has been read
     const fs::path file = folder.path() / ("film" + wish_.extension);
     {
         FrameWriter writer({{file.string(), {}}}, 1);

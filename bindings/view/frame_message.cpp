@@ -61,10 +61,10 @@ private:
 
 // Whole numbers for values between low and high: from `first` to the largest of 16 bits. What is not a number, or
 // below, gets the least.
-struct Scale {
+struct WordScale {
     float low, factor, first = 0;
 
-    Scale(float from, float to, float least = 0)
+    WordScale(float from, float to, float least = 0)
         : low(from), factor(to > from ? (65535 - least) / (to - from) : 0), first(least)
     {
     }
@@ -137,7 +137,7 @@ void add_positions(Message& message, const PointSet& points)
         for (std::size_t j = 0; j < period; ++j) {
             const auto axis = static_cast<Eigen::Index>(j % 3);
             from[j] = low[axis];
-            factor[j] = Scale(low[axis], high[axis]).factor;
+            factor[j] = WordScale(low[axis], high[axis]).factor;
         }
         const auto quantise = [&](const float* source, std::size_t begin, std::size_t n) {
             for (std::size_t j = 0; j < n; ++j) {
@@ -182,7 +182,7 @@ void add_values(Message& message, const char* name, std::vector<float> values, b
     for (const float value : values) unknown += std::isnan(value);
     message.header()["unknown"][name] = unknown;
     // 0 is kept for those without a value, where there are some.
-    const Scale scale(low, high, unknown > 0 ? 1 : 0);
+    const WordScale scale(low, high, unknown > 0 ? 1 : 0);
     const std::size_t count = values.size();
     message.add<std::uint16_t>(name, "u16", count, [=, values = std::move(values)](std::span<std::uint16_t> to) {
         for (std::size_t k = 0; k < count; ++k) to[k] = scale(values[k]);

@@ -31,12 +31,12 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using Tcp = asio::ip::tcp;
 using Request = http::request<http::string_body>;
-using Response = http::response<http::string_body>;
+using HttpResponse = http::response<http::string_body>;
 
 // Bytes. A header has the cookies of all views that a browser has seen: it keeps 180 of a host, of 50 bytes each.
 constexpr std::size_t most_header = 32768, most_body = 1024, most_message = 1 << 20;
 // Answers that a page has not taken, and their bytes: it asks for few at a time.
-constexpr std::size_t most_waiting = 64, most_waiting_bytes = std::size_t{256} << 20;
+constexpr std::size_t most_answers = 64, most_answer_bytes = std::size_t{256} << 20;
 
 std::string random_token()
 {
@@ -175,9 +175,9 @@ private:
         return "";
     }
 
-    Response answer(const Request& request)
+    HttpResponse answer(const Request& request)
     {
-        Response response(http::status::ok, request.version());
+        HttpResponse response(http::status::ok, request.version());
         response.keep_alive(request.keep_alive());
         response.set(http::field::cache_control, "no-store");
         response.set("X-Content-Type-Options", "nosniff");
@@ -274,7 +274,7 @@ private:
     {
         if (is_closed_) return;
         bytes_ += message.size();
-        if (waiting_.size() >= most_waiting || (bytes_ > most_waiting_bytes && !waiting_.empty())) return close();
+        if (waiting_.size() >= most_answers || (bytes_ > most_answer_bytes && !waiting_.empty())) return close();
         waiting_.emplace_back(std::move(message), binary);
         if (waiting_.size() == 1) write();
     }
@@ -340,7 +340,7 @@ private:
     beast::tcp_stream stream_;
     beast::flat_buffer buffer_;
     std::optional<http::request_parser<http::string_body>> parser_;
-    Response response_;
+    HttpResponse response_;
 };
 
 void ViewServer::Impl::accept()

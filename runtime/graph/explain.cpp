@@ -42,7 +42,7 @@ bool needs(const Node& node, Stage stage)
     return std::find(node.type->stages.begin(), node.type->stages.end(), stage) != node.type->stages.end();
 }
 
-std::string list_of(const Plan& plan, const std::vector<std::size_t>& nodes)
+std::string list_of_nodes(const Plan& plan, const std::vector<std::size_t>& nodes)
 {
     std::vector<std::string> names;
     for (const std::size_t i : nodes) names.push_back(plan.nodes[i].node->name);
@@ -52,7 +52,7 @@ std::string list_of(const Plan& plan, const std::vector<std::size_t>& nodes)
 // "swirl reads it", "swirl, solve1 read it".
 std::string done_by(const Plan& plan, const std::vector<std::size_t>& nodes, std::string_view verb)
 {
-    return fmt::format("{} {}{} it", list_of(plan, nodes), verb, nodes.size() == 1 ? "s" : "");
+    return fmt::format("{} {}{} it", list_of_nodes(plan, nodes), verb, nodes.size() == 1 ? "s" : "");
 }
 
 std::string why_kept(const Plan& plan, const PlannedAttribute& attribute)

@@ -1,5 +1,5 @@
 // Names of attributes in files whose columns are scalars (.csv, .ply): a vec3 is NAMEx NAMEy NAMEz, a quaternion NAMEx
-// NAMEy NAMEz NAMEw.
+// NAMEy NAMEz NAMEw. A group is a column of its own, in files of arrays and channels group_NAME.
 #pragma once
 
 #include <span>
@@ -10,6 +10,9 @@
 #include "runtime/points/point_set.h"
 
 namespace rapid {
+
+inline constexpr std::string_view group_prefix = "group_";
+inline constexpr std::size_t most_numbers = 16;  // of a point in an array; arrays of more are no attributes
 
 // The number of components of the type: 1, 3 or 4.
 std::size_t component_count(AttributeType type);

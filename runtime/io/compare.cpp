@@ -31,7 +31,7 @@ double difference(double a, double b)
 using Numbers = Eigen::Array<double, 4, 1>;
 
 template <class T>
-Numbers numbers(const T& value)
+Numbers components(const T& value)
 {
     Numbers result = Numbers::Zero();
     if constexpr (std::is_same_v<T, Vec3f>)
@@ -60,7 +60,7 @@ ValueDifference difference(const A& a, const B& b)
             if (a == b) return {0, 0};
         return {1, 0};
     } else {
-        const Numbers x = numbers(a), y = numbers(b);
+        const Numbers x = components(a), y = components(b);
         Numbers d;
         for (int c = 0; c < 4; ++c) d[c] = difference(x[c], y[c]);
         const double scale = std::max(x.matrix().norm(), y.matrix().norm());

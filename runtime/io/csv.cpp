@@ -25,7 +25,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view group_prefix = "group:";
+constexpr std::string_view group_column = "group:";
 constexpr std::size_t number_chars = 24;  // the longest is an int64 of 20; a float of 9 digits has 15
 
 char* put(char* to, float value)
@@ -86,7 +86,7 @@ CsvTable csv_table(const PointSet& points)
     }
     for (const auto& [name, members] : points.groups()) {
         table.groups.push_back(&members);
-        names.push_back(std::string(group_prefix) + name);
+        names.push_back(std::string(group_column) + name);
     }
     check_column_names(names, ",\"\r\n");
     for (const std::string& name : names) table.header += (table.header.empty() ? "" : ",") + name;
@@ -353,9 +353,9 @@ PointSet read_csv(const std::filesystem::path& path)
             points.set(attribute.name, joined<Vec3f, float>(columns, which));
         } else if (which.size() == 4) {
             points.set(attribute.name, joined<Quatf, float>(columns, which));
-        } else if (attribute.name.starts_with(group_prefix)) {
+        } else if (attribute.name.starts_with(group_column)) {
             std::span<std::uint8_t> members =
-                points.group(std::string_view(attribute.name).substr(group_prefix.size())).overwrite();
+                points.group(std::string_view(attribute.name).substr(group_column.size())).overwrite();
             for (std::size_t i = 0; i < members.size(); ++i) members[i] = first.numbers[i] != 0;
         } else if (attribute.name == "id") {
             if (!first.is_whole) throw Error("the column id holds numbers that are not whole");

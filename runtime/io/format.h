@@ -39,7 +39,9 @@ const Format& format_of(const std::filesystem::path& path);
 struct FormatRegistration {
     explicit FormatRegistration(Format format);
 };
-#define RAPID_FORMAT(...) static const ::rapid::FormatRegistration format_registration(__VA_ARGS__)
+#define RAPID_FORMAT(...) RAPID_FORMAT_COUNTED(__COUNTER__, __VA_ARGS__)  // files may be compiled as one
+#define RAPID_FORMAT_COUNTED(count, ...) RAPID_FORMAT_NUMBER(count, __VA_ARGS__)
+#define RAPID_FORMAT_NUMBER(count, ...) static const ::rapid::FormatRegistration format_##count(__VA_ARGS__)
 
 // Format::write, of what the format holds.
 void write_as(const Format& format, OutputFile& file, const PointSet& points, const FrameInfo& frame);

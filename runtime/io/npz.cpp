@@ -26,8 +26,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view magic = "\x93NUMPY", suffix = ".npy", group_prefix = "group_";
-constexpr std::size_t most_numbers = 16;  // of a point in an array
+constexpr std::string_view npy_magic = "\x93NUMPY", suffix = ".npy";
 
 std::string_view numpy_type(AttributeType type)
 {
@@ -62,10 +61,10 @@ std::string npy_header(std::string_view type, std::size_t n, std::size_t count)
 {
     std::string dictionary = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({},{}), }}", type, n,
                                          count > 1 ? fmt::format(" {}", count) : "");
-    const std::size_t before = magic.size() + 2 + 2;
+    const std::size_t before = npy_magic.size() + 2 + 2;
     dictionary.resize((before + dictionary.size() + 1 + 63) / 64 * 64 - before - 1, ' ');
     dictionary += '\n';
-    std::string header = std::string(magic) + '\1' + '\0';
+    std::string header = std::string(npy_magic) + '\1' + '\0';
     header += static_cast<char>(dictionary.size() & 0xff);
     header += static_cast<char>(dictionary.size() >> 8);
     return header + dictionary;
@@ -264,7 +263,7 @@ struct Array {
 std::optional<Array> array_in(std::span<const unsigned char> bytes)
 {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (!text.starts_with(magic) || bytes.size() < 12) throw Error("not an array of NumPy");
+    if (!text.starts_with(npy_magic) || bytes.size() < 12) throw Error("not an array of NumPy");
     const std::size_t length_bytes = bytes[6] == 1 ? 2 : 4, begin = 8 + length_bytes;
     std::size_t length = 0;
     for (std::size_t b = length_bytes; b-- > 0;) length = length << 8 | bytes[8 + b];

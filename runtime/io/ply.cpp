@@ -22,7 +22,6 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view group_prefix = "group_";
 constexpr std::string_view white_space = " \t\r\n";
 
 // The names of an attribute's components in the file.

@@ -27,7 +27,7 @@ struct PointStreamRegistration {
     PointStreamRegistration(const char* extension, BeginStream begin);
 };
 #define RAPID_POINT_STREAM(extension, begin) \
-    static const ::rapid::PointStreamRegistration point_stream_registration(extension, begin)
+    static const ::rapid::PointStreamRegistration begin##_registration(extension, begin)
 
 // Adds points that have the columns of `to`; groups and details stay behind.
 void append_points(PointSet& to, const PointSet& from);

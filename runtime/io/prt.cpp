@@ -16,6 +16,7 @@
 #include <cstring>
 #include <memory>
 
+#include "runtime/files/deflate.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
@@ -27,9 +28,8 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view magic = "\xc0PRT\r\n\x1a\n";
+constexpr std::string_view prt_magic = "\xc0PRT\r\n\x1a\n";
 constexpr std::string_view signature = "Extensible Particle Format";
-constexpr std::string_view group_prefix = "group_";
 constexpr std::size_t header_bytes = 56, name_bytes = 32, channel_bytes = 44;
 
 // By number in the file.
@@ -39,26 +39,26 @@ constexpr ScalarType channel_types[] = {ScalarType::Int16,  ScalarType::Int32,  
 enum ChannelType : std::int32_t { Int32Channel = 1, Int64Channel = 2, FloatChannel = 4, UInt8Channel = 10 };
 
 // Krakatoa's names.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 9> known_names = {{{"P", "Position"},
-                                                                                       {"v", "Velocity"},
-                                                                                       {"id", "ID"},
-                                                                                       {"Cd", "Color"},
-                                                                                       {"N", "Normal"},
-                                                                                       {"age", "Age"},
-                                                                                       {"life", "LifeSpan"},
-                                                                                       {"pscale", "Radius"},
-                                                                                       {"orient", "Orientation"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 9> channel_names = {{{"P", "Position"},
+                                                                                         {"v", "Velocity"},
+                                                                                         {"id", "ID"},
+                                                                                         {"Cd", "Color"},
+                                                                                         {"N", "Normal"},
+                                                                                         {"age", "Age"},
+                                                                                         {"life", "LifeSpan"},
+                                                                                         {"pscale", "Radius"},
+                                                                                         {"orient", "Orientation"}}};
 
 std::string channel_name(const std::string& attribute)
 {
-    for (const auto& [ours, theirs] : known_names)
+    for (const auto& [ours, theirs] : channel_names)
         if (attribute == ours) return std::string(theirs);
     return attribute;
 }
 
-std::string attribute_name(const std::string& channel)
+std::string attribute_of_channel(const std::string& channel)
 {
-    for (const auto& [ours, theirs] : known_names)
+    for (const auto& [ours, theirs] : channel_names)
         if (channel == theirs) return std::string(ours);
     return channel;
 }
@@ -150,7 +150,7 @@ void write_prt(OutputFile& file, const PointSet& points, const FrameInfo&)
 {
     const Layout layout = layout_of(points);
     const std::size_t record_bytes = layout.records.record_bytes();
-    const std::string header = std::string(magic) + little_endian(header_bytes, 4) + padded(signature, 32) +
+    const std::string header = std::string(prt_magic) + little_endian(header_bytes, 4) + padded(signature, 32) +
                                little_endian(1, 4) + little_endian(points.size(), 8) + little_endian(4, 4) +
                                little_endian(layout.names.size(), 4) + little_endian(channel_bytes, 4) +
                                layout.channels + "\x78\x01";  // the beginning of the zlib stream (RFC 1950)
@@ -207,14 +207,13 @@ RecordAttribute attribute_of(const std::string& name, ScalarType type, std::size
     RecordAttribute attribute;
     attribute.type = type;
     attribute.group = type == ScalarType::UInt8 && count == 1 && name.starts_with(group_prefix);
-    attribute.name = attribute.group ? name.substr(group_prefix.size()) : attribute_name(name);
+    attribute.name = attribute.group ? name.substr(group_prefix.size()) : attribute_of_channel(name);
     for (std::size_t c = 0; c < count; ++c) attribute.offsets.push_back(offset + c * scalar_bytes(type));
     return attribute;
 }
 
 Channels read_channels(LittleEndianReader& reader)
 {
-    constexpr std::int32_t most_numbers = 16;  // more are no attribute of a point; they are left out
     Channels channels;
     std::vector<std::string> names;
     const auto count = reader.integer<std::int32_t>(), bytes = reader.integer<std::int32_t>();
@@ -234,8 +233,8 @@ Channels read_channels(LittleEndianReader& reader)
         const ScalarType scalar = channel_types[type];
         const std::size_t begin = static_cast<std::size_t>(offset), size = static_cast<std::size_t>(numbers);
         channels.stride = std::max(channels.stride, begin + size * scalar_bytes(scalar));
-        names.push_back(attribute_name(name));
-        if (numbers <= most_numbers)
+        names.push_back(attribute_of_channel(name));
+        if (size <= most_numbers)
             channels.attributes.push_back(attribute_of(name, scalar, size, begin));
         else
             LeftOut::add(fmt::format("the channel \"{}\" of {} numbers a point", name, numbers));
@@ -248,8 +247,8 @@ PointSet read_prt(const std::filesystem::path& path)
 {
     const InputFile file(path);
     LittleEndianReader reader(file.bytes());
-    if (!file.text().starts_with(magic)) throw Error("not a .prt file");
-    reader.take(magic.size());
+    if (!file.text().starts_with(prt_magic)) throw Error("not a .prt file");
+    reader.take(prt_magic.size());
     const auto header = reader.integer<std::int32_t>();
     if (header < static_cast<std::int32_t>(header_bytes))
         throw Error(fmt::format("its header has {} bytes; it must have at least {}", header, header_bytes));
@@ -266,10 +265,8 @@ PointSet read_prt(const std::filesystem::path& path)
         [](const RecordAttribute& a) { return a.name == "P" && a.offsets.size() == 3 && is_floating(a.type); });
     if (!placed) throw Error("there is no channel Position of three floats");
 
-    // Deflate makes at most 1,032 bytes of one.
-    constexpr std::size_t most_expansion = 1032;
     const std::size_t n = static_cast<std::size_t>(count);
-    const std::size_t held = reader.rest().size() * most_expansion / channels.stride;
+    const std::size_t held = reader.rest().size() * most_deflate_expansion / channels.stride;
     if (n > held)
         throw Error(fmt::format("the file ends early: its header promises {} points, it holds at most {}", n, held));
     const std::size_t bytes = n * channels.stride;

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::string_view magic = "\x89RAPID\r\n";
+constexpr std::string_view state_magic = "\x89RAPID\r\n";
 constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
 constexpr std::string_view types[] = {"float", "vec3", "int32", "int64", "quat", "string", "uint8"};  // KeptColumn's
 static_assert(std::size(types) == std::variant_size_v<KeptColumn>);
@@ -35,7 +35,7 @@ constexpr std::size_t sample_bytes = std::size_t{1} << 16;
 constexpr double worthwhile = 0.75;  // of the bytes, that are left of a sample
 constexpr int level = 1;
 constexpr const char* codec = "lz4";
-constexpr std::uint64_t most_expansion = 1024;  // more than any codec's
+constexpr std::uint64_t most_codec_expansion = 1024;  // more than any codec's
 
 // What is in a block before it is compressed.
 struct Raw {
@@ -90,14 +90,14 @@ void unpack(std::span<const unsigned char> piece, char* data, std::size_t bytes)
 }
 
 template <class T>
-constexpr std::size_t scalar_bytes = sizeof(T) % sizeof(float) == 0 && !std::is_integral_v<T> ? sizeof(float)
+constexpr std::size_t number_bytes = sizeof(T) % sizeof(float) == 0 && !std::is_integral_v<T> ? sizeof(float)
                                                                                               : sizeof(T);
 
 Raw raw_of(const KeptColumn& column)
 {
     return std::visit(
         []<class T>(const Column<T>& values) -> Raw {
-            return {reinterpret_cast<const char*>(values.read().data), values.bytes(), scalar_bytes<T>};
+            return {reinterpret_cast<const char*>(values.read().data), values.bytes(), number_bytes<T>};
         },
         column);
 }
@@ -181,7 +181,7 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
     };
     const std::string text = header.dump(1, ' ', false, ordered_json::error_handler_t::replace);
     const std::uint64_t length = text.size();
-    append(magic.data(), magic.size());
+    append(state_magic.data(), state_magic.size());
     append(&length, sizeof length);
     append(text.data(), text.size());
     for (const Piece& piece : pieces) append(piece.bytes.data(), piece.bytes.size());
@@ -194,19 +194,20 @@ bool StateFile::is_one(const std::filesystem::path& path)
     std::error_code none;
     if (!std::filesystem::is_regular_file(path, none)) return false;  // of a pipe reading would wait
     std::ifstream file(path, std::ios::binary);
-    std::array<char, magic.size()> head{};
-    return file.read(head.data(), head.size()) && std::string_view(head.data(), head.size()) == magic;
+    std::array<char, state_magic.size()> head{};
+    return file.read(head.data(), head.size()) && std::string_view(head.data(), head.size()) == state_magic;
 }
 
 StateFile::StateFile(const std::filesystem::path& path) : file_(path)
 {
     const std::span<const unsigned char> bytes = file_.bytes();
-    constexpr std::size_t ends = magic.size() + 2 * sizeof(std::uint64_t);
-    if (bytes.size() < ends || file_.text().substr(0, magic.size()) != magic) damaged("it does not begin as one");
+    constexpr std::size_t ends = state_magic.size() + 2 * sizeof(std::uint64_t);
+    if (bytes.size() < ends || file_.text().substr(0, state_magic.size()) != state_magic)
+        damaged("it does not begin as one");
     const std::size_t body = bytes.size() - sizeof(std::uint64_t);
     if (XXH3_64bits(bytes.data(), body) != number_at(bytes.data() + body)) damaged("its checksum is wrong");
-    const std::uint64_t length = number_at(bytes.data() + magic.size());
-    const std::size_t begin = magic.size() + sizeof length;
+    const std::uint64_t length = number_at(bytes.data() + state_magic.size());
+    const std::size_t begin = state_magic.size() + sizeof length;
     if (length > body - begin) damaged("its header is longer than the file");
     blocks_at_ = begin + static_cast<std::size_t>(length);
     try {
@@ -236,7 +237,7 @@ SavedState StateFile::state() const
     };
     std::vector<Place> places;
     // No more memory is taken than a file of this size can fill.
-    std::uint64_t left = (end - at) * most_expansion;
+    std::uint64_t left = (end - at) * most_codec_expansion;
     const auto add = [&](const ordered_json& block, std::size_t bytes_a_value, const auto& allocate) {
         const std::uint64_t values = block.at("values").get<std::uint64_t>();
         if (values > left / bytes_a_value) damaged("a block does not fit its header");

@@ -24,18 +24,18 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view group_prefix = "group_", primvar = "primvars:";
+constexpr std::string_view primvar = "primvars:";
 
 struct UsdName {
     std::string_view ours, theirs, type;
 };
-constexpr UsdName known_names[] = {{"P", "points", "point3f"},
-                                   {"v", "velocities", "vector3f"},
-                                   {"id", "ids", "int64"},
-                                   {"pscale", "widths", "float"},
-                                   {"N", "normals", "normal3f"},
-                                   {"Cd", "primvars:displayColor", "color3f"},
-                                   {"Alpha", "primvars:displayOpacity", "float"}};
+constexpr UsdName usd_names[] = {{"P", "points", "point3f"},
+                                 {"v", "velocities", "vector3f"},
+                                 {"id", "ids", "int64"},
+                                 {"pscale", "widths", "float"},
+                                 {"N", "normals", "normal3f"},
+                                 {"Cd", "primvars:displayColor", "color3f"},
+                                 {"Alpha", "primvars:displayOpacity", "float"}};
 
 std::string_view usd_type(AttributeType type)
 {
@@ -48,7 +48,7 @@ std::string_view usd_type(AttributeType type)
 UsdName usd_name(const std::string& name, AttributeType type, std::string& storage)
 {
     const bool vec3 = type == AttributeType::Vec3;
-    for (const UsdName& known : known_names) {
+    for (const UsdName& known : usd_names) {
         if (known.ours != name) continue;
         if (known.type == usd_type(type) || (vec3 && known.type.ends_with("3f"))) return known;
     }
@@ -223,9 +223,9 @@ void write_usda(OutputFile& file, const PointSet& points, const FrameInfo& frame
     UsdaWriter(file, points, frame).write();
 }
 
-std::string attribute_name(std::string_view name)
+std::string attribute_of_property(std::string_view name)
 {
-    for (const UsdName& known : known_names)
+    for (const UsdName& known : usd_names)
         if (name == known.theirs) return std::string(known.ours);
     return std::string(name.starts_with(primvar) ? name.substr(primvar.size()) : name);
 }
@@ -258,12 +258,12 @@ PointSet read_usda(const std::filesystem::path& path)
             continue;
         }
         if (array.texts) {
-            points.set(attribute_name(array.name), texts_of(array, points.size()));
+            points.set(attribute_of_property(array.name), texts_of(array, points.size()));
             names.push_back(array.name);
             continue;
         }
         RecordAttribute attribute;
-        attribute.name = attribute_name(array.name);
+        attribute.name = attribute_of_property(array.name);
         attribute.type = array.type;
         attribute.group =
             array.type == ScalarType::UInt8 && array.tuple == 1 && attribute.name.starts_with(group_prefix);

@@ -275,7 +275,7 @@ PointSet read_vdb(const std::filesystem::path& path)
     return points;
 }
 
-const bool defined = vdb_reader.define(read_vdb);
+RAPID_DEFINE(vdb_reader, read_vdb);
 
 }  // namespace
 }  // namespace rapid

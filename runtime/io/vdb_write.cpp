@@ -529,7 +529,7 @@ void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame)
     }
 }
 
-const bool defined = vdb_writer.define(write_vdb);
+RAPID_DEFINE(vdb_writer, write_vdb);
 
 }  // namespace
 }  // namespace rapid

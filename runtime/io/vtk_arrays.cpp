@@ -12,15 +12,15 @@
 
 #include "runtime/error.h"
 #include "runtime/files/base64.h"
+#include "runtime/files/deflate.h"
+#include "runtime/io/attribute_names.h"
 #include "runtime/io/text_table.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_numbers = 16;      // of a row of an attribute
-constexpr std::size_t most_expansion = 1032;  // bytes that deflate makes of one, at most
-constexpr std::string_view white_space = " \t\r\n";
+constexpr std::string_view xml_space = " \t\r\n";
 
 std::optional<ScalarType> scalar_type(std::string_view name)
 {
@@ -37,7 +37,7 @@ Error ends_early() { return Error("the array ends early"); }
 
 std::string_view without_space(std::string_view text)
 {
-    text.remove_prefix(std::min(text.find_first_not_of(white_space), text.size()));
+    text.remove_prefix(std::min(text.find_first_not_of(xml_space), text.size()));
     return text;
 }
 
@@ -53,7 +53,7 @@ std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type
             Number number = 0;
             const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
             text.remove_prefix(static_cast<std::size_t>(parsed.ptr - text.data()));
-            if (parsed.ec != std::errc() || (!text.empty() && white_space.find(text[0]) == std::string_view::npos))
+            if (parsed.ec != std::errc() || (!text.empty() && xml_space.find(text[0]) == std::string_view::npos))
                 throw Error(fmt::format("the array has no number of its type where it should have its {}", i));
             std::memcpy(bytes.data() + i * sizeof number, &number, sizeof number);
         }
@@ -148,7 +148,7 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
         packed += bytes;
         if (packed > text.size()) throw ends_early();
     }
-    if (wanted / most_expansion > packed) throw ends_early();
+    if (wanted / most_deflate_expansion > packed) throw ends_early();
     const std::vector<unsigned char> data = bytes_at(packed, length);
     if (const auto all = static_cast<double>(wanted); !fits_in_memory(all))
         throw beyond_memory("an array, decompressed,", all, "write fewer points to the file");
@@ -182,7 +182,7 @@ std::size_t VtkFile::bytes_of(std::string_view text, bool base64) const
     if (!compressed_) return header_number(header(1), 0);
     const std::vector<unsigned char> sizes = header(3);
     const std::size_t blocks = header_number(sizes, 0), block = header_number(sizes, 1), last = header_number(sizes, 2);
-    if (blocks > text.size() / number || block > text.size() * most_expansion) throw ends_early();
+    if (blocks > text.size() / number || block > text.size() * most_deflate_expansion) throw ends_early();
     return blocks == 0 ? 0 : (blocks - 1) * block + (last > 0 ? last : block);
 }
 
@@ -206,8 +206,8 @@ std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
             // The bytes as numbers.
             std::size_t count = 0;
             for (std::size_t i = 0; i < text.size(); ++i)
-                count += white_space.find(text[i]) == std::string_view::npos &&
-                         (i == 0 || white_space.find(text[i - 1]) != std::string_view::npos);
+                count += xml_space.find(text[i]) == std::string_view::npos &&
+                         (i == 0 || xml_space.find(text[i - 1]) != std::string_view::npos);
             bytes = parsed_numbers(text, ScalarType::UInt8, count);
         } else {
             const auto [data, base64] = data_of(node, text);

@@ -23,8 +23,6 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view group_prefix = "group_";
-
 std::string_view vtk_type(AttributeType type)
 {
     if (type == AttributeType::String) return "String";

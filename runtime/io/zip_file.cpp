@@ -10,12 +10,12 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/files/deflate.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_expansion = 1032;  // bytes that deflate makes of one, at most
 constexpr std::size_t longest_name = 0xffff;
 
 // Minizip moves to a place relative to one of these.
@@ -175,7 +175,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
             throw Error(fmt::format("\"{}\" is compressed by method {}; it must be stored or deflated", text,
                                     info.compression_method));
         held += std::min<std::uint64_t>(info.compressed_size, bytes.size() + 1);
-        const std::uint64_t expansion = info.compression_method == 0 ? 1 : most_expansion;
+        const std::uint64_t expansion = info.compression_method == 0 ? 1 : most_deflate_expansion;
         if (held > bytes.size() || info.uncompressed_size > info.compressed_size * expansion)
             throw Error(fmt::format("\"{}\" holds less than its directory promises; the file is damaged", text));
         members_.push_back({text, place.pos_in_zip_directory, place.num_of_file, info.uncompressed_size});

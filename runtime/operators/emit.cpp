@@ -48,9 +48,6 @@ constexpr std::size_t batch_size = 256;     // births at a time, in the first-le
 constexpr double most_births = 2147483647;  // in a frame
 constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness is examined
 
-// Of a point with the attributes that most have, in the state and in what is made of it within a frame.
-constexpr double bytes_a_birth = 2 * 64;
-
 struct Emit {
     EmitSource source;
     std::string from, density, joins;

@@ -11,11 +11,10 @@
 #include "runtime/points/members.h"
 #include "runtime/points/neighbours.h"
 #include "runtime/random.h"
+#include "runtime/solver/unit_mass.h"
 
 namespace rapid {
 namespace {
-
-const float unit_mass = 1;
 
 // Looks of one point at another in a frame, 20 ns each: five hours of one processor.
 constexpr double most_looks = 1e12;

@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include "runtime/points/members.h"
+#include "runtime/solver/unit_mass.h"
 
 namespace rapid {
 namespace {
-
-const float unit_mass = 1;
 
 // Adds each dynamic to the scene.
 class SceneBuilder {

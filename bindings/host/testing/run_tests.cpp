@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "bindings/host/lua_text.h"
 #include "bindings/host/modules.h"
 #include "bindings/host/session.h"
 #include "bindings/host/testing/test_points.h"
@@ -25,13 +26,6 @@ struct Host {
 };
 
 Host& host_of(lua_State* L) { return *static_cast<Host*>(lua_touserdata(L, lua_upvalueindex(1))); }
-
-std::string text_at(lua_State* L, int index)
-{
-    std::size_t size = 0;
-    const char* text = luaL_checklstring(L, index, &size);
-    return {text, size};
-}
 
 std::optional<double> number_field(lua_State* L, int table, const char* name)
 {
@@ -65,7 +59,7 @@ SceneRun read_run(lua_State* L)
 {
     const Host& host = host_of(L);
     SceneRun run;
-    run.graph = text_at(L, 1);
+    run.graph = checked_text_at(L, 1);
     run.first = static_cast<std::int64_t>(number_field(L, 2, "first").value_or(0));
     run.last = static_cast<std::int64_t>(number_field(L, 2, "last").value_or(0));
     if (const auto seed = number_field(L, 2, "seed")) run.seed = static_cast<std::uint64_t>(*seed);
@@ -76,7 +70,8 @@ SceneRun read_run(lua_State* L)
     run.check_declarations = flag_field(L, 2, "check_declarations");
     run.watch_traces = flag_field(L, 2, "watch_traces");
     lua_getfield(L, 2, "set");
-    for (lua_pushnil(L); lua_next(L, -2); lua_pop(L, 1)) run.session.set[text_at(L, -2)] = text_at(L, -1);
+    for (lua_pushnil(L); lua_next(L, -2); lua_pop(L, 1))
+        run.session.set[checked_text_at(L, -2)] = checked_text_at(L, -1);
     lua_pop(L, 1);
     return run;
 }
@@ -166,7 +161,7 @@ int run(lua_State* L)
 int tell(lua_State* L)
 {
     constexpr const char* kinds[] = {"started", "passed", "failed", "skipped", "broken", nullptr};
-    host_of(L).tell({static_cast<TestEvent::Kind>(luaL_checkoption(L, 1, nullptr, kinds)), text_at(L, 2),
+    host_of(L).tell({static_cast<TestEvent::Kind>(luaL_checkoption(L, 1, nullptr, kinds)), checked_text_at(L, 2),
                      luaL_optstring(L, 3, "")});
     return 0;
 }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "bindings/host/lua_text.h"
 #include "bindings/host/testing/point_checks.h"
 #include "runtime/error.h"
 
@@ -20,13 +21,6 @@ constexpr const char* metatable = "rapid.points";
 TestedPoints& points_at(lua_State* L, int index)
 {
     return **static_cast<TestedPoints**>(luaL_checkudata(L, index, metatable));
-}
-
-std::string text_at(lua_State* L, int index)
-{
-    std::size_t size = 0;
-    const char* text = luaL_checklstring(L, index, &size);
-    return {text, size};
 }
 
 // Turns an Error into a Lua error with exactly its text.
@@ -66,7 +60,7 @@ int source(lua_State* L)
     return 1;
 }
 
-int push_names(lua_State* L, const std::vector<std::string>& names)
+int push_list_of_names(lua_State* L, const std::vector<std::string>& names)
 {
     lua_newtable(L);
     int i = 0;
@@ -77,16 +71,16 @@ int push_names(lua_State* L, const std::vector<std::string>& names)
     return 1;
 }
 
-int names(lua_State* L) { return push_names(L, points_at(L, 1).set.column_names()); }
+int names(lua_State* L) { return push_list_of_names(L, points_at(L, 1).set.column_names()); }
 
-int group_names(lua_State* L) { return push_names(L, points_at(L, 1).set.group_names()); }
+int group_names(lua_State* L) { return push_list_of_names(L, points_at(L, 1).set.group_names()); }
 
 // value(points, place from 1, name): the numbers of the value, or its text.
 int value(lua_State* L)
 {
     const TestedPoints& points = points_at(L, 1);
     const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
-    const AnyColumn& any = column_of(points, text_at(L, 3));
+    const AnyColumn& any = column_of(points, checked_text_at(L, 3));
     if (const auto* texts = std::get_if<Column<Token>>(&any)) {
         const std::string_view text = (*texts)[place].text();
         return lua_pushlstring(L, text.data(), text.size()), 1;
@@ -105,7 +99,7 @@ const Column<std::uint8_t>& group_of(const TestedPoints& points, const std::stri
 int within(lua_State* L)
 {
     const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
-    lua_pushboolean(L, group_of(points_at(L, 1), text_at(L, 3))[place] != 0);
+    lua_pushboolean(L, group_of(points_at(L, 1), checked_text_at(L, 3))[place] != 0);
     return 1;
 }
 
@@ -124,7 +118,7 @@ int place_of(lua_State* L)
 int group(lua_State* L)
 {
     const TestedPoints& points = points_at(L, 1);
-    const std::string name = text_at(L, 2);
+    const std::string name = checked_text_at(L, 2);
     const Column<std::uint8_t>& members = group_of(points, name);
     std::vector<std::uint8_t> mask(points.set.size());
     for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = members[i];
@@ -144,7 +138,7 @@ double folded(const std::string& what, double so_far, double x)
 // reduce(points, name, "min" | "max" | "mean"), for each number of the values. Without points: inf, -inf and NaN.
 int reduce(lua_State* L)
 {
-    const std::string what = text_at(L, 3), name = text_at(L, 2);
+    const std::string what = checked_text_at(L, 3), name = checked_text_at(L, 2);
     if (type_of(column_of(points_at(L, 1), name)) == AttributeType::String)
         throw Error(fmt::format("the attribute \"{}\" is a string, which has no {}", name, what));
     const double start = what == "min"   ? std::numeric_limits<double>::infinity()

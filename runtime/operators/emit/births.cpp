@@ -9,11 +9,6 @@
 namespace rapid {
 namespace {
 
-// Births: a number due that is this near to a whole one counts as that. 0.29 births a second for 100 s are
-// 28.999999999999996 in doubles, and 29 to the user. Rounding stays below 1e-11 after 100,000 changes of the rate, and
-// a birth is shifted by at most this fraction of the interval between two.
-constexpr double whole_tolerance = 1e-9;
-
 double snapped(double births)
 {
     const double whole = std::round(births);

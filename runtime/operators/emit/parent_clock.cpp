@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/operators/emit/births.h"
 #include "runtime/operators/emit/draws.h"
 #include "runtime/points/id_index.h"
 
 namespace rapid {
 namespace {
 
-constexpr double whole_tolerance = 1e-9;       // of a birth, as in births.cpp
 constexpr double most_of_parent = 4294967295;  // births: their numbers are half of a counter
 
 double whole_births(double due) { return std::floor(due + whole_tolerance); }

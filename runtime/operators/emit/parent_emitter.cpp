@@ -5,14 +5,12 @@
 #include <algorithm>
 
 #include "runtime/memory_budget.h"
+#include "runtime/operators/emit/births.h"
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/id_index.h"
 
 namespace rapid {
 namespace {
-
-// Of a newborn point with the attributes that most have, as in emit.cpp.
-constexpr double bytes_a_birth = 2 * 64;
 
 void require_room(const PointSet& points, const std::vector<Brood>& broods)
 {

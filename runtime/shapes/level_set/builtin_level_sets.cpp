@@ -156,7 +156,9 @@ LevelSetPtr torus(double radius, double tube, const Vec3d& center, const LevelSe
         options);
 }
 
-const bool defined = level_set_sphere.define(sphere) && level_set_box.define(box) && level_set_torus.define(torus);
+RAPID_DEFINE(level_set_sphere, sphere);
+RAPID_DEFINE(level_set_box, box);
+RAPID_DEFINE(level_set_torus, torus);
 
 }  // namespace
 }  // namespace rapid

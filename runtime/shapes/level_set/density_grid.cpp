@@ -101,7 +101,7 @@ bool is_fog(const openvdb::GridBase& grid)
     return grid.isType<FloatGrid>() && grid.getGridClass() != openvdb::GRID_LEVEL_SET;
 }
 
-openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
+openvdb::GridBase::Ptr choose_fog(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
 {
     if (!name.empty()) return grid_of_name(path, name, grids);
     openvdb::GridPtrVec fogs;
@@ -113,14 +113,14 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
     throw Error(fmt::format("there are {} fogs in \"{}\": {}; name one by grid", fogs.size(), path, grids_of(fogs)));
 }
 
-FloatGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::string& name)
+FloatGrid::Ptr read_fog(const std::filesystem::path& file_path, const std::string& name)
 {
     initialize_openvdb();
     const std::string path = file_path.string();
     try {
         openvdb::io::File file(path);
         file.open(/*delayLoad=*/false);
-        const auto chosen = choose(path, name, *file.readAllGridMetadata());
+        const auto chosen = choose_fog(path, name, *file.readAllGridMetadata());
         if (!is_fog(*chosen))
             throw Error(fmt::format(
                 "grid \"{}\" of \"{}\" is {}{}; it must be a fog of floats: rapid.levelset.read takes "
@@ -133,14 +133,14 @@ FloatGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::stri
     }
 }
 
-const ApartReader<FloatGrid::Ptr> reader("fog", read_grid, send_grid<FloatGrid>, receive_grid<FloatGrid>);
+const ApartReader<FloatGrid::Ptr> fog_reader("fog", read_fog, send_grid<FloatGrid>, receive_grid<FloatGrid>);
 
-DensityGridPtr read(const std::filesystem::path& path, const std::string& name)
+DensityGridPtr fog_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(reader, path, name);
+    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(fog_reader, path, name);
     try {
         return std::make_shared<OpenDensityGrid>(grid);
     } catch (const Error& error) {
@@ -148,7 +148,7 @@ DensityGridPtr read(const std::filesystem::path& path, const std::string& name)
     }
 }
 
-const bool defined = read_density_grid.define(read);
+RAPID_DEFINE(read_density_grid, fog_of_file);
 
 }  // namespace
 }  // namespace rapid

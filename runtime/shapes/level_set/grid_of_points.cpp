@@ -218,7 +218,8 @@ VectorGridPtr vectors(const SpreadPoints& points)
         }));
 }
 
-const bool defined = density_of_points.define(density) && vectors_of_points.define(vectors);
+RAPID_DEFINE(density_of_points, density);
+RAPID_DEFINE(vectors_of_points, vectors);
 
 }  // namespace
 }  // namespace rapid

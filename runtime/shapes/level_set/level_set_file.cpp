@@ -20,7 +20,8 @@ bool is_level_set(const openvdb::GridBase& grid)
     return grid.isType<FloatGrid>() && grid.getGridClass() == openvdb::GRID_LEVEL_SET;
 }
 
-openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
+openvdb::GridBase::Ptr choose_level_set(const std::string& path, const std::string& name,
+                                        const openvdb::GridPtrVec& grids)
 {
     if (!name.empty()) return grid_of_name(path, name, grids);
     openvdb::GridPtrVec level_sets;
@@ -35,7 +36,7 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
 
 // The metadata of all grids, and the values of the chosen one alone. All that may take as much memory as the file says
 // is done here, in the process that may.
-FloatGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::string& name)
+FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const std::string& name)
 {
     initialize_openvdb();
     const std::string path = file_path.string();
@@ -43,7 +44,7 @@ FloatGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::stri
         openvdb::io::File file(path);
         file.open(/*delayLoad=*/false);
         const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
-        const auto chosen = choose(path, name, *grids);
+        const auto chosen = choose_level_set(path, name, *grids);
         if (!is_level_set(*chosen))
             throw Error(fmt::format("grid \"{}\" of \"{}\" is {} of class \"{}\"; it must be a float level set",
                                     chosen->getName(), path, chosen->valueType(),
@@ -62,14 +63,15 @@ FloatGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::stri
     }
 }
 
-const ApartReader<FloatGrid::Ptr> reader("level set", read_grid, send_grid<FloatGrid>, receive_grid<FloatGrid>);
+const ApartReader<FloatGrid::Ptr> level_set_reader("level set", read_level_set_grid, send_grid<FloatGrid>,
+                                                   receive_grid<FloatGrid>);
 
-LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
+LevelSetPtr level_set_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(reader, path, name);
+    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(level_set_reader, path, name);
     if (grid->activeVoxelCount() == 0)
         throw Error(
             fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));
@@ -82,7 +84,7 @@ LevelSetPtr read(const std::filesystem::path& path, const std::string& name)
     return level_set;
 }
 
-const bool defined = read_level_set.define(read);
+RAPID_DEFINE(read_level_set, level_set_of_file);
 
 }  // namespace
 

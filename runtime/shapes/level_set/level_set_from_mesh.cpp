@@ -121,7 +121,8 @@ LevelSetPtr from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::
     return level_set;
 }
 
-const bool defined = level_set_from_mesh.define(from_mesh) && level_set_of_same_faces.define(of_same_faces);
+RAPID_DEFINE(level_set_from_mesh, from_mesh);
+RAPID_DEFINE(level_set_of_same_faces, of_same_faces);
 
 }  // namespace
 }  // namespace rapid

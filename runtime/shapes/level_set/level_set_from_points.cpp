@@ -1,6 +1,7 @@
 // Level sets around points: the union of their balls, exact outside of them.
 #include <fmt/format.h>
 #include <openvdb/tools/ParticlesToLevelSet.h>
+#include <openvdb/tools/Prune.h>
 
 #include <numbers>
 
@@ -66,13 +67,14 @@ LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius,
         grid->setName("surface");
         openvdb::tools::ParticlesToLevelSet<FloatGrid> rasterizer(*grid);
         rasterizer.rasterizeSpheres(*balls);
-        rasterizer.finalize(/*prune=*/true);
+        // All that its finalize() does without attributes; that of others would be compiled with it, for a third more.
+        openvdb::tools::pruneLevelSet(grid->tree());
         return grid;
     };
     return std::make_shared<GridLevelSet>(build(options.half_width * voxel), build);
 }
 
-const bool defined = level_set_from_points.define(from_points);
+RAPID_DEFINE(level_set_from_points, from_points);
 
 }  // namespace
 }  // namespace rapid

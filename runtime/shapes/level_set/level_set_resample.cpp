@@ -81,7 +81,7 @@ LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
     return std::make_shared<GridLevelSet>(build(half_width * voxel), build);
 }
 
-const bool defined = resample_level_set.define(resampled);
+RAPID_DEFINE(resample_level_set, resampled);
 
 }  // namespace
 }  // namespace rapid

@@ -174,8 +174,10 @@ LevelSetPtr moved(const LevelSetPtr& shape, const Pose& pose)
     return finished(build(pose.scale * grid->band()), build, "the moved level set");
 }
 
-const bool defined = combine_level_sets.define(combined) && offset_level_set.define(offset) &&
-                     smooth_level_set.define(smoothed) && move_level_set.define(moved);
+RAPID_DEFINE(combine_level_sets, combined);
+RAPID_DEFINE(offset_level_set, offset);
+RAPID_DEFINE(smooth_level_set, smoothed);
+RAPID_DEFINE(move_level_set, moved);
 
 }  // namespace
 }  // namespace rapid

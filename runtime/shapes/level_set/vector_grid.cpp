@@ -14,7 +14,8 @@ namespace {
 
 using openvdb::Vec3SGrid;
 
-openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids)
+openvdb::GridBase::Ptr choose_vectors(const std::string& path, const std::string& name,
+                                      const openvdb::GridPtrVec& grids)
 {
     if (!name.empty()) return grid_of_name(path, name, grids);
     openvdb::GridPtrVec vectors;
@@ -28,14 +29,14 @@ openvdb::GridBase::Ptr choose(const std::string& path, const std::string& name, 
                             grids_of(vectors)));
 }
 
-Vec3SGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::string& name)
+Vec3SGrid::Ptr read_vectors(const std::filesystem::path& file_path, const std::string& name)
 {
     initialize_openvdb();
     const std::string path = file_path.string();
     try {
         openvdb::io::File file(path);
         file.open(/*delayLoad=*/false);
-        const auto chosen = choose(path, name, *file.readAllGridMetadata());
+        const auto chosen = choose_vectors(path, name, *file.readAllGridMetadata());
         if (!chosen->isType<Vec3SGrid>())
             throw Error(
                 fmt::format("grid \"{}\" of \"{}\" is {}; it must be of vectors (vec3s): three grids of floats are "
@@ -47,14 +48,15 @@ Vec3SGrid::Ptr read_grid(const std::filesystem::path& file_path, const std::stri
     }
 }
 
-const ApartReader<Vec3SGrid::Ptr> reader("vector grid", read_grid, send_grid<Vec3SGrid>, receive_grid<Vec3SGrid>);
+const ApartReader<Vec3SGrid::Ptr> vectors_reader("vector grid", read_vectors, send_grid<Vec3SGrid>,
+                                                 receive_grid<Vec3SGrid>);
 
-VectorGridPtr read(const std::filesystem::path& path, const std::string& name)
+VectorGridPtr vectors_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    return std::make_shared<OpenVectorGrid>(read_grid_apart<Vec3SGrid>(reader, path, name));
+    return std::make_shared<OpenVectorGrid>(read_grid_apart<Vec3SGrid>(vectors_reader, path, name));
 }
 
 VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes, std::span<const Vec3f> values)
@@ -73,7 +75,8 @@ VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nod
     return std::make_shared<OpenVectorGrid>(grid);
 }
 
-const bool defined = read_vector_grid.define(read) && make_vector_grid.define(make);
+RAPID_DEFINE(read_vector_grid, vectors_of_file);
+RAPID_DEFINE(make_vector_grid, make);
 
 }  // namespace
 }  // namespace rapid

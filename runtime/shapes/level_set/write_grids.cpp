@@ -29,7 +29,7 @@ void write(const std::filesystem::path& path, const std::map<std::string, Object
     write_archive(path, written);
 }
 
-const bool defined = write_grids.define(write);
+RAPID_DEFINE(write_grids, write);
 
 }  // namespace
 }  // namespace rapid

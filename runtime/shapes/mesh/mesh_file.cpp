@@ -210,7 +210,7 @@ MeshFile import(const std::filesystem::path& path)
     return corners;
 }
 
-const bool defined = import_mesh.define(import);
+RAPID_DEFINE(import_mesh, import);
 
 }  // namespace
 }  // namespace rapid

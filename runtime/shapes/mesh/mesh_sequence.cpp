@@ -11,10 +11,10 @@ namespace rapid {
 namespace {
 
 // The spline of a frame and the jumps around it need six; two more carry over to the next frame.
-constexpr std::size_t most_kept = 8;
+constexpr std::size_t most_kept_meshes = 8;
 
 // Corners of one vertex may differ by this part of the mesh's size, by the rounding of an exporter.
-constexpr double same_place = 1e-6;
+constexpr double same_corner = 1e-6;
 
 }  // namespace
 
@@ -50,7 +50,7 @@ MeshPtr MeshSequence::at(std::int64_t frame) const
         mesh = read(held);
     }
     kept_.emplace_front(held, mesh);
-    if (kept_.size() > most_kept) kept_.pop_back();
+    if (kept_.size() > most_kept_meshes) kept_.pop_back();
     return mesh;
 }
 
@@ -75,7 +75,7 @@ MeshPtr MeshSequence::read(int frame) const
                         "other vertices; a sequence deforms one mesh, whose faces stay the same",
                         name_, frame, first(), faces_, other.first - mesh->triangles.begin()));
 
-    const double near = same_place * mesh->bounds().sizes().maxCoeff();
+    const double near = same_corner * mesh->bounds().sizes().maxCoeff();
     for (std::size_t corner = 0; corner < corners_; ++corner) {
         const double apart = (file.positions[corner] - mesh->positions[vertex_of_[corner]]).norm();
         if (!(apart <= near))

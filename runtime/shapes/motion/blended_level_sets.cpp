@@ -233,7 +233,7 @@ std::shared_ptr<const BlendedLevelSets> blended(BlendedInterval interval)
     return std::make_shared<Blended>(std::move(interval));
 }
 
-const bool defined = blended_level_sets.define(blended);
+RAPID_DEFINE(blended_level_sets, blended);
 
 }  // namespace
 }  // namespace rapid

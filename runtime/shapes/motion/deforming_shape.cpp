@@ -404,8 +404,9 @@ ShapePtr between(const LevelSetPtr& begin, const LevelSetPtr& end, const std::sh
                                                               MovingTriangles(tree, std::move(curves)), duration));
 }
 
-const bool defined =
-    triangle_tree.define(tree_of) && deforming_shape.define(between) && deforming_surface.define(surface);
+RAPID_DEFINE(triangle_tree, tree_of);
+RAPID_DEFINE(deforming_shape, between);
+RAPID_DEFINE(deforming_surface, surface);
 
 }  // namespace
 }  // namespace rapid

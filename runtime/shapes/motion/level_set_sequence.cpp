@@ -11,7 +11,7 @@ namespace rapid {
 namespace {
 
 // Two files as read, and both widened twice: as it is first asked, and for the radius of points.
-constexpr std::size_t most_kept = 8;
+constexpr std::size_t most_kept_level_sets = 8;
 constexpr double most_voxels = 0x1p27;  // of a widened level set
 
 // How far the vertices of a surface are from the other level set, as far as its band tells.
@@ -56,7 +56,7 @@ LevelSetPtr LevelSetSequence::widened(int file, double band) const
     }
     const std::lock_guard lock(mutex_);
     kept_.push_front({file, band, found});
-    if (kept_.size() > most_kept) kept_.pop_back();
+    if (kept_.size() > most_kept_level_sets) kept_.pop_back();
     return found;
 }
 

@@ -18,7 +18,10 @@ std::int32_t key_of(std::string_view node)
     return static_cast<std::int32_t>(hash >> 1 | 1);
 }
 
-bool is_zero(const PerPoint<float>& parameter) { return parameter.attribute.empty() && parameter.constant == 0; }
+bool is_zero_for_all(const PerPoint<float>& parameter)
+{
+    return parameter.attribute.empty() && parameter.constant == 0;
+}
 
 Strided<float> adhesion_of(const Collider& collider, const PointSet& points)
 {
@@ -46,8 +49,8 @@ Obstacle::Obstacle(const Collider& collider, const PointSet& points, Strided<flo
       viscosity(collider.viscosity.read(points)),
       key(key_of(collider.node)),
       members(members_of(points, collider.group)),
-      adheres_(collider.adhesion && !is_zero(*collider.adhesion)),
-      flows_(!is_zero(collider.viscosity))
+      adheres_(collider.adhesion && !is_zero_for_all(*collider.adhesion)),
+      flows_(!is_zero_for_all(collider.viscosity))
 {
 }
 

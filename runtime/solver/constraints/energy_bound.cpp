@@ -11,7 +11,7 @@ namespace rapid {
 namespace {
 
 // Differences of energies are rounding below this part of them.
-constexpr double rounding = 1e-12;
+constexpr double energy_rounding = 1e-12;
 
 // Rods and springs that leave a gain above this part of the energy available have found no solution.
 constexpr double largest_gain = 0.5;
@@ -127,7 +127,7 @@ ContactEnergy EnergyBound::change(const Substep& step) const
         size += inertia * (step.spins[i].s.squaredNorm() + s_[i].squaredNorm());
     }
     ContactEnergy energy;
-    if (std::abs(sum) > rounding * size) energy.take(sum);
+    if (std::abs(sum) > energy_rounding * size) energy.take(sum);
     return energy;
 }
 
@@ -203,14 +203,14 @@ ContactEnergy EnergyBound::limit(Substep& step, EnergyIslands& islands, const Ri
         const double credit = std::max(island.credit, 0.0);
         island.change -= credit;
         if (driven) seen.change -= credit + seen.given;
-        if (const double gain = seen.change_at(1); gain > rounding * seen.size)
+        if (const double gain = seen.change_at(1); gain > energy_rounding * seen.size)
             island.part = largest_part(seen.slope, seen.curvature, seen.change);
         limits |= island.part < 1;
-        island.stalled = fallback && seen.change_at(1) > rounding * seen.size &&
+        island.stalled = fallback && seen.change_at(1) > energy_rounding * seen.size &&
                          !(seen.change_at(island.part) <= largest_gain * seen.available);
         stalls |= island.stalled;
         const double limited = island.change_at(island.part);
-        if (island.stalled || !(std::abs(limited) > rounding * island.size)) continue;
+        if (island.stalled || !(std::abs(limited) > energy_rounding * island.size)) continue;
         energy.take(limited);
         if (driven) driven_ += limited + credit;
     }

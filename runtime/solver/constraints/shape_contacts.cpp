@@ -21,7 +21,7 @@ namespace {
 constexpr double flush = 0.01;
 
 // Points that are handled together.
-constexpr std::size_t points_a_task = 2048;
+constexpr std::size_t points_a_chunk = 2048;
 
 bool turns(const Substep& step, std::uint32_t i) { return !step.spins.empty() && step.spins[i].k > 0; }
 
@@ -48,7 +48,7 @@ ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t si
       size_(size),
       sleep_(sleep),
       clearance_(obstacles, size),
-      contacts_((size + points_a_task - 1) / points_a_task),
+      contacts_((size + points_a_chunk - 1) / points_a_chunk),
       before_(contacts_.size())
 {
 }
@@ -65,7 +65,7 @@ void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& 
         contact.normal_impulse = contact.carried_impulse = 0.5 * dt * load.normal;
         contact.tangential_impulse = dt * load.tangent.cast<double>();
         contact.rolling_impulse = dt * load.rolling.cast<double>();
-        contacts_[i / points_a_task].push_back(contact);
+        contacts_[i / points_a_chunk].push_back(contact);
     }
     for (Batch& contacts : contacts_) std::sort(contacts.begin(), contacts.end(), is_before);
 }
@@ -89,9 +89,9 @@ void ShapeContacts::detect(const Substep& step, std::span<const Vec3d> free)
     clearance_.begin(free);
     std::swap(contacts_, before_);
     const auto find_in_chunk = [&](std::size_t begin, std::size_t end) {
-        find(contacts_[begin / points_a_task], before_[begin / points_a_task], step, free, begin, end);
+        find(contacts_[begin / points_a_chunk], before_[begin / points_a_chunk], step, free, begin, end);
     };
-    for_each_chunk(size_, find_in_chunk, points_a_task);
+    for_each_chunk(size_, find_in_chunk, points_a_chunk);
 }
 
 void ShapeContacts::solve_impacts(Substep& step, std::uint32_t sweep)
@@ -137,7 +137,7 @@ void ShapeContacts::warm_start(Substep& step)
 {
     if (!step.reaction.empty()) share_reactions(step);
     const auto start_chunk = [&](std::size_t begin, std::size_t) {
-        for (ShapeContact& contact : contacts_[begin / points_a_task]) {
+        for (ShapeContact& contact : contacts_[begin / points_a_chunk]) {
             if (!step.paths.empty()) leave_parting(contact, step);
             const double w = step.points[contact.i].w;
             if (!(w > 0)) continue;
@@ -150,7 +150,7 @@ void ShapeContacts::warm_start(Substep& step)
             step.v[contact.i] += w * half;
         }
     };
-    for_each_chunk(size_, start_chunk, points_a_task);
+    for_each_chunk(size_, start_chunk, points_a_chunk);
 }
 
 // What impacts have left inside, and parting, is moved out by no impulse.
@@ -289,8 +289,8 @@ void ShapeContacts::share_reactions(const Substep& step)
                          [](const ShapeContact* a, const ShapeContact* b) { return a->i < b->i; });
         Batch missed;
         auto first = by_point.begin();
-        const std::size_t end = std::min(size_, (c + 1) * points_a_task);
-        for (std::size_t i = c * points_a_task; i < end; ++i) {
+        const std::size_t end = std::min(size_, (c + 1) * points_a_chunk);
+        for (std::size_t i = c * points_a_chunk; i < end; ++i) {
             const auto last = std::find_if(first, by_point.end(), [&](const ShapeContact* at) { return at->i != i; });
             if (step.points[i].w > 0 && !step.reaction[i].isZero(0))
                 share_reaction({first, last}, static_cast<std::uint32_t>(i), step, missed);

@@ -30,7 +30,7 @@ constexpr std::size_t most_sampled = 64, most_solved = 16;
 // The finite difference, relative to the norm of a position and a velocity (at least least_size, m and m/s): rounding
 // in double and in the single precision of fields both stay far below.
 constexpr double difference = 1e-5, least_size = 1e-3;
-constexpr double rounding = 1e-6;  // relative error of a step from these differences: equal results keep the first
+constexpr double step_rounding = 1e-6;  // relative error of a step from these differences: equal results keep the first
 
 // The indices of points evenly spread over those that the step advances.
 std::vector<std::uint32_t> sample_of(const PointSet& points, const std::string& group)
@@ -353,7 +353,7 @@ void keep_worst(std::vector<Stiffness>& worst, const std::vector<Stiffness>& fou
             continue;
         }
         const bool alone = known->alone && stiffness.alone;
-        if (known->step * (1 + rounding) < stiffness.step) *known = stiffness;
+        if (known->step * (1 + step_rounding) < stiffness.step) *known = stiffness;
         known->alone = alone;
     }
 }

@@ -19,7 +19,7 @@ constexpr auto one_over = [] {
 
 // Taylor series of the impulse response h(t), h'' + k h' + w2 h = 0, h(0) = 0, h'(0) = 1; of its integral and its
 // derivative. For k t and w2 t² up to 1 the terms fall as 1/n!.
-Propagator by_series(double k, double w2, double t)
+Propagator propagator_by_series(double k, double w2, double t)
 {
     const double kt = k * t, w2t2 = w2 * t * t;
     double before = 0, term = 1;  // c_n t^(n-1), from n = 0 and 1
@@ -73,7 +73,7 @@ double e1(double x) { return x == 0 ? 1 : std::expm1(x) / x; }
 Propagator respond(double k, double w2, double t)
 {
     if (w2 == 0) return respond_to_drag(k, t);
-    if (k * t <= 1 && w2 * t * t <= 1) return by_series(k, w2, t);
+    if (k * t <= 1 && w2 * t * t <= 1) return propagator_by_series(k, w2, t);
     const double half = 0.5 * k, discriminant = (half - std::sqrt(w2)) * (half + std::sqrt(w2));
     const double root = std::sqrt(std::abs(discriminant));
     if (discriminant > 0 && root * t > 0.125) {  // two decays; their rates without cancellation

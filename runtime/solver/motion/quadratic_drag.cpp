@@ -18,7 +18,7 @@ struct Response {
 };
 
 // Taylor series in t; k t up to 2 and |b| t² up to 1, where terms fall as 2^n/n!.
-Response by_series(double k, double b, double t)
+Response response_by_series(double k, double b, double t)
 {
     const double kt = k * t, bt2 = b * t * t;
     double before = 0, term = 1, j = 0;  // coefficients of H and J
@@ -57,7 +57,7 @@ Response by_oscillation(double k, double b, double w, double t)
 
 Response respond_of(double k, double b, double t)
 {
-    if (k * t <= 2 && std::abs(b) * t * t <= 1) return by_series(k, b, t);
+    if (k * t <= 2 && std::abs(b) * t * t <= 1) return response_by_series(k, b, t);
     const double R2 = 0.25 * k * k + b;
     return R2 > 0 ? by_exponentials(k, b, std::sqrt(R2), t) : by_oscillation(k, b, std::sqrt(-R2), t);
 }

@@ -15,7 +15,7 @@ Vec3d turned(const Vec3d& x, const Vec3d& a, const Vec3d& b)
     return both > 1e-9 ? Vec3d(x - b.dot(x) / both * (a + b)) : x;
 }
 
-Vec3d across(const Vec3d& x, const Vec3d& n) { return x - x.dot(n) * n; }
+Vec3d along_surface(const Vec3d& x, const Vec3d& n) { return x - x.dot(n) * n; }
 
 // ∫ X_G over the time t: X_G'' + k X_G' + w2 X_G = 1, integrated; near w2 = 0 the cube of the time.
 double integral_of_x_of_G(const Propagator& r, double k, double w2, double t)
@@ -43,7 +43,7 @@ Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient, const Vec3d& V)
     pull_ = G - (k + 0.5 * t * w2) * V0_;
     const Propagator through = respond(k, w2 + s, t);
     const double way = u0_.dot(n0_) * through.x_of_v + (pull_.dot(n0_) - s * d0_) * through.x_of_G;
-    return P0 + t * V0_ + across(u0_, n0_) * along.x_of_v + across(pull_, n0_) * along.x_of_G + way * n0_;
+    return P0 + t * V0_ + along_surface(u0_, n0_) * along.x_of_v + along_surface(pull_, n0_) * along.x_of_G + way * n0_;
 }
 
 // The normal of the middle is the mean of both ends. Returns the end, but for the curvature of the surface.
@@ -56,8 +56,8 @@ Vec3d SurfaceMotion::go(const Vec3d& gradient, const Vec3d& V)
     if (turns_away(n1)) n1 = -n1;
     n_ = 1 + n0_.dot(n1) > 1e-9 ? Vec3d((n0_ + n1).normalized()) : n0_;
     const Propagator along = respond(k, w2, t), through = respond(k, w2 + s, t);
-    const Vec3d from = turned(across(u0_, n0_), n0_, n_), pull = across(pull_, n_);
-    const Vec3d turning = across(n1 - n0_, n_) / t;  // n'
+    const Vec3d from = turned(along_surface(u0_, n0_), n0_, n_), pull = along_surface(pull_, n_);
+    const Vec3d turning = along_surface(n1 - n0_, n_) / t;  // n'
     const double speed = u0_.dot(n0_), integral = integral_of_x_of_G(through, k, w2 + s, t);
     const Vec3d straight = from * along.x_of_v + pull * along.x_of_G;
     Vec3d way = straight;
@@ -123,7 +123,10 @@ std::optional<double> SurfaceMotion::distance_reached(const Vec3d& surface, cons
     return std::clamp(d1_, (b - root) / a, (b + root) / a);
 }
 
-Vec3d SurfaceMotion::path_v() const { return acts_ ? Vec3d(V0_ + across(u0_, n0_) + (d1_ - d0_) / t * n0_) : v0; }
+Vec3d SurfaceMotion::path_v() const
+{
+    return acts_ ? Vec3d(V0_ + along_surface(u0_, n0_) + (d1_ - d0_) / t * n0_) : v0;
+}
 
 double SurfaceMotion::energy_left(const Vec3d& place, double distance) const
 {

@@ -14,6 +14,8 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "bindings/host/modules.h"
 #include "runtime/error.h"
@@ -142,6 +144,18 @@ void give_up_privileges()
     }
 }
 
+// What the loader, the C library and Rapid ask for. Of the rest the restarted process knows nothing: it may hold
+// secrets.
+std::vector<char*> own_environment()
+{
+    std::vector<char*> own;
+    for (char** variable = environ; *variable; ++variable)
+        for (const char* kept : {"RAPID_", "LD_", "LC_", "LANG=", "PATH=", "TERM=", "COLUMNS=", "TZ="})
+            if (std::string_view(*variable).starts_with(kept)) own.push_back(*variable);
+    own.push_back(nullptr);
+    return own;
+}
+
 void limit(__rlimit_resource resource, rlim_t most)
 {
     const rlimit value{most, most};
@@ -166,7 +180,7 @@ void enter_sandbox(const SandboxAccess& access)
     close_inherited(access.first_closed);
     give_up_privileges();
     restrict_files(access);
-    execv(program.c_str(), arguments.data());
+    execve(program.c_str(), arguments.data(), own_environment().data());
     throw refused("can't restart in the sandbox", errno);
 }
 

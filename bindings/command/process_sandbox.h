@@ -8,6 +8,7 @@
 //               and changes files below `writable`, and nothing else
 //   seccomp     it makes the system calls that Rapid needs (system_call_filter.h): it opens no socket, starts no
 //               process, reaches no other process, and changes no mode, owner, time or attribute of a file
+//   environment it has that of the loader, the C library and Rapid
 //   privileges  of root's those that open files of other users, and no new ones
 //   limits      no core file; no more memory of its own than the machine has, and none that is shared
 //   descriptors those that it inherited are closed, but for standard output and standard error, and a viewer's socket

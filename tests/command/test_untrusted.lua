@@ -120,10 +120,11 @@ kill -9 $pid]], { cwd = folder.path }).stdout
     assert.equal(4 * threads, sets)
   end)
 
-  it("closes the descriptors that it inherits, and standard input", function()
+  it("has neither the descriptors, nor standard input, nor the environment that it inherits", function()
     local folder = new_folder("local n = 0 for i = 1, 3e8 do n = n + i % 7 end " .. plain)
     local seen = command.shell([[
 echo secret >outside/secret
+export SECRET=hush RAPID_KEPT=known
 "$RAPID" run inside/scene.lua --untrusted --quiet -f 1 7<outside/secret <outside/secret & pid=$!
 for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
   grep -qs 'Seccomp:.2' /proc/$pid/status && break
@@ -131,10 +132,13 @@ for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
 done
 grep -h Seccomp: /proc/$pid/status
 for fd in /proc/$pid/fd/*; do readlink $fd; done
+tr '\0' '\n' </proc/$pid/environ
 kill -9 $pid]], { cwd = folder.path }).stdout
     assert.match("Seccomp:%s*2", seen)
     assert.match("/dev/null", seen)
     assert.falsy(seen:find "secret", seen)
+    assert.falsy(seen:find "hush", seen)
+    assert.match("\nRAPID_KEPT=known\n", seen)
   end)
 
   it("reads modules on RAPID_PATH", function()
@@ -307,9 +311,11 @@ describe("sandboxed", function()
     assert.is_nil(io.open("outside/mesh.obj"))
     assert.not_equal(0, os.execute "touch outside/new")
   end)
+  it("let no secret be asked for", function() assert.is_nil(os.getenv "SECRET") end)
 end)]])
-    local result = command.rapid("test --untrusted inside/test_sandboxed.lua", { cwd = folder.path })
-    assert.equal("2 passed, 0 failed, 0 skipped\n", result.stdout)
+    local result = command.rapid("test --untrusted inside/test_sandboxed.lua",
+      { cwd = folder.path, environment = { SECRET = "hush" } })
+    assert.equal("3 passed, 0 failed, 0 skipped\n", result.stdout)
     assert.is_nil(folder:read "outside/new")
     assert.not_equal(0, command.rapid("test inside/test_sandboxed.lua", { cwd = folder.path }).status)
   end)

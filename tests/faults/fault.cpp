@@ -371,7 +371,7 @@ lua_State* lua_newstate(void* (*allocate)(void*, void*, std::size_t, std::size_t
 }
 
 // The process ends without its destructors.
-[[noreturn]] void _Exit(int status)
+void _Exit(int status)
 {
     arm.end();
     ::_exit(status);

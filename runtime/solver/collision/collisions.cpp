@@ -63,7 +63,7 @@ void Collisions::limit_energy(std::size_t displaced)
         const Vec3d v0 = motion_.initial_v(i) - V;
         const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from);
         const double speed = speed_of_shapes(i, from, V);
-        const double most = speed > 0 ? driven_energy(i, energy, speed) : energy;
+        const double most = speed > 0 ? driven_energy(i, from, energy, speed) : energy;
         double potential = motion_.potential(i, P - way);
         if (most - potential < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
             P = from + way;
@@ -106,16 +106,23 @@ double Collisions::speed_of_shapes(std::size_t i, const Vec3d& from, const Vec3d
 //
 //   √(2E) <= √(2E0) + 2V (1 + Ωt)          E above the least potential energy
 //
-// Where the spring turns it by less than a radian in the sub-step, what stands for it is right, and has no bound; nor
-// has what draws to a surface and elsewhere by a force.
-double Collisions::driven_energy(std::size_t i, double energy, double speed) const
+// which is that of where the forces balance, or, of a spring to a surface, of as far as the point may go along it.
+// Where the spring turns it by less than a radian in the sub-step, what stands for it is right, and has no bound.
+double Collisions::driven_energy(std::size_t i, const Vec3d& from, double energy, double speed) const
 {
     constexpr double unbounded = std::numeric_limits<double>::infinity();
     const Damped::Pull& pull = motion_.pull(i);
     const double turns = std::sqrt(pull.w2 + pull.surface.w2) * block_.dt[i];
-    if (!(turns > 1) || (!(pull.w2 > 0) && !pull.G.isZero(0))) return unbounded;
-    const double least = pull.w2 > 0 ? -0.5 * pull.G.squaredNorm() / pull.w2 : 0;
-    const double root = std::sqrt(2 * std::max(0.0, energy - least)) + 2 * speed * (1 + turns);
+    if (!(turns > 1)) return unbounded;
+    const double kicks = 2 * speed * (1 + turns);
+    double least = 0;
+    if (pull.w2 > 0) {
+        least = -0.5 * pull.G.squaredNorm() / pull.w2;
+    } else {
+        const double G = pull.G.norm(), t = block_.dt[i], gained = pull.G.dot(from - motion_.initial_P(i));
+        least = -gained - G * t * (std::sqrt(2 * std::max(0.0, energy + gained)) + kicks + G * t);
+    }
+    const double root = std::sqrt(2 * std::max(0.0, energy - least)) + kicks;
     return least + 0.5 * root * root;
 }
 

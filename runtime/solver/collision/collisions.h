@@ -66,7 +66,7 @@ private:
     void move_along_free_paths();
     void limit_energy(std::size_t displaced);
     double speed_of_shapes(std::size_t i, const Vec3d& from, const Vec3d& V) const;
-    double driven_energy(std::size_t i, double energy, double speed) const;
+    double driven_energy(std::size_t i, const Vec3d& from, double energy, double speed) const;
     void correct();
     void find_first_contacts(std::size_t obstacle);
 

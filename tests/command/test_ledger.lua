@@ -115,6 +115,13 @@ describe("the ledger", function()
     check({ by_contacts = 5000 / 2 * 0.25 + 0.5 }, sums, 0.01)
   end)
 
+  it("has what a shape drives by a rod from a point that sticks to it, as contacts where there is no pin", function()
+    local sums = ledger [[rapid.points.from { P = {{0, 0, 0}, {0, 1, 0}} } } :attribute { mass = 2 }
+  :distance { pairs = {{1, 2}} } :collide { shape = rapid.shape.plane {}, bounce = 0, response = "stick",
+    transform = function(frame) return rapid.translate(0, 0.5 * frame.time ^ 2, 0) end } :solve { substeps = 4 }]]
+    check({ by_contacts = 2 * 2 / 2 }, sums, 1e-3) -- m v²/2 of both, at 1 m/s
+  end)
+
   it("has m g h of a floor that lifts, as the work of shapes", function()
     local sums = ledger([[rapid.points.from { P = {{0, 0.1, 0}}, v = {{0, 0.5, 0}} } } :attribute { mass = 3 }
   :gravity {} :contact { radius = 0.1, record = true } :collide { bounce = 0, shape = rapid.shape.plane {},

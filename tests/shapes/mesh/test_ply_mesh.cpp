@@ -156,7 +156,8 @@ private:
 TEST_CASE("polygons that wind are cut, whichever corner is first, many of them and long ones", "[mesh][ply]")
 {
     const PlyFolder folder;
-    const auto [corners, times] = GENERATE(table<int, int>({{256, 1000}, {4000, 1}}));
+    const std::pair<int, int> size = GENERATE(std::pair(256, 1000), std::pair(4000, 1));
+    const int corners = size.first, times = size.second;
     const Spiral spiral(corners);
     const MeshPtr mesh = folder.read(spiral.file(GENERATE_COPY(0, corners / 3, corners / 2 + 1), times));
     CHECK(mesh->triangles.size() == static_cast<std::size_t>(times * (corners - 2)));

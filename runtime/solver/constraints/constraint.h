@@ -74,6 +74,9 @@ struct Substep {
     // support. Of the sub-step before; and of this one, as contacts are solved.
     std::span<const std::uint8_t> support;
     std::span<std::uint8_t> next_support;
+    // m/s: of the shape that supports a point. Empty where all are at rest.
+    std::span<const Vec3d> support_v;
+    std::span<Vec3d> next_support_v;
 
     std::size_t size() const { return points.size(); }
     Mobility mobility_of(std::size_t i) const { return mobility.empty() ? Mobility{dt, 0.5 * dt * dt} : mobility[i]; }

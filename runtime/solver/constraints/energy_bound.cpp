@@ -36,13 +36,13 @@ double largest_part(double slope, double curvature, double change)
 
 // J: an upper bound of what forces can give a point in a sub-step, by acceleration from rest or from where it is drawn
 // to.
-double available_work(const Substep& step, std::size_t i)
+double available_work(const Substep& step, std::size_t i, const Vec3d& P)
 {
     const bool own = !step.mobility.empty();
     const double stiffness = own ? step.mobility[i].stiffness : 0;
-    const Vec3d a = (own ? step.mobility[i].pull : step.acceleration) - stiffness * step.points[i].P;
+    const Vec3d a = (own ? step.mobility[i].pull : step.acceleration) - stiffness * P;
     double work = a.squaredNorm() * (stiffness > 0 ? 0.5 / stiffness : step.dt * step.dt);
-    if (own && step.surface_springs[i].w2 > 0) work += potential_energy(step.surface_springs[i], step.points[i].P);
+    if (own && step.surface_springs[i].w2 > 0) work += potential_energy(step.surface_springs[i], P);
     return work / step.inverse_mass[i];
 }
 
@@ -151,7 +151,7 @@ void EnergyBound::add(const Substep& step, std::uint32_t i, Island& island) cons
     island.curvature += 0.5 * mass * change.squaredNorm();
     island.change += change_[i];
     island.size += mass * (v_[i].squaredNorm() + step.v[i].squaredNorm()) + std::abs(change_[i]);
-    island.available += 0.5 * mass * v_[i].squaredNorm() + stored_[i] + available_work(step, i);
+    island.available += 0.5 * mass * v_[i].squaredNorm() + stored_[i] + available_work(step, i, P_[i]);
     if (!credit_.empty()) island.credit += credit_[i];
     add_turning(step, i, island);
 }
@@ -175,8 +175,8 @@ void EnergyBound::add_seen(const Substep& step, std::uint32_t i, const EnergyIsl
         const double held = 0.5 * step.dt * w2 + 2 / step.dt * std::abs(1 - mobility.v / step.dt);  // 1/s
         island.given += mass * held * by.mean.v.norm() * moved.norm();
     }
-    island.available +=
-        0.5 * mass * (seen.squaredNorm() + step.dt * step.dt * A.squaredNorm()) + stored + available_work(step, i);
+    island.available += 0.5 * mass * (seen.squaredNorm() + step.dt * step.dt * A.squaredNorm()) + stored +
+                        available_work(step, i, P_[i]);
     add_turning(step, i, island);
 }
 

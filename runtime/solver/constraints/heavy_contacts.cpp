@@ -17,6 +17,13 @@ constexpr double stuck = 0.9;
 // Ratio of masses above which iterations are too few.
 constexpr double uneven = 2;
 
+void pass_on(Substep& step, std::uint32_t from, std::uint32_t to)
+{
+    if (step.support[from] <= step.next_support[to] + 1) return;
+    step.next_support[to] = step.support[from] - 1;
+    if (!step.support_v.empty()) step.next_support_v[to] = step.support_v[from];
+}
+
 }  // namespace
 
 void HeavyContacts::begin(const Substep& step)
@@ -32,17 +39,15 @@ void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
     for (std::uint32_t l = 0; l < pack.count; ++l) {
         if (!(pack.normal_impulse[l] > 0)) continue;
         const std::uint32_t i = pack.i[l], j = pack.j[l];
-        const std::uint8_t support_i = step.support[i], support_j = step.support[j];
-        std::uint8_t &next_i = step.next_support[i], &next_j = step.next_support[j];
-        next_i = std::max<std::uint8_t>(next_i, std::max<std::uint8_t>(support_j, 1) - 1);
-        next_j = std::max<std::uint8_t>(next_j, std::max<std::uint8_t>(support_i, 1) - 1);
+        pass_on(step, i, j);
+        pass_on(step, j, i);
     }
 }
 
 // The lighter one is a wall where it is better supported; or where the heavy one wedges it against its support: what
-// parts them then moves the light one, and that is put back. Of the heavy one's velocity what is its own into the
-// lighter is taken off; a light one that is squeezed out, or thrown, does not give it more than weight takes, which is
-// what a shape that lifts both has to.
+// parts them then moves the light one, and that is put back. Of the heavy one's velocity, as seen from what supports
+// the lighter, what is its own into that is taken off; a light one that is squeezed out, or thrown, does not give it
+// more than weight takes, which is what a shape that lifts both has to.
 void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& material, Substep& step)
 {
     const bool first = step.points[contact.i].w < step.points[contact.j].w;  // is the heavier
@@ -58,7 +63,8 @@ void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& m
     if (step.support[light] <= step.support[heavy] && !wedged) return;
     const Vec3d n = d / distance;
     step.points[heavy].P += depth * n;
-    const double own = -n.dot(step.v[heavy]), closing = own + n.dot(step.v[light]);
+    const Vec3d support = step.support_v.empty() ? Vec3d(Vec3d::Zero()) : step.support_v[light];
+    const double own = -n.dot(step.v[heavy] - support), closing = n.dot(step.v[light] - step.v[heavy]);
     step.v[heavy] += std::clamp(closing, 0.0, std::max(own, resting_speed(step))) * n;
 }
 

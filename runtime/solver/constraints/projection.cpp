@@ -35,6 +35,8 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
       is_driven_(std::any_of(constraints.begin(), constraints.end(),
                              [](const LocalConstraint& local) { return local.coupling->is_driven(); })),
       follows_(is_driven_ || has_kinematic(step)),
+      moving_support_(follows_ || std::any_of(obstacles.begin(), obstacles.end(),
+                                              [](const Obstacle& obstacle) { return obstacle.moves; })),
       free_(step.size())
 {
     // Rods and springs keep what they have come to before contacts push their points, whichever node comes first.
@@ -333,6 +335,16 @@ void Projection::begin_support(Substep& step)
     }
     step.support = support_;
     step.next_support = next_support_;
+    if (!moving_support_) return;
+    support_v_.resize(step.size(), Vec3d::Zero());
+    next_support_v_.resize(step.size());
+    std::swap(support_v_, next_support_v_);
+    for (std::size_t i = 0; i < step.size(); ++i) {
+        if (!(step.points[i].w > 0)) support_v_[i] = step.v[i];
+        next_support_v_[i].setZero();
+    }
+    step.support_v = support_v_;
+    step.next_support_v = next_support_v_;
 }
 
 void Projection::follow_rods(const Substep& step)

@@ -74,6 +74,7 @@ private:
     bool is_driven_;        // some constraint moves points by itself
     bool carries_ = false;  // shapes do, points that are glued to them
     bool follows_;          // or some point that no row moves has a velocity
+    bool moving_support_;   // or a shape moves
     EnergyBound bound_;
     RigidFallback fallback_;
     ContactEnergy energy_;
@@ -84,6 +85,7 @@ private:
     std::vector<Vec3d> begun_;                          // where rows begin: with what pins move where they move it
     std::vector<double> stored_;                        // J, in rows, there
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
+    std::vector<Vec3d> support_v_, next_support_v_;     // Substep::support_v
     std::vector<std::uint32_t> rods_;                   // by point, the island that rods and springs link it to
 };
 

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "runtime/parallel.h"
+#include "runtime/shapes/shape.h"
 #include "runtime/solver/constraints/energy_bound.h"
 
 namespace rapid {
@@ -36,13 +37,33 @@ void RigidFallback::begin(const Substep& step)
 
 void RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const
 {
-    const bool is_drawn = std::any_of(points.begin(), points.end(), [&](std::uint32_t i) {
-        return !step.mobility.empty() && (step.mobility[i].stiffness > 0 || step.surface_springs[i].w2 > 0);
-    });
-    if (driver || is_drawn)
-        carry(step, points, driver ? *driver : Drive{});
+    const std::optional<Drive> rest = resting_place(step, points);
+    if (driver || rest)
+        carry(step, points, driver ? *driver : *rest);
     else
         move(step, points);
+}
+
+// How what draws the points goes: the mean of the surfaces, at rest where only places do; nothing where none are drawn.
+std::optional<Drive> RigidFallback::resting_place(const Substep& step, std::span<const std::uint32_t> points) const
+{
+    if (step.mobility.empty()) return {};
+    Drive mean;
+    double stiffness = 0;  // N/m
+    for (const std::uint32_t i : points) {
+        const double of_place = step.mobility[i].stiffness / step.inverse_mass[i];
+        const SurfaceSpring& spring = step.surface_springs[i];
+        const double of_surface = spring.w2 / step.inverse_mass[i];
+        stiffness += of_place + of_surface;
+        if (!(of_surface > 0) || !spring.shape->moves()) continue;
+        const Vec3d v_before = spring.shape->velocity_at(start_[i], spring.time - step.dt);
+        const Vec3d v = spring.shape->velocity_at(start_[i] + step.dt * v_before, spring.time);
+        const Drive surface = Drive::of(v_before, v, step.dt);
+        mean.v += of_surface * surface.v, mean.way += of_surface * surface.way;
+    }
+    if (!(stiffness > 0)) return {};
+    mean.v /= stiffness, mean.way /= stiffness;
+    return mean;
 }
 
 void RigidFallback::carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const

@@ -7,10 +7,12 @@
 // with d the mean displacement of their free motion, X and V their middle and mean velocity by mass, ω that of their
 // angular momentum. Both momenta stay; what rows store stays, as no distance changes; of the energy of motion all that
 // is not of a rigid body is lost. The body does not turn within the sub-step, which would change one of these. Points
-// that are linked to what no row moves go along with that; those that are drawn to places stay where they are.
+// that are linked to what no row moves go along with that; those that springs draw, with the places or surfaces that
+// draw them, by the mean of these.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,6 +31,7 @@ public:
     void apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const;
 
 private:
+    std::optional<Drive> resting_place(const Substep& step, std::span<const std::uint32_t> points) const;
     void carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const;
     void move(Substep& step, std::span<const std::uint32_t> points) const;
     void place(Substep& step, std::uint32_t i, const Vec3d& P, const Vec3d& v) const;

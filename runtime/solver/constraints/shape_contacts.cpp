@@ -251,8 +251,10 @@ void ShapeContacts::solve_velocities(Substep& step)
         for (ShapeContact& contact : contacts_[c]) {
             const std::uint32_t i = contact.i;
             if (!(step.points[i].w > 0)) continue;
-            if (contact.n.dot(step.points[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i])
+            if (contact.n.dot(step.points[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i]) {
                 step.next_support[i] = 255;
+                if (!step.next_support_v.empty()) step.next_support_v[i] = contact.vc;
+            }
             solve_velocity(contact, step);
         }
         move_out(contacts_[c], step);

@@ -2,6 +2,7 @@
 // the search against all pairs.
 #include "runtime/solver/constraints/contacts.h"
 
+#include <rapidcheck.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <random>
 #include <set>
 
+#include "runtime/shapes/motion/moving.h"
 #include "tests/solver/constraints/granular.h"
 
 namespace rapid {
@@ -363,6 +365,32 @@ TEST_CASE("a heavy point does not sink through a light one by wedging it into a 
         CHECK(scene.P(1).x() == Approx(x).epsilon(0.03));
         for (const std::size_t i : {0, 1}) CHECK(scene.v(i).norm() < std::sqrt(2) * g / 24 / 11);  // a sub-step's worth
     }
+}
+
+TEST_CASE("a heavy point on a light one on a floor that moves goes as it does on one at rest", "[contacts][extreme]")
+{
+    rc::prop("", [](unsigned seed) {
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<float> in(-1, 1);
+        const float r = 0.05f, R = 0.15f, ratio = std::pow(10.0f, 3 + 2 * in(random));
+        const Vec3f off = Vec3f(0.5f * in(random), 1, 0.5f * in(random)).normalized();
+        const Vec3f v(in(random), -1.5f + in(random), in(random));
+        const Vec3f V(10 * in(random), 10 * in(random), 10 * in(random));
+        const double h = 0.125;
+        const auto fall = [&](const Vec3f& of_floor) {
+            const std::vector<Vec3f> at = {{0, r, 0}, Vec3f(0, r, 0) + 1.01f * (r + R) * off};
+            const std::vector<Vec3f> seen = {of_floor, v + of_floor};
+            Granular scene(points(at).v(seen).set<float>("pscale", {r, R}).set<float>("mass", {1, ratio}), 0, 0.3f);
+            const MotionPtr motion = keyed_motion({{0, {}}, {1, {of_floor.cast<double>()}}});
+            scene.gravity().collide(moving(make_plane({0, 1, 0}, 0), *motion, {1, 0}, 0, h), 0.0f, 0.3f);
+            return scene.frame_length(h).substeps(12).run(1);
+        };
+        const auto rest = fall(Vec3f::Zero()), carried = fall(V);
+        for (const std::size_t i : {0, 1}) {
+            RC_ASSERT((carried.P(i) - h * V.cast<double>() - rest.P(i)).norm() < 1e-5);
+            RC_ASSERT((carried.v(i) - V.cast<double>() - rest.v(i)).norm() < 1e-4);
+        }
+    });
 }
 
 TEST_CASE("a ball of 10^6 times their mass on a bed of grains is in none of them, nor are they in the floor",

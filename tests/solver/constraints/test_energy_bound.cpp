@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "runtime/shapes/analytic/analytic.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -122,6 +123,34 @@ TEST_CASE("a pair that corrections of positions lift out of all proportion moves
     CHECK((pairs.momentum(0) - momentum).norm() <= 1e-12 * momentum.norm());
     CHECK((pairs.points[0].P - pairs.points[1].P).norm() == Approx(length));
     CHECK(pairs.points[2].P == other);
+}
+
+// What stretches a spring has not been available before.
+TEST_CASE("a pair that corrections of positions move off the places that springs draw it to has no solution",
+          "[energy_bound]")
+{
+    Pairs pairs(1, 2);
+    pairs.step.displacement = pairs.displacement;
+    std::vector<Mobility> mobility(2, {0.01, 5e-5});
+    const ShapePtr sphere = make_sphere_shape(0.3, Vec3d::Zero());
+    std::vector<SurfaceSpring> springs(2);
+    const bool of_surface = GENERATE(false, true);
+    if (of_surface)
+        springs[0] = {1e4, sphere.get(), 0};
+    else
+        mobility[0].stiffness = 1e4;
+    pairs.points[0].P = of_surface ? Vec3d(0, 0.3, 0) : Vec3d(0, 0, 0);
+    pairs.start[0] = pairs.points[0].P;
+    pairs.step.mobility = mobility, pairs.step.surface_springs = springs;
+    EnergyBound bound;
+    bound.begin(pairs.step, Pairs::nothing);
+    RigidFallback fallback;
+    fallback.begin(pairs.step);
+    for (ProjectedPoint& point : pairs.points) point.P += Vec3d(0, 1e3, 0);
+    const ContactEnergy told = pairs.close(bound, &fallback);
+    REQUIRE(bound.stalled().size() == 2);
+    CHECK(told.added == 0);
+    for (std::size_t i : {0, 1}) CHECK(pairs.points[i].P == pairs.start[i]);
 }
 
 TEST_CASE("a pair without a solution, one of whose points a place holds, stays where it was", "[energy_bound]")

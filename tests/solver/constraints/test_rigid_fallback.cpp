@@ -6,6 +6,8 @@
 #include <numeric>
 #include <random>
 
+#include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/motion/moving.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "tests/test.h"
 
@@ -125,6 +127,30 @@ TEST_CASE("what is linked to a point at rest, or drawn to a place, stays where i
     fallback.apply(body.step, body.all, drawn ? nullptr : &at_rest);
     CHECK(body.places() == start);
     CHECK(body.kinetic() == 0);
+}
+
+TEST_CASE("a body without a solution goes along with the surfaces that draw it, by their stiffness", "[rigid_fallback]")
+{
+    Body body(3, 4, false);
+    const std::vector<Mobility> mobility(4, {0.1, 0.005});
+    const Vec3d V(3, -2, 5);
+    const MotionPtr motion = keyed_motion({{0, {}}, {1, {V}}});
+    const ShapePtr rest = make_sphere_shape(0.3, Vec3d::Zero()), moves = moving(rest, *motion, {1, 0}, 0, 1);
+    std::vector<SurfaceSpring> springs(4);
+    springs[1] = {3 * body.inverse_mass[1], moves.get(), 0.5};
+    const bool both = GENERATE(false, true);
+    if (both) springs[2] = {1 * body.inverse_mass[2], rest.get(), 0.5};
+    body.step.mobility = mobility;
+    body.step.surface_springs = springs;
+    RigidFallback fallback;
+    fallback.begin(body.step);
+    const std::vector<Vec3d> start = body.start;
+    fallback.apply(body.step, body.all, nullptr);
+    const Vec3d by = both ? Vec3d(0.75 * V) : V;
+    for (const std::uint32_t i : body.all) {
+        CHECK_THAT(body.places()[i], test::close_to(Vec3d(start[i] + 0.1 * by), 1e-12));
+        CHECK_THAT(body.v[i], test::close_to(by, 1e-12));
+    }
 }
 
 TEST_CASE("a body without a solution goes along with what drives it", "[rigid_fallback]")

@@ -15,6 +15,7 @@
 
 #include "runtime/error.h"
 #include "runtime/io/text_table.h"
+#include "runtime/of_thread.h"
 
 namespace rapid {
 namespace {
@@ -29,10 +30,10 @@ constexpr std::string_view type_of_bytes = "bytes";
 
 // Compressed and read on all threads. Blosc sorts the bytes of numbers by their place, which makes ids a hundredth; LZ4
 // on its first level reads and writes gigabytes a second. Of positions and velocities it takes a tenth off, and more
-// time than the tenth takes to be written: they are stored as they are.
+// time than the tenth takes to be written: what does not become half of itself is stored as it is.
 constexpr std::size_t piece_bytes = std::size_t{1} << 20;
 constexpr std::size_t sample_bytes = std::size_t{1} << 16;
-constexpr double worthwhile = 0.75;  // of the bytes, that are left of a sample
+constexpr double worthwhile = 0.5;  // of the bytes, that are left of a sample
 constexpr int level = 1;
 constexpr const char* codec = "lz4";
 constexpr std::uint64_t most_codec_expansion = 1024;  // more than any codec's
@@ -51,18 +52,21 @@ struct Piece {
     std::span<const char> bytes;
 };
 
+// Into room for the worst case, which each thread has once; what is kept of a piece takes no more than its bytes.
 Piece packed(std::span<const char> bytes, std::size_t scalar)
 {
-    const std::size_t most = bytes.size() + BLOSC_MAX_OVERHEAD;
-    Piece piece{std::make_unique_for_overwrite<char[]>(most), bytes};
-    const int size = blosc_compress_ctx(level, BLOSC_SHUFFLE, scalar, bytes.size(), bytes.data(), piece.packed.get(),
-                                        most, codec, 0, 1);
+    thread_local OfThread<std::vector<char>> kept;
+    std::vector<char>& room = *kept;
+    room.resize(piece_bytes + BLOSC_MAX_OVERHEAD);
+    const int size = blosc_compress_ctx(level, BLOSC_SHUFFLE, scalar, bytes.size(), bytes.data(), room.data(),
+                                        bytes.size() + BLOSC_MAX_OVERHEAD, codec, 0, 1);
     if (size <= 0) throw Error("can't be compressed");
-    if (const auto fewer = static_cast<std::size_t>(size); fewer < bytes.size())
-        piece.bytes = {piece.packed.get(), fewer};
-    else
-        piece.packed.reset();
-    return piece;
+    const auto fewer = static_cast<std::size_t>(size);
+    if (fewer >= bytes.size()) return {nullptr, bytes};
+    auto smaller = std::make_unique_for_overwrite<char[]>(fewer);
+    std::memcpy(smaller.get(), room.data(), fewer);
+    const std::span<const char> content(smaller.get(), fewer);
+    return {std::move(smaller), content};
 }
 
 bool is_worth_packing(const Raw& raw)

@@ -140,7 +140,8 @@ void Buffer::reserve(std::size_t bytes)
     Buffer grown;
     if (wanted >= mapped_from) {
         const std::size_t offset = stagger();
-        const SparePages::Block pages = new_pages(whole_pages(wanted + offset));
+        // A page more than the values, wherever they begin in it: buffers of one size take each other's pages.
+        const SparePages::Block pages = new_pages(whole_pages(wanted) + page);
         grown.block_ = pages.begin;
         grown.block_bytes_ = pages.bytes;
         grown.mapped_ = true;

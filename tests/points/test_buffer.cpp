@@ -47,6 +47,17 @@ TEST_CASE("room that is there already is kept where it is", "[buffer]")
     CHECK(buffer.data() == before);
 }
 
+TEST_CASE("buffers of one size take each other's pages, wherever they begin in them", "[buffer]")
+{
+    constexpr std::size_t bytes = 12'000'000;
+    std::uintptr_t first = 0;
+    for (int k = 0; k < 64; ++k) {
+        const Buffer buffer(bytes);
+        if (k == 0) first = address(buffer) / 4096;
+        REQUIRE(address(buffer) / 4096 == first);
+    }
+}
+
 TEST_CASE("pages that are given back serve the next of about their size, and no other", "[buffer]")
 {
     const std::size_t bytes = std::size_t{5} << 20;

@@ -16,4 +16,9 @@ double potential_energy(const SurfaceSpring& spring, const Vec3d& P)
     return std::isinf(spring.shape->band()) ? 0.5 * spring.w2 * phi * phi : 0;
 }
 
+Vec3d velocity_of_surface(const SurfaceSpring& spring, const Vec3d& P, double before)
+{
+    return spring.shape->moves() ? spring.shape->velocity_at(P, spring.time - before) : Vec3d(Vec3d::Zero());
+}
+
 }  // namespace rapid

@@ -5,7 +5,6 @@
 #include <Eigen/Eigenvalues>
 
 #include "runtime/parallel.h"
-#include "runtime/shapes/shape.h"
 #include "runtime/solver/constraints/energy_bound.h"
 
 namespace rapid {
@@ -55,9 +54,9 @@ std::optional<Drive> RigidFallback::resting_place(const Substep& step, std::span
         const SurfaceSpring& spring = step.surface_springs[i];
         const double of_surface = spring.w2 / step.inverse_mass[i];
         stiffness += of_place + of_surface;
-        if (!(of_surface > 0) || !spring.shape->moves()) continue;
-        const Vec3d v_before = spring.shape->velocity_at(start_[i], spring.time - step.dt);
-        const Vec3d v = spring.shape->velocity_at(start_[i] + step.dt * v_before, spring.time);
+        if (!(of_surface > 0)) continue;
+        const Vec3d v_before = velocity_of_surface(spring, start_[i], step.dt);
+        const Vec3d v = velocity_of_surface(spring, start_[i] + step.dt * v_before, 0);
         const Drive surface = Drive::of(v_before, v, step.dt);
         mean.v += of_surface * surface.v, mean.way += of_surface * surface.way;
     }

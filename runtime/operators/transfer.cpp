@@ -11,8 +11,8 @@
 #include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/members.h"
+#include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/motion/mesh_surface.h"
-#include "runtime/shapes/motion/nearest_on_triangle.h"
 
 namespace rapid {
 namespace {

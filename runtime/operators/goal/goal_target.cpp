@@ -9,8 +9,8 @@
 #include "runtime/operators/goal/free_places.h"
 #include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
+#include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/motion/mesh_surface.h"
-#include "runtime/shapes/motion/nearest_on_triangle.h"
 
 namespace rapid {
 namespace {

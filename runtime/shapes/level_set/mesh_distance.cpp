@@ -1,21 +1,21 @@
 // The signed distance from a mesh, on a grid.
 //
-// OpenVDB finds the voxels near a mesh and their distances. Two errors that make points visibly sink into the surface
-// are corrected here: the signs are wrong at some voxels next to the surface (dents of up to a third of a voxel, 2 to 3
-// % of a thin body's volume at ten voxels across), and beyond two voxels the nearest triangle may be wrong (up to 0.7
-// of a voxel).
-#include <openvdb/math/Proximity.h>
+// The distance is that to the nearest triangle (mesh_band.h), the sign that of the winding number. A mesh without one
+// has OpenVDB's distances and signs.
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
-#include <numbers>
+#include <span>
 
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/mesh_band.h"
+#include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/mesh/ray_crossings.h"
 
 namespace rapid {
@@ -29,93 +29,103 @@ using Leaf = FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with the tree*/ false>;
 using NearestAccessor = openvdb::tree::ValueAccessor<const openvdb::Int32Tree, /*registered with the tree*/ false>;
 
-// The plane of a triangle and those through its edges perpendicular to it: a bound of the distance in a few
-// multiplications. Beside an edge it is the distance, past a corner less.
-class Prism {
-public:
-    Prism(const openvdb::Vec3d& a, const openvdb::Vec3d& b, const openvdb::Vec3d& c)
-        : up_((b - a).cross(c - a).unitSafe()), height_(up_.dot(a))
-    {
-        const openvdb::Vec3d corners[3] = {a, b, c};
-        for (int k = 0; k < 3; ++k) {
-            outward_[k] = (corners[(k + 1) % 3] - corners[k]).cross(up_).unitSafe();
-            edge_[k] = outward_[k].dot(corners[k]);
-        }
-    }
+Vec3d center(const Coord& voxel) { return {double(voxel.x()), double(voxel.y()), double(voxel.z())}; }
 
-    // The square of a lower bound on the distance.
-    double square_at_least(const openvdb::Vec3d& P) const
-    {
-        const double h = up_.dot(P) - height_;
-        double beside = 0;
-        for (int k = 0; k < 3; ++k) beside = std::max(beside, outward_[k].dot(P) - edge_[k]);
-        return h * h + beside * beside;
-    }
-
-private:
-    openvdb::Vec3d up_, outward_[3];  // unit; zero where the triangle has no area
-    double height_, edge_[3];
-};
-
-// The mesh in voxels, in OpenVDB's form and ours.
+// A mesh in voxels.
 struct InVoxels {
     std::shared_ptr<Mesh> mesh = std::make_shared<Mesh>();
-    std::vector<openvdb::Vec3s> points;
-    std::vector<openvdb::Vec3I> faces;
-    std::vector<Prism> prisms;  // of the faces
 
     InVoxels(const Mesh& world, const openvdb::math::Transform& transform)
     {
         mesh->triangles = world.triangles;
         mesh->positions.reserve(world.positions.size());
-        points.reserve(world.positions.size());
-        faces.reserve(world.triangles.size());
         for (const Vec3f& P : world.positions) {
-            points.emplace_back(transform.worldToIndex(openvdb::Vec3d(P.x(), P.y(), P.z())));
-            mesh->positions.emplace_back(points.back().x(), points.back().y(), points.back().z());
-        }
-        prisms.reserve(world.triangles.size());
-        for (const Mesh::Triangle& t : world.triangles) {
-            faces.emplace_back(t[0], t[1], t[2]);
-            prisms.emplace_back(points[t[0]], points[t[1]], points[t[2]]);
+            const openvdb::Vec3d there = transform.worldToIndex(openvdb::Vec3d(P.x(), P.y(), P.z()));
+            mesh->positions.push_back(Vec3d(there.x(), there.y(), there.z()).cast<float>());
         }
     }
 
-    openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter() const
+    Vec3d corner(std::int32_t triangle, int k) const
     {
-        return {points, faces};
+        return mesh->positions[mesh->triangles[triangle][k]].cast<double>();
     }
-    openvdb::Vec3d nearest_on(openvdb::Int32 triangle, const Coord& voxel) const
+    Vec3d nearest_on(std::int32_t triangle, const Coord& voxel) const
     {
-        const openvdb::Vec3I& face = faces[triangle];
-        openvdb::Vec3d weights;
-        return openvdb::math::closestPointOnTriangleToPoint(openvdb::Vec3d(points[face[0]]),
-                                                            openvdb::Vec3d(points[face[1]]),
-                                                            openvdb::Vec3d(points[face[2]]), voxel.asVec3d(), weights);
+        const Vec3d a = corner(triangle, 0), ab = corner(triangle, 1) - a, ac = corner(triangle, 2) - a;
+        const auto [b, c] = nearest_weights(center(voxel), a, corner(triangle, 1), corner(triangle, 2));
+        return a + b * ab + c * ac;
     }
-    openvdb::Vec3d normal(openvdb::Int32 triangle) const
+    Vec3d normal(std::int32_t triangle) const
     {
-        const openvdb::Vec3d a(points[faces[triangle][0]]), b(points[faces[triangle][1]]),
-            c(points[faces[triangle][2]]);
-        return (b - a).cross(c - a).unitSafe();
+        const Vec3d a = corner(triangle, 0);
+        return (corner(triangle, 1) - a).cross(corner(triangle, 2) - a).stableNormalized();
     }
-    double distance_to(openvdb::Int32 triangle, const Coord& voxel) const
+    double distance_to(std::int32_t triangle, const Coord& voxel) const
     {
-        return (nearest_on(triangle, voxel) - voxel.asVec3d()).length();
+        return (nearest_on(triangle, voxel) - center(voxel)).norm();
     }
 };
 
-// A narrow band under correction: the distance of each voxel, and its nearest triangle.
+// A narrow band: the distance of each voxel, at first without a sign, and the nearest triangle.
 struct Band {
+    using Nearest = std::array<std::int32_t, MeshBand::voxels>;
+
     FloatGrid::Ptr distance;
-    Int32Grid::Ptr nearest;
     std::vector<Leaf*> leaves;
+    std::vector<Nearest> nearest;  // of each leaf; -1 beyond the band
     double voxel;
 
-    void find_leaves()
+    Band(const InVoxels& mesh, const openvdb::math::Transform& transform, double half_width)
+        : distance(FloatGrid::create(static_cast<float>(half_width))), voxel(transform.voxelSize()[0])
     {
-        leaves.clear();
-        distance->tree().getNodes(leaves);
+        static_assert(MeshBand::block == Leaf::DIM && MeshBand::voxels == Leaf::SIZE);
+        distance->setTransform(transform.copy());
+        const MeshBand band(*mesh.mesh, half_width / voxel);
+        leaves.resize(band.size());
+        nearest.resize(band.size());
+        for_each_chunk(
+            band.size(),
+            [&](std::size_t begin, std::size_t end) {
+                for (std::size_t b = begin; b < end; ++b) leaves[b] = measured(band, b);
+            },
+            8);
+        std::size_t kept = 0;
+        for (std::size_t b = 0; b < leaves.size(); ++b) {
+            if (!leaves[b]) continue;
+            distance->tree().addLeaf(leaves[b]);
+            if (kept != b) leaves[kept] = leaves[b], nearest[kept] = nearest[b];
+            ++kept;
+        }
+        leaves.resize(kept);
+        nearest.resize(kept);
+    }
+
+    Int32Grid::Ptr nearest_grid() const
+    {
+        auto grid = Int32Grid::create(-1);
+        for (std::size_t i = 0; i < leaves.size(); ++i) {
+            auto* leaf = new Int32Grid::TreeType::LeafNodeType(leaves[i]->origin(), -1, true);
+            std::copy(nearest[i].begin(), nearest[i].end(), leaf->buffer().data());
+            grid->tree().addLeaf(leaf);
+        }
+        return grid;
+    }
+
+private:
+    // Null where no voxel of the block is in the band.
+    Leaf* measured(const MeshBand& band, std::size_t b)
+    {
+        std::array<float, MeshBand::voxels> voxels;
+        if (band.measure(b, voxels, nearest[b]) == 0) return nullptr;
+        const Eigen::Vector3i origin = band.origin(b);
+        auto* leaf = new Leaf(Coord(origin.x(), origin.y(), origin.z()), distance->background(), false);
+        float* values = leaf->buffer().data();
+        for (std::size_t v = 0; v < voxels.size(); ++v) {
+            if (nearest[b][v] < 0) continue;
+            values[v] = voxels[v] * static_cast<float>(voxel);
+            leaf->setValueOn(static_cast<openvdb::Index>(v));
+        }
+        return leaf;
     }
 };
 
@@ -123,33 +133,29 @@ struct Band {
 struct Update {
     Coord voxel;
     float distance;
-    openvdb::Int32 nearest;
+    std::int32_t nearest;
 };
 
-// The 26 neighbours of a voxel, or the six across its faces alone, and their distances, in voxels.
 template <class F>
-void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
+void for_each_neighbour(const Coord& voxel, const F& f)
 {
-    static constexpr double far[4] = {0, 1, std::numbers::sqrt2, std::numbers::sqrt3};
     for (int x = -1; x <= 1; ++x)
         for (int y = -1; y <= 1; ++y)
-            for (int z = -1; z <= 1; ++z) {
-                const int steps = std::abs(x) + std::abs(y) + std::abs(z);
-                if (steps == 1 || (steps > 1 && !across_faces)) f(voxel.offsetBy(x, y, z), far[steps]);
-            }
+            for (int z = -1; z <= 1; ++z)
+                if (x != 0 || y != 0 || z != 0) f(voxel.offsetBy(x, y, z));
 }
 
 // Jacobi iteration: calls `improve(voxel, phi, accessor, nearest, updates)` for all active voxels, applies the updates,
 // and repeats it around the voxels that have changed, until there are none. A voxel depends on the previous round
 // alone, never on an order. Distances only shrink.
 template <class Improve>
-void improve_until_done(Band& band, const Improve& improve)
+void improve_until_done(FloatGrid& distance, Int32Grid& nearest, std::span<Leaf* const> leaves, const Improve& improve)
 {
     constexpr std::size_t part = 512;
-    FloatGrid::Accessor distance = band.distance->getAccessor();
-    Int32Grid::Accessor nearest = band.nearest->getAccessor();
+    FloatGrid::Accessor distances = distance.getAccessor();
+    Int32Grid::Accessor triangles = nearest.getAccessor();
     std::vector<Coord> asked;
-    for (const Leaf* leaf : band.leaves)
+    for (const Leaf* leaf : leaves)
         for (auto it = leaf->cbeginValueOn(); it; ++it) asked.push_back(it.getCoord());
     std::vector<std::vector<Update>> updates;
     while (!asked.empty()) {
@@ -159,8 +165,8 @@ void improve_until_done(Band& band, const Improve& improve)
             [&](std::size_t begin, std::size_t end) {
                 std::vector<Update>& found = updates[begin / part];
                 found.clear();
-                const Accessor now(band.distance->constTree());
-                const NearestAccessor nearest_now(band.nearest->constTree());
+                const Accessor now(distance.constTree());
+                const NearestAccessor nearest_now(nearest.constTree());
                 for (std::size_t i = begin; i < end; ++i)
                     improve(asked[i], now.getValue(asked[i]), now, nearest_now, found);
             },
@@ -169,56 +175,16 @@ void improve_until_done(Band& band, const Improve& improve)
         asked.clear();
         for (const auto& of_part : updates)
             for (const Update& update : of_part) {
-                if (std::abs(update.distance) >= std::abs(distance.getValue(update.voxel))) continue;
-                distance.setValue(update.voxel, update.distance);
-                nearest.setValue(update.voxel, update.nearest);
+                if (std::abs(update.distance) >= std::abs(distances.getValue(update.voxel))) continue;
+                distances.setValue(update.voxel, update.distance);
+                triangles.setValue(update.voxel, update.nearest);
                 asked.push_back(update.voxel);
-                for_each_neighbour(update.voxel, /*across_faces=*/false,
-                                   [&](const Coord& other, double) { asked.push_back(other); });
+                for_each_neighbour(update.voxel, [&](const Coord& other) { asked.push_back(other); });
             }
-        std::erase_if(asked, [&](const Coord& voxel) { return !distance.isValueOn(voxel); });
+        std::erase_if(asked, [&](const Coord& voxel) { return !distances.isValueOn(voxel); });
         std::sort(asked.begin(), asked.end());
         asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
     }
-    band.find_leaves();
-}
-
-// A voxel takes the triangle of a neighbour nearer to the mesh if that is nearer to it too, and voxels missing from the
-// band are added to it.
-void shorten_distances(Band& band, const InVoxels& mesh)
-{
-    // m: the least improvement. Half of it would end the rounds, and the rounding to single precision is 1e-6 of a
-    // voxel.
-    const double worth = 1e-3 * band.voxel;
-    // m: OpenVDB tests each triangle against the voxels within √3/2 of it and all their neighbours, so nearer ones are
-    // right.
-    const double exact = 1.5 * band.voxel;
-    const double half_width = band.distance->background();
-    improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
-                                 const NearestAccessor& nearest, std::vector<Update>& updates) {
-        const openvdb::Int32 own = nearest.getValue(voxel);
-        double best = phi;
-        openvdb::Int32 triangle = own, tried = own;
-        for_each_neighbour(voxel, phi < exact, [&](const Coord& other, double far) {
-            const double there = accessor.getValue(other);
-            if (there >= half_width) {
-                if (phi + far * band.voxel < half_width)
-                    updates.push_back({other, static_cast<float>(mesh.distance_to(own, other) * band.voxel), own});
-                return;
-            }
-            if (there >= best || phi < exact) return;
-            const openvdb::Int32 candidate = nearest.getValue(other);
-            if (candidate == tried || candidate == triangle) return;
-            tried = candidate;
-            const double enough = (best - worth) / band.voxel;
-            if (mesh.prisms[candidate].square_at_least(voxel.asVec3d()) >= enough * enough) return;
-            const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
-            if (distance >= best - worth) return;
-            best = distance;
-            triangle = candidate;
-        });
-        if (triangle != own) updates.push_back({voxel, static_cast<float>(best), triangle});
-    });
 }
 
 // Negative where the winding number is not 0, by whole rows of voxels along x. Returns whether any faces lie inside:
@@ -257,40 +223,53 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
 {
     // Seen from inside, the nearest point of a face is on the surface if it is outside just behind it; for a voxel on
     // the face, on either side of it.
-    const auto is_surface = [&](openvdb::Int32 triangle, const Coord& voxel) {
+    const auto is_surface = [&](std::int32_t triangle, const Coord& voxel) {
         constexpr double behind = 1e-3;  // voxels; the positions have about 1e-4
-        const auto outside = [&](const openvdb::Vec3d& P) { return faces.from({P.x(), P.y(), P.z()}).windings == 0; };
-        const openvdb::Vec3d there = mesh.nearest_on(triangle, voxel), to_face = there - voxel.asVec3d();
-        if (to_face.length() > behind) return outside(there + to_face * (behind / to_face.length()));
-        const openvdb::Vec3d step = mesh.normal(triangle) * behind;
+        const auto outside = [&](const Vec3d& P) { return faces.from(P).windings == 0; };
+        const Vec3d there = mesh.nearest_on(triangle, voxel), to_face = there - center(voxel);
+        if (to_face.norm() > behind) return outside(there + to_face * (behind / to_face.norm()));
+        const Vec3d step = mesh.normal(triangle) * behind;
         return outside(there + step) || outside(there - step);
     };
     const auto half_width = band.distance->background();
     tbb::parallel_for(std::size_t{0}, band.leaves.size(), [&](std::size_t i) {
-        const NearestAccessor nearest(band.nearest->constTree());
         for (auto it = band.leaves[i]->beginValueOn(); it; ++it)
-            if (std::signbit(*it) && !is_surface(nearest.getValue(it.getCoord()), it.getCoord()))
-                it.setValue(-half_width);
+            if (std::signbit(*it) && !is_surface(band.nearest[i][it.pos()], it.getCoord())) it.setValue(-half_width);
     });
-    improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
-                                 const NearestAccessor& nearest, std::vector<Update>& updates) {
-        if (phi > -half_width) return;
-        double best = half_width;
-        openvdb::Int32 triangle = -1;
-        for_each_neighbour(voxel, /*across_faces=*/false, [&](const Coord& other, double) {
-            const float there = accessor.getValue(other);
-            if (!(there < half_width && there > -half_width)) return;
-            const openvdb::Int32 candidate = nearest.getValue(other);
-            const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
-            if (distance >= best || !is_surface(candidate, voxel)) return;
-            best = distance;
-            triangle = candidate;
-        });
-        if (triangle >= 0) updates.push_back({voxel, static_cast<float>(-best), triangle});
-    });
+    const Int32Grid::Ptr nearest_grid = band.nearest_grid();
+    improve_until_done(*band.distance, *nearest_grid, band.leaves,
+                       [&](const Coord& voxel, double phi, const Accessor& accessor, const NearestAccessor& nearest,
+                           std::vector<Update>& updates) {
+                           if (phi > -half_width) return;
+                           double best = half_width;
+                           std::int32_t triangle = -1;
+                           for_each_neighbour(voxel, [&](const Coord& other) {
+                               const float there = accessor.getValue(other);
+                               if (!(there < half_width && there > -half_width)) return;
+                               const std::int32_t candidate = nearest.getValue(other);
+                               const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
+                               if (distance >= best || !is_surface(candidate, voxel)) return;
+                               best = distance;
+                               triangle = candidate;
+                           });
+                           if (triangle >= 0) updates.push_back({voxel, static_cast<float>(-best), triangle});
+                       });
     for (Leaf* leaf : band.leaves)
         for (auto it = leaf->beginValueOn(); it; ++it)
             if (*it <= -half_width) it.setValueOff();
+}
+
+FloatGrid::Ptr by_openvdb(const Mesh& mesh, const openvdb::math::Transform& transform, double half_width)
+{
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> faces;
+    for (const Vec3f& P : mesh.positions) points.emplace_back(P.x(), P.y(), P.z());
+    for (const Mesh::Triangle& t : mesh.triangles) faces.emplace_back(t[0], t[1], t[2]);
+    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, faces);
+    openvdb::util::NullInterrupter never;
+    const auto voxels = static_cast<float>(half_width / transform.voxelSize()[0]);
+    return openvdb::tools::meshToVolume<FloatGrid>(never, adapter, transform, voxels, voxels,
+                                                   openvdb::tools::DISABLE_RENORMALIZATION);
 }
 
 }  // namespace
@@ -298,19 +277,9 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
 FloatGrid::Ptr signed_distance(const Mesh& world, bool balanced, const openvdb::math::Transform& transform,
                                double half_width)
 {
-    openvdb::util::NullInterrupter never;
     const InVoxels mesh(world, transform);
-    const double voxel = transform.voxelSize()[0];
-    const auto voxels = static_cast<float>(half_width / voxel);
-    if (!balanced)
-        return openvdb::tools::meshToVolume<FloatGrid>(never, mesh.adapter(), transform, voxels, voxels,
-                                                       openvdb::tools::DISABLE_RENORMALIZATION);
-
-    Band band{nullptr, Int32Grid::create(openvdb::util::INVALID_IDX), {}, voxel};
-    band.distance = openvdb::tools::meshToVolume<FloatGrid>(
-        never, mesh.adapter(), transform, voxels, voxels, openvdb::tools::UNSIGNED_DISTANCE_FIELD, band.nearest.get());
-    band.find_leaves();
-    shorten_distances(band, mesh);
+    if (!balanced) return by_openvdb(*mesh.mesh, transform, half_width);
+    Band band(mesh, transform, half_width);
     const RayCrossings faces(mesh.mesh);
     if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
     openvdb::tools::signedFloodFill(band.distance->tree());

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "runtime/shapes/mesh/detailed_mesh.h"
-#include "runtime/shapes/motion/nearest_on_triangle.h"
+#include "runtime/shapes/mesh/nearest_on_triangle.h"
 
 namespace rapid {
 namespace {

@@ -5,7 +5,8 @@
 -- something unknown. Where two paths meet, unequal values become unknown (or stay shared). The result:
 --
 --   reads, writes    names indexed on the point itself
---   may              names indexed anywhere in helpers, and on values that may be the point
+--   may              names indexed anywhere in helpers, and on values that may be the point; of a function of the whole
+--                    set also its texts, which may name attributes
 --   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
 --                    are the calls of a method `join` of anything
 --   computes_names   whether it indexes the point, or a value that may be the point, by a computed name
@@ -230,6 +231,7 @@ end
 function effects.KSTR(at)
   local text = at:string_constant(at.d)
   if text == "index" then at.found.asks_places = true end
+  if at.found.of_the_set and text then at.found.may[text] = true end -- points:max "age"
   return { kind = "string", value = text }
 end
 

@@ -170,7 +170,7 @@ local function make(native, rand, point_names, texts)
   end
   function methods.rand(p, use, when)
     local place = place_in(p, "rand")
-    if when == frame then when = frame.number end
+    if rawequal(when, frame) then when = frame.number end
     if type(use) ~= "number" or (when ~= nil and type(when) ~= "number") then
       error("p:rand takes a number, which of the point's random numbers, and the frame where they are to be new", 0)
     end

@@ -77,10 +77,14 @@ local element_type = {
   int64 = "int64_t", string = "uint32_t",
 }
 
--- Lets every operator say what to compute with instead.
+-- Lets every operator say what to compute with instead; a comparison with a number would be false, silently.
 local function refuse_operators(what, meta)
   for _, name in ipairs(operators) do
     meta[name] = function() error(what, 0) end
+  end
+  meta.__eq = function(a, b)
+    if type(a) == "number" or type(b) == "number" then error(what, 0) end
+    return rawequal(a, b)
   end
   return meta
 end
@@ -143,7 +147,7 @@ local function rand(...)
   if i < 0 then dead() end
   if type(use) ~= "number" then wrong_use("a number, which of the point's random numbers", use) end
   local frame_number = 0
-  if frame_or_number ~= nil then
+  if type(frame_or_number) ~= "nil" then -- not by ==, which the frame answers itself
     frame_number = frame_or_number
     if istype(frame_type, frame_number) then
       frame_number = frame_number.number

@@ -9,7 +9,7 @@ local describe = require "describe"
 local function options_of(what, options)
   if options == nil then return {} end
   if type(options) ~= "table" then
-    error(("%s takes a table of options, not a %s"):format(what, type(options)), 3)
+    error(("%s takes a table of options, not %s"):format(what, describe.operand(options)), 3)
   end
   local copy = {}
   for name, value in pairs(options) do copy[name] = value end
@@ -189,8 +189,12 @@ local function make(native, load_node, numeric, shapes, studies)
   }
 
   function rapid.translate(x, y, z)
-    for _, part in ipairs { x or false, y or false, z or false } do
-      if type(part) ~= "number" then error("rapid.translate takes three numbers: rapid.translate(x, y, z)", 2) end
+    for k = 1, 3 do
+      local part = select(k, x, y, z)
+      if type(part) ~= "number" then
+        error(("rapid.translate takes three numbers, rapid.translate(x, y, z); one is %s"):format(
+          describe.value(part)), 2)
+      end
     end
     return native.make("motion.translate", { by = vector.make(x, y, z) })
   end

@@ -25,18 +25,8 @@ local remedies = {
   ["^"] = "take its components",
 }
 
--- The frame and the step are no numbers, but what has some.
-local function remedy_of(operator, a, b)
-  for _, value in ipairs { a, b } do
-    local text = type(value) == "cdata" and tostring(value) or ""
-    if text:find "^frame " then return "take a number of it: frame.time, frame.dt or frame.number" end
-    if text == "a step" then return "take a number of it: step.time, step.dt or step.index" end
-  end
-  return remedies[operator]
-end
-
 local function wrong_operand(operator, a, b)
-  error(("can't compute %s %s %s; %s"):format(show(a), operator, show(b), remedy_of(operator, a, b)), 3)
+  error(("can't compute %s %s %s; %s"):format(show(a), operator, show(b), remedies[operator]), 3)
 end
 
 local function need_vec3(what, value)

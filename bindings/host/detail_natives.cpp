@@ -8,6 +8,7 @@
 #include "bindings/host/script_error.h"
 #include "bindings/host/state.h"
 #include "bindings/host/values.h"
+#include "runtime/points/attribute_like.h"
 
 namespace rapid {
 namespace {
@@ -31,7 +32,7 @@ int column(State& state)
     DetailRun& detail = detail_run_of(state);
     const std::string name = text_at(state.lua(), 1);
     AnyColumn* any = lua_type(L, 1) == LUA_TSTRING ? detail.points.find(name) : nullptr;
-    if (!any) throw Error(fmt::format("no attribute \"{}\"{}", name, did_you_mean(name, detail.points.column_names())));
+    if (!any) throw Error(no_attribute(name, detail.points.column_names()));
     const bool writable = lua_toboolean(L, 2) != 0;
     std::visit(
         [&]<class T>(Column<T>& values) {

@@ -25,12 +25,19 @@ bool varies(const Value& value)
 // What a node says of a parameter that it has not; of an attribute, how its newborn points get it.
 std::string unknown(const NodeType& type, const std::string& name)
 {
-    if (type.find("attributes") && (known_attribute(name) || conventional_attribute(name)))
-        return fmt::format("unknown parameter \"{}\"; it is an attribute of points: attributes = {{ {} }}", name,
-                           text_of_making(name));
+    const Param* values = type.find("attributes");
+    const bool gives_attributes = values && values->type == param_type<std::map<std::string, AttributeValue>>();
+    const std::string made = name == "name" ? "" : text_of_making(name);
+    if (gives_attributes && (known_attribute(name) || conventional_attribute(name)))
+        return fmt::format("unknown parameter \"{}\"; it is an attribute of points: attributes = {{ {} }}", name, made);
     const std::vector<std::string> names = type.param_names();
     if (const std::string near = did_you_mean(name, names); !near.empty())
         return fmt::format("unknown parameter \"{}\"{}", name, near);
+    if (gives_attributes)
+        return fmt::format(
+            "unknown parameter \"{}\"; rapid nodes {} lists them, and an attribute of points goes into "
+            "attributes = {{ {} }}",
+            name, type.name, made);
     constexpr std::size_t most = 12;  // in a message
     if (names.size() > most) return fmt::format("unknown parameter \"{}\"; rapid nodes {} lists them", name, type.name);
     return fmt::format("unknown parameter \"{}\"; {} has {}", name, type.name, fmt::join(names, ", "));

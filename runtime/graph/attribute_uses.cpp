@@ -66,12 +66,7 @@ struct MadeNames {
         std::vector<std::string> names = point_names_of(PointName::OwnColumn);
         for (const auto& [made, maker] : attributes) names.push_back(made);
         for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
-        const std::string near = conventional_attribute(name) ? "" : nearest_name(name, names);
-        const std::string made = text_of_making(name);
-        throw Error(near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
-                                 : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} "
-                                               "before it)",
-                                               name, near, made));
+        throw Error(no_attribute(name, names));
     }
 
     void check_group(const std::string& name) const

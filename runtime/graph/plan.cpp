@@ -19,7 +19,7 @@ Uses uses_of(const PlannedNode& planned)
     for (const auto& [name, value] : planned.node->arguments)
         if (value.function()) uses.functions.insert(name);
     uses.source_makes = planned.source_makes;
-    planned.op->uses(uses);
+    name_errors(planned.node->name, planned.node->location, [&] { planned.op->uses(uses); });
     std::vector<std::string>& references = planned.sources.empty() ? uses.reads : uses.reads_of_source;
     for (const auto& [name, value] : planned.node->arguments)
         if (const auto* reference = value.get<AttributeRef>()) references.push_back(reference->name);
@@ -70,7 +70,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         simulation.recorded |= simulation.solve && std::find(named.begin(), named.end(), "events") != named.end();
     }
     find_changes();
-    warn_of_idle_dynamics();
+    warn_of_idle_nodes();
     for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, s);
     for (std::size_t s = 0; s < simulations.size(); ++s) {
         PlannedSimulation& simulation = simulations[s];
@@ -137,18 +137,20 @@ void Plan::collect_nodes(const Graph& graph)
     }
 }
 
-// Forces, colliders and constraints act in a Solve alone. One warning a simulation, of the first of them.
-void Plan::warn_of_idle_dynamics()
+// Forces, colliders and constraints act in a Solve alone, and points are carried from frame to frame by one alone. One
+// warning a simulation, of the first such node.
+void Plan::warn_of_idle_nodes()
 {
     std::set<std::size_t> told;
     for (const PlannedNode& planned : nodes) {
         const Node& node = *planned.node;
-        if (node.type->kind != NodeKind::Dynamic || simulations[planned.simulation].solve) continue;
+        const bool is_dynamic = node.type->kind == NodeKind::Dynamic;
+        if (planned.in_loop || (!is_dynamic && node.type->name != "emit")) continue;
         if (!told.insert(planned.simulation).second) continue;
         warnings.push_back(
-            fmt::format("{}:{}: node \"{}\": acts on nothing: no :solve comes after it; end the chain "
-                        "with :solve {{}}",
-                        node.location.file, node.location.line, node.name));
+            fmt::format("{}:{}: node \"{}\": {}: no :solve comes after it; end the chain with :solve {{}}",
+                        node.location.file, node.location.line, node.name,
+                        is_dynamic ? "acts on nothing" : "its points are gone after the frame of their birth"));
     }
 }
 

@@ -122,7 +122,7 @@ private:
     void find_made_by_sources(PlannedNode& planned) const;
     void bind_all();
     void find_changes();
-    void warn_of_idle_dynamics();
+    void warn_of_idle_nodes();
 };
 
 // The uses of a node: those of its type, its own, and those of its arguments.

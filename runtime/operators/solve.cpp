@@ -131,7 +131,11 @@ struct Solve {
         if (estimates && !moves_alone(flow)) estimate_coupled(flow, now, figures);
         report(done, beyond, flow, now);
         recorder.end();
+        const bool none_left = flow.points.empty();
         now.figures.died += age_points(flow.points, group, now.frame.dt, &recorder);
+        if (newborn && !none_left && flow.points.empty())
+            now.warnings.push_back(fmt::format(
+                "node \"{}\": all points die in the frame of their birth; give them a longer life", now.node));
         feed_back(flow);
         if (flow.simulation->tells_points) {
             for (const SleepRecords::Record& record : sleep_records_.records) figures.note_asleep(record.id);

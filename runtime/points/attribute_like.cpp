@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
+#include "runtime/error.h"
+
 namespace rapid {
 
 const AttributeSpec* conventional_attribute(std::string_view name)
@@ -23,6 +27,7 @@ const AttributeSpec* conventional_attribute(std::string_view name)
 std::string text_of_making(const std::string& name)
 {
     const AttributeSpec* usual = conventional_attribute(name);
+    if (!usual) usual = known_attribute(name);
     if (!usual) return name + " = 0";
     // A parameter of every node has this name, too.
     if (type_of(usual->fallback) == AttributeType::String) return fmt::format("attributes = {{ {} = \"\" }}", name);
@@ -33,7 +38,17 @@ std::string text_of_making(const std::string& name)
     };
     if (const auto* vector = std::get_if<Vec3f>(&usual->fallback)) return list(*vector, 0, 1, 2);
     if (const auto* turn = std::get_if<Quatf>(&usual->fallback)) return list(turn->coeffs(), 0, 1, 2, 3);
-    return std::holds_alternative<float>(usual->fallback) ? name + " = 1" : name + " = 0";
+    const auto* number = std::get_if<float>(&usual->fallback);
+    return fmt::format("{} = {:g}", name, !number ? 0 : std::isfinite(*number) ? *number : 1);
+}
+
+std::string no_attribute(const std::string& name, const std::vector<std::string>& names)
+{
+    const std::string near = conventional_attribute(name) || known_attribute(name) ? "" : nearest_name(name, names);
+    const std::string made = text_of_making(name);
+    return near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
+                        : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} before it)",
+                                      name, near, made);
 }
 
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "runtime/points/point_set.h"
 
@@ -13,6 +14,9 @@ const AttributeSpec* conventional_attribute(std::string_view name);
 
 // How an attribute of this name is made by a node `attribute`: "Cd = {1, 1, 1}", "heat = 0".
 std::string text_of_making(const std::string& name);
+
+// What an error says of an attribute that nothing makes, with the nearest of the names that there are.
+std::string no_attribute(const std::string& name, const std::vector<std::string>& names);
 
 // An attribute that some points have, with values of the type of `like`, as the others get it: a known one with its
 // default, else that by convention, else zero.

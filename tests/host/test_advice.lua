@@ -40,6 +40,18 @@ describe("a message", function()
     expect("number expected, got cdata); the frame, a point and a vec3 are no numbers: frame.time, p.age",
       fault(emit:format "return math.sin(frame)"))
     expect("the frame, a point and a vec3 are no numbers", kernel_fault "p.v = vec3(math.sin(p.P), 0, 0)")
+    expect(number, kernel_fault "if frame == 2 then p.v = p.P end")
+    expect(number, fault(emit:format "return frame == 2 and 1 or 0"))
+    local shown = "the frame (frame.time is a number)"
+    for _, text in ipairs {
+      kernel_fault "p.v = vec3(0, frame, 0)", kernel_fault "p.v = rapid.math.clamp(frame, 0, 1) * p.P",
+      kernel_fault "p.v = rapid.math.noise(p.P, frame) * p.P", kernel_fault "p.v = p.v:lerp(p.P, frame)",
+      kernel_fault "p.v = frame",
+      fault [[return rapid.create { points = POINTS } :collide { shape = rapid.shape.sphere {},
+        transform = function(frame) return rapid.translate(0, frame, 0) end } :solve {}]],
+    } do expect(shown, text) end
+    expect("the step (step.time is a number)", fault [[return rapid.create { points = POINTS }
+      :action("k", function(p, step) p.v = vec3(0, step, 0) end) :solve {}]])
   end)
 
   it("says what there is in place of chance, files and clocks", function()
@@ -56,7 +68,24 @@ describe("a message", function()
     expect('unknown parameter "pscale"; it is an attribute of points: attributes = { pscale = 0 }',
       fault(emit:format "pscale = 0.1"))
     expect("attributes = { Cd = {1, 1, 1} }", fault(emit:format "Cd = {1, 0, 0}"))
+    expect("attributes = { mass = 1 }", fault(emit:format "mass = 2"))
+    expect("an attribute of points goes into attributes = { heat = 0 }", fault(emit:format "heat = 2"))
     expect('did you mean "rate"?', fault(emit:format "rat = 1"))
+  end)
+end)
+
+describe("what a :detail names", function()
+  it("is there, also where a method is given its name", function()
+    local result = scene.run([[
+return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {0, 2, 0}} } }
+  :detail("d", function(points, frame)
+    points.detail.oldest, points.detail.weight = points:max "age", points:sum "mass"
+  end)
+  :attribute { oldest = 0, weight = 0 }
+  :points("k", function(p, frame) p.oldest, p.weight = frame.detail.oldest, frame.detail.weight end)
+  :solve {}]], { frames = {1, 4} })
+    assert.near(2 / 24, result[4][1].oldest, 1e-7)
+    assert.equal(2, result[4][1].weight)
   end)
 end)
 
@@ -67,6 +96,14 @@ describe("a warning", function()
     assert.falsy(text:find("wind1", 1, true))
     assert.equal("", warnings "return rapid.create { points = POINTS } :gravity {} :solve {}")
     assert.equal("", warnings "return rapid.create { points = POINTS } :attribute { heat = 1 }")
+    expect('node "wind1": acts on nothing', warnings "return rapid.create { points = POINTS } :solve {} :wind {}")
+    assert.equal("", warnings [[return rapid.create {} :emit { source = POINTS, rate = 9 } :wind {}
+      :merge(rapid.create { points = POINTS }) :solve {}]])
+  end)
+
+  it("names the emitter whose points are gone after a frame, as no :solve comes after it", function()
+    expect('node "emit1": its points are gone after the frame of their birth: no :solve comes after it',
+      warnings "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 100 }")
   end)
 
   it("tells where all points die as they are born", function()
@@ -75,6 +112,12 @@ describe("a warning", function()
   :collide { shape = rapid.shape.sphere { radius = %s }, response = "die" } :solve {}]]
     expect('node "collide1": kills all points where they are born', warnings(scene_text:format "1"))
     assert.equal("", warnings(scene_text:format "0.5"))
+    local short = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 2000, life = %g } :solve {}"
+    for _, life in ipairs { 0, 1e-6 } do
+      expect('node "solve1": all points die in the frame of their birth; give them a longer life',
+        warnings(short:format(life)))
+    end
+    assert.equal("", warnings(short:format(0.03)))
   end)
 
   it("tells of a voxel that is as large as half of the mesh", function()

@@ -241,7 +241,7 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.mesh.sphere { radius = 0 }"] = "radius = 0 is out of range; it must be above 0",
       ["rapid.mesh.sphere { radius = 'big' }"] = 'radius = "big" has the wrong type; it must be a number',
       ["rapid.mesh.sphere { raduis = 1 }"] = 'unknown option "raduis"; did you mean "radius"?',
-      ["rapid.mesh.sphere(2)"] = "takes a table of options, not a number",
+      ["rapid.mesh.sphere(2)"] = "takes a table of options, not 2",
       ["rapid.mesh.sphere { 2 }"] = "rapid.mesh.sphere: 2 has no name; write { NAME = value, ... }",
       ["rapid.mesh.box { size = 2 }"] = "size = 2 has the wrong type; it must be a vec3 or {x, y, z}",
       ["rapid.mesh.box { size = {1, -1, 1} }"] = "size = {1, -1, 1}: each edge must be above 0",
@@ -293,7 +293,7 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.fog.read 'none.vdb'"] = "rapid.fog.read: there is no file",
       ["rapid.levelset.sphere { radius = 1, voxel = 0.2 }:write 'ball.vdb' rapid.fog.read 'ball.vdb'"] =
         "there is no fog of floats",
-      ["rapid.translate(1, 2)"] = "rapid.translate takes three numbers: rapid.translate(x, y, z)",
+      ["rapid.translate(1, 2)"] = "rapid.translate takes three numbers, rapid.translate(x, y, z); one is nil",
       ["rapid.rotate({0, 0, 0}, 90)"] = "rapid.rotate: the axis has length 0; it needs a direction",
       ["rapid.rotate({0, 1, 0})"] = "rapid.rotate: the degrees is missing",
       ["rapid.scale(0)"] = "rapid.scale: factor = 0 is out of range; it must be above 0",

@@ -197,7 +197,9 @@ describe("an error in a detail function", function()
     for body, expected in pairs {
       ["points[5].heat = 1"] = "points: there is no point 5; the set has 1 to 4",
       ["points[0].heat = 1"] = "points: there is no point 0; the set has 1 to 4",
-      ["points[1].hat = 1"] = 'no attribute "hat"; did you mean "heat"?',
+      ["points[1].hat = 1"] = 'no attribute "hat"; did you mean "heat"? (or add :attribute{ hat = 0 } before it)',
+      ["points[1].N = vec3(1, 0, 0)"] = 'no attribute "N"; add :attribute{ N = {0, 0, 0} } before it',
+      ["points:max 'colour'"] = 'no attribute "colour"; add :attribute{ colour = 0 } before it',
       ["points[1].heat = vec3(0, 0, 0)"] = 'attribute "heat" takes a number, not vec3(0, 0, 0)',
       ["points[1].P = vec3(1 / 0, 0, 0)"] = "P became vec3(inf, 0, 0); a float is finite, within 3.4e38 either way",
       ["points[1].id = 3"] = "id is read only",
@@ -205,7 +207,8 @@ describe("an error in a detail function", function()
       ["points:add { dt = 0.1 }"] =
         "points:add: dt = 0.1; it is the time that the point moves in this frame, from 0 to 0.0416666667 s",
       ["points:add { group = 'cold' }"] = "points:add: no node makes a group \"cold\"",
-      ["points:add { heta = 3 }"] = 'no attribute "heta"; did you mean "heat"?',
+      ["points:add { heta = 3 }"] =
+        'no attribute "heta"; did you mean "heat"? (or add :attribute{ heta = 0 } before it)',
       ["points:neighbours(1, 0)"] = "neighbours within 0 m of points up to 3 m from the origin; the radius must be " ..
         "above 0, and above 2.79397e-09 m there",
       ["points:average 'heat'"] = 'points have no "average"; they have add, bounds, detail, events, kill, max, ' ..

@@ -30,7 +30,7 @@ local by_the_plan = {
 local at_a_point = {
   ["p.heat = nil"] = 'attribute "heat" takes a number, not nil',
   ["p.v = vec3(1, 2, 3) * frame"] =
-    "can't compute vec3(1, 2, 3) * frame 2; take a number of it: frame.time, frame.dt or frame.number",
+    "can't compute vec3(1, 2, 3) * the frame (frame.time is a number); the other must be a number or a vec3",
   ["p.heat = 'hot'"] = 'attribute "heat" takes a number, not "hot"',
   ["p.heat = p.P"] = 'attribute "heat" takes a number, not vec3(0, 1, 0)',
   ["p.heat = {}"] = 'attribute "heat" takes a number, not a table',

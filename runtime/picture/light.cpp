@@ -19,6 +19,58 @@ constexpr int slices = 64;         // and along the light
 constexpr float cells_a_texel = static_cast<float>(cells) / shadow_size;
 constexpr std::size_t slice = std::size_t{cells} * cells;
 
+// Points of a larger radius are discs of cells, smaller ones are in one cell with all that they cover.
+constexpr float small_radius = 1.5f;  // cells
+constexpr float most_covered = 4;     // times, by one large ball, which lets nothing through: exp(-0.7 4) is dark
+
+// What a point covers, in cells.
+struct ShadowDisc {
+    float x, y, radius, taken;
+
+    int reach() const { return radius <= small_radius ? 0 : static_cast<int>(std::ceil(radius)); }
+
+    // How often it covers a cell.
+    float covers(int cell_x, int cell_y) const
+    {
+        if (radius <= small_radius) {
+            const bool in_cell = cell_x == static_cast<int>(x) && cell_y == static_cast<int>(y);
+            return in_cell ? taken * 3.14159f * radius * radius : 0;
+        }
+        const float dx = static_cast<float>(cell_x) + 0.5f - x, dy = static_cast<float>(cell_y) + 0.5f - y;
+        const float part = std::clamp(radius + 0.5f - std::sqrt(dx * dx + dy * dy), 0.0f, 1.0f);
+        return part * taken * std::min(radius / small_radius, most_covered);
+    }
+
+    // How often it covers its own middle, as the blurred cells tell it there.
+    float covers_itself() const
+    {
+        if (radius > 5) return taken * std::min(radius / small_radius, most_covered);
+        const std::array<float, 7> along_x = weights(x), along_y = weights(y);
+        if (radius <= small_radius) return along_x[3] * along_y[3] * covers(static_cast<int>(x), static_cast<int>(y));
+        float sum = 0;
+        for (int j = -3; j <= 3; ++j)
+            for (int i = -3; i <= 3; ++i)
+                if (const float weight = along_x[i + 3] * along_y[j + 3]; weight > 0)
+                    sum += weight * covers(static_cast<int>(x) + i, static_cast<int>(y) + j);
+        return sum;
+    }
+
+private:
+    // Of the cells around that of `at` in a value that is interpolated there, between two blurred cells.
+    static std::array<float, 7> weights(float at)
+    {
+        constexpr std::array<float, 9> blur = {0, 0, 0.0625f, 0.25f, 0.375f, 0.25f, 0.0625f, 0, 0};
+        const float middle = at - std::floor(at) - 0.5f;
+        const int low = middle < 0 ? -1 : 0;  // the nearer of the two, from the point's cell
+        const float part = middle - static_cast<float>(low);
+        std::array<float, 7> result{};
+        for (int k = -3; k <= 3; ++k)
+            result[k + 3] =
+                (1 - part) * blur[std::clamp(k - low + 4, 0, 8)] + part * blur[std::clamp(k - low - 1 + 4, 0, 8)];
+        return result;
+    }
+};
+
 Vec3f light_direction(const Camera& camera)
 {
     const Lens lens = Lens::of_camera(camera, 2, 2);
@@ -87,6 +139,7 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
     };
     for_each_row([&](std::size_t row) { std::fill_n(&covered_[row + x_.begin], x_.end - x_.begin, 0.0f); });
 
+    least_radius_ = least_radius;
     const Strided<Vec3f> P = points.P().read();
     const Column<float>* pscale = points.find<float>("pscale");
     const float cells_a_metre = lens_.focal * cells_a_texel;
@@ -101,12 +154,20 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
             const float taken = opacity.empty() ? 1 : opacity[i];
             if (taken == 0) continue;
             const float r = std::max(least_radius, pscale ? (*pscale)[i] : 0.0f) * cells_a_metre;
-            const float share = taken * std::min(3.14159f * r * r, 16.0f);
+            const ShadowDisc disc{x, y, std::min(r, static_cast<float>(cells)), taken};
             const Eigen::Vector3i cell = Vec3f(x, y, z).cast<int>();
-            for (int axis = 0; axis < 3; ++axis) range[axis].extend(cell[axis], cell[axis]);
-            sums_[static_cast<std::size_t>(cell.z()) * slice + static_cast<std::size_t>(cell.y()) * cells +
-                  static_cast<std::size_t>(cell.x())]
-                .fetch_add(static_cast<std::uint64_t>(unit * share + 0.5f), std::memory_order_relaxed);
+            const int reach = disc.reach();
+            const int left = std::max(cell.x() - reach, 0), right = std::min(cell.x() + reach, cells - 1);
+            const int low = std::max(cell.y() - reach, 0), high = std::min(cell.y() + reach, cells - 1);
+            range[0].extend(left, right);
+            range[1].extend(low, high);
+            range[2].extend(cell.z(), cell.z());
+            for (int cy = low; cy <= high; ++cy)
+                for (int cx = left; cx <= right; ++cx)
+                    sums_[static_cast<std::size_t>(cell.z()) * slice + static_cast<std::size_t>(cy) * cells +
+                          static_cast<std::size_t>(cx)]
+                        .fetch_add(static_cast<std::uint64_t>(unit * disc.covers(cx, cy) + 0.5f),
+                                   std::memory_order_relaxed);
         }
     });
     x_ = y_ = z_ = Range();
@@ -197,7 +258,20 @@ bool Light::may_shade(const Box3f& box) const
     return box.intersects(Box3f(low, high));
 }
 
-float Light::past_points(const Vec3f& cell) const
+float Light::past_points(const Vec3f& cell) const { return past_points(cell, 0, slices); }
+
+float Light::past_other_points(const Vec3f& P, float radius, float taken) const
+{
+    if (z_.begin == z_.end) return 1;
+    const Vec3f cell = cell_of(P);
+    const float cells_a_metre = lens_.focal * cells_a_texel;
+    const float r = std::min(std::max(least_radius_, radius) * cells_a_metre, static_cast<float>(cells));
+    return past_points(cell, ShadowDisc{cell.x() + 0.5f, cell.y() + 0.5f, r, taken}.covers_itself(),
+                       static_cast<int>(lens_.project(P).z() / depth_range_ * slices));
+}
+
+// own: how often the point whose place it is covers it, with its slice.
+float Light::past_points(const Vec3f& cell, float own, int own_slice) const
 {
     if (z_.begin == z_.end) return 1;
     if (!(cell.x() >= 0 && cell.y() >= 0 && cell.z() >= 0 && cell.x() < cells - 1 && cell.y() < cells - 1)) return 1;
@@ -211,7 +285,8 @@ float Light::past_points(const Vec3f& cell) const
         return low + part.y() * (high - low);
     };
     const float near = of_slice(c);
-    const float covered = near + part.z() * (of_slice(c + slice) - near);
+    float covered = near + part.z() * (of_slice(c + slice) - near);
+    if (corner.z() + 1 >= own_slice) covered -= own * (corner.z() >= own_slice ? 1 : part.z());
     return covered > 0 ? std::exp(-0.7f * covered) : 1;
 }
 

@@ -32,12 +32,15 @@ public:
     Vec3f cell_of(const Vec3f& P) const;
     // The part of the light that passes the points between the lamp and such a place.
     float past_points(const Vec3f& cell) const;
+    // The same at a point that has been gathered, by all others: a ball casts no shadow on its own middle.
+    float past_other_points(const Vec3f& P, float radius, float taken) const;
     // Whether any place in the box of cells may be in their shadow.
     bool may_shade(const Box3f& box) const;
 
 private:
     void draw_meshes(const PictureScene& scene);
     void blur_covered();
+    float past_points(const Vec3f& cell, float own, int own_slice) const;
 
     // The cells that points cover, with those that the blur reaches: of none, begin = end.
     struct Range {
@@ -48,6 +51,7 @@ private:
     Vec3f direction_;
     Lens lens_;
     float depth_range_;              // m, of the lit region
+    float least_radius_ = 0;         // m, of the points that were gathered
     std::vector<float> mesh_depth_;  // of the nearest mesh, shape [shadow_size][shadow_size]; empty: no meshes
     // How often points cover a cell's cross section, summed from the lamp to the cell's far side; shape [slices][size]
     // [size] over the same square. Integers while they are summed: a sum does not depend on the order of threads.

@@ -193,7 +193,8 @@ struct PointLook {
         // A colour brighter than white shines, and no shadow dims it.
         const float shining = m.additive ? 1 : glow(own);
         if (shining < 1) {
-            const float lamp = light.past_meshes(P, Vec3f::Zero()) * light.past_points(light.cell_of(P));
+            const float lamp =
+                light.past_meshes(P, Vec3f::Zero()) * light.past_other_points(P, m.metres, (1 - shining) * m.opacity);
             const float lit = 0.30f + 0.80f * lamp;
             m.colour *= lit + shining * (1 - lit);
         }

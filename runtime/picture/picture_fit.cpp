@@ -27,28 +27,30 @@ Box3d trimmed_bounds(const PointSet& points, const std::string& group, double ah
     const Strided<std::uint8_t> members = members_of(points, group);
     constexpr std::size_t sample_size = 20000;
     const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
-    std::vector<double> along[3];
+    const Column<float>* pscale = points.find<float>("pscale");
+    std::vector<double> lows[3], highs[3];  // of the balls
     for (std::size_t i = 0; i < points.size(); i += group.empty() ? step : 1) {
         if (!members[i]) continue;
         const Vec3d P = points.P()[i].cast<double>();
         Vec3d later = P + ahead * points.v()[i].cast<double>();
         later.y() = std::max(later.y(), std::min(P.y(), floor));
         if (!P.allFinite() || !later.allFinite()) continue;
-        for (int axis = 0; axis < 3; ++axis) {
-            along[axis].push_back(P[axis]);
-            if (ahead > 0) along[axis].push_back(later[axis]);
-        }
+        const double radius = pscale && std::isfinite((*pscale)[i]) ? std::max(0.0, double{(*pscale)[i]}) : 0;
+        for (int axis = 0; axis < 3; ++axis)
+            for (const Vec3d& at : {P, later}) {
+                lows[axis].push_back(at[axis] - radius);
+                highs[axis].push_back(at[axis] + radius);
+                if (ahead == 0) break;
+            }
     }
     Box3d bounds;
-    if (along[0].empty()) return bounds;
-    const std::size_t left_out = along[0].size() / 200;
+    if (lows[0].empty()) return bounds;
+    const auto left_out = static_cast<std::ptrdiff_t>(lows[0].size() / 200);
     for (int axis = 0; axis < 3; ++axis) {
-        std::vector<double>& values = along[axis];
-        const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);
-        const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
-        std::nth_element(values.begin(), low, values.end());
+        const auto low = lows[axis].begin() + left_out, high = highs[axis].end() - 1 - left_out;
+        std::nth_element(lows[axis].begin(), low, lows[axis].end());
         bounds.min()[axis] = *low;
-        std::nth_element(values.begin(), high, values.end());
+        std::nth_element(highs[axis].begin(), high, highs[axis].end());
         bounds.max()[axis] = *high;
     }
     return bounds;
@@ -174,9 +176,12 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     const PictureScene& scene = frame.scene ? *frame.scene : nothing;
 
     const bool first = !settled();
-    if (!first) StateReader::expect(is_view(view_) && goal_.sizes().allFinite() && seen_.sizes().allFinite());
+    const bool has_seen = !seen_.isEmpty();  // anything but a group that had no points
+    if (!first)
+        StateReader::expect(is_view(view_) && goal_.sizes().allFinite() && (!has_seen || seen_.sizes().allFinite()));
     const std::string& group = scene.camera.group;
-    const Box3d moving = trimmed_bounds(points, group, first ? look_ahead : 0, floor_of(scene));
+    // A group is followed, wherever it goes.
+    const Box3d moving = trimmed_bounds(points, group, first && group.empty() ? look_ahead : 0, floor_of(scene));
     Box3d content = group.empty() ? shape_bounds(scene, moving) : moving;
     if (!content.isEmpty()) {
         // A single point, a flat sheet: a metre or a tenth of the rest, so that there is something to look at.

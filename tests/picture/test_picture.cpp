@@ -261,6 +261,52 @@ TEST_CASE("what shines casts no shadow, and the rest does", "[io][picture]")
     CHECK(darkest({2, 2, 2}, {}) <= 1);  // its edge covers a little of the ground
 }
 
+TEST_CASE("a ball casts no shadow on itself, wherever it is", "[io][picture]")
+{
+    PictureView view = front_view();
+    view.camera.position = Vec3d(0.3, 0.4, 1.5);
+    view.camera.target = Vec3d(0.3, 0.4, 0);
+    view.bounds = Box3d(Vec3d(-2, -1, -2), Vec3d(2, 3, 2));
+    for (const float radius : {0.06f, 0.1f, 0.2f, 0.5f}) {
+        int darkest = 255, lightest = 0;
+        for (int k = 0; k < 24; ++k) {  // through some slices of the light's region, at any place in its cells
+            const auto x = static_cast<float>(k % 3) * 0.3f, y = static_cast<float>(k) * 0.037f;
+            const Picture picture = render(balls({{x, y, 0}}, {{0.4f, 0.4f, 0.4f}}, radius), small, {}, view);
+            const int at = *std::max_element(picture.rgb.begin(), picture.rgb.end());
+            darkest = std::min(darkest, at);
+            lightest = std::max(lightest, at);
+        }
+        CAPTURE(radius, darkest, lightest);
+        CHECK(lightest - darkest <= 12);  // where its middle is in a pixel makes some of that
+    }
+}
+
+TEST_CASE("the shadow of a ball is as large as the ball", "[io][picture]")
+{
+    PictureView view = front_view();
+    view.camera.position = Vec3d(0, 12, 0.01);
+    view.bounds = Box3d(Vec3d(-3, -3, -3), Vec3d(3, 3, 3));
+    PictureScene scene;
+    scene.planes.push_back({Vec3d::UnitY(), -1});
+    for (const float radius : {0.25f, 0.4f, 0.6f}) {
+        // The lamp is from above and the left: the shadow falls to the right of what hides the ground.
+        const Picture with = render(balls({{-1, 2.5f, 0}}, {{0.1f, 0.1f, 0.1f}}, radius), small, scene, view);
+        const Picture without = render(PointSet(), small, scene, view);
+        int most = 0;
+        const auto darker = [&](int x, int y) { return without.pixel(x, y)[1] - with.pixel(x, y)[1]; };
+        const int left = static_cast<int>(160 + 100 * (-1 + radius) / (12 - 2.5)) + 3;
+        for (int y = 0; y < 200; ++y)
+            for (int x = left; x < 320; ++x) most = std::max(most, darker(x, y));
+        int area = 0;  // pixels in which the shadow is at least half as deep as anywhere
+        for (int y = 0; y < 200; ++y)
+            for (int x = left; x < 320; ++x) area += 2 * darker(x, y) > most;
+        const double pixel = (12 + 1) / 100.0, slope = std::hypot(0.45, 0.85 + 0.35) / (0.85 + 0.35);
+        CAPTURE(radius, most, area);
+        CHECK(most > 10);
+        CHECK(area * pixel * pixel == Approx(EIGEN_PI * radius * radius * slope).epsilon(0.3));
+    }
+}
+
 TEST_CASE("a style is that of a group, and the later one counts", "[io][picture]")
 {
     PointSet points = balls({{-2, 0, 0}, {2, 0, 0}}, {red, red}, 0.3f);
@@ -348,6 +394,7 @@ TEST_CASE("the fitted camera sees all points and shapes, and no more than it nee
     CAPTURE(scale);
     PointSet points = random_points({.size = 2000, .extent = scale});
     for (Vec3f& v : points.v().write()) v *= 0.1f * scale;
+    points.column<float>("pscale").fill(0.01f * scale);
     auto scene = std::make_shared<PictureScene>();
     scene->bodies.push_back({make_sphere(scale, 16, {2.0 * scale, 0, 0})});
 
@@ -362,6 +409,17 @@ TEST_CASE("the fitted camera sees all points and shapes, and no more than it nee
     for (std::size_t i = 0; i < points.size(); i += 20) seen(points.P()[i]);
     for (const Vec3f& P : scene->bodies[0].mesh->positions) seen(P);
     CHECK(widest > 0.6);
+}
+
+TEST_CASE("the fitted camera sees the whole of large points", "[io][picture]")
+{
+    const PictureView view = PictureFit().next(balls({{-2, 0, 0}, {2, 0, 0}}, {red, green}, 1.5f), {});
+    for (const double x : {-2.0, 2.0})
+        for (const Vec3d& side : {Vec3d(1.5, 0, 0), Vec3d(0, 1.5, 0), Vec3d(0, 0, 1.5)})
+            for (const double sign : {-1.0, 1.0}) {
+                const Vec3d s = view.camera.project(Vec3d(x, 0, 0) + sign * side, 1280, 720);
+                CHECK((s.x() > 0 && s.x() < 1280 && s.y() > 0 && s.y() < 720));
+            }
 }
 
 TEST_CASE("over a sequence the camera holds still, and glides back a few times when points leave it", "[io][picture]")
@@ -438,6 +496,7 @@ TEST_CASE("a camera that frames a group follows it, and not the rest", "[io][pic
 {
     PointSet points = balls({{0, 0, 0}, {0.2f, 0.1f, 0}, {50, 0, 0}, {-50, 3, 9}}, {red, red, green, green}, 0.05f);
     points.group("pair").write()[0] = points.group("pair").write()[1] = 1;
+    points.v().fill(Vec3f(0.24f, 0.48f, 0));
     auto scene = std::make_shared<PictureScene>();
     scene->camera.group = "pair";
     PictureFit fit;
@@ -447,9 +506,23 @@ TEST_CASE("a camera that frames a group follows it, and not the rest", "[io][pic
         const Vec3d pair = (points.P()[0] + points.P()[1]).cast<double>() / 2;
         const Vec3d seen = view.camera.project(pair, 1280, 720);
         CAPTURE(frame);
-        CHECK((std::abs(seen.x() - 640) < 320 && std::abs(seen.y() - 360) < 180));
+        CHECK((std::abs(seen.x() - 640) < 2 && std::abs(seen.y() - 360) < 2));
         CHECK((view.camera.position - pair).norm() < 5);
     }
+}
+
+TEST_CASE("a camera that frames a group waits where it is while nobody is in it", "[io][picture]")
+{
+    PointSet points = balls({{3, 1, 0}}, {red}, 0.05f);
+    auto scene = std::make_shared<PictureScene>();
+    scene->camera.group = "late";
+    PictureFit fit;
+    const PictureView first = fit.next(points, {.number = 1, .scene = scene});
+    CHECK(fit.next(points, {.number = 2, .time = 1 / 24.0, .scene = scene}).camera.position == first.camera.position);
+    points.group("late").write()[0] = 1;
+    const PictureView later = fit.next(points, {.number = 3, .time = 2 / 24.0, .scene = scene});
+    const Vec3d seen = later.camera.project({3, 1, 0}, 1280, 720);
+    CHECK((std::abs(seen.x() - 640) < 2 && std::abs(seen.y() - 360) < 2));
 }
 
 TEST_CASE("a picture's options set its camera and its size", "[io][picture]")

@@ -1,12 +1,12 @@
-// goal: each point travels to a place, and is there, at rest, when its time is over.
+// goal: each point travels to a place, and is there, at rest, when its time is over; then it goes where the place goes.
 //
 //   P(u) = P + d (3u² - 2u³) + v T (u - 2u² + u³)            d = to - P;  T: the time that is left;  u = t / T
 //
 // The cubic from where the point is, at its velocity, to rest at its place, is made anew at each frame: with no other
 // force it is the same each time, and what another force did in a frame before the last is made good; a place that
 // moves is headed for as it is at the end of the frame. A kick and a constant acceleration take Solve to the cubic's
-// place and velocity at the frame's end. A force that acts in the last frame, or while the point is held, moves it by a
-// dt²/2.
+// place and velocity at the frame's end. A point that is held at its place goes evenly with it through the frame, and
+// has its velocity. A force that acts in the last frame, or while the point is held, moves it by a dt²/2.
 #include <algorithm>
 #include <optional>
 
@@ -78,7 +78,8 @@ struct Goal {
         Flow flow = std::move(inputs[0]);
         PointSet& points = flow.points;
         const Strided<std::uint8_t> members = members_of(points, group);
-        if (to.object) find_places(points, members, flow.simulation->clock(), now);
+        std::optional<Column<Vec3f>> places_before;
+        if (to.object) places_before = find_places(points, members, flow.simulation->clock(), now);
         const Strided<Vec3f> goal = std::as_const(points).column<Vec3f>(to.object ? "goal" : to.attribute).read();
         const Strided<std::int64_t> id = std::as_const(points).id().read();
         const Strided<Vec3f> P = std::as_const(points).P().read();
@@ -93,7 +94,13 @@ struct Goal {
                 const double since = (age ? double{(*age)[i]} : now.frame.time - dt) - start -
                                      stagger * uniform4(now.random, static_cast<std::uint64_t>(id[i]), stagger_use)[0];
                 const std::optional<double> left = time_left(since, dt);
-                if (left) go(goal[i].cast<double>() - P[i].cast<double>(), *left, dt, double{mass[i]}, v[i], force[i]);
+                if (!left) continue;
+                const Vec3d at = P[i].cast<double>(), d = goal[i].cast<double>() - at;
+                // Of a point that was at its place, and not elsewhere, the place is as fast as the way through the
+                // frame.
+                const bool is_held = *left <= 1e-6 * time && places_before &&
+                                     (at - (*places_before)[i].cast<double>()).norm() <= 1e-3 * d.norm();
+                go(d, *left, dt, double{mass[i]}, is_held ? Vec3d(d / dt) : Vec3d::Zero(), v[i], force[i]);
             }
         });
         return flow;
@@ -111,12 +118,12 @@ private:
         return left;
     }
 
-    // d: from the point to its place.
-    static void go(const Vec3d& d, double left, double dt, double mass, Vec3f& v, Vec3f& force)
+    // d: from the point to its place; there: its velocity where its time is over.
+    static void go(const Vec3d& d, double left, double dt, double mass, const Vec3d& there, Vec3f& v, Vec3f& force)
     {
         const double u = left > dt ? dt / left : 1;
         const Vec3d before = v.cast<double>();
-        Vec3d way = d * (u * u * (3 - 2 * u)), after = Vec3d::Zero();
+        Vec3d way = d * (u * u * (3 - 2 * u)), after = there;
         if (u < 1) {
             way += before * (dt * (1 - u) * (1 - u));
             after = d * (6 * u * (1 - u) / left) + before * ((1 - u) * (1 - 3 * u));
@@ -125,7 +132,9 @@ private:
         force += ((after - v.cast<double>()) * (mass / dt)).cast<float>();
     }
 
-    void find_places(PointSet& points, Strided<std::uint8_t> members, const FrameClock& of, const Evaluation& now)
+    // Returns the places of the frame before.
+    Column<Vec3f> find_places(PointSet& points, Strided<std::uint8_t> members, const FrameClock& of,
+                              const Evaluation& now)
     {
         if (known_ != to.object) {
             known_ = to.object;
@@ -133,9 +142,11 @@ private:
         }
         points.add({"goal", Vec3f(Vec3f::Zero())});
         if (to.is_taken(by)) points.add({goal_number, std::int64_t{-1}});
-        Column<Vec3f> column = points.column<Vec3f>("goal");
+        const Column<Vec3f> before = points.column<Vec3f>("goal");
+        Column<Vec3f> column = before;
         places_->find(points, members, of, now, column.write());
         points.set("goal", std::move(column));
+        return before;
     }
 
     // Of the target of the last frame; a cache.

@@ -254,6 +254,10 @@ return rapid.create { fps = 10, points = two }
           assert.near({x, P.y + 0.2 * (f - 1), z}, Q, 2e-4)
         end
       end
+      for i = 1, #result[6] do -- who is there goes with it, at its speed
+        assert.near((result[6][i].P - result[5][i].P) * 10, result[6][i].v, 1e-4)
+        assert.near({0, 0, 0}, result[5][i].v, 1e-4)
+      end
     end
   end)
 

@@ -31,7 +31,7 @@ inline bool have_ids_below(const PointSet& points, std::int64_t next_id)
 template <StateArchive Archive>
 void serialize(Archive& keep, LoggedHit& hit)
 {
-    keep(hit.point, hit.collider, hit.time, hit.P, hit.n, hit.vc, hit.v0, hit.v1, hit.speed, hit.impulse);
+    keep(hit.point, hit.collider, hit.time, hit.P, hit.n, hit.vc, hit.v0, hit.v1, hit.speed, hit.impulse, hit.recorded);
 }
 
 template <StateArchive Archive>

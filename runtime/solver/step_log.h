@@ -20,6 +20,7 @@ struct LoggedHit {
     Vec3f v0, v1;           // the point's velocity before and after, m/s
     float speed;            // of approach, m/s
     float impulse;          // kg m/s
+    bool recorded;          // in the hit attributes
 };
 
 class StepLog {

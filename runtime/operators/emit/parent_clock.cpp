@@ -227,8 +227,26 @@ private:
         }
     }
 
+    // The number of contacts grows at contacts, of which each is an event with a normal.
+    void take_contacts(std::uint32_t i, const ParentPaths::Parent& parent, State& state)
+    {
+        const AttributeComparison& comparison = plan_.on->comparison;
+        double total = value_->at(parent, parent.begin);
+        if (comparison.holds(total) && !state.held) add_at(i, state, parent.begin);
+        for (std::uint32_t k = parent.hit; k < parent.hit + parent.hits; ++k) {
+            const LoggedHit& hit = parents_.record().hits[k];
+            const double t = parents_.time_of(hit);
+            if (!hit.recorded || t > parent.end) continue;
+            const bool before = comparison.holds(total);
+            if (comparison.holds(++total) && !before) add_at(i, state, t, k);
+        }
+        state.held = comparison.holds(total);
+    }
+
     void take_comparison(std::uint32_t i, const ParentPaths::Parent& parent, State& state)
     {
+        if (plan_.on->comparison.attribute == "hittotal" && parents_.record().has_contacts)
+            return take_contacts(i, parent, state);
         const bool first = plan_.on->comparison.holds(value_->at(parent, parent.begin));
         const bool last = plan_.on->comparison.holds(value_->at(parent, parent.end));
         if (first && !state.held)

@@ -28,7 +28,7 @@ void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
         block_.context.log->add({index, obstacle, impact.time, impact.P.cast<float>(), impact.n.cast<float>(),
                                  impact.vc.cast<float>(), impact.v.cast<float>(),
                                  (impact.v + impact.change).cast<float>(), static_cast<float>(impact.speed),
-                                 static_cast<float>(impulse)});
+                                 static_cast<float>(impulse), records});
 }
 
 // A free path keeps v²/2 - a·P, so any change of it is the work of contacts.

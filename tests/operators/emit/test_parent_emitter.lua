@@ -266,6 +266,22 @@ return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthti
     assert.near(1.5, points[1].P.y, 1e-6)
   end)
 
+  it("a comparison of hittotal: at the contact itself, along its normal", function()
+    local ground = ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.5, record = %s }"
+    local first = fall + 2 * 0.5 * g * fall / g -- of the second bounce
+    for record, moments in pairs { ["true"] = { fall, first, first + fall / 2 }, ["5"] = { fall } } do
+      for n = 1, 3 do
+        local points = born(('on = "hittotal >= %d", count = 2, inherit_velocity = 0, speed = 1'):format(n),
+          { before = ground:format(record), frames = 40 })
+        assert.equal(moments[n] and 2 or 0, #points)
+        for i = 1, #points do
+          assert.near(moments[n], points[i].birthtime, 1e-6)
+          assert.near({3 * moments[n], 39 / 24 - moments[n], 0}, points[i].P, 1e-5)
+        end
+      end
+    end
+  end)
+
   it("a function of a point: at the end of the frame in which it begins to be true", function()
     local points = born("on = function(p) return p.P.y < 1.5 end, inherit_velocity = 0")
     assert.equal(1, #points)
@@ -351,7 +367,8 @@ describe("a node as source that can't be one", function()
     fails(with(":solve {}", 'source = parents, on = "hit", rate = 3'), "rate and on are given together")
     fails(with(":solve {}", 'source = parents, count = 1, kill_parent = true'),
       "kill_parent is for births at an event in a parent's life")
-    fails(with(":solve {}", 'source = parents, count = 1, inherit = {"heta"}'), 'the source has no attribute "heta"')
+    fails(with(":solve {}", 'source = parents, count = 1, inherit = {"heta"}'),
+      'node "emit1": inherit: the source has no attribute "heta"')
     fails(with(":solve {}", 'source = parents, count = rapid.attr "n"'), 'no attribute "n"')
     fails(with(":solve {}", 'source = parents, count = 1, source_group = "old"'), 'no node makes a group "old"')
     fails(with(":solve {}", 'source = parents, count = 1, from = "points"'), "from is not for a source that is a node")

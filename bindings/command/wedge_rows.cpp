@@ -112,6 +112,15 @@ std::string missing_names(const std::string& pattern, const std::vector<SweptSet
     return fmt::format("{}", fmt::join(missing, " and "));
 }
 
+[[noreturn]] void refuse_same_files(const std::string& pattern, const std::vector<SweptSetting>& settings,
+                                    const std::string& row, const std::string& other)
+{
+    if (row == other) throw Error(fmt::format("--vary: {} is there twice; leave one out", row));
+    const std::string missing = missing_names(pattern, settings);
+    throw Error(fmt::format("-o {}: {} and {} write the same files; {}", pattern, row, other,
+                            missing.empty() ? "leave one out" : fmt::format("put {} into the pattern", missing)));
+}
+
 }  // namespace
 
 std::string WedgeRow::label() const
@@ -133,9 +142,7 @@ std::vector<WedgeRow> wedge_rows(const std::vector<SweptSetting>& settings, bool
         for (const std::string& pattern : patterns) {
             const std::string name = with_values(pattern, rows.back().settings, names);
             const auto [other, is_new] = written.emplace(name, rows.back().label());
-            if (!is_new)
-                throw Error(fmt::format("-o {}: {} and {} write the same files; put {} into the pattern", pattern,
-                                        other->second, rows.back().label(), missing_names(pattern, settings)));
+            if (!is_new) refuse_same_files(pattern, settings, other->second, rows.back().label());
             rows.back().outputs.push_back(name);
         }
     }

@@ -118,6 +118,8 @@ describe("rapid wedge", function()
       ["--vary rate=1,2 --vary rate=3"] = "rate is varied twice",
       ["--vary rate=1,2 --vary solve.substeps=1,2,3 --zip"] = "rate has 2 values and solve.substeps has 3",
       ["--vary rate=1,2 -o 'x.####.csv'"] = "rate=1 and rate=2 write the same files; put {rate} into",
+      ["--vary rate=1,1 -o '{rate}.####.csv'"] = "--vary: rate=1 is there twice; leave one out",
+      ["--vary 'rate=1,{1}' -o '{rate}.####.csv'"] = "rate=1 and rate={1} write the same files; leave one out",
       ["--vary rate=1,2 -o '{rat}.####.csv'"] = '{rat} is not varied; did you mean "rate"?',
       ["--vary rate=1,2 -o '{rate}.####.cvs'"] = ".cvs",
       ["--vary rate=1,2 --jobs 0"] = "--jobs",

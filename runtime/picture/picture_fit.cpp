@@ -176,13 +176,15 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     const PictureScene& scene = frame.scene ? *frame.scene : nothing;
 
     const bool first = !settled();
-    const bool has_seen = !seen_.isEmpty();  // anything but a group that had no points
+    const bool has_seen = !seen_.isEmpty();
     if (!first)
         StateReader::expect(is_view(view_) && goal_.sizes().allFinite() && (!has_seen || seen_.sizes().allFinite()));
     const std::string& group = scene.camera.group;
-    // A group is followed, wherever it goes.
-    const Box3d moving = trimmed_bounds(points, group, first && group.empty() ? look_ahead : 0, floor_of(scene));
-    Box3d content = group.empty() ? shape_bounds(scene, moving) : moving;
+    // A group is followed, wherever it goes; while nobody has been in it, the scene is seen.
+    Box3d moving = trimmed_bounds(points, group, first && group.empty() ? look_ahead : 0, floor_of(scene));
+    const bool follows = !group.empty() && !(first && moving.isEmpty());
+    if (first && !group.empty() && !follows) moving = trimmed_bounds(points, "", look_ahead, floor_of(scene));
+    Box3d content = follows ? moving : shape_bounds(scene, moving);
     if (!content.isEmpty()) {
         // A single point, a flat sheet: a metre or a tenth of the rest, so that there is something to look at.
         const double least = content.diagonal().norm() > 0 ? 0.1 * content.diagonal().norm() : 1.0;
@@ -192,10 +194,10 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
                 content.min()[axis] -= missing;
                 content.max()[axis] += missing;
             }
-        if (group.empty())
-            seen_.extend(content);
-        else
+        if (follows)
             seen_ = content;
+        else
+            seen_.extend(content);
     }
     const Box3d all = seen_.isEmpty() ? Box3d(Vec3d::Constant(-1), Vec3d::Constant(1)) : seen_;
     const double passed = std::max(0.0, frame.time - time_);

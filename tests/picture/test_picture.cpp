@@ -511,13 +511,17 @@ TEST_CASE("a camera that frames a group follows it, and not the rest", "[io][pic
     }
 }
 
-TEST_CASE("a camera that frames a group waits where it is while nobody is in it", "[io][picture]")
+TEST_CASE("a camera that frames a group sees the scene until somebody is in it", "[io][picture]")
 {
-    PointSet points = balls({{3, 1, 0}}, {red}, 0.05f);
+    PointSet points = balls({{3, 1, 0}, {-2, 0, 0}}, {red, green}, 0.05f);
     auto scene = std::make_shared<PictureScene>();
     scene->camera.group = "late";
     PictureFit fit;
     const PictureView first = fit.next(points, {.number = 1, .scene = scene});
+    for (const Vec3d& P : {Vec3d(3, 1, 0), Vec3d(-2, 0, 0)}) {
+        const Vec3d s = first.camera.project(P, 1280, 720);
+        CHECK((s.x() > 0 && s.x() < 1280 && s.y() > 0 && s.y() < 720));
+    }
     CHECK(fit.next(points, {.number = 2, .time = 1 / 24.0, .scene = scene}).camera.position == first.camera.position);
     points.group("late").write()[0] = 1;
     const PictureView later = fit.next(points, {.number = 3, .time = 2 / 24.0, .scene = scene});

@@ -292,13 +292,18 @@ private:
         if (!m.additive) pixel.open *= 1 - cover;
     }
 
+    // Only discs of a few pixels are shaded as balls.
+    static float roundness_of(const Mark& m)
+    {
+        return m.additive ? 0 : std::clamp((m.radius - 1.2f) / 2.5f, 0.0f, 1.0f);
+    }
+
     // hidden: maybe, by surfaces.
     template <bool hidden>
     void disc(const Mark& m)
     {
         const float reach = m.radius + 0.5f, inverse = 1 / m.radius;
-        // Only discs of a few pixels are shaded as balls.
-        const float roundness = m.additive ? 0 : std::clamp((m.radius - 1.2f) / 2.5f, 0.0f, 1.0f);
+        const float roundness = roundness_of(m);
         const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
         for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
             const float squared = dx * dx + dy * dy;
@@ -327,9 +332,10 @@ private:
             const float t = std::clamp(w / R, -1.0f, 1.0f);
             return 0.5f * R * R * (t * std::sqrt(1 - t * t) + std::asin(t));
         };
+        const float roundness = roundness_of(m);
         const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
         for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
-            const float w = std::abs(ux * dy - uy * dx), u = ux * dx + uy * dy;
+            const float side = ux * dy - uy * dx, w = std::abs(side), u = ux * dx + uy * dy;
             if (w >= R + 0.5f) return;
             const float half = area(w + 0.5f) - area(w - 0.5f);
             const float time = (std::min(u + half, m.length) - std::max(u - half, 0.0f)) * inverse;
@@ -337,7 +343,12 @@ private:
             float cover = m.opacity * std::min(time, 1.0f);
             if constexpr (hidden)
                 cover *= past_surfaces(place, m.depth + std::clamp(u * inverse, 0.0f, 1.0f) * m.ddepth - m.metres);
-            add(pixel, m, cover, flat);
+            if (roundness == 0) return add(pixel, m, cover, flat);
+            // As the nearest of the balls along the way.
+            const float past = u - std::clamp(u, 0.0f, m.length);
+            const float nx = (ux * past - uy * side) / R, ny = (uy * past + ux * side) / R;
+            const float shaded = shade(nx, ny, std::sqrt(std::max(0.0f, 1 - nx * nx - ny * ny)));
+            add(pixel, m, cover, m.colour * (0.85f + roundness * (shaded - 0.85f)));
         });
     }
 

@@ -204,6 +204,19 @@ TEST_CASE("a streak has the light of its disc, spread along the way during the e
     CHECK(added(Vec3f(1, 2, 0) + 0.3f * way) == 0);
 }
 
+TEST_CASE("a ball that hardly moves is shaded as one at rest", "[io][picture]")
+{
+    PointSet points = balls({{0, 0, 0}}, {{0.4f, 0.4f, 0.4f}}, 2);
+    const Picture still = render(points, small, {}, front_view());
+    points.v().fill(Vec3f(0.06f, 0, 0));  // 0.6 pixels
+    const Picture moving = render(points, small, styled({.shutter = 1}), front_view());
+    for (int y = 88; y <= 112; y += 4)
+        for (int x = 148; x <= 172; x += 4) {
+            CAPTURE(x, y);
+            CHECK(std::abs(moving.pixel(x, y)[1] - still.pixel(x, y)[1]) <= 6);
+        }
+}
+
 TEST_CASE("a streak begins where its point was born", "[io][picture]")
 {
     PointSet points = balls({{0, 0, 0}}, {red}, 0.4f);

@@ -467,6 +467,22 @@ return scene:solve {}
     assert.is_true(picture("bare", camera .. ", colliders = false") ~= usual)
   end)
 
+  it("shows the shapes that points are born on, unless the scene says no", function()
+    local folder = new_folder ""
+    local function picture(name, source, says)
+      folder:write(name .. ".lua", ([[
+local rapid = require "rapid"
+return rapid.create {} :emit { source = %s, rate = 0 } :solve {}
+  :picture { camera = rapid.camera { position = {0, 2, 5}, target = {0, 0, 0} }, %s }]]):format(source, says))
+      local result = command.rapid(("run %s.lua -f 1 -o %s.png --size 64x48"):format(name, name), { cwd = folder.path })
+      assert.equal(0, result.status, result.stderr)
+      return folder:read(name .. ".png")
+    end
+    local hidden = picture("hidden", "rapid.mesh.torus {}", "emitters = false")
+    assert.is_true(picture("shown", "rapid.mesh.torus {}", "") ~= hidden)
+    assert.is_true(picture("points", "rapid.points.from { P = {{0, 0, 0}} }", "") == hidden)
+  end)
+
   it("becomes a film of all frames", function()
     local folder = new_folder(ball)
     assert.equal(0, folder:run("-f 1-6x2 -o 'films/{output}.mp4' --size 64x48").status)

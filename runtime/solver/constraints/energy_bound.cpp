@@ -171,9 +171,12 @@ void EnergyBound::add_seen(const Substep& step, std::uint32_t i, const EnergyIsl
     island.given += 2 * mass * by.spread * (seen.norm() + by.spread);
     if (!step.mobility.empty()) {
         const Mobility& mobility = step.mobility[i];
-        const double w2 = mobility.stiffness + step.surface_springs[i].w2;
-        const double held = 0.5 * step.dt * w2 + 2 / step.dt * std::abs(1 - mobility.v / step.dt);  // 1/s
-        island.given += mass * held * by.mean.v.norm() * moved.norm();
+        const SurfaceSpring& spring = step.surface_springs[i];
+        double held =
+            by.mean.v.norm() * (0.5 * step.dt * mobility.stiffness + 2 / step.dt * std::abs(1 - mobility.v / step.dt));
+        if (spring.w2 > 0)
+            held += 0.5 * step.dt * spring.w2 * (by.mean.v - velocity_of_surface(spring, P_[i], 0)).norm();
+        island.given += mass * held * moved.norm();
     }
     island.available += 0.5 * mass * (seen.squaredNorm() + step.dt * step.dt * A.squaredNorm()) + stored +
                         available_work(step, i, P_[i]);

@@ -19,7 +19,8 @@
 //   Σ 2 m s (|v - V| + s),   s = max |V_k - V|
 //
 // Drag and springs to places are at rest in the world, and give points that they hold back otherwise than in their free
-// motion the energy |V| times the difference of their impulses at most.
+// motion the energy |V| times the difference of their impulses at most; springs to surfaces that of their velocity from
+// V.
 #pragma once
 
 #include <cstdint>

@@ -115,6 +115,7 @@ void Sleep::wake_now(std::size_t i, Substep& step)
     step.points[i].w = inverse_mass_[i] * mobility.v / step.dt;
     step.points[i].P += mobility.x * acceleration_[i];
     step.v[i] += mobility.v * acceleration_[i];
+    if (!step.displacement.empty()) step.displacement[i] = mobility.x * acceleration_[i];
 }
 
 void Sleep::count_sleepers(const Substep& step, std::vector<std::uint32_t>& sleepers)

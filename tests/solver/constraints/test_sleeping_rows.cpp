@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <limits>
 
 #include "runtime/solver/constraints/sleep.h"
 #include "tests/solver/constraints/granular.h"
@@ -11,6 +12,7 @@
 namespace rapid {
 namespace {
 
+using test::close_to;
 using test::Granular;
 using test::immovable;
 using test::links_of_chain;
@@ -182,6 +184,27 @@ TEST_CASE("a rope wakes with the forces that it fell asleep with", "[sleep]")
         scene.run(1);
         CHECK(scene.last.asleep == 0);
         CHECK(fastest(scene) < 2e-3);  // g dt is 0.05
+    }
+}
+
+// What has slept has no free motion in the sub-step in which it is woken.
+TEST_CASE("a rope whose end a force wakes moves as an awake one", "[sleep]")
+{
+    bool pulls = false;
+    Scene scene = rope(4);
+    scene.force(
+        [&pulls](const Chunk& chunk, std::size_t i) { return Vec3d(pulls && chunk.first + i == 4 ? 200 : 0, 0, 0); });
+    fall_asleep(scene, 4);
+    pulls = true;
+    Scene awake = scene;
+    awake.options.sleep_records = nullptr;
+    awake.options.sleep = std::numeric_limits<double>::infinity();
+    for (Scene* each : {&scene, &awake}) each->run(1);
+    CHECK(scene.last.asleep == 0);
+    CHECK(awake.v(4).x() > 1);
+    for (std::size_t i = 0; i <= 4; ++i) {
+        CHECK_THAT(scene.P(i), close_to(awake.P(i), 1e-5));
+        CHECK_THAT(scene.v(i), close_to(awake.v(i), 1e-3));
     }
 }
 

@@ -76,6 +76,19 @@ void refuse_rest(const CLI::App& command)
     }
 }
 
+// Of a file or folder, as a variable of the shell that is not set leaves it.
+void refuse_empty_names(const CLI::App& command)
+{
+    for (const CLI::Option* option : command.get_options()) {
+        const std::string kind = option->get_type_name();
+        if (kind != "FILE" && kind != "DIR") continue;
+        for (const std::string& name : option->results())
+            if (name.empty())
+                throw Error(fmt::format("{} = \"\"; it must be the name of a {}", option->get_name(),
+                                        kind == "DIR" ? "folder" : "file"));
+    }
+}
+
 int finish(int status)
 {
     // A reader that has gone (`rapid nodes | head`) wanted no more.
@@ -127,6 +140,7 @@ std::optional<int> read_arguments(CLI::App& app, Arguments arguments)
         std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
         app.parse(arguments);
         refuse_rest(*chosen);
+        refuse_empty_names(*chosen);
         return std::nullopt;
     } catch (const CLI::Success& request) {  // --help, --version
         return app.exit(request), finish(status_done);

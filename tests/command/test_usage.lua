@@ -66,6 +66,8 @@ describe("rapid", function()
       ["--script-timeout 0"] = '--script-timeout = "0"; it must be a number above 0',
       ["--script-memory 1T"] = '--script-memory = "1T"; it must be bytes above 0, such as 1073741824, 512M or 1G',
       ["--set count"] = '--set "count"; it must be NAME=VALUE',
+      ["--cache ''"] = '--cache = ""; it must be the name of a folder',
+      ["--stats ''"] = '--stats = ""; it must be the name of a file',
       ["--size 1280"] = '--size = "1280"; it must be WIDTHxHEIGHT, each from 1 to 16384',
     } do
       local result = rapid("run scene.lua " .. arguments)

@@ -37,7 +37,7 @@ struct FrameRecord {
     std::vector<Stiffness> stiff;
     std::vector<std::string> warnings;
     Fingerprint read;              // contents of files, since the frame before
-    double seconds = 0;            // of the run, up to this frame
+    double seconds = 0;            // of the run, until this frame's files were written
     std::uint64_t peak_bytes = 0;  // likewise
     std::vector<WrittenFile> files;
 

@@ -320,16 +320,13 @@ std::vector<const FrameRecord*> RunCache::records(std::int64_t first, std::int64
     return list;
 }
 
-void RunCache::computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff, double seconds,
-                        std::uint64_t peak_bytes)
+void RunCache::computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff)
 {
     FrameRecord& record = open_[frame.frame];
     record.statistics = frame;
     record.stiff = stiff;
     record.warnings = std::exchange(warnings_, {});
     record.read = read_->take();
-    record.seconds = seconds;
-    record.peak_bytes = peak_bytes;
     for (const auto& [name, hash] : record.read) contents_[name] = hash;
     // Files that are left as they are.
     if (const auto known = known_.frames.find(frame.frame); known != known_.frames.end())
@@ -355,10 +352,13 @@ void RunCache::written(const FrameFiles::Written& file)
         open->second.statistics.seconds.write += file.seconds;
 }
 
-void RunCache::complete_before(std::optional<std::int64_t> frame)
+void RunCache::complete_before(std::optional<std::int64_t> frame, double seconds, std::uint64_t peak_bytes)
 {
     while (!open_.empty() && (!frame || open_.begin()->first < *frame)) {
-        add(open_.begin()->second);
+        FrameRecord& record = open_.begin()->second;
+        record.seconds = seconds;
+        record.peak_bytes = peak_bytes;
+        add(record);
         open_.erase(open_.begin());
     }
 }

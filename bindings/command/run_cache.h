@@ -47,12 +47,11 @@ public:
     std::vector<const FrameRecord*> records(std::int64_t first, std::int64_t last) const;
 
     // Of the frames that are computed, as RunReport hears of them. complete_before: frames of whose files none is to
-    // come; all, where none is to come of any.
+    // come; all, where none is to come of any. The seconds and the peak are those of the run until now.
     void warned(const std::string& text) { warnings_.push_back(text); }
-    void computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff, double seconds,
-                  std::uint64_t peak_bytes);
+    void computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff);
     void written(const FrameFiles::Written& file);
-    void complete_before(std::optional<std::int64_t> frame);
+    void complete_before(std::optional<std::int64_t> frame, double seconds, std::uint64_t peak_bytes);
 
     // After a frame: a snapshot, where one is due, or in any case.
     void keep(const Evaluator& evaluator, EventFile& events, bool in_any_case);

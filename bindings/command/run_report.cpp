@@ -34,7 +34,7 @@ void RunReport::frame(const FrameResult& result)
     totals_.add(frame);
     if (statistics_) statistics_->add(frame);
     if (profile_) profile_->add(result);
-    if (cache_) cache_->computed(frame, result.figures.stiff, now(), std::max(earlier_peak_, peak_memory()));
+    if (cache_) cache_->computed(frame, result.figures.stiff);
     add_writing();
     keep_worst(run_.stiff, result.figures.stiff);
     progress_->frame(frame, now());
@@ -134,7 +134,7 @@ void RunReport::add_writing()
         if (profile_) profile_->add(file);
         if (cache_) cache_->written(file);
     }
-    if (cache_) cache_->complete_before(unwritten);
+    if (cache_) cache_->complete_before(unwritten, now(), std::max(earlier_peak_, peak_memory()));
     if (statistics_) statistics_->write_before(unwritten);
 }
 

@@ -10,6 +10,7 @@
 #include "runtime/graph/attribute_uses.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/point_edit.h"
+#include "runtime/solver/collision/hits.h"
 
 namespace rapid {
 
@@ -49,6 +50,31 @@ std::vector<NodePtr> sources_of(const Node& node)
     return handle ? std::vector{handle->node} : std::vector<NodePtr>();
 }
 
+// A node that reads hit attributes of points of which no collider writes any.
+std::set<std::string> reads_of_no_hits(const std::vector<PlannedNode>& nodes,
+                                       const std::vector<PlannedSimulation>& simulations)
+{
+    const auto comes = [&](std::size_t simulation, const char* name) {
+        const PlannedAttribute& hit = *simulations[simulation].find(name);
+        return !hit.made_by.empty() || !hit.written_by.empty();
+    };
+    std::set<std::string> warnings;
+    for (std::size_t s = 0; s < simulations.size(); ++s)
+        for (const char* name : Hits::names) {
+            const PlannedAttribute& hit = *simulations[s].find(name);
+            if (hit.read_by.empty() || comes(s, name)) continue;
+            const PlannedNode& reader = nodes[hit.read_by.front()];
+            const bool comes_elsewhere = std::any_of(reader.carries.begin(), reader.carries.end(),
+                                                     [&](std::size_t other) { return comes(other, name); });
+            if (comes_elsewhere) continue;
+            warnings.insert(
+                fmt::format("{}:{}: node \"{}\": reads {}, which no collider writes; give a :collide record = true",
+                            reader.node->location.file, reader.node->location.line, reader.node->name, name));
+            break;
+        }
+    return warnings;
+}
+
 }  // namespace
 
 Plan::Plan(const Graph& graph, const PlanOptions& options)
@@ -78,6 +104,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         for (const PlannedAttribute& attribute : simulation.attributes)
             if (!attribute.kept && attribute.name != "dt") simulation.left_out.insert(attribute.name);
     }
+    for (const std::string& warning : reads_of_no_hits(nodes, simulations)) warnings.push_back(warning);
 }
 
 // The nodes that are reached from the outputs, in the order in which they were made: inputs come first.

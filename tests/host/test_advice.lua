@@ -106,6 +106,16 @@ describe("a warning", function()
       warnings "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 100 }")
   end)
 
+  it("names the node that reads contacts which no collider records", function()
+    local chain = "local chain = rapid.create { points = POINTS } :collide { shape = rapid.shape.plane {}%s }"
+    local reads = chain .. ":points('k', function(p) if p.hitnum > 0 then p.v = p.v * 2 end end) :solve {} return chain"
+    local bears = chain .. ":solve {} return rapid.create {} :emit { source = chain, on = 'hittotal >= 2' } :solve {}"
+    expect('node "k": reads hitnum, which no collider writes; give a :collide record = true',
+      warnings(reads:format ""))
+    expect('node "emit1": reads hittotal, which no collider writes', warnings(bears:format ""))
+    for _, text in ipairs { reads, bears } do assert.equal("", warnings(text:format ", record = true")) end
+  end)
+
   it("tells where all points die as they are born", function()
     local scene_text = [[return rapid.create {}
   :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 2000, attributes = { pscale = 0.1 } }

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "runtime/parallel.h"
+#include "runtime/shapes/level_set/prism.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/simd.h"
 
@@ -26,33 +27,6 @@ Corners corners_of(const Mesh& mesh, std::int32_t triangle)
             mesh.positions[t[2]].cast<double>()};
 }
 
-// The plane of a triangle and those through its edges perpendicular to it: a bound of the distance in a few
-// multiplications. Beside an edge it is the distance, past a corner less.
-class Prism {
-public:
-    explicit Prism(const Corners& corners)
-        : up_((corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized()), height_(up_.dot(corners[0]))
-    {
-        for (int k = 0; k < 3; ++k) {
-            outward_[k] = (corners[(k + 1) % 3] - corners[k]).cross(up_).stableNormalized();
-            edge_[k] = outward_[k].dot(corners[k]);
-        }
-    }
-
-    // The square of a lower bound on the distance.
-    double square_at_least(const Vec3d& P) const
-    {
-        const double h = up_.dot(P) - height_;
-        double beside = 0;
-        for (int k = 0; k < 3; ++k) beside = std::max(beside, outward_[k].dot(P) - edge_[k]);
-        return h * h + beside * beside;
-    }
-
-private:
-    Vec3d up_, outward_[3];  // unit; zero where the triangle has no area
-    double height_, edge_[3];
-};
-
 // A triangle that may be within the band of a block.
 struct Near {
     Place block;
@@ -68,7 +42,8 @@ struct Near {
 // The blocks of one triangle.
 class Descent {
 public:
-    Descent(const Corners& corners, double half_width) : prism_(corners), half_width_(half_width)
+    Descent(const Corners& corners, double half_width)
+        : prism_(corners[0], corners[1], corners[2]), half_width_(half_width)
     {
         Box3d bounds;
         for (const Vec3d& corner : corners) bounds.extend(corner);

@@ -1,6 +1,8 @@
 // The signed distance from a mesh, on a grid.
 //
-// The distance is that to the nearest triangle (mesh_band.h), the sign that of the winding number. A mesh without one
+// In a narrow band the distance is that to the nearest triangle (mesh_band.h). The voxels of a wide one have too many
+// triangles about them to ask each: there it is OpenVDB's, whose triangle may be the wrong one beyond two voxels (by up
+// to 0.7 of a voxel), corrected to a thousandth of a voxel. The sign is that of the winding number. A mesh without one
 // has OpenVDB's distances and signs.
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/SignedFloodFill.h>
@@ -10,11 +12,14 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <memory>
+#include <numbers>
 #include <span>
 
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/mesh_band.h"
+#include "runtime/shapes/level_set/prism.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/mesh/ray_crossings.h"
 
@@ -28,6 +33,8 @@ using openvdb::Int32Grid;
 using Leaf = FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with the tree*/ false>;
 using NearestAccessor = openvdb::tree::ValueAccessor<const openvdb::Int32Tree, /*registered with the tree*/ false>;
+
+constexpr double widest_measured = 5;  // voxels
 
 Vec3d center(const Coord& voxel) { return {double(voxel.x()), double(voxel.y()), double(voxel.z())}; }
 
@@ -66,66 +73,93 @@ struct InVoxels {
     }
 };
 
-// A narrow band: the distance of each voxel, at first without a sign, and the nearest triangle.
-struct Band {
-    using Nearest = std::array<std::int32_t, MeshBand::voxels>;
+FloatGrid::Ptr by_openvdb(const Mesh& mesh, const openvdb::math::Transform& transform, double half_width, int flags,
+                          Int32Grid* nearest)
+{
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> faces;
+    for (const Vec3f& P : mesh.positions) points.emplace_back(P.x(), P.y(), P.z());
+    for (const Mesh::Triangle& t : mesh.triangles) faces.emplace_back(t[0], t[1], t[2]);
+    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, faces);
+    openvdb::util::NullInterrupter never;
+    const auto voxels = static_cast<float>(half_width / transform.voxelSize()[0]);
+    return openvdb::tools::meshToVolume<FloatGrid>(never, adapter, transform, voxels, voxels, flags, nearest);
+}
 
+struct Band;
+void shorten_distances(Band& band, const InVoxels& mesh);
+
+// A narrow band: the distance of each voxel, at first without a sign, and its nearest triangle.
+struct Band {
     FloatGrid::Ptr distance;
+    Int32Grid::Ptr nearest = Int32Grid::create(openvdb::util::INVALID_IDX);
     std::vector<Leaf*> leaves;
-    std::vector<Nearest> nearest;  // of each leaf; -1 beyond the band
     double voxel;
 
     Band(const InVoxels& mesh, const openvdb::math::Transform& transform, double half_width)
-        : distance(FloatGrid::create(static_cast<float>(half_width))), voxel(transform.voxelSize()[0])
+        : voxel(transform.voxelSize()[0])
     {
-        static_assert(MeshBand::block == Leaf::DIM && MeshBand::voxels == Leaf::SIZE);
-        distance->setTransform(transform.copy());
-        const MeshBand band(*mesh.mesh, half_width / voxel);
-        leaves.resize(band.size());
-        nearest.resize(band.size());
-        for_each_chunk(
-            band.size(),
-            [&](std::size_t begin, std::size_t end) {
-                for (std::size_t b = begin; b < end; ++b) leaves[b] = measured(band, b);
-            },
-            8);
-        std::size_t kept = 0;
-        for (std::size_t b = 0; b < leaves.size(); ++b) {
-            if (!leaves[b]) continue;
-            distance->tree().addLeaf(leaves[b]);
-            if (kept != b) leaves[kept] = leaves[b], nearest[kept] = nearest[b];
-            ++kept;
+        if (half_width <= widest_measured * voxel) {
+            measure(mesh, transform, half_width);
+            find_leaves();
+        } else {
+            distance =
+                by_openvdb(*mesh.mesh, transform, half_width, openvdb::tools::UNSIGNED_DISTANCE_FIELD, nearest.get());
+            find_leaves();
+            shorten_distances(*this, mesh);
         }
-        leaves.resize(kept);
-        nearest.resize(kept);
     }
 
-    Int32Grid::Ptr nearest_grid() const
+    void find_leaves()
     {
-        auto grid = Int32Grid::create(-1);
-        for (std::size_t i = 0; i < leaves.size(); ++i) {
-            auto* leaf = new Int32Grid::TreeType::LeafNodeType(leaves[i]->origin(), -1, true);
-            std::copy(nearest[i].begin(), nearest[i].end(), leaf->buffer().data());
-            grid->tree().addLeaf(leaf);
-        }
-        return grid;
+        leaves.clear();
+        distance->tree().getNodes(leaves);
     }
 
 private:
-    // Null where no voxel of the block is in the band.
-    Leaf* measured(const MeshBand& band, std::size_t b)
+    void measure(const InVoxels& mesh, const openvdb::math::Transform& transform, double half_width)
     {
-        std::array<float, MeshBand::voxels> voxels;
-        if (band.measure(b, voxels, nearest[b]) == 0) return nullptr;
-        const Eigen::Vector3i origin = band.origin(b);
-        auto* leaf = new Leaf(Coord(origin.x(), origin.y(), origin.z()), distance->background(), false);
-        float* values = leaf->buffer().data();
-        for (std::size_t v = 0; v < voxels.size(); ++v) {
-            if (nearest[b][v] < 0) continue;
-            values[v] = voxels[v] * static_cast<float>(voxel);
-            leaf->setValueOn(static_cast<openvdb::Index>(v));
+        static_assert(MeshBand::block == Leaf::DIM && MeshBand::voxels == Leaf::SIZE);
+        distance = FloatGrid::create(static_cast<float>(half_width));
+        distance->setTransform(transform.copy());
+        const MeshBand band(*mesh.mesh, half_width / voxel);
+        std::vector<Block> blocks(band.size());
+        for_each_chunk(
+            band.size(),
+            [&](std::size_t begin, std::size_t end) {
+                for (std::size_t b = begin; b < end; ++b) blocks[b] = block_of(band, b);
+            },
+            8);
+        for (Block& block : blocks) {
+            if (!block.distance) continue;
+            distance->tree().addLeaf(block.distance.release());
+            nearest->tree().addLeaf(block.nearest.release());
         }
-        return leaf;
+    }
+
+    using NearestLeaf = openvdb::Int32Tree::LeafNodeType;
+    struct Block {
+        std::unique_ptr<Leaf> distance;
+        std::unique_ptr<NearestLeaf> nearest;
+    };
+
+    // Empty where no voxel of the block is in the band.
+    Block block_of(const MeshBand& band, std::size_t b) const
+    {
+        const Eigen::Vector3i origin = band.origin(b);
+        const Coord lowest(origin.x(), origin.y(), origin.z());
+        Block block = {std::make_unique<Leaf>(lowest, distance->background(), false),
+                       std::make_unique<NearestLeaf>(lowest, -1, true)};
+        const std::span<std::int32_t, MeshBand::voxels> triangles(block.nearest->buffer().data(), MeshBand::voxels);
+        std::array<float, MeshBand::voxels> far;
+        if (band.measure(b, far, triangles) == 0) return {};
+        float* values = block.distance->buffer().data();
+        for (openvdb::Index v = 0; v < MeshBand::voxels; ++v) {
+            if (triangles[v] < 0) continue;
+            values[v] = far[v] * static_cast<float>(voxel);
+            block.distance->setValueOn(v);
+        }
+        return block;
     }
 };
 
@@ -136,26 +170,30 @@ struct Update {
     std::int32_t nearest;
 };
 
+// The 26 neighbours of a voxel, or the six across its faces alone, and their distances, in voxels.
 template <class F>
-void for_each_neighbour(const Coord& voxel, const F& f)
+void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
 {
+    static constexpr double far[4] = {0, 1, std::numbers::sqrt2, std::numbers::sqrt3};
     for (int x = -1; x <= 1; ++x)
         for (int y = -1; y <= 1; ++y)
-            for (int z = -1; z <= 1; ++z)
-                if (x != 0 || y != 0 || z != 0) f(voxel.offsetBy(x, y, z));
+            for (int z = -1; z <= 1; ++z) {
+                const int steps = std::abs(x) + std::abs(y) + std::abs(z);
+                if (steps == 1 || (steps > 1 && !across_faces)) f(voxel.offsetBy(x, y, z), far[steps]);
+            }
 }
 
 // Jacobi iteration: calls `improve(voxel, phi, accessor, nearest, updates)` for all active voxels, applies the updates,
 // and repeats it around the voxels that have changed, until there are none. A voxel depends on the previous round
 // alone, never on an order. Distances only shrink.
 template <class Improve>
-void improve_until_done(FloatGrid& distance, Int32Grid& nearest, std::span<Leaf* const> leaves, const Improve& improve)
+void improve_until_done(Band& band, const Improve& improve)
 {
     constexpr std::size_t part = 512;
-    FloatGrid::Accessor distances = distance.getAccessor();
-    Int32Grid::Accessor triangles = nearest.getAccessor();
+    FloatGrid::Accessor distance = band.distance->getAccessor();
+    Int32Grid::Accessor nearest = band.nearest->getAccessor();
     std::vector<Coord> asked;
-    for (const Leaf* leaf : leaves)
+    for (const Leaf* leaf : band.leaves)
         for (auto it = leaf->cbeginValueOn(); it; ++it) asked.push_back(it.getCoord());
     std::vector<std::vector<Update>> updates;
     while (!asked.empty()) {
@@ -165,8 +203,8 @@ void improve_until_done(FloatGrid& distance, Int32Grid& nearest, std::span<Leaf*
             [&](std::size_t begin, std::size_t end) {
                 std::vector<Update>& found = updates[begin / part];
                 found.clear();
-                const Accessor now(distance.constTree());
-                const NearestAccessor nearest_now(nearest.constTree());
+                const Accessor now(band.distance->constTree());
+                const NearestAccessor nearest_now(band.nearest->constTree());
                 for (std::size_t i = begin; i < end; ++i)
                     improve(asked[i], now.getValue(asked[i]), now, nearest_now, found);
             },
@@ -175,16 +213,62 @@ void improve_until_done(FloatGrid& distance, Int32Grid& nearest, std::span<Leaf*
         asked.clear();
         for (const auto& of_part : updates)
             for (const Update& update : of_part) {
-                if (std::abs(update.distance) >= std::abs(distances.getValue(update.voxel))) continue;
-                distances.setValue(update.voxel, update.distance);
-                triangles.setValue(update.voxel, update.nearest);
+                if (std::abs(update.distance) >= std::abs(distance.getValue(update.voxel))) continue;
+                distance.setValue(update.voxel, update.distance);
+                nearest.setValue(update.voxel, update.nearest);
                 asked.push_back(update.voxel);
-                for_each_neighbour(update.voxel, [&](const Coord& other) { asked.push_back(other); });
+                for_each_neighbour(update.voxel, /*across_faces=*/false,
+                                   [&](const Coord& other, double) { asked.push_back(other); });
             }
-        std::erase_if(asked, [&](const Coord& voxel) { return !distances.isValueOn(voxel); });
+        std::erase_if(asked, [&](const Coord& voxel) { return !distance.isValueOn(voxel); });
         std::sort(asked.begin(), asked.end());
         asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
     }
+    band.find_leaves();
+}
+
+// A voxel takes the triangle of a neighbour nearer to the mesh if that is nearer to it too, and voxels missing from the
+// band are added to it.
+void shorten_distances(Band& band, const InVoxels& mesh)
+{
+    std::vector<Prism> prisms;
+    prisms.reserve(mesh.mesh->triangles.size());
+    for (std::size_t t = 0; t < mesh.mesh->triangles.size(); ++t) {
+        const auto triangle = static_cast<std::int32_t>(t);
+        prisms.emplace_back(mesh.corner(triangle, 0), mesh.corner(triangle, 1), mesh.corner(triangle, 2));
+    }
+    // m: the least improvement. Half of it would end the rounds, and the rounding to single precision is 1e-6 of a
+    // voxel.
+    const double worth = 1e-3 * band.voxel;
+    // m: OpenVDB tests each triangle against the voxels within √3/2 of it and all their neighbours, so nearer ones are
+    // right.
+    const double exact = 1.5 * band.voxel;
+    const double half_width = band.distance->background();
+    improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
+                                 const NearestAccessor& nearest, std::vector<Update>& updates) {
+        const std::int32_t own = nearest.getValue(voxel);
+        double best = phi;
+        std::int32_t triangle = own, tried = own;
+        for_each_neighbour(voxel, phi < exact, [&](const Coord& other, double far) {
+            const double there = accessor.getValue(other);
+            if (there >= half_width) {
+                if (phi + far * band.voxel < half_width)
+                    updates.push_back({other, static_cast<float>(mesh.distance_to(own, other) * band.voxel), own});
+                return;
+            }
+            if (there >= best || phi < exact) return;
+            const std::int32_t candidate = nearest.getValue(other);
+            if (candidate == tried || candidate == triangle) return;
+            tried = candidate;
+            const double enough = (best - worth) / band.voxel;
+            if (prisms[candidate].square_at_least(center(voxel)) >= enough * enough) return;
+            const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
+            if (distance >= best - worth) return;
+            best = distance;
+            triangle = candidate;
+        });
+        if (triangle != own) updates.push_back({voxel, static_cast<float>(best), triangle});
+    });
 }
 
 // Negative where the winding number is not 0, by whole rows of voxels along x. Returns whether any faces lie inside:
@@ -233,43 +317,30 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
     };
     const auto half_width = band.distance->background();
     tbb::parallel_for(std::size_t{0}, band.leaves.size(), [&](std::size_t i) {
+        const NearestAccessor nearest(band.nearest->constTree());
         for (auto it = band.leaves[i]->beginValueOn(); it; ++it)
-            if (std::signbit(*it) && !is_surface(band.nearest[i][it.pos()], it.getCoord())) it.setValue(-half_width);
+            if (std::signbit(*it) && !is_surface(nearest.getValue(it.getCoord()), it.getCoord()))
+                it.setValue(-half_width);
     });
-    const Int32Grid::Ptr nearest_grid = band.nearest_grid();
-    improve_until_done(*band.distance, *nearest_grid, band.leaves,
-                       [&](const Coord& voxel, double phi, const Accessor& accessor, const NearestAccessor& nearest,
-                           std::vector<Update>& updates) {
-                           if (phi > -half_width) return;
-                           double best = half_width;
-                           std::int32_t triangle = -1;
-                           for_each_neighbour(voxel, [&](const Coord& other) {
-                               const float there = accessor.getValue(other);
-                               if (!(there < half_width && there > -half_width)) return;
-                               const std::int32_t candidate = nearest.getValue(other);
-                               const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
-                               if (distance >= best || !is_surface(candidate, voxel)) return;
-                               best = distance;
-                               triangle = candidate;
-                           });
-                           if (triangle >= 0) updates.push_back({voxel, static_cast<float>(-best), triangle});
-                       });
+    improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
+                                 const NearestAccessor& nearest, std::vector<Update>& updates) {
+        if (phi > -half_width) return;
+        double best = half_width;
+        std::int32_t triangle = -1;
+        for_each_neighbour(voxel, /*across_faces=*/false, [&](const Coord& other, double) {
+            const float there = accessor.getValue(other);
+            if (!(there < half_width && there > -half_width)) return;
+            const std::int32_t candidate = nearest.getValue(other);
+            const double distance = mesh.distance_to(candidate, voxel) * band.voxel;
+            if (distance >= best || !is_surface(candidate, voxel)) return;
+            best = distance;
+            triangle = candidate;
+        });
+        if (triangle >= 0) updates.push_back({voxel, static_cast<float>(-best), triangle});
+    });
     for (Leaf* leaf : band.leaves)
         for (auto it = leaf->beginValueOn(); it; ++it)
             if (*it <= -half_width) it.setValueOff();
-}
-
-FloatGrid::Ptr by_openvdb(const Mesh& mesh, const openvdb::math::Transform& transform, double half_width)
-{
-    std::vector<openvdb::Vec3s> points;
-    std::vector<openvdb::Vec3I> faces;
-    for (const Vec3f& P : mesh.positions) points.emplace_back(P.x(), P.y(), P.z());
-    for (const Mesh::Triangle& t : mesh.triangles) faces.emplace_back(t[0], t[1], t[2]);
-    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, faces);
-    openvdb::util::NullInterrupter never;
-    const auto voxels = static_cast<float>(half_width / transform.voxelSize()[0]);
-    return openvdb::tools::meshToVolume<FloatGrid>(never, adapter, transform, voxels, voxels,
-                                                   openvdb::tools::DISABLE_RENORMALIZATION);
 }
 
 }  // namespace
@@ -278,7 +349,8 @@ FloatGrid::Ptr signed_distance(const Mesh& world, bool balanced, const openvdb::
                                double half_width)
 {
     const InVoxels mesh(world, transform);
-    if (!balanced) return by_openvdb(*mesh.mesh, transform, half_width);
+    if (!balanced)
+        return by_openvdb(*mesh.mesh, transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr);
     Band band(mesh, transform, half_width);
     const RayCrossings faces(mesh.mesh);
     if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);

@@ -1,0 +1,38 @@
+// A bound of the distance to a triangle.
+#pragma once
+
+#include <algorithm>
+
+#include "runtime/vec.h"
+
+namespace rapid {
+
+// The plane of a triangle and those through its edges perpendicular to it: a bound of the distance in a few
+// multiplications. Beside an edge it is the distance, past a corner less.
+class Prism {
+public:
+    Prism(const Vec3d& a, const Vec3d& b, const Vec3d& c)
+        : up_((b - a).cross(c - a).stableNormalized()), height_(up_.dot(a))
+    {
+        const Vec3d corners[3] = {a, b, c};
+        for (int k = 0; k < 3; ++k) {
+            outward_[k] = (corners[(k + 1) % 3] - corners[k]).cross(up_).stableNormalized();
+            edge_[k] = outward_[k].dot(corners[k]);
+        }
+    }
+
+    // The square of a lower bound on the distance.
+    double square_at_least(const Vec3d& P) const
+    {
+        const double h = up_.dot(P) - height_;
+        double beside = 0;
+        for (int k = 0; k < 3; ++k) beside = std::max(beside, outward_[k].dot(P) - edge_[k]);
+        return h * h + beside * beside;
+    }
+
+private:
+    Vec3d up_, outward_[3];  // unit; zero where the triangle has no area
+    double height_, edge_[3];
+};
+
+}  // namespace rapid

@@ -122,7 +122,7 @@ public:
             if (k == 0) height = (up_.x() * px + up_.y() * py) + up_.z() * pz;
         }
         const Floats to_plane = height * height + beside_;
-        return outside | (to_edges < to_plane) ? to_edges : to_plane;
+        return (outside | (to_edges < to_plane)) ? to_edges : to_plane;
     }
 
 private:

@@ -145,9 +145,9 @@ public:
         tolerance_check();
         scripts();
         main_job();
-        by_hand();
         output();
         examples();
+        by_hand();  // last: it reads points, and the peak of a process counts what it was forked with
     }
 
     std::string as_markdown() const

@@ -22,7 +22,7 @@
 namespace rapid {
 
 // The "format" of the files that this Rapid writes, and of those that it reads.
-inline constexpr int state_format = 4;
+inline constexpr int state_format = 5;
 
 // Compresses on all threads. header: an object. The caller finishes the file.
 void write_state(OutputFile& file, nlohmann::ordered_json header, const SavedState& state);

@@ -6,7 +6,7 @@ local folder = command.folder()
 local slurm = folder:file "slurm"
 
 -- The cluster ends with this process, whose id the shell has as its parent's.
-local started = command.shell(("exec tests/farm/private_slurm start %s %s 4"):format(
+local started = command.shell(("exec tests/farm/slurm_daemons start %s %s 4"):format(
   slurm, command.shell("echo $PPID").stdout:gsub("%s+$", "")))
 local environment = { SLURM_CONF = slurm .. "/slurm.conf" }
 

@@ -81,11 +81,11 @@ private:
     Place lowest_, highest_;
 };
 
-// A triangle as a row of voxels along z asks it, in single precision.
-class Row {
+// A triangle in single precision, as a row of voxels along z asks it.
+class FloatTriangle {
 public:
     // corners: from the block's lowest voxel.
-    explicit Row(const Corners& corners)
+    explicit FloatTriangle(const Corners& corners)
     {
         const Vec3d n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         for (int k = 0; k < 3; ++k) {
@@ -162,14 +162,14 @@ struct Rows {
         const auto first = [&](int axis) { return std::max(0.0, std::ceil(low[axis] - half_width)); };
         const auto last = [&](int axis) { return std::min(side - 1.0, std::floor(high[axis] + half_width)); };
         if (first(2) > last(2)) return;
-        const Row row(corners);
+        const FloatTriangle near(corners);
         for (auto x = static_cast<int>(first(0)); x <= last(0); ++x) {
             const double dx = std::max({low.x() - x, 0.0, x - high.x()});
             for (auto y = static_cast<int>(first(1)); y <= last(1); ++y) {
                 const double dy = std::max({low.y() - y, 0.0, y - high.y()});
                 const int r = side * x + y;
                 if (dx * dx + dy * dy >= farthest[r]) continue;
-                const Floats d = row.square_distances(static_cast<float>(x), static_cast<float>(y));
+                const Floats d = near.square_distances(static_cast<float>(x), static_cast<float>(y));
                 const FloatFlags nearer = d < square[r];
                 square[r] = nearer ? d : square[r];
                 nearest[r] = nearer ? FloatFlags{} + triangle : nearest[r];
@@ -181,8 +181,7 @@ struct Rows {
 
 double distance_to(const Corners& corners, const Vec3d& P)
 {
-    const auto [b, c] = nearest_weights(P, corners[0], corners[1], corners[2]);
-    return (corners[0] + b * (corners[1] - corners[0]) + c * (corners[2] - corners[0]) - P).norm();
+    return (nearest_place(P, corners[0], corners[1], corners[2]) - P).norm();
 }
 
 }  // namespace

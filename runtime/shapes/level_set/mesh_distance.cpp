@@ -15,6 +15,7 @@
 #include <memory>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
@@ -35,6 +36,7 @@ using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with
 using NearestAccessor = openvdb::tree::ValueAccessor<const openvdb::Int32Tree, /*registered with the tree*/ false>;
 
 constexpr double widest_measured = 5;  // voxels
+constexpr std::int32_t no_triangle = -1;
 
 Vec3d center(const Coord& voxel) { return {double(voxel.x()), double(voxel.y()), double(voxel.z())}; }
 
@@ -58,9 +60,7 @@ struct InVoxels {
     }
     Vec3d nearest_on(std::int32_t triangle, const Coord& voxel) const
     {
-        const Vec3d a = corner(triangle, 0), ab = corner(triangle, 1) - a, ac = corner(triangle, 2) - a;
-        const auto [b, c] = nearest_weights(center(voxel), a, corner(triangle, 1), corner(triangle, 2));
-        return a + b * ab + c * ac;
+        return nearest_place(center(voxel), corner(triangle, 0), corner(triangle, 1), corner(triangle, 2));
     }
     Vec3d normal(std::int32_t triangle) const
     {
@@ -86,28 +86,17 @@ FloatGrid::Ptr by_openvdb(const Mesh& mesh, const openvdb::math::Transform& tran
     return openvdb::tools::meshToVolume<FloatGrid>(never, adapter, transform, voxels, voxels, flags, nearest);
 }
 
-struct Band;
-void shorten_distances(Band& band, const InVoxels& mesh);
-
 // A narrow band: the distance of each voxel, at first without a sign, and its nearest triangle.
 struct Band {
     FloatGrid::Ptr distance;
-    Int32Grid::Ptr nearest = Int32Grid::create(openvdb::util::INVALID_IDX);
-    std::vector<Leaf*> leaves;
+    Int32Grid::Ptr nearest;
+    std::vector<Leaf*> leaves;  // of the distances
     double voxel;
 
-    Band(const InVoxels& mesh, const openvdb::math::Transform& transform, double half_width)
-        : voxel(transform.voxelSize()[0])
+    Band(FloatGrid::Ptr distances, Int32Grid::Ptr triangles)
+        : distance(std::move(distances)), nearest(std::move(triangles)), voxel(distance->voxelSize()[0])
     {
-        if (half_width <= widest_measured * voxel) {
-            measure(mesh, transform, half_width);
-            find_leaves();
-        } else {
-            distance =
-                by_openvdb(*mesh.mesh, transform, half_width, openvdb::tools::UNSIGNED_DISTANCE_FIELD, nearest.get());
-            find_leaves();
-            shorten_distances(*this, mesh);
-        }
+        find_leaves();
     }
 
     void find_leaves()
@@ -115,53 +104,55 @@ struct Band {
         leaves.clear();
         distance->tree().getNodes(leaves);
     }
-
-private:
-    void measure(const InVoxels& mesh, const openvdb::math::Transform& transform, double half_width)
-    {
-        static_assert(MeshBand::block == Leaf::DIM && MeshBand::voxels == Leaf::SIZE);
-        distance = FloatGrid::create(static_cast<float>(half_width));
-        distance->setTransform(transform.copy());
-        const MeshBand band(*mesh.mesh, half_width / voxel);
-        std::vector<Block> blocks(band.size());
-        for_each_chunk(
-            band.size(),
-            [&](std::size_t begin, std::size_t end) {
-                for (std::size_t b = begin; b < end; ++b) blocks[b] = block_of(band, b);
-            },
-            8);
-        for (Block& block : blocks) {
-            if (!block.distance) continue;
-            distance->tree().addLeaf(block.distance.release());
-            nearest->tree().addLeaf(block.nearest.release());
-        }
-    }
-
-    using NearestLeaf = openvdb::Int32Tree::LeafNodeType;
-    struct Block {
-        std::unique_ptr<Leaf> distance;
-        std::unique_ptr<NearestLeaf> nearest;
-    };
-
-    // Empty where no voxel of the block is in the band.
-    Block block_of(const MeshBand& band, std::size_t b) const
-    {
-        const Eigen::Vector3i origin = band.origin(b);
-        const Coord lowest(origin.x(), origin.y(), origin.z());
-        Block block = {std::make_unique<Leaf>(lowest, distance->background(), false),
-                       std::make_unique<NearestLeaf>(lowest, -1, true)};
-        const std::span<std::int32_t, MeshBand::voxels> triangles(block.nearest->buffer().data(), MeshBand::voxels);
-        std::array<float, MeshBand::voxels> far;
-        if (band.measure(b, far, triangles) == 0) return {};
-        float* values = block.distance->buffer().data();
-        for (openvdb::Index v = 0; v < MeshBand::voxels; ++v) {
-            if (triangles[v] < 0) continue;
-            values[v] = far[v] * static_cast<float>(voxel);
-            block.distance->setValueOn(v);
-        }
-        return block;
-    }
 };
+
+struct BandBlock {
+    std::unique_ptr<Leaf> distance;
+    std::unique_ptr<openvdb::Int32Tree::LeafNodeType> nearest;
+};
+
+// Empty where no voxel of the block is in the band.
+BandBlock measured_block(const MeshBand& band, std::size_t b, double voxel, float half_width)
+{
+    const Eigen::Vector3i origin = band.origin(b);
+    const Coord lowest(origin.x(), origin.y(), origin.z());
+    BandBlock block = {std::make_unique<Leaf>(lowest, half_width, false),
+                       std::make_unique<openvdb::Int32Tree::LeafNodeType>(lowest, no_triangle, true)};
+    const std::span<std::int32_t, MeshBand::voxels> triangles(block.nearest->buffer().data(), MeshBand::voxels);
+    std::array<float, MeshBand::voxels> far;
+    if (band.measure(b, far, triangles) == 0) return {};
+    float* values = block.distance->buffer().data();
+    for (openvdb::Index v = 0; v < MeshBand::voxels; ++v) {
+        if (triangles[v] < 0) continue;
+        values[v] = far[v] * static_cast<float>(voxel);
+        block.distance->setValueOn(v);
+    }
+    return block;
+}
+
+Band measured_band(const Mesh& mesh, const openvdb::math::Transform& transform, double half_width)
+{
+    static_assert(MeshBand::block == Leaf::DIM && MeshBand::voxels == Leaf::SIZE);
+    const double voxel = transform.voxelSize()[0];
+    const auto distance = FloatGrid::create(static_cast<float>(half_width));
+    const auto nearest = Int32Grid::create(no_triangle);
+    distance->setTransform(transform.copy());
+    const MeshBand band(mesh, half_width / voxel);
+    std::vector<BandBlock> blocks(band.size());
+    for_each_chunk(
+        band.size(),
+        [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b)
+                blocks[b] = measured_block(band, b, voxel, distance->background());
+        },
+        8);
+    for (BandBlock& block : blocks) {
+        if (!block.distance) continue;
+        distance->tree().addLeaf(block.distance.release());
+        nearest->tree().addLeaf(block.nearest.release());
+    }
+    return {distance, nearest};
+}
 
 // A better distance (m) of a voxel, and its triangle.
 struct Update {
@@ -271,6 +262,15 @@ void shorten_distances(Band& band, const InVoxels& mesh)
     });
 }
 
+Band corrected_band(const InVoxels& mesh, const openvdb::math::Transform& transform, double half_width)
+{
+    const auto nearest = Int32Grid::create(no_triangle);
+    Band band(by_openvdb(*mesh.mesh, transform, half_width, openvdb::tools::UNSIGNED_DISTANCE_FIELD, nearest.get()),
+              nearest);
+    shorten_distances(band, mesh);
+    return band;
+}
+
 // Negative where the winding number is not 0, by whole rows of voxels along x. Returns whether any faces lie inside:
 // with a winding number other than 0 on both their sides.
 bool sign_by_windings(Band& band, const RayCrossings& faces)
@@ -351,7 +351,9 @@ FloatGrid::Ptr signed_distance(const Mesh& world, bool balanced, const openvdb::
     const InVoxels mesh(world, transform);
     if (!balanced)
         return by_openvdb(*mesh.mesh, transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr);
-    Band band(mesh, transform, half_width);
+    Band band = half_width <= widest_measured * transform.voxelSize()[0]
+                    ? measured_band(*mesh.mesh, transform, half_width)
+                    : corrected_band(mesh, transform, half_width);
     const RayCrossings faces(mesh.mesh);
     if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
     openvdb::tools::signedFloodFill(band.distance->tree());

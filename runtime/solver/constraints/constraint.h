@@ -74,7 +74,7 @@ struct Substep {
     // support. Of the sub-step before; and of this one, as contacts are solved.
     std::span<const std::uint8_t> support;
     std::span<std::uint8_t> next_support;
-    // m/s: of the shape that supports a point. Empty where all are at rest.
+    // m/s: of what supports a point, where something does. Empty where all that does is at rest.
     std::span<const Vec3d> support_v;
     std::span<Vec3d> next_support_v;
 

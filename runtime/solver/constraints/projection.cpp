@@ -336,13 +336,11 @@ void Projection::begin_support(Substep& step)
     step.support = support_;
     step.next_support = next_support_;
     if (!moving_support_) return;
-    support_v_.resize(step.size(), Vec3d::Zero());
+    support_v_.resize(step.size());
     next_support_v_.resize(step.size());
     std::swap(support_v_, next_support_v_);
-    for (std::size_t i = 0; i < step.size(); ++i) {
+    for (std::size_t i = 0; i < step.size(); ++i)
         if (!(step.points[i].w > 0)) support_v_[i] = step.v[i];
-        next_support_v_[i].setZero();
-    }
     step.support_v = support_v_;
     step.next_support_v = next_support_v_;
 }

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "runtime/error.h"
+#include "tests/shapes/mesh/distance_to_all.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -50,27 +51,6 @@ Sample ask(const Shape& shape, const Vec3d& P)
     Sample sample;
     shape.distance({&P, 1}, {&sample.phi, 1}, {&sample.gradient, 1});
     return sample;
-}
-
-// The distance to the nearest triangle (Ericson 2005, 5.1.5), over all of them.
-double brute_force_distance(const Mesh& mesh, const Vec3d& P)
-{
-    double least = std::numeric_limits<double>::infinity();
-    for (const Mesh::Triangle& t : mesh.triangles) {
-        const Vec3d a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>();
-        const Vec3d c = mesh.positions[t[2]].cast<double>();
-        const auto to_segment = [&](const Vec3d& from, const Vec3d& to) {
-            const double s = std::clamp((P - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
-            return (P - from - s * (to - from)).norm();
-        };
-        least = std::min({least, to_segment(a, b), to_segment(b, c), to_segment(c, a)});
-        const Vec3d n = (b - a).cross(c - a).normalized();
-        const Vec3d foot = P - n.dot(P - a) * n;
-        const bool over = n.dot((b - a).cross(foot - a)) >= 0 && n.dot((c - b).cross(foot - b)) >= 0 &&
-                          n.dot((a - c).cross(foot - c)) >= 0;
-        if (over) least = std::min(least, std::abs(n.dot(P - a)));
-    }
-    return least;
 }
 
 // A mesh whose parts are those of `a` and of `b`.
@@ -212,7 +192,7 @@ TEST_CASE("a level set from a mesh has the distance to the nearest triangle at e
         for (int j = -8; j <= 8; ++j)
             for (int k = -24; k <= 24; ++k) {
                 const Vec3d P = voxel * Vec3d(i, j, k);
-                const double exact = brute_force_distance(*mesh, P);
+                const double exact = test::distance_to_all(*mesh, P);
                 if (exact > 2.5 * voxel) continue;
                 worst = std::max(worst, std::abs(std::abs(ask(*torus, P).phi) - exact));
                 ++asked;

@@ -5,28 +5,15 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <limits>
 #include <random>
 #include <set>
 #include <tuple>
 
-#include "runtime/shapes/mesh/nearest_on_triangle.h"
+#include "tests/shapes/mesh/distance_to_all.h"
 #include "tests/test.h"
 
 namespace rapid {
 namespace {
-
-double distance_to_all(const Mesh& mesh, const Vec3d& P)
-{
-    double least = std::numeric_limits<double>::infinity();
-    for (const Mesh::Triangle& t : mesh.triangles) {
-        const Vec3d a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>(),
-                    c = mesh.positions[t[2]].cast<double>();
-        const auto [u, w] = nearest_weights(P, a, b, c);
-        least = std::min(least, (a + u * (b - a) + w * (c - a) - P).norm());
-    }
-    return least;
-}
 
 // Triangles of any size up to that given: also ones that are lines, points, and all but lines.
 Mesh soup(std::mt19937& random, int triangles, double size, double spread)
@@ -67,7 +54,7 @@ TEST_CASE("each voxel of a mesh's band has the distance to the nearest triangle,
             std::size_t found = 0;
             for (int v = 0; v < int(MeshBand::voxels); ++v) {
                 const double exact =
-                    distance_to_all(mesh, (origin + Eigen::Vector3i(v / 64, v / 8 % 8, v % 8)).cast<double>());
+                    test::distance_to_all(mesh, (origin + Eigen::Vector3i(v / 64, v / 8 % 8, v % 8)).cast<double>());
                 RC_ASSERT(std::abs(distance[v] - std::min(exact, half_width)) <= 1e-6 * (1 + size));
                 RC_ASSERT((nearest[v] >= 0) == (distance[v] < static_cast<float>(half_width)));
                 found += nearest[v] >= 0;
@@ -77,7 +64,7 @@ TEST_CASE("each voxel of a mesh's band has the distance to the nearest triangle,
         std::uniform_real_distribution<double> in(-15 - size, 15 + size);
         for (int k = 0; k < 300; ++k) {
             const Eigen::Vector3d P(std::round(in(random)), std::round(in(random)), std::round(in(random)));
-            if (distance_to_all(mesh, P) >= half_width) continue;
+            if (test::distance_to_all(mesh, P) >= half_width) continue;
             const Eigen::Vector3i origin = 8 * (P / 8).array().floor().matrix().cast<int>();
             RC_ASSERT(near.count({origin.x(), origin.y(), origin.z()}));
         }

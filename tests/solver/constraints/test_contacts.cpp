@@ -6,12 +6,14 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <random>
 #include <set>
 
 #include "runtime/shapes/motion/moving.h"
+#include "runtime/solver/constraints/heavy_contacts.h"
 #include "tests/solver/constraints/granular.h"
 
 namespace rapid {
@@ -391,6 +393,25 @@ TEST_CASE("a heavy point on a light one on a floor that moves goes as it does on
             RC_ASSERT((carried.v(i) - V.cast<double>() - rest.v(i)).norm() < 1e-4);
         }
     });
+}
+
+TEST_CASE("what a point rests on bears those that press it too, and has its velocity", "[contacts]")
+{
+    const std::array<std::uint8_t, 3> support = {255, 0, 0};
+    const std::array<Vec3d, 3> support_v = {Vec3d(1, 2, 3), Vec3d::Zero(), Vec3d::Zero()};
+    std::array<std::uint8_t, 3> next = {255, 0, 0};
+    std::array<Vec3d, 3> next_v = support_v;
+    Substep step;
+    step.support = support, step.next_support = next;
+    step.support_v = support_v, step.next_support_v = next_v;
+    ContactPack pack = {};
+    pack.count = 2;
+    pack.i[0] = 1, pack.j[0] = 0, pack.normal_impulse[0] = 1;
+    pack.i[1] = 2, pack.j[1] = 0, pack.normal_impulse[1] = 0;  // near, and does not press
+    HeavyContacts::pass_on_support(pack, step);
+    CHECK(next == std::array<std::uint8_t, 3>{255, 254, 0});
+    CHECK(next_v[1] == Vec3d(1, 2, 3));
+    CHECK(next_v[2].isZero(0));
 }
 
 TEST_CASE("a ball of 10^6 times their mass on a bed of grains is in none of them, nor are they in the floor",

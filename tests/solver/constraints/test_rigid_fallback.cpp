@@ -153,6 +153,35 @@ TEST_CASE("a body without a solution goes along with the surfaces that draw it, 
     }
 }
 
+class Falling : public Motion {
+public:
+    explicit Falling(const Vec3d& a) : a_(a) {}
+    Pose at(const Frame& frame) const override { return {0.5 * frame.time * frame.time * a_}; }
+    FrameRange range() const override { return {0, 1}; }
+
+private:
+    Vec3d a_;
+};
+
+TEST_CASE("a body without a solution goes as a surface that accelerates and draws it", "[rigid_fallback]")
+{
+    Body body(3, 4, false);
+    const std::vector<Mobility> mobility(4, {0.1, 0.005});
+    const Vec3d a(3, -2, 5);
+    const ShapePtr falls = moving(make_sphere_shape(0.3, Vec3d::Zero()), Falling(a), {1, 0}, 0, 1);
+    const std::vector<SurfaceSpring> springs(4, {1, falls.get(), 0.5});  // at the end of a sub-step of 0.1 s
+    body.step.mobility = mobility;
+    body.step.surface_springs = springs;
+    RigidFallback fallback;
+    fallback.begin(body.step);
+    const std::vector<Vec3d> start = body.start;
+    fallback.apply(body.step, body.all, nullptr);
+    for (const std::uint32_t i : body.all) {
+        CHECK_THAT(body.places()[i], test::close_to(Vec3d(start[i] + 0.5 * (0.25 - 0.16) * a), 1e-6));
+        CHECK_THAT(body.v[i], test::close_to(Vec3d(0.5 * a), 1e-6));
+    }
+}
+
 TEST_CASE("a body without a solution goes along with what drives it", "[rigid_fallback]")
 {
     Body body(3, 5, false);

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "bindings/command/whole_file.h"
+#include "runtime/checked_json.h"
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
 
@@ -13,7 +13,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 constexpr int job_version = 1;
 
@@ -122,7 +121,7 @@ std::string script_of_last(const FarmJob& job, const std::string& program)
 SubmittedJob SubmittedJob::read(const fs::path& file)
 {
     try {
-        const ordered_json json = ordered_json::parse(InputFile(file).text());
+        const CheckedJson json = CheckedJson::parse(InputFile(file).text());
         if (const int version = json.at("rapid_farm").get<int>(); version != job_version)
             throw Error(fmt::format("is of version {}; it must be {}", version, job_version));
         SubmittedJob submitted;
@@ -135,7 +134,7 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
         job.folder = json.at("folder").get<std::string>();
         job.outputs = json.at("outputs").get<std::string>();
         submitted.last = json.at("last").at("job");
-        for (const ordered_json& task : json.at("tasks")) {
+        for (const CheckedJson& task : json.at("tasks")) {
             job.tasks.push_back({task.at("name"), task.at("command").get<std::vector<std::string>>()});
             submitted.arrays.push_back(task.at("job"));
         }
@@ -152,18 +151,18 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
 
 void SubmittedJob::write() const
 {
-    ordered_json json = {{"rapid_farm", job_version},
-                         {"name", job.name},
-                         {"folder", job.folder.string()},
-                         {"outputs", job.outputs.string()},
-                         {"options", job.options},
-                         {"command", job.words},
-                         {"tasks", ordered_json::array()},
-                         {"last", {{"commands", job.last}, {"needs_all", job.last_needs_all}, {"job", last}}}};
+    CheckedJson json = {{"rapid_farm", job_version},
+                        {"name", job.name},
+                        {"folder", job.folder.string()},
+                        {"outputs", job.outputs.string()},
+                        {"options", job.options},
+                        {"command", job.words},
+                        {"tasks", CheckedJson::array()},
+                        {"last", {{"commands", job.last}, {"needs_all", job.last_needs_all}, {"job", last}}}};
     for (std::size_t k = 0; k < job.tasks.size(); ++k)
         json["tasks"].push_back(
             {{"name", job.tasks[k].name}, {"command", job.tasks[k].words}, {"job", arrays[k]}, {"number", k + 1}});
-    write_whole(job.file(), json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+    write_whole(job.file(), json.dump(2, ' ', false, CheckedJson::error_handler_t::replace) + '\n');
 }
 
 }  // namespace rapid

@@ -3,18 +3,16 @@
 #include <fmt/format.h>
 
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "bindings/command/part_options.h"
 #include "bindings/command/whole_file.h"
+#include "runtime/checked_json.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/frame_pattern.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
 
 constexpr int record_version = 1;
 
@@ -30,7 +28,7 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
 {
     PartRecord record;
     try {
-        const ordered_json json = ordered_json::parse(InputFile(file).text());
+        const CheckedJson json = CheckedJson::parse(InputFile(file).text());
         if (const int version = json.at("rapid_part").get<int>(); version != record_version)
             throw Error(fmt::format("is a record of version {}; it must be {}", version, record_version));
         const auto number = json.at("part").get<std::int64_t>(), count = json.at("parts").get<std::int64_t>();
@@ -60,15 +58,15 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
 
 void PartRecord::write(const std::filesystem::path& file) const
 {
-    const ordered_json json = {{"rapid_part", record_version},
-                               {"part", part.number},
-                               {"parts", part.count},
-                               {"sample", sample ? ordered_json(*sample) : ordered_json()},
-                               {"frames", {{"first", frames.first}, {"last", frames.last}, {"step", frames.step}}},
-                               {"fps", fps},
-                               {"start", start},
-                               {"identity", identity}};
-    write_whole(file, json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+    const CheckedJson json = {{"rapid_part", record_version},
+                              {"part", part.number},
+                              {"parts", part.count},
+                              {"sample", sample ? CheckedJson(*sample) : CheckedJson()},
+                              {"frames", {{"first", frames.first}, {"last", frames.last}, {"step", frames.step}}},
+                              {"fps", fps},
+                              {"start", start},
+                              {"identity", identity}};
+    write_whole(file, json.dump(2, ' ', false, CheckedJson::error_handler_t::replace) + '\n');
 }
 
 std::string difference(const PartRecord& there, const PartRecord& here)

@@ -19,7 +19,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 constexpr double longest_wait = 5;  // s, for a run that ends
 constexpr std::string_view prefix = "snapshot.", suffix = ".rapid";
@@ -381,7 +380,7 @@ void RunCache::keep(const Evaluator& evaluator, EventFile& events, bool in_any_c
     if (std::string failure = events.take_failure(); !failure.empty()) failures_.push_back(std::move(failure));
     if (!events.path().empty() && !events.logged()) return;
     KeptRun kept{evaluator.save(), events.logged().value_or(0)};
-    ordered_json header = {{"what", "snapshot of a run"}, {"graph", graph_.string()}, {"frame", frame}};
+    CheckedJson header = {{"what", "snapshot of a run"}, {"graph", graph_.string()}, {"frame", frame}};
     for (const auto& [name, state] : kept.snapshot.simulations) header["simulations"][name] = state.size();
     for (const auto& [name, state] : kept.snapshot.nodes) header["nodes"][name] = state.size();
     Fingerprint all = fingerprint_;

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-std::string failure_of(const std::filesystem::path& path, const nlohmann::ordered_json& header, const SavedState& state)
+std::string failure_of(const std::filesystem::path& path, const CheckedJson& header, const SavedState& state)
 {
     try {
         OutputFile file(path);
@@ -39,7 +39,7 @@ SnapshotWriter::~SnapshotWriter()
     thread_.join();
 }
 
-void SnapshotWriter::submit(std::filesystem::path file, nlohmann::ordered_json header, SavedState state)
+void SnapshotWriter::submit(std::filesystem::path file, CheckedJson header, SavedState state)
 {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return !waiting_; });

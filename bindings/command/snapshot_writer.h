@@ -4,12 +4,12 @@
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "runtime/checked_json.h"
 #include "runtime/points/saved_state.h"
 
 namespace rapid {
@@ -21,7 +21,7 @@ public:
     ~SnapshotWriter();
 
     // Waits while another one waits. The state shares its columns with the run.
-    void submit(std::filesystem::path file, nlohmann::ordered_json header, SavedState state);
+    void submit(std::filesystem::path file, CheckedJson header, SavedState state);
     // Waits until all are written.
     void finish();
     // Why files could not be written, since the last call.
@@ -30,7 +30,7 @@ public:
 private:
     struct Job {
         std::filesystem::path file;
-        nlohmann::ordered_json header;
+        CheckedJson header;
         SavedState state;
     };
     void run();

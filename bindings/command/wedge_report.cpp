@@ -9,6 +9,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/whole_file.h"
+#include "runtime/checked_json.h"
 #include "runtime/io/frame_pattern.h"
 #include "runtime/picture/contact_sheet.h"
 #include "runtime/picture/png_file.h"
@@ -19,7 +20,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using nlohmann::ordered_json;
 
 // The picture of the last frame up to `last` that has one; empty: there is none, or the files are no pictures.
@@ -67,22 +67,22 @@ void WedgeReport::read(const fs::path& statistics, Result& result)
     std::error_code none;
     if (!fs::is_regular_file(statistics, none)) return;  // reading a pipe would wait
     std::ifstream file(statistics);
-    const json all = json::parse(file, nullptr, false);
+    const CheckedJson all = CheckedJson::parse(file, nullptr, false);
     if (all.is_discarded()) return;
     try {
         result.seconds = all.at("seconds");
         result.peak_bytes = all.at("peak_bytes");
-        for (const json& frame : all.at("frames")) {
+        for (const CheckedJson& frame : all.at("frames")) {
             result.last_frame = frame.at("frame").get<std::int64_t>();
             result.points = frame.at("points");
             result.contacts += frame.at("collisions").get<std::uint64_t>();
             if (!frame.contains("error")) continue;
-            const json& error = frame.at("error");
+            const CheckedJson& error = frame.at("error");
             const double p95 = error.at("position_p95");
             if (!result.error || p95 > result.error->p95)
                 result.error = {error.at("position_p50"), p95, error.at("position_max"), frame.at("frame")};
         }
-    } catch (const json::exception&) {
+    } catch (const nlohmann::json::exception&) {
         result.failure = fmt::format("{}: it does not hold the statistics of a run", statistics.string());
     }
 }

@@ -9,10 +9,10 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 
+#include "runtime/checked_json.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
@@ -21,7 +21,7 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using Json = CheckedJson;
 
 constexpr std::size_t most_runs = 8;
 constexpr const char *frame_file = "frame", *shapes_file = "shapes", *snapshot_file = "snapshot";

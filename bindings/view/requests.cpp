@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "runtime/graph/evaluation.h"
 #include "runtime/picture/frame_picture.h"
@@ -16,7 +15,7 @@
 namespace rapid {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = CheckedJson;
 
 constexpr std::size_t most_rows = 500;          // of the spreadsheet, at a time
 constexpr std::size_t most_figures = 500;       // frames, at a time

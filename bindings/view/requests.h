@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "bindings/view/frame_message.h"
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
+#include "runtime/checked_json.h"
 
 namespace rapid {
 
@@ -28,7 +28,7 @@ public:
     void answer_waiting();
 
 private:
-    using Json = nlohmann::ordered_json;
+    using Json = CheckedJson;
     struct Ask {  // a request with its number and the way back
         std::uint32_t re;
         Answer answer;

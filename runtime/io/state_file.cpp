@@ -20,8 +20,6 @@
 namespace rapid {
 namespace {
 
-using nlohmann::ordered_json;
-
 constexpr std::string_view state_magic = "\x89RAPID\r\n";
 constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
 constexpr std::string_view types[] = {"float", "vec3", "int32", "int64", "quat", "string", "uint8"};  // KeptColumn's
@@ -112,14 +110,14 @@ std::size_t values_of(const KeptColumn& column)
 }
 
 // The texts of columns that hold their places so far.
-void take_texts(const ordered_json& blocks, SavedState& state)
+void take_texts(const CheckedJson& blocks, SavedState& state)
 {
     for (std::size_t k = 0; k < state.columns.size(); ++k) {
         const auto found = blocks[k + 1].find("texts");
         if (found == blocks[k + 1].end()) continue;
         std::vector<Token> texts;
         try {
-            for (const ordered_json& text : *found) texts.push_back(token_of(text.get<std::string>()));
+            for (const CheckedJson& text : *found) texts.push_back(token_of(text.get<std::string>()));
             state.columns[k] = texts_at(texts, std::get<Column<std::int32_t>>(state.columns[k]));
         } catch (const nlohmann::json::exception&) {
             damaged("its header can't be read");
@@ -138,7 +136,7 @@ std::uint64_t number_at(const unsigned char* at)
 
 }  // namespace
 
-void write_state(OutputFile& file, ordered_json header, const SavedState& state)
+void write_state(OutputFile& file, CheckedJson header, const SavedState& state)
 {
     std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
     // Of a column of texts the block holds the places, and the header its texts.
@@ -164,15 +162,15 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
         pieces[k] = is_packed[b] ? packed(bytes, blocks[b].scalar) : Piece{nullptr, bytes};
     });
     header["format"] = state_format;
-    ordered_json& list = header["blocks"] = ordered_json::array();
+    CheckedJson& list = header["blocks"] = CheckedJson::array();
     for (std::size_t b = 0, next = 0; b < blocks.size(); ++b) {
-        ordered_json sizes = ordered_json::array();
+        CheckedJson sizes = CheckedJson::array();
         for (std::size_t k = 0; k < blocks[b].pieces(); ++k) sizes.push_back(pieces[next++].bytes.size());
         list.push_back({{"type", b == 0 ? type_of_bytes : types[state.columns[b - 1].index()]},
                         {"values", b == 0 ? state.bytes.size() : values_of(state.columns[b - 1])},
                         {"pieces", std::move(sizes)}});
         if (b == 0 || !std::holds_alternative<Column<Token>>(state.columns[b - 1])) continue;
-        ordered_json& of_block = list.back()["texts"] = ordered_json::array();
+        CheckedJson& of_block = list.back()["texts"] = CheckedJson::array();
         for (const Token text : texts[b - 1]) of_block.push_back(text.text());
     }
 
@@ -183,7 +181,7 @@ void write_state(OutputFile& file, ordered_json header, const SavedState& state)
         XXH3_64bits_update(sum.get(), data, bytes);
         file.append(data, bytes);
     };
-    const std::string text = header.dump(1, ' ', false, ordered_json::error_handler_t::replace);
+    const std::string text = header.dump(1, ' ', false, CheckedJson::error_handler_t::replace);
     const std::uint64_t length = text.size();
     append(state_magic.data(), state_magic.size());
     append(&length, sizeof length);
@@ -215,11 +213,11 @@ StateFile::StateFile(const std::filesystem::path& path) : file_(path)
     if (length > body - begin) damaged("its header is longer than the file");
     blocks_at_ = begin + static_cast<std::size_t>(length);
     try {
-        header_ = ordered_json::parse(file_.text().substr(begin, static_cast<std::size_t>(length)),
-                                      [](int depth, ordered_json::parse_event_t, ordered_json&) {
-                                          if (depth > most_depth) damaged("its header is nested too deep");
-                                          return true;
-                                      });
+        header_ = CheckedJson::parse(file_.text().substr(begin, static_cast<std::size_t>(length)),
+                                     [](int depth, CheckedJson::parse_event_t, CheckedJson&) {
+                                         if (depth > most_depth) damaged("its header is nested too deep");
+                                         return true;
+                                     });
         if (!header_.is_object()) damaged("its header can't be read");
         if (header_.at("format").get<int>() != state_format)
             throw Error(fmt::format("it has the format {} of snapshots; this Rapid reads {}",
@@ -242,14 +240,14 @@ SavedState StateFile::state() const
     std::vector<Place> places;
     // No more memory is taken than a file of this size can fill.
     std::uint64_t left = (end - at) * most_codec_expansion;
-    const auto add = [&](const ordered_json& block, std::size_t bytes_a_value, const auto& allocate) {
+    const auto add = [&](const CheckedJson& block, std::size_t bytes_a_value, const auto& allocate) {
         const std::uint64_t values = block.at("values").get<std::uint64_t>();
         if (values > left / bytes_a_value) damaged("a block does not fit its header");
         const std::size_t bytes = static_cast<std::size_t>(values) * bytes_a_value;
         left -= bytes;
         char* const to = allocate(static_cast<std::size_t>(values));
         std::size_t done = 0;
-        for (const ordered_json& piece : block.at("pieces")) {
+        for (const CheckedJson& piece : block.at("pieces")) {
             const std::uint64_t size = piece.get<std::uint64_t>();
             if (size > end - at) damaged("it is shorter than its header says");
             const std::size_t filled = std::min(piece_bytes, bytes - done);
@@ -260,7 +258,7 @@ SavedState StateFile::state() const
         if (done != bytes) damaged("a block does not fit its header");
     };
     try {
-        const ordered_json& blocks = header_.at("blocks");
+        const CheckedJson& blocks = header_.at("blocks");
         if (blocks.empty() || blocks[0].at("type") != type_of_bytes) damaged("its header can't be read");
         add(blocks[0], 1, [&](std::size_t size) { return state.bytes.resize(size), state.bytes.data(); });
         state.columns.reserve(blocks.size() - 1);

@@ -13,8 +13,8 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
+#include "runtime/checked_json.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/output_file.h"
 #include "runtime/points/saved_state.h"
@@ -25,14 +25,14 @@ namespace rapid {
 inline constexpr int state_format = 5;
 
 // Compresses on all threads. header: an object. The caller finishes the file.
-void write_state(OutputFile& file, nlohmann::ordered_json header, const SavedState& state);
+void write_state(OutputFile& file, CheckedJson header, const SavedState& state);
 
 class StateFile {
 public:
     // Reads and checks the whole file. Error: it can't be read; it is no such file, torn or damaged.
     explicit StateFile(const std::filesystem::path& path);
 
-    const nlohmann::ordered_json& header() const { return header_; }
+    const CheckedJson& header() const { return header_; }
     std::uint64_t bytes() const { return file_.bytes().size(); }
     // Decompresses, on all threads. Error: it is damaged.
     SavedState state() const;
@@ -42,7 +42,7 @@ public:
 
 private:
     InputFile file_;
-    nlohmann::ordered_json header_;
+    CheckedJson header_;
     std::size_t blocks_at_ = 0;
 };
 

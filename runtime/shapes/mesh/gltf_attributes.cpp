@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
+#include "runtime/checked_json.h"
 #include "runtime/error.h"
 #include "runtime/files/base64.h"
 #include "runtime/files/input_file.h"
@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-using nlohmann::json;
+using json = SortedCheckedJson;
 using Bytes = std::vector<unsigned char>;
 
 constexpr std::uint32_t binary_mark = 0x46546c67;  // "glTF"

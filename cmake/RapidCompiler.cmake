@@ -45,6 +45,9 @@ endif()
 # clang does not know g++'s optimisation pragmas, and advises && where a branch would cost more.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   target_compile_options(rapid_private INTERFACE -Wno-unknown-pragmas -Wno-bitwise-instead-of-logical -Wno-psabi)
+  # It would write into a precompiled header when each file that it holds was changed last: that of another build folder
+  # would never be the same, and ccache would find nothing there.
+  target_compile_options(rapid_private INTERFACE "SHELL:-Xclang -fno-pch-timestamp")
 endif()
 if(RAPID_POISON)
   target_compile_options(rapid_private INTERFACE -ftrivial-auto-var-init=pattern)

@@ -556,7 +556,8 @@ end
 -- env: the environment in which the kernel's globals live; of_a_point: the kernel's first parameter is a point;
 -- point_names: the table of the host.
 local function analyse(kernel, env, of_a_point, point_names)
-  if not util.funcinfo(kernel).bytecodes then
+  local info = util.funcinfo(kernel)
+  if not info.bytecodes or info.source:find "^=%[rapid" then
     error("the kernel is a function of Lua's own library; it must be one of the scene's, which may call it", 0)
   end
   local found = nothing_found(env, to_remember(of_a_point), "the kernel", point_names.methods)

@@ -4,6 +4,8 @@
 -- The chunk is called with the host's native functions and returns a table of entry points.
 local native = ...
 
+require("elementary").replace(native.elementary, math)
+
 local bytecode = require "bytecode"
 local describe = require "describe"
 local detail = require "detail"
@@ -124,8 +126,8 @@ end
 jit.off(watched) -- makes a function, which is not compiled
 
 function entry.runner(f, layout, memory)
-  local runner, set_params = engine.runner(f, layout, memory)
-  return watched(f, runner, true), set_params
+  local runner, set_params, translate = engine.runner(f, layout, memory)
+  return watched(f, runner, true), set_params, translate
 end
 
 -- The userdata that a function reaches.

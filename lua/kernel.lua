@@ -6,6 +6,7 @@
 -- traces, and fall to a fifth of their speed.
 local describe = require "describe"
 local ffi = require "ffi"
+local lanes = require "lanes"
 local util = require "jit.util"
 local vector = require "vec3"
 
@@ -123,7 +124,7 @@ end
 -- look-up in a table would leave its checks. Upvalues that are never assigned, and are no longer than two pointers, are
 -- constants there too: the chunk's address, the view, the frame.
 local text_head = [[
-local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush, texts = ...
+local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush, texts, holder = ...
 local istype, floor, type, tonumber, error = ffi.istype, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
@@ -192,8 +193,8 @@ ffi.metatype(step_type, refuse.operators("the step is no number; compute with wh
 -- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve.
 -- memory: a userdata with room for rapid_chunk and, behind it, a pointer for each column and then each group. The host
 -- writes it before each run().
--- Returns run(), and set_params(values, details): the third argument of a Lua node's kernel, and the values of
--- frame.detail.
+-- Returns run(), set_params(values, details): the third argument of a Lua node's kernel, and the values of
+-- frame.detail; and translate(): the kernel as a program of lanes, where it is one (lua/lanes.lua).
 local function make_runner(kernel, layout, memory, shared)
   local fields, names = { "rapid_chunk chunk;" }, { dt = true }
   for _, name in ipairs(shared.point_names.fields) do names[name] = true end
@@ -307,7 +308,7 @@ run = function(...)
   chunk.at = -1
 end
 local function set_params(values, detail_values)
-  details = detail_values
+  details, holder.values, holder.details = detail_values, values, detail_values
   for _, value in next, values do
     if type(value) == "userdata" then adopt(value) end
   end
@@ -355,8 +356,10 @@ return run, set_params
   end
   local make = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
   local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
-  return make(ffi, vec3, quat, kernel, pointer, shared.frame_type, shared.draw, shared.adopt, shared.shown,
-    refuse, names, jit.flush, shared.texts)
+  local holder = { values = {}, details = {} }
+  local run, set_params = make(ffi, vec3, quat, kernel, pointer, shared.frame_type, shared.draw, shared.adopt,
+    shared.shown, refuse, names, jit.flush, shared.texts, holder)
+  return run, set_params, function() return lanes.translate(kernel, layout, holder) end
 end
 
 -- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua);

@@ -88,7 +88,7 @@ local function no_order()
   error("vec3 values have no order; compare their lengths or components", 2)
 end
 
-ffi.metatype(vec3, {
+local of_vec3 = {
   __add = function(...)
     local a, b = ...
     if not (istype(vec3, a) and istype(vec3, b)) then wrong_operand("+", a, b) end
@@ -142,7 +142,8 @@ ffi.metatype(vec3, {
     if name == "normalized" then return normalized end
     error(("a vec3 has no %q; it has x, y, z, dot, cross, length, normalized and lerp"):format(describe.name(name)), 2)
   end,
-})
+}
+ffi.metatype(vec3, of_vec3)
 
 -- Rotations: (x, y, z) = axis sin(angle / 2), w = cos(angle / 2), as Houdini's orient holds them.
 local function need_quat(what, value)
@@ -200,7 +201,7 @@ local function slerp(...)
   return (quat(a * q.x + b * r.x, a * q.y + b * r.y, a * q.z + b * r.z, a * q.w + b * r.w))
 end
 
-ffi.metatype(quat, {
+local of_quat = {
   -- The rotation r, and then q.
   __mul = function(...)
     local q, r = ...
@@ -231,7 +232,8 @@ ffi.metatype(quat, {
     error(("a quat has no %q; it has x, y, z, w, rotate, inverse, length, normalized and slerp"):format(
       describe.name(name)), 2)
   end,
-})
+}
+ffi.metatype(quat, of_quat)
 
 -- From four numbers.
 local function make_quat(...)
@@ -255,4 +257,9 @@ local function make_vec3(...)
   return (vec3(x, y, z))
 end
 
-return { type = vec3, quat = quat, make = make_vec3, make_quat = make_quat }
+-- The metatable of one of the types.
+local function operators(of)
+  return rawequal(of, vec3) and of_vec3 or of_quat
+end
+
+return { type = vec3, quat = quat, make = make_vec3, make_quat = make_quat, operators = operators }

@@ -31,4 +31,8 @@ private:
 // out[i] is uniform4(key, items[i], use) to the bit.
 void uniform4(RandomKey key, const Items& items, std::uint64_t use, std::span<std::array<double, 4>> out);
 
+// A number uniform in [0, 1) with 53 bits, and those of several items; as many numbers as items.
+double uniform53(RandomKey key, std::uint64_t item, std::uint64_t use);
+void uniform53(RandomKey key, std::span<const std::uint64_t> items, std::uint64_t use, std::span<double> out);
+
 }  // namespace rapid

@@ -1,12 +1,12 @@
 #include "bindings/host/kernel_functions.h"
 
-#include <bit>
 #include <cstdint>
 #include <lua.hpp>
 
 #include "bindings/host/kernel_moment.h"
+#include "runtime/elementary.h"
+#include "runtime/lanes/lane_program.h"
 #include "runtime/noise.h"
-#include "runtime/random.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/motion/value_on_mesh.h"
@@ -14,31 +14,11 @@
 namespace rapid {
 namespace {
 
-// The key of the numbers of a frame.
-RandomKey key_in_frame(RandomKey key, double frame)
-{
-    const auto mixed = uniform4(key, std::bit_cast<std::uint64_t>(frame), ~std::uint64_t{0});
-    key.value ^= static_cast<std::uint64_t>(mixed[0] * 0x1p32) << 32 | static_cast<std::uint64_t>(mixed[1] * 0x1p32);
-    return key;
-}
-
-// frame: 0, or the frame's number where the numbers differ from frame to frame.
 double draw(std::uint64_t random, std::int64_t id, double use, double frame)
 {
-    // The points of a pass share the key: it takes as long as a number.
-    thread_local struct {
-        std::uint64_t random = 0;
-        double frame = 0;
-        RandomKey key;
-    } last;
     RandomKey key;
     key.value = random;
-    if (frame != 0) {
-        if (last.random != random || last.frame != frame) last = {random, frame, key_in_frame(key, frame)};
-        key = last.key;
-    }
-    const auto numbers = uniform4(key, static_cast<std::uint64_t>(id), std::bit_cast<std::uint64_t>(use + 0.0));
-    return numbers[0] + numbers[1] * 0x1p-32 < 1 ? numbers[0] + numbers[1] * 0x1p-32 : numbers[0];
+    return kernel_random(key, static_cast<std::uint64_t>(id), use, frame);
 }
 
 NoiseOptions noise_options(double time, double octaves, double seed)
@@ -129,6 +109,11 @@ void set_kernel_functions(lua_State* L)
     set("mesh_value", &mesh_value);
     set("vector_grid_sample", &vector_grid_sample);
     set("fog_sample", &fog_sample);
+    lua_newtable(L);
+    set("sin", static_cast<double (*)(double)>(&sine));
+    set("cos", static_cast<double (*)(double)>(&cosine));
+    set("exp", static_cast<double (*)(double)>(&exponential));
+    lua_setfield(L, -2, "elementary");
 }
 
 }  // namespace rapid

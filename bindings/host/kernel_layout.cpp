@@ -6,6 +6,7 @@
 #include <lua.hpp>
 
 #include "bindings/host/chunk.h"
+#include "bindings/host/kernel_lanes.h"
 #include "bindings/host/lua_text.h"
 
 namespace rapid {
@@ -106,9 +107,11 @@ State::Runner& runner_for(State& state, std::size_t kernel, const KernelLayout& 
     state.push_entry("runner");
     state.push_kernel(kernel);
     push_layout(L, layout);
-    State::Runner runner{layout.key};
+    State::Runner runner;
+    runner.layout = layout.key;
     runner.chunk = push_chunk(L, layout.columns.size() + layout.groups.size());
-    state.call(3, 2);
+    state.call(3, 3);
+    runner.translate = luaL_ref(L, LUA_REGISTRYINDEX);
     runner.set_params = luaL_ref(L, LUA_REGISTRYINDEX);
     runner.run = luaL_ref(L, LUA_REGISTRYINDEX);
     return runners.emplace_back(std::move(runner));

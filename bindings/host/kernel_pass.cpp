@@ -9,6 +9,7 @@
 
 #include "bindings/host/detail.h"
 #include "bindings/host/kernel.h"
+#include "bindings/host/kernel_lanes.h"
 #include "bindings/host/kernel_moment.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/values.h"
@@ -78,33 +79,54 @@ void KernelPass::run(const rapid_chunk& chunk, std::vector<void*> columns) const
 
     ScriptHost& host = kernel_.host();
     const KernelOrder::Sequence sequence = host.sequence_of(caller_.node);
-    if (sequence == KernelOrder::Forward) return call_runner(host.local(), call);
+    if (sequence == KernelOrder::Forward)
+        return host.options().on_trace_abort ? call_runner(host.local(), call) : call_lanes(host.local(), call);
     const std::int32_t size = chunk.size;
     for (std::int32_t k = 0; k < size; ++k) {
         const std::int32_t i = sequence == KernelOrder::Reversed ? size - 1 - k : k;
         call_runner(sequence == KernelOrder::TwoStates && i % 2 == 1 ? host.second() : host.local(),
-                    call_of_point(call, i));
+                    part_of(call, i, 1));
     }
 }
 
-// The chunk's point i as a chunk of its own.
-KernelPass::Call KernelPass::call_of_point(const Call& call, std::int32_t i) const
+std::size_t KernelPass::bytes_between(std::size_t pointer) const
 {
-    Call point = call;
-    for (std::size_t c = 0; c < point.pointers.size(); ++c) {
-        const ColumnMemory& memory = c < columns_.size() ? columns_[c] : groups_[c - columns_.size()];
-        point.pointers[c] = static_cast<char*>(point.pointers[c]) + static_cast<std::size_t>(i) * memory.element_bytes;
-    }
-    const auto at = [i](auto* first) { return first ? first + i : nullptr; };
-    rapid_chunk& chunk = point.chunk;
-    chunk.size = 1;
-    chunk.first += i;
+    return pointer < columns_.size() ? columns_[pointer].element_bytes
+                                     : groups_[pointer - columns_.size()].element_bytes;
+}
+
+KernelPass::Call KernelPass::part_of(const Call& call, std::int32_t begin, std::int32_t size) const
+{
+    Call part = call;
+    for (std::size_t c = 0; c < part.pointers.size(); ++c)
+        part.pointers[c] = static_cast<char*>(part.pointers[c]) + static_cast<std::size_t>(begin) * bytes_between(c);
+    const auto at = [begin](auto* first) { return first ? first + begin : nullptr; };
+    rapid_chunk& chunk = part.chunk;
+    chunk.size = size;
+    chunk.first += begin;
     chunk.kill = at(chunk.kill);
     chunk.result = at(chunk.result);
     chunk.members = at(chunk.members);
     chunk.times = at(chunk.times);
     chunk.steps = at(chunk.steps);
-    return point;
+    return part;
+}
+
+void KernelPass::call_lanes(State& state, const Call& call) const
+{
+    if (call.chunk.size < KernelLanes::least_points) return call_runner(state, call);
+    State::Runner& runner = runner_for(state, kernel_.source.number, layout_);
+    set_params(state, runner);
+    if (!runner.lanes) {
+        lua_rawgeti(state.lua(), LUA_REGISTRYINDEX, runner.translate);
+        runner.lanes = std::make_unique<KernelLanes>(state, layout_, kernel_.source.location);
+    }
+    if (!runner.lanes->is_ready(state, call.chunk)) return call_runner(state, call);
+    std::vector<LaneChunk::Memory> memory;
+    for (std::size_t c = 0; c < call.pointers.size(); ++c) memory.push_back({call.pointers[c], bytes_between(c)});
+    runner.lanes->run(call.chunk, memory, [&](std::int32_t begin, std::int32_t end) {
+        call_runner(state, part_of(call, begin, end - begin));
+    });
 }
 
 void KernelPass::call_runner(State& state, const Call& call) const

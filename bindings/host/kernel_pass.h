@@ -59,7 +59,11 @@ private:
         rapid_chunk chunk;
         std::vector<void*> pointers;  // of the layout's columns, and then of its groups
     };
-    Call call_of_point(const Call& call, std::int32_t i) const;
+    // The chunk's points from `begin` on, as a chunk of their own.
+    Call part_of(const Call& call, std::int32_t begin, std::int32_t size) const;
+    std::size_t bytes_between(std::size_t pointer) const;  // from point to point, of one of a call's pointers
+    // In the state of this thread, as a program of lanes where the kernel is one.
+    void call_lanes(State& state, const Call& call) const;
     void call_runner(State& state, const Call& call) const;
     void set_params(State& state, State::Runner& runner) const;
     Error placed(const Error& error, const rapid_chunk& chunk, const rapid_chunk& after) const;

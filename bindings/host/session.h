@@ -65,7 +65,10 @@ struct SessionOptions {
     // asks.
     std::shared_ptr<Interruption> interruption;
     // If set, told of each trace that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
+    // With it kernels go to that compiler, and are no programs of lanes.
     std::function<void(const std::string& message)> on_trace_abort;
+    // If set, told of each kernel that is no program of lanes (lua/lanes.lua): "FILE:LINE: why". From any thread.
+    std::function<void(const std::string& message)> on_no_lanes;
 };
 
 class ScriptHost;

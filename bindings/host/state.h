@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <exception>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@ struct rapid_chunk;  // lua/chunk.h
 
 namespace rapid {
 
+class KernelLanes;
 class ScriptHost;
 
 class State {
@@ -91,6 +93,8 @@ public:
         int run = 0, set_params = 0;
         rapid_chunk* chunk = nullptr;
         std::uint64_t pass = 0;  // whose parameters it has been given
+        int translate = 0;       // makes the kernel a program of lanes; once it has parameters
+        std::unique_ptr<KernelLanes> lanes;
     };
     std::map<std::size_t, std::vector<Runner>> runners;  // by kernel
 

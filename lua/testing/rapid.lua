@@ -5,7 +5,9 @@
 --   result:frames()            iterates: frame, points
 --   result:output "smoke"      the same of another output
 --   result.warnings            a list of messages
---   result.trace_aborts        the same of what LuaJIT did not compile, after { watch_traces = true }
+--   result.trace_aborts        the same of what LuaJIT did not compile, after { watch_traces = true }; then kernels go
+--                              over one point at a time
+--   result.no_lanes            the same of kernels that do so in any case, and why, after { watch_lanes = true }
 --   #points, points[1].P, points:by_id(7).heat, points:min "P", points:mean "v", points:group "hot"
 local vector = require "vec3"
 local ffi = require "ffi"
@@ -73,6 +75,7 @@ return function(native)
     return setmetatable({
       run = run, output_name = output_name or false, outputs = run.outputs, warnings = run.warnings,
       trace_aborts = run.trace_aborts,
+      no_lanes = run.no_lanes,
     }, result_metatable)
   end
 
@@ -102,7 +105,7 @@ return function(native)
   end
 
   local known_options = { frames = true, set = true, seed = true, threads = true, script_timeout = true,
-    check_declarations = true, watch_traces = true }
+    check_declarations = true, watch_lanes = true, watch_traces = true }
 
   local function whole(name, value, least)
     if type(value) ~= "number" or value % 1 ~= 0 or (least and value < least) then
@@ -120,7 +123,7 @@ return function(native)
     for name in pairs(options) do
       if not known_options[name] then
         error(("rapid.run: unknown option %q; it must be frames, set, seed, threads, script_timeout, "
-          .. "check_declarations or watch_traces"):format(tostring(name)), 2)
+          .. "check_declarations, watch_traces or watch_lanes"):format(tostring(name)), 2)
       end
     end
     local frames = options.frames
@@ -134,7 +137,7 @@ return function(native)
 
     local set = {}
     for name, value in pairs(options.set or {}) do set[name] = setting(name, value) end
-    local ok, found, warnings, trace_aborts = pcall(native.run, path, {
+    local ok, found, warnings, trace_aborts, no_lanes = pcall(native.run, path, {
       first = run.first,
       last = run.last,
       seed = options.seed and whole("seed", options.seed, 0),
@@ -142,11 +145,13 @@ return function(native)
       script_timeout = options.script_timeout,
       check_declarations = options.check_declarations == true,
       watch_traces = options.watch_traces == true,
+      watch_lanes = options.watch_lanes == true,
       set = set,
     })
     if not ok then error(found, 0) end
     run.frames, run.warnings = found, warnings
     if options.watch_traces then run.trace_aborts = trace_aborts end
+    if options.watch_lanes then run.no_lanes = no_lanes end
     for name in pairs(found) do table.insert(run.outputs, name) end
     table.sort(run.outputs)
     return result_of(run, found.main and "main" or #run.outputs == 1 and run.outputs[1])

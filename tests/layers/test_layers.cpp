@@ -20,6 +20,7 @@ const std::map<std::string, std::set<std::string>> below = {
     {"runtime", {}},
     {"runtime/files", {"runtime"}},
     {"runtime/points", {"runtime"}},
+    {"runtime/lanes", {"runtime"}},
     {"runtime/shapes", {"runtime", "runtime/points"}},
     {"runtime/shapes/mesh", {"runtime", "runtime/files", "runtime/shapes"}},
     {"runtime/shapes/scatter", {"runtime", "runtime/shapes", "runtime/shapes/mesh"}},

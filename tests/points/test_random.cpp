@@ -109,4 +109,21 @@ TEST_CASE("numbers of some items are those of each, however many there are", "[r
     CHECK(Items(4).from(5)[2] == 11);
 }
 
+TEST_CASE("a number of 53 bits is made of two of 32, for any items side by side", "[random]")
+{
+    const RandomKey key(7, "points1");
+    const std::uint64_t use = std::uint64_t{5} << 32 | 16;
+    for (const std::size_t n : {0, 1, 7, 15, 16, 17, 130}) {
+        std::vector<std::uint64_t> items(n);
+        for (std::size_t i = 0; i < n; ++i) items[i] = i * i * 0x9E3779B97F4A7C15;
+        std::vector<double> numbers(n);
+        uniform53(key, items, use, numbers);
+        for (std::size_t i = 0; i < n; ++i) {
+            const auto parts = uniform4(key, items[i], use);
+            CHECK(numbers[i] == parts[0] + parts[1] * 0x1p-32);
+            CHECK(numbers[i] == uniform53(key, items[i], use));
+        }
+    }
+}
+
 }  // namespace rapid

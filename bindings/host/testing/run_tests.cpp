@@ -51,6 +51,7 @@ struct SceneRun {
     int threads = 0;
     SessionOptions session;
     bool check_declarations = false;
+    bool watch_lanes = false;
     bool watch_traces = false;  // only on request: the JIT's events are not safe in every run
 };
 
@@ -68,6 +69,7 @@ SceneRun read_run(lua_State* L)
     run.session.on_timeout = host.options.on_timeout;
     run.session.may_write = false;
     run.check_declarations = flag_field(L, 2, "check_declarations");
+    run.watch_lanes = flag_field(L, 2, "watch_lanes");
     run.watch_traces = flag_field(L, 2, "watch_traces");
     lua_getfield(L, 2, "set");
     for (lua_pushnil(L); lua_next(L, -2); lua_pop(L, 1))
@@ -114,8 +116,8 @@ void push_list(lua_State* L, const std::vector<std::string>& texts)
     }
 }
 
-// native.run(path, options): point sets by output and frame; the warnings, in order; and the traces that LuaJIT gave
-// up.
+// native.run(path, options): point sets by output and frame; the warnings, in order; the traces that LuaJIT gave up;
+// and the kernels that are no programs of lanes.
 int run(lua_State* L)
 {
     std::string error;
@@ -127,6 +129,12 @@ int run(lua_State* L)
             scene.session.on_trace_abort = [&](const std::string& message) {
                 const std::lock_guard lock(mutex);
                 aborts.push_back(message);
+            };
+        std::vector<std::string> no_lanes;
+        if (scene.watch_lanes)
+            scene.session.on_no_lanes = [&](const std::string& message) {
+                const std::lock_guard lock(mutex);
+                no_lanes.push_back(message);
             };
         lua_newtable(L);
         const int outputs = lua_gettop(L);
@@ -148,7 +156,8 @@ int run(lua_State* L)
         });
         push_list(L, warnings);
         push_list(L, aborts);
-        return 3;
+        push_list(L, no_lanes);
+        return 4;
     } catch (const Error& raised) {
         error = raised.what();
     }

@@ -1,0 +1,306 @@
+-- Kernels as programs of lanes: the same bits as one point at a time, of every construct that they know, of random
+-- kernels, and where a tile goes back to the kernel itself.
+local scene = require "testing.scene"
+
+-- Points with values of both signs, zeros and large ones, of all types.
+local head = [[
+local points = rapid.points.grid { size = {10, 9, 7}, spacing = 1 }
+local limit, tint, names = 0.25, vec3(0.2, -0.4, 1.5), { near = 2.5, { 7 } }
+local function mixed(a, b) return a * 0.25 + b * 0.75 end
+local function choice(p) if p.P.x > 1 then return p.v, 2 end return -p.v, p.heat end
+return rapid.create { points = points, seed = 4 }
+  :attribute { heat = 0.5, instance = 3, axis = {0, 1, 0}, turn = {0, 0, 0, 1} }
+  :points("first", function(p)
+      p.v = p.P * 0.3 - vec3(0.7, 0.2, 0.1) * p:rand(7)
+      p.heat = p.P.x - p.P.y * 0.5
+      if p.P.z > 2 then p:join "high" end
+      if p.id == 200 then p.heat = 0 end
+    end)
+]]
+
+local function values_of(points)
+  local lines = {}
+  for k = 1, #points do
+    local point = points[k]
+    local words = {}
+    for _, name in ipairs(points:names()) do words[#words + 1] = name .. "=" .. tostring(point[name]) end
+    for _, name in ipairs(points:groups()) do words[#words + 1] = name .. tostring(point:within(name)) end
+    lines[k] = table.concat(words, " ")
+  end
+  return lines
+end
+
+-- The points of both ways, and the kernels that are no programs.
+local function both(text, frames)
+  local lanes = scene.run(text, { frames = frames or {1, 4}, watch_lanes = true, threads = 1 })
+  local single = scene.run(text, { frames = frames or {1, 4}, watch_traces = true, threads = 1 })
+  local last = (frames or {1, 4})[2]
+  return values_of(lanes[last]), values_of(single[last]), lanes.no_lanes, lanes
+end
+
+local function same(body, behind)
+  local text = head .. ("  :points(\"k\", function(p, frame)\n%s\nend)\n%s  :solve {}"):format(body, behind or "")
+  local lanes, single, none = both(text)
+  assert.same({}, none)
+  assert.same(single, lanes)
+  return lanes
+end
+
+describe("a kernel as a program of lanes", function()
+  for what, body in pairs {
+    ["arithmetic"] = "p.heat = (p.heat + 2) * p.P.x - p.P.y / (1 + p.heat * p.heat) % 0.7 - -p.P.z",
+    ["a remainder of both signs"] = "p.heat = p.P.x % 0.7 + p.P.y % -0.3",
+    ["a square"] = "p.heat = p.P.x ^ 2",
+    ["functions"] = "p.heat = math.sqrt(math.abs(p.P.x)) + math.floor(p.P.y) + math.ceil(p.P.z) + math.sin(p.P.x) "
+      .. "+ math.cos(p.P.y * 40) + math.exp(p.P.z)",
+    ["functions of the C library"] = "p.heat = math.tan(p.P.x) + math.atan(p.P.y) + math.atan2(p.P.y, p.P.z + 0.01) "
+      .. "+ math.log(1.5 + math.abs(p.P.x)) + math.tanh(p.P.z)",
+    ["angles that are large"] = "p.heat = math.sin(p.P.x * 1e5) + math.cos(p.P.y * 1e9)",
+    ["the least and the largest"] = "p.heat = math.max(math.min(p.P.x, p.P.y, 0.5), p.P.z, -0.25)",
+    ["vectors"] = "p.v = (p.P + p.v * 2 - tint) / 3 * p.P + -tint:cross(p.v) * p.P:dot(p.v)",
+    ["functions of vectors"] = "p.v = p.P:normalized():lerp(p.v, p:rand(1)) * p.v:length()",
+    ["turns"] = "p.turn = rapid.math.rotation(p.P + vec3(0, 20, 0), p.heat * 30) * p.turn  "
+      .. "p.axis = p.turn:rotate(p.axis)",
+    ["random numbers"] = "p.v = vec3(p:rand(1), p:rand(2, frame), p:rand(p.P.x)) * p:rand(3, p.P.y)",
+    ["branches"] = "if p.P.x > 1 then p.heat = 1 elseif p.P.y < 0 then p.heat = 2 else p.heat = p.heat * 3 end",
+    ["branches within branches"] = "local a = 1  if p.P.x > 0 then a = 2  "
+      .. "if p.P.y > 0 then a = p.P.z  p.v = p.v * 2 end else p.heat = -a end  p.heat = p.heat + a",
+    ["and, or, not"] = "local far = p.P.x > 2 or not (p.P.y > 0 and p.P.z > 0)  "
+      .. "p.heat = far and 3 or p.P.x > 0 and 4 or 5",
+    ["comparisons"] = "p.heat = (p.P.x >= 1 and 1 or 0) + (p.P.y <= 1 and 2 or 0) + (p.P.z ~= 1 and 4 or 0) "
+      .. "+ (p.P.x == p.P.y and 8 or 0) + (p.P == p.v and 16 or 0)",
+    ["a return in the middle"] = "if p.P.x > 1 then return end  p.heat = 9",
+    ["helpers"] = "p.heat = mixed(p.P.x, p.heat)  local a, b = choice(p)  p.v = a * b",
+    ["values that are shared"] = "p.heat = limit * names.near + names[1][1] + frame.time * frame.number "
+      .. "+ frame.dt + p.dt",
+    ["functions of rapid.math"] = "p.heat = rapid.math.fit(p.P.x, -1, 1, 0, 2) + rapid.math.smoothstep(-2, 2, p.P.y) "
+      .. "+ rapid.math.clamp(p.P.z, -1, 1)",
+    ["groups"] = "if p:within \"high\" then p:leave \"high\" else p:join \"low\" end  "
+      .. "p.heat = p:within \"low\" and 1 or 0",
+    ["whole numbers"] = "p.instance = p.instance + math.floor(p.P.x) * 2  p.heat = p.id + p.index",
+    ["death"] = "if p.P.x > 2 and p:rand(9) < 0.5 then p:kill() end",
+    ["what it has written"] = "p.heat = 1 / 3  p.v = vec3(p.heat, p.heat * 3, 0)  p.heat = p.v.x - 1 / 3",
+  } do
+    it("has the same bits with " .. what, function()
+      same(body)
+    end)
+  end
+
+  it("is one in a group, in a test, with parameters and detail values, and in an action", function()
+    local text = head .. [[
+  :detail("sum", function(points) points.detail.mean = #points * 0.001 end)
+  :points { name = "of_high", group = "high", kernel = function(p, frame) p.heat = p.heat + frame.detail.mean end }
+  :delete { where = function(p) return p.heat > 3 and p:rand(5) < 0.5 end }
+  :action("inside", function(p, step)
+      p.v = p.v * (1 - 0.1 * step.dt) + vec3(0, 0.01 * step.index, p:rand(1, step))
+      p.P = p.P + vec3(0, 0, 1e-3 * step.time)
+    end)
+  :gravity {} :solve { substeps = 3 }]]
+    local lanes, single, none = both(text)
+    assert.same({}, none)
+    assert.same(single, lanes)
+    assert.truthy(#lanes > 100)
+  end)
+
+  it("follows a parameter whose value changes", function()
+    local node = scene.folder:write("swell.lua", [[
+local rapid = require "rapid"
+return rapid.node { name = "swell", doc = "larger", params = { by = { "float", default = 1, doc = "times" } },
+  points = function(p, _, params) p.heat = p.heat * params.by end }
+]])
+    assert.truthy(node)
+    local text = head .. "  :swell { by = function(frame) return frame.number end } :solve {}"
+    local lanes, single, none = both(text, {1, 5})
+    assert.same({}, none)
+    assert.same(single, lanes)
+  end)
+
+  it("is none that writes a text, or another type", function()
+    for body, message in pairs { ["p.name = 3"] = "takes a text, not 3", ["p.name = \"b\""] = false } do
+      local text = head:gsub("heat = 0.5", "heat = 0.5, attributes = { name = \"a\" }")
+        .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body)
+      if message then
+        assert.truthy(scene.error(text):find(message, 1, true))
+      else
+        local _, _, none = both(text)
+        assert.truthy(none[1]:find("the attribute name is a text", 1, true), none[1])
+      end
+    end
+  end)
+
+  it("is none where its calls would be followed without end", function()
+    local chain = { "local function f0(x) return x end" }
+    for k = 1, 25 do chain[k + 1] = ("local function f%d(x) return f%d(f%d(x)) end"):format(k, k - 1, k - 1) end
+    local text = table.concat(chain, "\n") .. "\n" .. head
+      .. "  :points(\"k\", function(p) if p.heat > 1e9 then p.heat = f25(p.heat) end end) :solve {}"
+    local lanes, single, none = both(text)
+    assert.equal(1, #none)
+    assert.truthy(none[1]:find("it is long", 1, true), none[1])
+    assert.same(single, lanes)
+  end)
+
+  it("has the same bits on any number of threads", function()
+    local text = head .. [[
+  :points("k", function(p) p.v = p.v:normalized() * math.sin(p.P.x) * p:rand(2) end) :solve {}]]
+    local one = values_of(scene.run(text, { frames = {1, 3}, threads = 1 })[3])
+    assert.same(one, values_of(scene.run(text, { frames = {1, 3}, threads = 3 })[3]))
+  end)
+
+  it("gives a tile back whose points do what it can't", function()
+    local lanes, single, none = both(head .. [[
+  :points("k", function(p)
+      local far = p.P.x > 4 and p.P.y > 3
+      if far then
+        local list = { p.P.x, p.P.y }
+        table.sort(list)
+        p.heat = list[1]
+      else
+        p.heat = p.heat * 2
+      end
+    end) :solve {}]])
+    assert.same({}, none)
+    assert.same(single, lanes)
+  end)
+
+  for body, message in pairs {
+    ["p.heat = 1 / p.heat"] = "became inf",
+    ["p.heat = math.log(p.heat)"] = "heat became nan",
+    ["if p.P.x > 4 then p.v = 3 end"] = "takes a vec3, not 3",
+    ["if p.P.x > 4 then error(\"here\") end"] = "here",
+    ["if p.P.x > 4 then local t = nil  p.heat = t.x end"] = "nil",
+    ["p.instance = p.P.x / 3"] = "takes a whole number",
+    ["p.heat = rapid.math.clamp(1, p.P.x, 2)"] = "is above hi",
+  } do
+    it("fails as one point at a time does: " .. body, function()
+      local text = head .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body)
+      local told = scene.error(text, { threads = 1 })
+      assert.equal(scene.error(text, { threads = 1, watch_traces = true }), told)
+      assert.truthy(told:find(message, 1, true), told)
+    end)
+  end
+
+  it("tells why it is none", function()
+    for body, reason in pairs {
+      ["for k = 1, 3 do p.heat = p.heat + k end"] = "it has a FORI",
+      ["local t = { p.heat } p.heat = t[1]"] = "it has a TNEW",
+      ["p.heat = math.abs(p.heat) ^ 1.5"] = "it takes a power",
+    } do
+      local _, _, none = both(head .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body))
+      assert.equal(1, #none)
+      assert.truthy(none[1]:find(reason, 1, true), none[1])
+      assert.truthy(none[1]:find("scene.lua:13", 1, true), none[1])
+    end
+  end)
+end)
+
+describe("random kernels", function()
+  -- Numbers from 1 to n, the same in each run.
+  local state = 1
+  local function draw(n)
+    state = (state * 16807) % 2147483647
+    return state % n + 1
+  end
+  local function pick(list) return list[draw(#list)] end
+
+  local number, vector
+
+  function vector(depth)
+    if depth == 0 then return pick { "p.P", "p.v", "tint", "a", "vec3(1, p.heat, -2)" } end
+    local less = depth - 1
+    return pick {
+      function() return ("(%s + %s)"):format(vector(less), vector(less)) end,
+      function() return ("(%s - %s * 0.5)"):format(vector(less), vector(less)) end,
+      function() return ("(%s) * (%s)"):format(vector(less), number(less)) end,
+      function() return ("(%s):normalized()"):format(vector(less)) end,
+      function() return ("(%s):cross(%s)"):format(vector(less), vector(less)) end,
+      function() return ("(%s):lerp(%s, %s)"):format(vector(less), vector(less), number(less)) end,
+      function() return ("(%s > 0 and %s or %s)"):format(number(less), vector(less), vector(less)) end,
+      function() return ("vec3(%s, %s, %s)"):format(number(less), number(less), number(less)) end,
+    }()
+  end
+
+  function number(depth)
+    if depth == 0 then
+      return pick { "p.heat", "p.P.x", "p.v.y", "limit", "0.5", "3", "p:rand(1)", "p:rand(2, frame)", "frame.time",
+                    "b" }
+    end
+    local less = depth - 1
+    return pick {
+      function() return ("(%s + %s)"):format(number(less), number(less)) end,
+      function() return ("(%s) * (%s)"):format(number(less), number(less)) end,
+      function() return ("((%s) / (1 + math.abs(%s)))"):format(number(less), number(less)) end,
+      function() return ("((%s) %% 1.5)"):format(number(less)) end,
+      function() return ("math.sin(%s)"):format(number(less)) end,
+      function() return ("math.cos(%s)"):format(number(less)) end,
+      function() return ("math.exp(-math.abs(%s))"):format(number(less)) end,
+      function() return ("math.floor(%s)"):format(number(less)) end,
+      function() return ("math.sqrt(math.abs(%s))"):format(number(less)) end,
+      function() return ("math.max(%s, %s)"):format(number(less), number(less)) end,
+      function() return ("(%s):length()"):format(vector(less)) end,
+      function() return ("(%s):dot(%s)"):format(vector(less), vector(less)) end,
+      function() return ("(%s < %s and %s or %s)"):format(number(less), number(less), number(less), number(less)) end,
+      function() return ("mixed(%s, %s)"):format(number(less), number(less)) end,
+    }()
+  end
+
+  local statement
+  local function block(depth)
+    local lines = {}
+    for k = 1, draw(2) do lines[k] = statement(depth) end
+    return table.concat(lines, "\n")
+  end
+  local function condition(depth)
+    return pick {
+      function() return ("%s < %s"):format(number(depth), number(depth)) end,
+      function() return ("p:within \"high\" or %s > 1"):format(number(depth)) end,
+      function() return ("not (%s >= 0 and %s <= 1)"):format(number(depth), number(depth)) end,
+    }()
+  end
+  -- Values are held below 10, so that none grows beyond a float.
+  function statement(depth)
+    local kinds = {
+      function() return ("b = %s"):format(number(2)) end,
+      function() return ("a = %s"):format(vector(2)) end,
+      function() return ("p.heat = (%s) %% 10"):format(number(3)) end,
+      function() return ("p.v = (%s):normalized() * 3"):format(vector(3)) end,
+      function() return pick { "p:join \"low\"", "p:leave \"high\"", "p.instance = math.floor(p.heat)" } end,
+    }
+    if depth > 0 then
+      kinds[6] = function() return ("if %s then\n%s\nend"):format(condition(1), block(depth - 1)) end
+      kinds[7] = function()
+        return ("if %s then\n%s\nelse\n%s\nend"):format(condition(1), block(depth - 1), block(depth - 1))
+      end
+    end
+    return pick(kinds)()
+  end
+
+  it("have the same bits as one point at a time", function()
+    for _ = 1, 40 do
+      local body = {}
+      for k = 1, 6 do
+        body[k] = (([[  :points("k%d", function(p, frame)
+      local a, b = p.P, 1
+      %s
+      %s
+      p.heat = (p.heat + b + a.x) %% 10
+    end)]]):format(k, statement(2), statement(2)))
+      end
+      local text = head .. table.concat(body, "\n") .. "  :solve {}"
+      local lanes, single, none = both(text, {1, 3})
+      assert.same({}, none)
+      if table.concat(lanes, "\n") ~= table.concat(single, "\n") then
+        assert.equal(text, "a scene with other bits")
+      end
+    end
+  end)
+end)
+
+describe("math.sin", function()
+  it("takes a text that is a number, as Lua's own does, and refuses what is none", function()
+    local result = scene.run([[return rapid.create { points = two } :points("k", function(p)
+      p.v = vec3(math.sin "0.5", math.cos(0.5), math.exp(0.5)) end) :solve {}]])
+    assert.near(math.sin(0.5), result[2][1].v.x, 1e-7)
+    assert.near(math.exp(0.5), result[2][1].v.z, 1e-7)
+    assert.truthy(scene.error [[local x = math.sin(nil)]]:find("number expected, got nil", 1, true))
+  end)
+end)

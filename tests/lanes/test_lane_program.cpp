@@ -1,0 +1,124 @@
+// Programs of lanes by hand: masks, what fails, and points that are not visited.
+#include <cmath>
+#include <numeric>
+
+#include "runtime/lanes/lane_program.h"
+#include "tests/test.h"
+
+using namespace rapid;
+
+namespace {
+
+// x = 2 x where x > 1, with slot 6 for the constant behind those of the chunk.
+LaneProgram doubling()
+{
+    LaneProgram program;
+    program.constants = {1, 2};
+    const std::uint16_t one = 5, two = 6, x = 7, large = 8, twice = 9;
+    program.code = {{lane_operation("LoadFloat"), x, 0, 0, 0, 0},
+                    {lane_operation("Less"), large, one, x, 0, 0},
+                    {lane_operation("Multiply"), twice, x, two, 0, 0},
+                    {lane_operation("Choose"), x, large, twice, x, 0},
+                    {lane_operation("CheckFloat"), 0, LaneProgram::visited, x, 0, 0},
+                    {lane_operation("StoreFloat"), 0, x, 0, 0, 0}};
+    program.slots = 10;
+    return program;
+}
+
+using Failed = std::vector<std::pair<std::size_t, std::size_t>>;
+
+Failed run(const LaneProgram& program, std::vector<float>& x, const std::vector<std::uint8_t>& members = {})
+{
+    const LaneChunk::Memory memory[] = {{x.data(), sizeof(float)}};
+    LaneChunk chunk;
+    chunk.size = x.size();
+    chunk.columns = memory;
+    chunk.members = members.empty() ? nullptr : members.data();
+    Failed failed;
+    LaneRunner().run(program, chunk, [&](std::size_t begin, std::size_t end) { failed.emplace_back(begin, end); });
+    return failed;
+}
+
+}  // namespace
+
+TEST_CASE("a program goes over any number of points, and stores nothing behind the last", "[lanes]")
+{
+    for (const std::size_t size : {1u, 7u, 127u, 128u, 129u, 1000u}) {
+        std::vector<float> x(size);
+        std::iota(x.begin(), x.end(), -2.0f);
+        std::vector<float> expected = x;
+        for (float& value : expected) value = value > 1 ? 2 * value : value;
+        CHECK(run(doubling(), x).empty());
+        CHECK(x == expected);
+    }
+}
+
+TEST_CASE("points that are not visited stay as they are", "[lanes]")
+{
+    std::vector<float> x(300, 5.0f);
+    std::vector<std::uint8_t> members(300);
+    for (std::size_t i = 0; i < 140; i += 3) members[i] = 1;
+    x[1] = std::numeric_limits<float>::quiet_NaN();
+    CHECK(run(doubling(), x, members).empty());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (i == 1)
+            CHECK(std::isnan(x[i]));
+        else
+            CHECK(x[i] == (members[i] ? 10.0f : 5.0f));
+    }
+}
+
+TEST_CASE("of a tile in which a value is none nothing is stored", "[lanes]")
+{
+    std::vector<float> x(400, 5.0f);
+    x[200] = std::numeric_limits<float>::max();  // twice it is none
+    CHECK(run(doubling(), x) == Failed{{128, 256}});
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (i != 200) CHECK(x[i] == (i >= 128 && i < 256 ? 5.0f : 10.0f));
+}
+
+TEST_CASE("random numbers of lanes are those of a kernel, one by one", "[lanes]")
+{
+    std::vector<std::int64_t> ids(300);
+    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int64_t>(i * i * 1000003);
+    for (const bool is_shared : {true, false})
+        for (const double frame : {0.0, 12.0}) {
+            LaneProgram program;
+            program.constants = {4, frame};
+            const std::uint16_t use = 5, of_frame = 6, drawn = 7;
+            program.code = {{lane_operation("Random"), drawn, use, of_frame, is_shared, 0},
+                            {lane_operation("StoreDouble"), 0, drawn, 0, 0, 0}};
+            program.slots = 8;
+            std::vector<double> numbers(ids.size());
+            const LaneChunk::Memory memory[] = {{numbers.data(), sizeof(double)}};
+            LaneChunk chunk;
+            chunk.size = ids.size();
+            chunk.columns = memory;
+            chunk.ids = {ids.data(), sizeof(std::int64_t)};
+            chunk.random = RandomKey(3, "k");
+            LaneRunner().run(program, chunk, [](std::size_t, std::size_t) { FAIL(); });
+            for (std::size_t i = 0; i < ids.size(); ++i)
+                CHECK(numbers[i] == kernel_random(chunk.random, static_cast<std::uint64_t>(ids[i]), 4, frame));
+        }
+}
+
+TEST_CASE("the least and the largest fail where their order of arguments counts", "[lanes]")
+{
+    for (const auto& [a, b, fails] : {std::tuple{1.0, 2.0, false}, std::tuple{2.0, 2.0, false},
+                                      std::tuple{0.0, -0.0, true}, std::tuple{std::nan(""), 1.0, true}}) {
+        LaneProgram program;
+        program.constants = {a, b};
+        program.code = {{lane_operation("Least"), 7, 5, 6, LaneProgram::visited, 0},
+                        {lane_operation("StoreFloat"), 0, 7, 0, 0, 0}};
+        program.slots = 8;
+        std::vector<float> x(8, 9.0f);
+        CHECK(run(program, x).empty() != fails);
+        CHECK(x[0] == (fails ? 9.0f : static_cast<float>(std::min(a, b))));
+    }
+}
+
+TEST_CASE("operations are found by their names", "[lanes]")
+{
+    CHECK(lane_operation("Add"));
+    CHECK_FALSE(lane_operation("add"));
+}

@@ -804,6 +804,7 @@ function run(program, f, args, state, depth)
         -- Under a mask it is a matter of the points that come here.
         if mask == program.visited then error(what, 0) end
         program:emit("Fail", mask)
+        program.failure = program.failure or what.reason
         path = nil
       elseif not at.state then
         path = nil
@@ -955,7 +956,7 @@ local function translate(kernel, layout, holder)
   local done, result = pcall(function()
     local args = { { kind = "point" }, { kind = layout.action and "step" or "frame" }, { kind = "params" } }
     local results, state = run(program, kernel, args, { regs = {}, memory = {}, mask = program.visited }, 1)
-    if not state then give_up "it always fails" end
+    if not state then give_up(program.failure) end
     local stores_of = {}
     for key, value in pairs(state.memory) do
       if key == "kill" then

@@ -603,11 +603,13 @@ for op in pairs(arithmetic) do
   effects[op .. "VV"] = with(of_b, of_c)
 end
 
--- A square; other powers are the C library's, in some of its ways.
+-- Powers are the C library's; a square is a product, as LuaJIT compiles it.
 function effects.POW(at)
   local base, exponent = reg(at, at.b), reg(at, at.c)
-  if base.kind ~= "number" or constant_of(at.program, exponent) ~= 2 then give_up "it takes a power" end
-  return { kind = "number", id = at.program:emit("Multiply", base.id, base.id) }
+  if base.kind == "number" and constant_of(at.program, exponent) == 2 then
+    return { kind = "number", id = at.program:emit("Multiply", base.id, base.id) }
+  end
+  return of_library("pow", 2)(at.program, at.state, { base, exponent })[1]
 end
 
 function effects.UGET(at)
@@ -762,98 +764,143 @@ local function step(at)
   if at.state then at.state.regs[at.a] = value end
 end
 
--- Follows f, called with these values by the points of a state. Returns its results and the state behind it; nothing
--- where no path returns.
-function run(program, f, args, state, depth)
-  if depth > most_depth then give_up "its calls are nested" end
-  local info = util.funcinfo(f)
-  local is_own = info.source:find("^=%[rapid") ~= nil
-  local caller = state
-  local path = { regs = {}, memory = caller.memory, mask = caller.mask }
-  for slot = 0, info.params - 1 do path.regs[slot] = args[slot + 1] or nothing end
+-- A function that is followed: the path that comes to the next instruction, none where all have gone elsewhere; those
+-- that come to a place by a jump; and those that have returned.
+local Activation = {}
+Activation.__index = Activation
 
-  local pending, ends = {}, {} -- by place: paths that come there by a jump; paths that have returned
-  local function send(place, from, other)
-    if place <= from then give_up "it has a loop" end
-    pending[place] = pending[place] or {}
-    table.insert(pending[place], other)
+function Activation:send(place, from, path)
+  if place <= from then give_up "it has a loop" end
+  self.pending[place] = self.pending[place] or {}
+  table.insert(self.pending[place], path)
+end
+
+-- Joins the paths that come to a place. The last to have been sent is the innermost: so masks become those of their
+-- parents again.
+function Activation:arrive(pc)
+  local paths = self.pending[pc] or {}
+  self.pending[pc] = nil
+  for k = #paths, 1, -1 do self.path = self.program:join(self.path, paths[k]) end
+end
+
+-- The path goes on where the flag of a condition leads it; the jump's own place is passed over.
+function Activation:branch(at, flag, target)
+  local path = at.state
+  self.path = nil
+  local function taken(state)
+    if at.name == "ISTC" or at.name == "ISFC" then state.regs[at.a] = state.regs[at.d] end
+    self:send(target, at.pc, state)
   end
-  for pc = 1, info.bytecodes - 1 do
-    for _, other in ipairs(pending[pc] or {}) do
-      -- The last to come is the innermost, so that masks become those of their parents again.
-      pending[pc].joined = { other, pending[pc].joined }
-    end
-    local joined = pending[pc] and pending[pc].joined
-    while joined do
-      path = program:join(path, joined[1])
-      joined = joined[2]
-    end
-    if path then
-      program.steps = program.steps + 1
-      if program.steps > most_steps then give_up "it is long" end
-      local ins = util.funcbc(f, pc)
-      local at = {
-        program = program, f = f, info = info, is_own = is_own, pc = pc, state = path, args = args, depth = depth,
-        name = names[band(ins, 0xff)], a = band(rshift(ins, 8), 0xff), b = rshift(ins, 24),
-        c = band(rshift(ins, 16), 0xff), d = rshift(ins, 16),
-      }
-      local mask = path.mask
-      local done, what, value, target = pcall(step, at)
-      if not done then
-        if type(what) ~= "table" then error(what, 0) end
-        -- Under a mask it is a matter of the points that come here.
-        if mask == program.visited then error(what, 0) end
-        program:emit("Fail", mask)
-        program.failure = program.failure or what.reason
-        path = nil
-      elseif not at.state then
-        path = nil
-      elseif what == "return" then
-        table.insert(ends, { values = value, state = at.state })
-        path = nil
-      elseif what == "jump" then
-        send(value, pc, at.state)
-        path = nil
-      elseif what == "branch" then
-        local copies = at.name == "ISTC" or at.name == "ISFC"
-        local function taken(branch)
-          if copies then branch.regs[at.a] = branch.regs[at.d] end
-          send(target, pc, branch)
-        end
-        -- The jump's own place is passed over.
-        if value == true then
-          taken(at.state)
-          path = nil
-        elseif value == false then
-          path = nil
-          send(pc + 2, pc, at.state)
-        else
-          local with, without = program:split(at.state, value)
-          taken(with)
-          send(pc + 2, pc, without)
-          path = nil
-        end
-      else
-        path = at.state
-      end
-    end
+  if flag == true then
+    taken(path)
+  elseif flag == false then
+    self:send(at.pc + 2, at.pc, path)
+  else
+    local with, without = self.program:split(path, flag)
+    taken(with)
+    self:send(at.pc + 2, at.pc, without)
   end
+end
+
+-- A loop over numbers that are known: once for each. Returns the place behind it.
+function Activation:unroll(at)
+  local program, behind = self.program, at.pc + at.d - 0x7fff
+  local value, last, by = constant_of(program, reg(at, at.a)), constant_of(program, reg(at, at.a + 1)),
+    constant_of(program, reg(at, at.a + 2))
+  if not (value and last and by) or by == 0 then give_up "it has a loop whose steps are not known" end
+  while self.path and (by > 0 and value <= last or by < 0 and value >= last) do
+    self.path.regs[at.a + 3] = program:number(value)
+    self:follow(at.pc + 1, behind - 1)
+    value = value + by
+  end
+  return behind
+end
+
+local is_loop = { FORI = true, JFORI = true }
+local loop_end = { FORL = true, IFORL = true, JFORL = true }
+
+-- The instruction at pc. Returns the place of the next one.
+function Activation:advance(pc)
+  local program, path = self.program, self.path
+  program.steps = program.steps + 1
+  if program.steps > most_steps then give_up "it is long" end
+  local ins = util.funcbc(self.f, pc)
+  local at = setmetatable({
+    pc = pc, state = path, name = names[band(ins, 0xff)], a = band(rshift(ins, 8), 0xff), b = rshift(ins, 24),
+    c = band(rshift(ins, 16), 0xff), d = rshift(ins, 16),
+  }, { __index = self })
+  if loop_end[at.name] then return pc + 1 end
+  local mask = path.mask
+  local done, what, value, target = pcall(function()
+    if is_loop[at.name] then return "loop", self:unroll(at) end
+    return step(at)
+  end)
+  if not done then
+    -- Under a mask it is a matter of the points that come here.
+    if type(what) ~= "table" or mask == program.visited then error(what, 0) end
+    program:emit("Fail", mask)
+    program.failure = program.failure or what.reason
+    self.path = nil
+  elseif what == "loop" then
+    return value
+  elseif not at.state then
+    self.path = nil
+  elseif what == "return" then
+    table.insert(self.ends, { values = value, state = at.state })
+    self.path = nil
+  elseif what == "jump" then
+    self.path = nil
+    self:send(value, pc, at.state)
+  elseif what == "branch" then
+    self:branch(at, value, target)
+  else
+    self.path = at.state
+  end
+  return pc + 1
+end
+
+function Activation:follow(first, last)
+  local pc = first
+  while pc <= last do
+    self:arrive(pc)
+    pc = self.path and self:advance(pc) or pc + 1
+  end
+end
+
+-- The results of all paths that have returned, and the memory and mask behind them.
+function Activation:joined_ends()
   local results, after
-  for k = #ends, 1, -1 do
-    local values, behind = ends[k].values, ends[k].state
-    behind = { regs = {}, memory = behind.memory, mask = behind.mask }
+  for k = #self.ends, 1, -1 do
+    local values, path = self.ends[k].values, self.ends[k].state
+    local behind = { regs = {}, memory = path.memory, mask = path.mask }
     if not after then
       results, after = values, behind
     else
       local joined = {}
       for place = 1, math.max(#results, #values) do
-        joined[place] = program:choose_value(behind.mask, values[place] or nothing, results[place] or nothing)
+        joined[place] = self.program:choose_value(behind.mask, values[place] or nothing, results[place] or nothing)
       end
-      results, after = joined, program:join(after, behind)
+      results, after = joined, self.program:join(after, behind)
     end
   end
+  return results, after
+end
+
+-- Follows f, called with these values by the points of a state. Returns its results and the state behind it; nothing
+-- where no path returns.
+function run(program, f, args, state, depth)
+  if depth > most_depth then give_up "its calls are nested" end
+  local info = util.funcinfo(f)
+  local path = { regs = {}, memory = state.memory, mask = state.mask }
+  for slot = 0, info.params - 1 do path.regs[slot] = args[slot + 1] or nothing end
+  local activation = setmetatable({
+    program = program, f = f, info = info, is_own = info.source:find("^=%[rapid") ~= nil, args = args, depth = depth,
+    path = path, pending = {}, ends = {},
+  }, Activation)
+  activation:follow(1, info.bytecodes - 1)
+  local results, after = activation:joined_ends()
   if not after then return nil end
-  return results, { regs = caller.regs, memory = after.memory, mask = after.mask, results = caller.results }
+  return results, { regs = state.regs, memory = after.memory, mask = after.mask, results = state.results }
 end
 
 -- The operands of a node that are nodes.

@@ -26,6 +26,7 @@ constexpr std::pair<std::string_view, LaneProgram::Function1> functions1[] = {
 };
 constexpr std::pair<std::string_view, LaneProgram::Function2> functions2[] = {
     {"atan2", [](double y, double x) { return std::atan2(y, x); }},
+    {"pow", [](double x, double y) { return std::pow(x, y); }},
 };
 
 // The functions below read fields of the table at the top of the stack.

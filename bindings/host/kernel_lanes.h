@@ -17,8 +17,8 @@ namespace rapid {
 
 class KernelLanes {
 public:
-    // Of fewer points a chunk is not worth it.
-    static constexpr std::int32_t least_points = 32;
+    // Of fewer points a set is not worth it.
+    static constexpr std::size_t least_points = 32;
 
     // Of the function at the top of the stack, which makes the program; it is taken off.
     KernelLanes(State& state, const KernelLayout& layout, const Location& location);

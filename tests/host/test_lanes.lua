@@ -50,7 +50,10 @@ describe("a kernel as a program of lanes", function()
   for what, body in pairs {
     ["arithmetic"] = "p.heat = (p.heat + 2) * p.P.x - p.P.y / (1 + p.heat * p.heat) % 0.7 - -p.P.z",
     ["a remainder of both signs"] = "p.heat = p.P.x % 0.7 + p.P.y % -0.3",
-    ["a square"] = "p.heat = p.P.x ^ 2",
+    ["powers"] = "p.heat = p.P.x ^ 2 + math.abs(p.P.y) ^ 0.5 + 2 ^ p.P.z + p.P.x ^ -3",
+    ["loops over known numbers"] = "local a = 1  for k = 3, 1, -1 do a = a * p.P.x + k  if a > 9 then break end "
+      .. "if p.P.y > 0 then a = a - 1 end end  for k = 1, 0 do a = 1e9 end  p.heat = a",
+    ["loops within loops"] = "local a = 0  for i = 1, 3 do for k = i, 3 do a = a + i * k * p.P.x end end  p.heat = a",
     ["functions"] = "p.heat = math.sqrt(math.abs(p.P.x)) + math.floor(p.P.y) + math.ceil(p.P.z) + math.sin(p.P.x) "
       .. "+ math.cos(p.P.y * 40) + math.exp(p.P.z)",
     ["functions of the C library"] = "p.heat = math.tan(p.P.x) + math.atan(p.P.y) + math.atan2(p.P.y, p.P.z + 0.01) "
@@ -181,11 +184,11 @@ return rapid.node { name = "swell", doc = "larger", params = { by = { "float", d
 
   it("tells why it is none", function()
     for body, reason in pairs {
-      ["for k = 1, 3 do p.heat = p.heat + k end"] = "it has a FORI",
+      ["for k = 1, frame.number do p.heat = p.heat + k end"] = "it has a loop whose steps are not known",
       ["local t = { p.heat } p.heat = t[1]"] = "it has a TNEW",
-      ["p.heat = math.abs(p.heat) ^ 1.5"] = "it takes a power",
+      ["while true do p.heat = 1 break end"] = "it has a LOOP",
     } do
-      local _, _, none = both(head .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body))
+      local _, _, none = both(head .. ("  :points(\"k\", function(p, frame)\n%s\nend) :solve {}"):format(body))
       assert.equal(1, #none)
       assert.truthy(none[1]:find(reason, 1, true), none[1])
       assert.truthy(none[1]:find("scene.lua:13", 1, true), none[1])

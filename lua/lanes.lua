@@ -7,12 +7,16 @@
 -- meet. What the program can't say (a loop, a table, a text, an error) makes the kernel one for the trace compiler;
 -- under a mask it makes the tile one, when a point comes there.
 local bit = require "bit"
-local ffi = require "ffi"
+local calls = require "lane_calls"
+local lane = require "lane_program"
 local util = require "jit.util"
 local vector = require "vec3"
 local vmdef = require "jit.vmdef"
 
 local band, rshift = bit.band, bit.rshift
+local Program, give_up, constant, nothing = lane.Program, lane.give_up, lane.constant, lane.nothing
+local constant_of, truth_of, as_value, is_flag = lane.constant_of, lane.truth_of, lane.as_value, lane.is_flag
+local component_names = lane.component_names
 
 jit.off(true, true) -- it runs once for a kernel, and what runs for a chunk is short
 
@@ -21,393 +25,7 @@ for op = 0, #vmdef.bcnames / 6 - 1 do
   names[op] = vmdef.bcnames:sub(op * 6 + 1, op * 6 + 6):gsub("%s", "")
 end
 
-local most_nodes, most_steps, most_depth = 4000, 20000, 30
-
--- Where the program ends: the reason is for tests.
-local function give_up(reason)
-  error({ reason = reason }, 0)
-end
-
-local function constant(value)
-  return { kind = "constant", value = value }
-end
-local nothing = constant(nil)
-local poison = { kind = "poison" } -- what two paths leave in a register that no one reads again
-
-local component_names = { "x", "y", "z", "w" }
-
--- The program of a kernel.
-local Program = {}
-Program.__index = Program
-
-local function new_program(layout, holder)
-  local program = setmetatable({ nodes = {}, known = {}, splits = {}, getters = {}, guards = {}, layout = layout,
-                                 holder = holder, functions1 = {}, functions2 = {}, steps = 0 }, Program)
-  program.visited = program:emit("visited")
-  return program
-end
-
-local reads_lane = { visited = true, Random = true, LoadTime = true, LoadStep = true, Index = true, LoadFlag = true }
-
--- The node of an operation; the same for the same one. number: of a column, a group, a function, a constant.
-function Program:emit(op, a, b, c, number, varies)
-  local key = ("%s %s %s %s %s"):format(op, a or "", b or "", c or "", number and ("%.17g"):format(number) or "")
-  if number == 0 and 1 / number < 0 then key = key .. "-" end
-  local id = self.known[key]
-  if id then return id end
-  local nodes = self.nodes
-  if #nodes >= most_nodes then give_up "it is long" end
-  local shared = not (varies or reads_lane[op])
-  local reads_third = op == "Choose" or op == "Least" or op == "Most"
-  for _, operand in ipairs { a or false, b or false, reads_third and c or false } do
-    if operand and not nodes[operand].shared then shared = false end
-  end
-  id = #nodes + 1
-  nodes[id] = { op = op, a = a, b = b, c = c, number = number, shared = shared }
-  self.known[key] = id
-  return id
-end
-
-function Program:number(value)
-  if value ~= value then give_up "a constant is no number" end
-  return { kind = "number", id = self:emit("constant", nil, nil, nil, value) }
-end
-
-local function constant_of(program, value)
-  local node = value.kind == "number" and program.nodes[value.id]
-  return node and node.op == "constant" and node.number or nil
-end
-
--- Whether it is a vec3: ffi.istype() takes a type for one of its values.
-local function is_vec3(value)
-  return type(value) == "cdata" and ffi.istype(vector.type, value) and not rawequal(value, vector.type)
-end
-
--- A number that all points share, which `get` finds anew for each chunk.
-function Program:input(get)
-  self.getters[#self.getters + 1] = get
-  return { kind = "number", id = self:emit("input", nil, nil, nil, #self.getters) }
-end
-
--- A value that all points share: `get` finds it again. Rapid's own never change.
-function Program:shared(value, get, is_own)
-  if type(value) == "number" then
-    if is_own then return self:number(value) end
-    return self:input(get)
-  end
-  if is_vec3(value) then
-    local result = { kind = "vector", of = vector.type, size = 3 }
-    for k = 1, 3 do
-      local name = component_names[k]
-      result[k] = self:input(function()
-        local now = get()
-        return is_vec3(now) and now[name] or nil
-      end).id
-    end
-    return result
-  end
-  if not is_own then self.guards[#self.guards + 1] = { get = get, value = value } end
-  return constant(value)
-end
-
--- Flags: true, false, or a node.
-
-function Program:no_flag()
-  return self:emit("AndNot", self.visited, self.visited)
-end
-
-local function truth_of(value)
-  if value.kind == "flag" then return value.id end
-  if value.kind == "constant" then return not not value.value end
-  if value.kind == "poison" then give_up "a value has two types" end
-  return true
-end
-
-function Program:flag_node(value)
-  local truth = truth_of(value)
-  if truth == true then return self.visited end
-  if truth == false then return self:no_flag() end
-  return truth
-end
-
-function Program:inverse(flag)
-  if type(flag) == "boolean" then return not flag end
-  return self:emit("AndNot", self.visited, flag)
-end
-
-local function as_value(flag)
-  return type(flag) == "boolean" and constant(flag) or { kind = "flag", id = flag }
-end
-
--- State of a path: registers, memory (columns, groups, kill), the mask of the points that come there.
-
-local function copy(map)
-  local result = {}
-  for key, value in pairs(map) do result[key] = value end
-  return result
-end
-
-local function copy_state(state)
-  return { regs = copy(state.regs), memory = copy(state.memory), mask = state.mask, results = state.results }
-end
-
--- The states of the points with a flag, and of those without.
-function Program:split(state, flag)
-  local with, without = copy_state(state), copy_state(state)
-  with.mask = self:emit("And", state.mask, flag)
-  without.mask = self:emit("AndNot", state.mask, flag)
-  self.splits[with.mask] = { parent = state.mask, other = without.mask }
-  self.splits[without.mask] = { parent = state.mask, other = with.mask }
-  return with, without
-end
-
-function Program:joined_mask(a, b)
-  local split = self.splits[a]
-  if split and split.other == b then return split.parent end
-  return self:emit("Or", a, b)
-end
-
-function Program:choose(mask, a, b)
-  if a == b then return a end
-  return self:emit("Choose", mask, a, b)
-end
-
-local function is_flag(value)
-  return value.kind == "flag" or value.kind == "constant" and type(value.value) == "boolean"
-end
-
--- a where the mask is set, else b.
-function Program:choose_value(mask, a, b)
-  if a == b then return a end
-  if a.kind == "constant" and b.kind == "constant" and rawequal(a.value, b.value) then return a end
-  if a.kind == "number" and b.kind == "number" then
-    return { kind = "number", id = self:choose(mask, a.id, b.id) }
-  elseif a.kind == "vector" and b.kind == "vector" and a.of == b.of then
-    local result = { kind = "vector", of = a.of, size = a.size }
-    for k = 1, a.size do result[k] = self:choose(mask, a[k], b[k]) end
-    return result
-  elseif is_flag(a) and is_flag(b) then
-    return { kind = "flag", id = self:choose(mask, self:flag_node(a), self:flag_node(b)) }
-  elseif a.kind == b.kind and a.kind ~= "constant" and a.name == b.name then
-    return a
-  end
-  return poison
-end
-
-function Program:join(a, b)
-  if not a then return b end
-  if not b then return a end
-  local joined = { regs = {}, memory = {}, mask = self:joined_mask(a.mask, b.mask) }
-  for slot, value in pairs(a.regs) do
-    if b.regs[slot] then joined.regs[slot] = self:choose_value(b.mask, b.regs[slot], value) end
-  end
-  for _, memory in ipairs { a.memory, b.memory } do
-    for key in pairs(memory) do
-      joined.memory[key] = joined.memory[key]
-        or self:choose_value(b.mask, b.memory[key] or self:initial(key), a.memory[key] or self:initial(key))
-    end
-  end
-  return joined
-end
-
--- Columns and groups. A key of memory is a column's place, a group's place as "g1", or "kill".
-
-local loads = { float = "LoadFloat", vec3 = "LoadFloat", quat = "LoadFloat", vec3d = "LoadDouble", int32 = "LoadInt32",
-                int64 = "LoadInt64" }
-local stores = { LoadFloat = "StoreFloat", LoadDouble = "StoreDouble", LoadInt32 = "StoreInt32",
-                 LoadInt64 = "StoreInt64" }
-local sizes = { vec3 = 3, vec3d = 3, quat = 4 }
-
-function Program:initial(key)
-  if key == "kill" then return { kind = "flag", id = self:no_flag() } end
-  if type(key) == "string" then
-    local place = tonumber(key:sub(2))
-    return { kind = "flag", id = self:emit("LoadFlag", nil, nil, nil, place - 1) }
-  end
-  local column = self.layout.columns[key]
-  local load = loads[column.type]
-  if not load then give_up("the attribute " .. column.name .. " is a text") end
-  local function component(k)
-    return self:emit(load, nil, nil, k - 1, key - 1, not column.uniform)
-  end
-  local size = sizes[column.type]
-  if not size then return { kind = "number", id = component(1) } end
-  local result = { kind = "vector", of = size == 4 and vector.quat or vector.type, size = size }
-  for k = 1, size do result[k] = component(k) end
-  return result
-end
-
-function Program:place_of(name)
-  for place, column in ipairs(self.layout.columns) do
-    if column.name == name then return place end
-  end
-end
-
-function Program:load(state, place)
-  local value = state.memory[place] or self:initial(place)
-  return value
-end
-
-function Program:store(state, name, value)
-  local place = self:place_of(name)
-  local column = place and self.layout.columns[place]
-  if not (column and column.writable) then give_up("it writes " .. name) end
-  local load, size = loads[column.type], sizes[column.type]
-  if not load then give_up("the attribute " .. name .. " is a text") end
-  if size and not (value.kind == "vector" and value.of == (size == 4 and vector.quat or vector.type))
-      or not size and value.kind ~= "number" then
-    give_up("it assigns another type to " .. name)
-  end
-  local check = load == "LoadInt32" and "CheckInt32" or load == "LoadInt64" and "CheckInt64" or "CheckFloat"
-  local function kept(id)
-    self:emit(check, state.mask, id)
-    return load == "LoadFloat" and self:emit("Round", id) or id
-  end
-  if not size then
-    state.memory[place] = { kind = "number", id = kept(value.id) }
-    return
-  end
-  local result = { kind = "vector", of = value.of, size = size }
-  for k = 1, size do result[k] = kept(value[k]) end
-  state.memory[place] = result
-end
-
-function Program:group_key(value, for_writing)
-  if value.kind ~= "constant" or type(value.value) ~= "string" then give_up "a group is computed" end
-  for place, group in ipairs(self.layout.groups) do
-    if group.name == value.value and (group.writable or not for_writing) then return "g" .. place end
-  end
-  if for_writing then give_up "it joins a group that it does not name" end
-end
-
--- Methods of the point.
-local methods = {}
-
-function methods.rand(program, _, args)
-  local use, frame = args[2], args[3] or nothing
-  if not use or use.kind ~= "number" then give_up "p:rand takes a number" end
-  local number
-  if frame.kind == "constant" and frame.value == nil then
-    number = program:number(0).id
-  else
-    if frame.kind == "frame" then
-      number = program:emit("chunk", nil, nil, nil, 0)
-    elseif frame.kind == "step" then
-      number = program:emit "LoadTime"
-    elseif frame.kind == "number" then
-      number = frame.id
-    else
-      give_up "p:rand takes the frame, or a number"
-    end
-    -- 0 stands for a number that is the same in every frame.
-    local zero = program:number(0).id
-    number = program:choose(program:emit("Equal", number, zero), program:number(5e-324).id, number)
-  end
-  return { { kind = "number", id = program:emit("Random", use.id, number) } }
-end
-
-function methods.within(program, state, args)
-  local key = program:group_key(args[2] or nothing)
-  return { key and (state.memory[key] or program:initial(key)) or constant(false) }
-end
-
-function methods.join(program, state, args)
-  state.memory[program:group_key(args[2] or nothing, true)] = { kind = "flag", id = program.visited }
-  return {}
-end
-
-function methods.leave(program, state, args)
-  state.memory[program:group_key(args[2] or nothing, true)] = { kind = "flag", id = program:no_flag() }
-  return {}
-end
-
-function methods.kill(program, state)
-  if program.layout.predicate then give_up "a test kills" end
-  state.memory.kill = { kind = "flag", id = program.visited }
-  return {}
-end
-
--- Lua's own functions, by what they are.
-local natives = {}
-
-local function numbers(args, count)
-  for k = 1, count do
-    if not args[k] or args[k].kind ~= "number" then give_up "a function of numbers is given something else" end
-  end
-end
-
-local function operation(op)
-  return function(program, _, args)
-    numbers(args, 1)
-    return { { kind = "number", id = program:emit(op, args[1].id) } }
-  end
-end
-
-local function of_library(name, count)
-  return function(program, _, args)
-    numbers(args, count)
-    if #args > count then give_up("math." .. name .. " takes more") end
-    local list = program["functions" .. count]
-    local place
-    for k, known in ipairs(list) do place = known == name and k or place end
-    if not place then
-      list[#list + 1] = name
-      place = #list
-    end
-    return { { kind = "number",
-               id = program:emit("Call" .. count, args[1].id, count == 2 and args[2].id or nil, nil, place - 1) } }
-  end
-end
-
-local function extreme(op)
-  return function(program, state, args)
-    numbers(args, math.max(#args, 1))
-    local id = args[1].id
-    for k = 2, #args do id = program:emit(op, id, args[k].id, state.mask) end
-    return { { kind = "number", id = id } }
-  end
-end
-
-natives[math.sqrt], natives[math.abs] = operation "SquareRoot", operation "Absolute"
-natives[math.floor], natives[math.ceil] = operation "Floor", operation "Ceiling"
-natives[math.sin], natives[math.cos], natives[math.exp] = operation "Sine", operation "Cosine", operation "Exponential"
-natives[math.min], natives[math.max] = extreme "Least", extreme "Most"
-for _, name in ipairs { "tan", "asin", "acos", "atan", "log", "log10", "sinh", "cosh", "tanh" } do
-  natives[math[name]] = of_library(name, 1)
-end
-natives[math.atan2] = of_library("atan2", 2)
-
-local type_names = { number = "number", vector = "cdata", flag = "boolean", point = "cdata", frame = "cdata",
-                     step = "cdata", params = "userdata", detail = "userdata", method = "function" }
-
-natives[type] = function(_, _, args)
-  local value = args[1]
-  if not value or value.kind == "poison" then give_up "type of nothing" end
-  return { constant(value.kind == "constant" and type(value.value) or type_names[value.kind]) }
-end
-
-natives[ffi.istype] = function(_, _, args)
-  local of, value = args[1], args[2]
-  if not value or value.kind == "poison" then give_up "a value has two types" end
-  if value.kind == "constant" and type(value.value) == "cdata" or value.kind == "frame" or value.kind == "step" then
-    give_up "a type is asked for"
-  end
-  return { constant(value.kind == "vector" and rawequal(value.of, of.value)) }
-end
-
-natives[tonumber] = function(_, _, args)
-  numbers(args, 1)
-  if args[2] then give_up "tonumber has a base" end
-  return { args[1] }
-end
-
-local function construct(of, args)
-  local size = rawequal(of, vector.type) and 3 or 4
-  numbers(args, size)
-  local result = { kind = "vector", of = of, size = size }
-  for k = 1, size do result[k] = args[k].id end
-  return { result }
-end
+local most_steps, most_depth = 20000, 30
 
 local run -- of a function
 
@@ -415,13 +33,12 @@ local run -- of a function
 function Program:call(state, callee, args, depth)
   if callee.kind == "method" then
     if not (args[1] and args[1].kind == "point") then give_up "a method is called without its point" end
-    return methods[callee.name](self, state, args), state
+    return calls.methods[callee.name](self, state, args), state
   end
   local f = callee.kind == "constant" and callee.value
-  if rawequal(f, vector.type) or rawequal(f, vector.quat) then return construct(f, args), state end
-  if type(f) ~= "function" then give_up "it calls a value" end
-  local native = natives[f]
+  local native = calls.natives[f]
   if native then return native(self, state, args), state end
+  if type(f) ~= "function" then give_up "it calls a value" end
   if not util.funcinfo(f).bytecodes then give_up "it calls a function of Lua's library" end
   return run(self, f, args, state, depth + 1)
 end
@@ -449,7 +66,7 @@ function Program:attribute(state, name)
   end
   if name == "dt" then return { kind = "number", id = self:emit("chunk", nil, nil, nil, 2) } end
   if name == "index" then return { kind = "number", id = self:emit "Index" } end
-  if methods[name] then return { kind = "method", name = name } end
+  if calls.methods[name] then return { kind = "method", name = name } end
   give_up("no attribute " .. name)
 end
 
@@ -609,7 +226,7 @@ function effects.POW(at)
   if base.kind == "number" and constant_of(at.program, exponent) == 2 then
     return { kind = "number", id = at.program:emit("Multiply", base.id, base.id) }
   end
-  return of_library("pow", 2)(at.program, at.state, { base, exponent })[1]
+  return calls.power(at.program, at.state, { base, exponent })[1]
 end
 
 function effects.UGET(at)
@@ -902,129 +519,37 @@ function run(program, f, args, state, depth)
   if not after then return nil end
   return results, { regs = state.regs, memory = after.memory, mask = after.mask, results = state.results }
 end
-
--- The operands of a node that are nodes.
-local function operands(node)
-  local list = { node.a, node.b }
-  if node.op == "Choose" or node.op == "Least" or node.op == "Most" then list = { node.a, node.b, node.c } end
+-- The instructions that store what a state's memory has: columns, then groups, then death.
+local function stores_of_memory(program, state)
+  local layout, memory, list = program.layout, state.memory, {}
+  for place, column in ipairs(layout.columns) do
+    local value, size = memory[place], lane.sizes[column.type] or 1
+    for k = 1, value and size or 0 do
+      list[#list + 1] = { op = lane.stores[lane.loads[column.type]], a = value.id or value[k], c = k - 1,
+                          number = place - 1 }
+    end
+  end
+  for place in ipairs(layout.groups) do
+    local value = memory["g" .. place]
+    if value then list[#list + 1] = { op = "StoreFlag", a = program:flag_node(value), number = place - 1 } end
+  end
+  if memory.kill then list[#list + 1] = { op = "Kill", a = program:flag_node(memory.kill) } end
   return list
-end
-
-local has_effect = { Fail = true, CheckFloat = true, CheckInt32 = true, CheckInt64 = true }
-
--- Slots for nodes, and lists of numbers for the host: six for an instruction.
-function Program:assemble(stores_of)
-  local nodes = self.nodes
-  local needed = {}
-  local function need(id)
-    if needed[id] then return end
-    needed[id] = true
-    for _, operand in ipairs(operands(nodes[id])) do need(operand) end
-  end
-  for id, node in ipairs(nodes) do
-    if has_effect[node.op] then need(id) end
-  end
-  for _, store in ipairs(stores_of) do need(store.a) end
-
-  local result = { constants = {}, inputs = #self.getters, shared = {}, code = {}, functions1 = self.functions1,
-                   functions2 = self.functions2, reads_ids = false, kills = false }
-  local slot_of = { [self.visited] = 0 }
-  for id, node in ipairs(nodes) do
-    if node.op == "chunk" then slot_of[id] = 1 + node.number end
-    if node.op == "constant" and needed[id] then
-      result.constants[#result.constants + 1] = node.number
-      slot_of[id] = 4 + #result.constants
-    end
-  end
-  local next_slot = 5 + #result.constants + result.inputs
-  for id, node in ipairs(nodes) do
-    if node.op == "input" then slot_of[id] = 4 + #result.constants + node.number end
-  end
-  local leaves = { visited = true, chunk = true, constant = true, input = true }
-  local function instruction(node, to)
-    local is_choice = node.op == "Choose" or node.op == "Least" or node.op == "Most"
-    local c = is_choice and slot_of[node.c] or not is_choice and node.c or 0
-    if node.op == "Random" then c = nodes[node.a].shared and nodes[node.b].shared and 1 or 0 end
-    return { op = node.op, to, node.a and slot_of[node.a] or 0, node.b and slot_of[node.b] or 0, c, node.number or 0 }
-  end
-  local code = {}
-  for id, node in ipairs(nodes) do
-    if needed[id] and not leaves[node.op] then
-      if node.shared and not has_effect[node.op] then
-        slot_of[id] = next_slot
-        next_slot = next_slot + 1
-        result.shared[#result.shared + 1] = instruction(node, slot_of[id])
-      else
-        code[#code + 1] = id
-      end
-      if node.op == "Random" then result.reads_ids = true end
-    end
-  end
-  -- A slot is free again behind the last instruction that reads it.
-  local last = {}
-  for place, id in ipairs(code) do
-    for _, operand in ipairs(operands(nodes[id])) do last[operand] = place end
-  end
-  for _, store in ipairs(stores_of) do last[store.a] = math.huge end
-  local free = {}
-  for place, id in ipairs(code) do
-    local node = nodes[id]
-    local freed = {}
-    for _, operand in ipairs(operands(node)) do
-      if last[operand] == place and not nodes[operand].shared and operand ~= self.visited and not freed[operand] then
-        freed[operand] = true
-      end
-    end
-    local to = 0
-    if not has_effect[node.op] then
-      to = table.remove(free)
-      if not to then
-        to = next_slot
-        next_slot = next_slot + 1
-      end
-      slot_of[id] = to
-    end
-    result.code[#result.code + 1] = instruction(node, to)
-    for operand in pairs(freed) do free[#free + 1] = slot_of[operand] end
-  end
-  for _, store in ipairs(stores_of) do
-    result.code[#result.code + 1] = { op = store.op, 0, slot_of[store.a], 0, store.c or 0, store.number or 0 }
-    if store.op == "Kill" then result.kills = true end
-  end
-  result.slots = next_slot
-  return result
 end
 
 -- The program of a kernel for a layout (lua/kernel.lua), or nil and why there is none. holder: its `values` and
 -- `details` are the node's parameters and the detail values of the pass. program.inputs_now() returns true and the
 -- inputs, or false where what all points share is no longer of the same kind.
 local function translate(kernel, layout, holder)
-  local program = new_program(layout, holder)
+  local program = lane.new(layout, holder)
   local done, result = pcall(function()
     local args = { { kind = "point" }, { kind = layout.action and "step" or "frame" }, { kind = "params" } }
     local results, state = run(program, kernel, args, { regs = {}, memory = {}, mask = program.visited }, 1)
     if not state then give_up(program.failure) end
-    local stores_of = {}
-    for key, value in pairs(state.memory) do
-      if key == "kill" then
-        stores_of[#stores_of + 1] = { op = "Kill", a = program:flag_node(value), order = 1e6 }
-      elseif type(key) == "string" then
-        local place = tonumber(key:sub(2))
-        stores_of[#stores_of + 1] = { op = "StoreFlag", a = program:flag_node(value), number = place - 1,
-                                      order = 1e5 + place }
-      else
-        local column = layout.columns[key]
-        local size = sizes[column.type] or 1
-        for k = 1, size do
-          stores_of[#stores_of + 1] = { op = stores[loads[column.type]], a = size == 1 and value.id or value[k],
-                                        c = k - 1, number = key - 1, order = key * 8 + k }
-        end
-      end
-    end
+    local stores_of = stores_of_memory(program, state)
     if layout.predicate then
-      stores_of[#stores_of + 1] = { op = "StoreResult", a = program:flag_node(results[1] or nothing), order = 2e6 }
+      stores_of[#stores_of + 1] = { op = "StoreResult", a = program:flag_node(results[1] or nothing) }
     end
-    table.sort(stores_of, function(a, b) return a.order < b.order end)
     return program:assemble(stores_of)
   end)
   if not done then

@@ -57,7 +57,8 @@ describe("a kernel as a program of lanes", function()
     ["functions"] = "p.heat = math.sqrt(math.abs(p.P.x)) + math.floor(p.P.y) + math.ceil(p.P.z) + math.sin(p.P.x) "
       .. "+ math.cos(p.P.y * 40) + math.exp(p.P.z)",
     ["functions of the C library"] = "p.heat = math.tan(p.P.x) + math.atan(p.P.y) + math.atan2(p.P.y, p.P.z + 0.01) "
-      .. "+ math.log(1.5 + math.abs(p.P.x)) + math.tanh(p.P.z)",
+      .. "+ math.log(1.5 + math.abs(p.P.x)) + math.log10(2 + p.P.x ^ 2) + math.tanh(p.P.z) + math.sinh(p.P.x) "
+      .. "+ math.cosh(p.P.y) + math.asin(p:rand(1)) + math.acos(-p:rand(2))",
     ["angles that are large"] = "p.heat = math.sin(p.P.x * 1e5) + math.cos(p.P.y * 1e9)",
     ["the least and the largest"] = "p.heat = math.max(math.min(p.P.x, p.P.y, 0.5), p.P.z, -0.25)",
     ["vectors"] = "p.v = (p.P + p.v * 2 - tint) / 3 * p.P + -tint:cross(p.v) * p.P:dot(p.v)",

@@ -204,8 +204,8 @@ end
 
 local loads = { float = "LoadFloat", vec3 = "LoadFloat", quat = "LoadFloat", vec3d = "LoadDouble", int32 = "LoadInt32",
                 int64 = "LoadInt64" }
-local stores = { LoadFloat = "StoreFloat", LoadDouble = "StoreDouble", LoadInt32 = "StoreInt32",
-                 LoadInt64 = "StoreInt64" }
+local stores = { float = "StoreFloat", vec3 = "StoreFloatVector", quat = "StoreFloat", vec3d = "StoreDoubleVector",
+                 int32 = "StoreInt32", int64 = "StoreInt64" }
 local sizes = { vec3 = 3, vec3d = 3, quat = 4 }
 
 function Program:initial(key)
@@ -274,7 +274,9 @@ local is_given = { visited = true, chunk = true, constant = true, input = true }
 -- Which nodes what is stored, and what may fail, comes from. Operands lie before their nodes.
 function Program:needed(stores_of)
   local needed = {}
-  for _, store in ipairs(stores_of) do needed[store.a] = true end
+  for _, store in ipairs(stores_of) do
+    for _, id in ipairs(store.nodes) do needed[id] = true end
+  end
   for id = #self.nodes, 1, -1 do
     local node = self.nodes[id]
     needed[id] = needed[id] or has_effect[node.op]
@@ -310,7 +312,7 @@ local function instruction(nodes, slot_of, node)
 end
 
 -- The program as the host takes it: instructions are an operation's name and to, a, b, c and number.
--- stores_of: the instructions at its end, { op, a, c, number }, where a is a node.
+-- stores_of: the instructions at its end, { op, nodes, component, number }: of one node, or of the three of a vector.
 function Program:assemble(stores_of)
   local nodes, needed = self.nodes, self:needed(stores_of)
   local slot_of, constants, next_slot = self:given_slots(needed)
@@ -335,7 +337,9 @@ function Program:assemble(stores_of)
       end
     end
   end
-  for _, store in ipairs(stores_of) do last[store.a] = math.huge end
+  for _, store in ipairs(stores_of) do
+    for _, id in ipairs(store.nodes) do last[id] = math.huge end
+  end
 
   local free = {}
   for place, id in ipairs(code) do
@@ -353,7 +357,9 @@ function Program:assemble(stores_of)
     end
   end
   for _, store in ipairs(stores_of) do
-    result.code[#result.code + 1] = { op = store.op, 0, slot_of[store.a], 0, store.c or 0, store.number or 0 }
+    local a, b, c = store.nodes[1], store.nodes[2], store.nodes[3]
+    result.code[#result.code + 1] = { op = store.op, 0, slot_of[a], b and slot_of[b] or 0,
+                                      c and slot_of[c] or store.component or 0, store.number or 0 }
     result.kills = result.kills or store.op == "Kill"
   end
   result.slots = next_slot

@@ -523,17 +523,20 @@ end
 local function stores_of_memory(program, state)
   local layout, memory, list = program.layout, state.memory, {}
   for place, column in ipairs(layout.columns) do
-    local value, size = memory[place], lane.sizes[column.type] or 1
-    for k = 1, value and size or 0 do
-      list[#list + 1] = { op = lane.stores[lane.loads[column.type]], a = value.id or value[k], c = k - 1,
-                          number = place - 1 }
+    local value, op = memory[place], lane.stores[column.type]
+    if value and value.kind == "vector" and value.size == 3 then
+      list[#list + 1] = { op = op, nodes = value, number = place - 1 }
+    elseif value then
+      for k = 1, value.size or 1 do
+        list[#list + 1] = { op = op, nodes = { value.id or value[k] }, component = k - 1, number = place - 1 }
+      end
     end
   end
   for place in ipairs(layout.groups) do
     local value = memory["g" .. place]
-    if value then list[#list + 1] = { op = "StoreFlag", a = program:flag_node(value), number = place - 1 } end
+    if value then list[#list + 1] = { op = "StoreFlag", nodes = { program:flag_node(value) }, number = place - 1 } end
   end
-  if memory.kill then list[#list + 1] = { op = "Kill", a = program:flag_node(memory.kill) } end
+  if memory.kill then list[#list + 1] = { op = "Kill", nodes = { program:flag_node(memory.kill) } } end
   return list
 end
 
@@ -548,7 +551,7 @@ local function translate(kernel, layout, holder)
     if not state then give_up(program.failure) end
     local stores_of = stores_of_memory(program, state)
     if layout.predicate then
-      stores_of[#stores_of + 1] = { op = "StoreResult", a = program:flag_node(results[1] or nothing) }
+      stores_of[#stores_of + 1] = { op = "StoreResult", nodes = { program:flag_node(results[1] or nothing) } }
     end
     return program:assemble(stores_of)
   end)

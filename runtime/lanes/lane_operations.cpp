@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "runtime/elementary.h"
@@ -151,16 +152,40 @@ bool random(Tile& tile, const Now& now)
     return true;
 }
 
-// With the numbers of elements of T that most columns have from point to point known when it is compiled.
-template <class Loop>
-void with_step(std::size_t step, const Loop& loop)
+template <class T>
+using Pack = std::conditional_t<std::is_same_v<T, double>, Doubles, Floats>;
+
+[[gnu::always_inline]] inline Doubles to_doubles(const Doubles& x) { return x; }
+[[gnu::always_inline]] inline Doubles to_doubles(const Floats& x) { return widen(x); }
+template <class T>
+[[gnu::always_inline]] inline Pack<T> from_doubles(const Doubles& x)
 {
-    if (step == 1)
-        loop(std::integral_constant<std::size_t, 1>());
-    else if (step == 3)
-        loop(std::integral_constant<std::size_t, 3>());
+    if constexpr (std::is_same_v<T, double>)
+        return x;
     else
-        loop(step);
+        return narrow(x);
+}
+
+// Component c of the eight vectors that three packs are side by side.
+template <int c, class P>
+[[gnu::always_inline]] inline P component(const P& p, const P& q, const P& r)
+{
+    if constexpr (c == 0)
+        return __builtin_shufflevector(__builtin_shufflevector(p, q, 0, 3, 6, 9, 12, 15, 0, 0), r, 0, 1, 2, 3, 4, 5, 10,
+                                       13);
+    else if constexpr (c == 1)
+        return __builtin_shufflevector(__builtin_shufflevector(p, q, 1, 4, 7, 10, 13, 0, 0, 0), r, 0, 1, 2, 3, 4, 8, 11,
+                                       14);
+    else
+        return __builtin_shufflevector(__builtin_shufflevector(p, q, 2, 5, 8, 11, 14, 0, 0, 0), r, 0, 1, 2, 3, 4, 9, 12,
+                                       15);
+}
+
+template <int c, class T>
+void load_component(const T* from, Doubles* into)
+{
+    for (std::size_t k = 0; k < Tile::packs; ++k, from += 3 * lanes)
+        into[k] = to_doubles(component<c>(load_pack(from), load_pack(from + lanes), load_pack(from + 2 * lanes)));
 }
 
 // t = component c of column k
@@ -169,16 +194,22 @@ bool load(Tile& tile, const Now& now)
 {
     const LaneChunk::Memory& memory = tile.chunk.columns[now.number];
     const T* const from =
-        reinterpret_cast<const T*>(static_cast<const char*>(memory.data) + tile.first * memory.stride) + now.c;
+        reinterpret_cast<const T*>(static_cast<const char*>(memory.data) + tile.first * memory.stride);
+    const std::size_t step = memory.stride / sizeof(T);
     double* const into = tile.numbers(now.to);
-    const std::size_t size = memory.stride == 0 ? Tile::points : tile.size;
-    with_step(memory.stride / sizeof(T), [&](auto step) {
-        if (size == Tile::points)
-            for (std::size_t i = 0; i < Tile::points; ++i) into[i] = static_cast<double>(from[i * step]);
-        else
-            for (std::size_t i = 0; i < Tile::points; ++i)
-                into[i] = i < size ? static_cast<double>(from[i * step]) : 0.0;
-    });
+    if constexpr (std::is_floating_point_v<T>) {
+        if (step == 3 && tile.size == Tile::points) {
+            constexpr decltype(&load_component<0, T>) of_component[] = {load_component<0, T>, load_component<1, T>,
+                                                                        load_component<2, T>};
+            of_component[now.c](from, tile.slot(now.to));
+            return true;
+        }
+    }
+    if (step == 1 && tile.size == Tile::points)
+        for (std::size_t i = 0; i < Tile::points; ++i) into[i] = static_cast<double>(from[i]);
+    else
+        for (std::size_t i = 0; i < Tile::points; ++i)
+            into[i] = i < tile.size || step == 0 ? static_cast<double>(from[i * step + now.c]) : 0.0;
     return true;
 }
 
@@ -187,15 +218,39 @@ template <class T>
 bool store(Tile& tile, const Now& now)
 {
     const LaneChunk::Memory& memory = tile.chunk.columns[now.number];
-    T* const into = reinterpret_cast<T*>(static_cast<char*>(memory.data) + tile.first * memory.stride) + now.c;
+    T* const into = reinterpret_cast<T*>(static_cast<char*>(memory.data) + tile.first * memory.stride);
+    const std::size_t step = memory.stride / sizeof(T);
     const double* const a = tile.numbers(now.a);
-    with_step(memory.stride / sizeof(T), [&](auto step) {
-        if (tile.visits_all())
-            for (std::size_t i = 0; i < Tile::points; ++i) into[i * step] = static_cast<T>(a[i]);
-        else
-            for (std::size_t i = 0; i < tile.size; ++i)
-                if (tile.visits(i)) into[i * step] = static_cast<T>(a[i]);
-    });
+    if (step == 1 && tile.visits_all())
+        for (std::size_t i = 0; i < Tile::points; ++i) into[i] = static_cast<T>(a[i]);
+    else
+        for (std::size_t i = 0; i < tile.size; ++i)
+            if (tile.visits(i)) into[i * step + now.c] = static_cast<T>(a[i]);
+    return true;
+}
+
+// The vectors of column k = (a, b, c)
+template <class T>
+bool store_vector(Tile& tile, const Now& now)
+{
+    T* into = reinterpret_cast<T*>(static_cast<char*>(tile.chunk.columns[now.number].data)) + 3 * tile.first;
+    if (!tile.visits_all()) {
+        const double* const from[] = {tile.numbers(now.a), tile.numbers(now.b), tile.numbers(now.c)};
+        for (std::size_t i = 0; i < tile.size; ++i)
+            if (tile.visits(i))
+                for (std::size_t n = 0; n < 3; ++n) into[3 * i + n] = static_cast<T>(from[n][i]);
+        return true;
+    }
+    const Doubles *const a = tile.slot(now.a), *const b = tile.slot(now.b), *const c = tile.slot(now.c);
+    for (std::size_t k = 0; k < Tile::packs; ++k, into += 3 * lanes) {
+        const Pack<T> x = from_doubles<T>(a[k]), y = from_doubles<T>(b[k]), z = from_doubles<T>(c[k]);
+        const Pack<T> xy0 = __builtin_shufflevector(x, y, 0, 8, 0, 1, 9, 0, 2, 10),
+                      xy1 = __builtin_shufflevector(x, y, 0, 3, 11, 0, 4, 12, 0, 5),
+                      xy2 = __builtin_shufflevector(x, y, 13, 0, 6, 14, 0, 7, 15, 0);
+        store_pack(Pack<T>(__builtin_shufflevector(xy0, z, 0, 1, 8, 3, 4, 9, 6, 7)), into);
+        store_pack(Pack<T>(__builtin_shufflevector(xy1, z, 10, 1, 2, 11, 4, 5, 12, 7)), into + lanes);
+        store_pack(Pack<T>(__builtin_shufflevector(xy2, z, 0, 13, 2, 3, 14, 5, 6, 15)), into + 2 * lanes);
+    }
     return true;
 }
 
@@ -319,7 +374,8 @@ constexpr std::pair<std::string_view, LaneOperation> operations[] = {
     {"CheckInt64", check_int64},
     {"Fail", fail},
     {"StoreFloat", store<float>},
-    {"StoreDouble", store<double>},
+    {"StoreFloatVector", store_vector<float>},
+    {"StoreDoubleVector", store_vector<double>},
     {"StoreInt32", store<std::int32_t>},
     {"StoreInt64", store<std::int64_t>},
     {"StoreFlag", store_flag},

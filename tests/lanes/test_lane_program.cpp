@@ -87,19 +87,60 @@ TEST_CASE("random numbers of lanes are those of a kernel, one by one", "[lanes]"
             program.constants = {4, frame};
             const std::uint16_t use = 5, of_frame = 6, drawn = 7;
             program.code = {{lane_operation("Random"), drawn, use, of_frame, is_shared, 0},
-                            {lane_operation("StoreDouble"), 0, drawn, 0, 0, 0}};
+                            {lane_operation("StoreDoubleVector"), 0, drawn, use, drawn, 0}};
             program.slots = 8;
-            std::vector<double> numbers(ids.size());
-            const LaneChunk::Memory memory[] = {{numbers.data(), sizeof(double)}};
+            std::vector<double> numbers(3 * ids.size());
+            const LaneChunk::Memory memory[] = {{numbers.data(), 3 * sizeof(double)}};
             LaneChunk chunk;
             chunk.size = ids.size();
             chunk.columns = memory;
             chunk.ids = {ids.data(), sizeof(std::int64_t)};
             chunk.random = RandomKey(3, "k");
             LaneRunner().run(program, chunk, [](std::size_t, std::size_t) { FAIL(); });
-            for (std::size_t i = 0; i < ids.size(); ++i)
-                CHECK(numbers[i] == kernel_random(chunk.random, static_cast<std::uint64_t>(ids[i]), 4, frame));
+            for (std::size_t i = 0; i < ids.size(); ++i) {
+                const double number = kernel_random(chunk.random, static_cast<std::uint64_t>(ids[i]), 4, frame);
+                CHECK(numbers[3 * i] == number);
+                CHECK(numbers[3 * i + 1] == 4);
+                CHECK(numbers[3 * i + 2] == number);
+            }
         }
+}
+
+// Vectors in another order of their components, from one column into another.
+template <class T>
+static void check_vectors(const char* load, const char* store)
+{
+    for (const std::size_t size : {1u, 127u, 128u, 129u, 400u}) {
+        for (const bool with_members : {false, true}) {
+            std::vector<T> from(3 * size), into(3 * size, T(-1));
+            for (std::size_t i = 0; i < from.size(); ++i) from[i] = static_cast<T>(i) + T(0.5);
+            std::vector<std::uint8_t> members(size, 1);
+            for (std::size_t i = 0; with_members && i < size; i += 2) members[i] = 0;
+            const LaneChunk::Memory memory[] = {{from.data(), 3 * sizeof(T)}, {into.data(), 3 * sizeof(T)}};
+            LaneProgram program;
+            program.code = {{lane_operation(load), 5, 0, 0, 0, 0},
+                            {lane_operation(load), 6, 0, 0, 1, 0},
+                            {lane_operation(load), 7, 0, 0, 2, 0},
+                            {lane_operation(store), 0, 7, 5, 6, 1}};
+            program.slots = 8;
+            LaneChunk chunk;
+            chunk.size = size;
+            chunk.columns = memory;
+            if (with_members) chunk.members = members.data();
+            LaneRunner().run(program, chunk, [](std::size_t, std::size_t) { FAIL(); });
+            for (std::size_t i = 0; i < size; ++i)
+                for (std::size_t n = 0; n < 3; ++n) {
+                    INFO(size << " points, " << i << ", " << n);
+                    CHECK(into[3 * i + n] == (members[i] ? from[3 * i + (n + 2) % 3] : T(-1)));
+                }
+        }
+    }
+}
+
+TEST_CASE("components of vectors are taken apart and put together", "[lanes]")
+{
+    check_vectors<float>("LoadFloat", "StoreFloatVector");
+    check_vectors<double>("LoadDouble", "StoreDoubleVector");
 }
 
 TEST_CASE("the least and the largest fail where their order of arguments counts", "[lanes]")

@@ -131,21 +131,27 @@ KernelLanes::KernelLanes(State& state, const KernelLayout& layout, const Locatio
     lua_pop(L, 1);
 }
 
-bool KernelLanes::is_ready(State& state, const rapid_chunk& chunk)
+bool KernelLanes::is_ready(State& state, const rapid_chunk& chunk, std::uint64_t pass)
 {
     constexpr std::size_t first_tiles = 64;
     if (!program_ || (kills_ && !chunk.kill)) return false;
     if (tiles_ > first_tiles && failed_tiles_ > tiles_ / 4) return false;
+    if (pass_ != pass) find_inputs(state);
+    pass_ = pass;
+    return has_inputs_;
+}
+
+void KernelLanes::find_inputs(State& state)
+{
     lua_State* const L = state.lua();
     const int results = static_cast<int>(program_->inputs) + 1;
     luaL_checkstack(L, results + 2, "for the inputs of a kernel");
     lua_rawgeti(L, LUA_REGISTRYINDEX, inputs_now_);
     state.call(0, results);
-    const bool ready = lua_toboolean(L, -results) != 0;
+    has_inputs_ = lua_toboolean(L, -results) != 0;
     inputs_.clear();
-    for (int k = 1; ready && k < results; ++k) inputs_.push_back(lua_tonumber(L, k - results));
+    for (int k = 1; has_inputs_ && k < results; ++k) inputs_.push_back(lua_tonumber(L, k - results));
     lua_pop(L, results);
-    return ready;
 }
 
 void KernelLanes::run(const rapid_chunk& chunk, std::span<const LaneChunk::Memory> memory,

@@ -121,7 +121,7 @@ void KernelPass::call_lanes(State& state, const Call& call) const
         lua_rawgeti(state.lua(), LUA_REGISTRYINDEX, runner.translate);
         runner.lanes = std::make_unique<KernelLanes>(state, layout_, kernel_.source.location);
     }
-    if (!runner.lanes->is_ready(state, call.chunk)) return call_runner(state, call);
+    if (!runner.lanes->is_ready(state, call.chunk, serial_)) return call_runner(state, call);
     std::vector<LaneChunk::Memory> memory;
     for (std::size_t c = 0; c < call.pointers.size(); ++c) memory.push_back({call.pointers[c], bytes_between(c)});
     runner.lanes->run(call.chunk, memory, [&](std::int32_t begin, std::int32_t end) {

@@ -114,7 +114,7 @@ void add_by_arguments(Filter& filter, Processes processes)
         filter.allow(SCMP_SYS(wait4));
         filter.allow(SCMP_SYS(memfd_create));  // the frames of a reference, for all copies
         filter.allow_if(SCMP_SYS(mmap), {SCMP_A3(SCMP_CMP_MASKED_EQ, kind, shared)});
-        filter.allow(SCMP_SYS(alarm));  // of a copy that reads a file
+        filter.allow(SCMP_SYS(setitimer));  // of a copy that reads a file
         for (const int option : {PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS})
             filter.allow_if(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, static_cast<scmp_datum_t>(option))});
         filter.allow(SCMP_SYS(seccomp));  // a further filter only forbids

@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <tbb/task_arena.h>
 #include <unistd.h>
@@ -13,6 +14,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <ctime>
 #include <new>
 
 #include "runtime/files/file_error.h"
@@ -107,12 +109,32 @@ std::size_t address_space()
     return high;
 }
 
+// A reader that waits, for a lock or a disk, takes no time of the processor: it ends when it has hardly taken any for
+// two intervals in a row. One alone may pass while all is stopped (SIGSTOP); and on a busy machine a reader that works
+// takes many.
+constexpr unsigned interval = 15;           // s
+constexpr double least_in_interval = 0.01;  // s: one part in 1,500 of a processor
+constexpr int status_of_waiting = 3;
+
+void end_where_it_waits(int)
+{
+    static double before = 0;
+    static bool waited = false;
+    timespec t;
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    const double now = static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    const bool waits = now - before < least_in_interval;
+    if (waits && waited) ::_exit(status_of_waiting);
+    before = now;
+    waited = waits;
+}
+
 void confine(pid_t parent, const Limits& limits)
 {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(1);  // it ended before the line above
-    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM, SIGXCPU, SIGTERM})
-        ::signal(signal, SIG_DFL);
+    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM}) ::signal(signal, SIG_DFL);
+    ::signal(SIGALRM, end_where_it_waits);
     sigset_t none;
     ::sigemptyset(&none);
     ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
@@ -123,7 +145,8 @@ void confine(pid_t parent, const Limits& limits)
     ::close_range(STDERR_FILENO + 1, ~0U, 0);
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_CPU, limits.seconds);
-    ::alarm(6 * limits.seconds);  // it may wait for something, too
+    const itimerval timer{{interval, 0}, {interval, 0}};
+    if (::setitimer(ITIMER_REAL, &timer, nullptr) != 0) ::_exit(1);
     limit(RLIMIT_AS, address_space() + limits.memory);
 }
 
@@ -149,7 +172,7 @@ Header outcome_of(const std::function<void(MessageWriter&)>& read, const SharedM
 
 std::string text_of_end(int status, const Limits& limits)
 {
-    if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGALRM))
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
         return fmt::format("takes its reader longer than {} s", limits.seconds);
     if (WIFSIGNALED(status))
         return fmt::format("ends its reader with signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
@@ -200,6 +223,8 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
         case Outcome::None:
             break;
     }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == status_of_waiting)
+        throw Error(fmt::format("can't be read: its reader waited for {} s", 2 * interval));
     throw Error(fmt::format("can't be read: it {}, and must be damaged", text_of_end(status, limits)));
 }
 

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <ctime>
 
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
@@ -103,6 +104,32 @@ TEST_CASE("a reader that takes too long is told from others that end by a signal
               ::raise(SIGXCPU);
               return {};
           }) == "can't be read: it takes its reader longer than 5 s, and must be damaged");
+}
+
+TEST_CASE("a reader that waits ends, one that was stopped or works slowly does not", "[files]")
+{
+    // Of the alarms of a reader those here come at once: between two nothing is done.
+    CHECK(error_in([]() -> Numbers {
+              for (int k = 0; k < 2; ++k) ::raise(SIGALRM);
+              return {};
+          }) == "can't be read: its reader waited for 30 s");
+
+    const auto work = [] {
+        const std::clock_t end = std::clock() + CLOCKS_PER_SEC / 20;  // of the processor
+        while (std::clock() < end) {
+        }
+    };
+    const TemporaryFolder folder;
+    std::ofstream(folder / "file") << "bytes";
+    const Numbers read_in_the_end = read(folder / "file", [&] {
+        for (int k = 0; k < 3; ++k) {
+            ::raise(SIGALRM);  // in vain, as while it was stopped
+            work();
+            ::raise(SIGALRM);
+        }
+        return Numbers{7};
+    });
+    CHECK(read_in_the_end == Numbers{7});
 }
 
 TEST_CASE("a message that promises more than it holds is an error", "[files]")

@@ -340,7 +340,7 @@ function rapid.curve.from(options) end
 function rapid.curve.read(path, options) end
 
 ---@class rapid.options.fog_from_points
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
 ---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
 
@@ -366,7 +366,7 @@ function rapid.fog.read(path, options) end
 ---@field at fun(P: rapid.Vec3): rapid.Vec3  asked at each node of the lattice, once [function of a place, required]
 ---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
 ---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
----@field voxel? number  between nodes [number, m, above 0, default 0.1]
+---@field voxel? number  between nodes [number, m, at least 2e-05, default 0.1]
 
 ---A grid of vectors by a function of the place.
 ---@param options? rapid.options.grid_from
@@ -374,7 +374,7 @@ function rapid.fog.read(path, options) end
 function rapid.grid.from(options) end
 
 ---@class rapid.options.grid_from_points
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
 ---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
 ---@field attribute? string  a vec3 [string, default "v"]
@@ -406,7 +406,7 @@ function rapid.grid.write(path, grids) end
 ---@class rapid.options.levelset_box
 ---@field size? rapid.Place  full edge lengths [vec3, m, default {1, 1, 1}]
 ---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
 
 ---A box.
@@ -415,7 +415,7 @@ function rapid.grid.write(path, grids) end
 function rapid.levelset.box(options) end
 
 ---@class rapid.options.levelset_from_mesh
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
 
 ---The distance to a closed mesh; where that moves or deforms, a collider that does.
@@ -426,7 +426,7 @@ function rapid.levelset.from_mesh(mesh, options) end
 
 ---@class rapid.options.levelset_from_points
 ---@field radius? number|rapid.Attribute  of the balls; the attribute pscale where the points have it [number, m, above 0, takes rapid.attr]
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
 
 ---The balls around points.
@@ -453,7 +453,7 @@ function LevelSet:offset(metres) end
 function rapid.levelset.read(path, options) end
 
 ---The same surface on voxels of another size.
----@param voxel number  edge of a voxel [number, m, above 0, required]
+---@param voxel number  edge of a voxel [number, m, at least 2e-05, required]
 ---@return rapid.LevelSet
 function LevelSet:resample(voxel) end
 
@@ -469,7 +469,7 @@ function LevelSet:smooth(options) end
 ---@class rapid.options.levelset_sphere
 ---@field radius? number  of the sphere [number, m, above 0, default 1]
 ---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
 
 ---A sphere.
@@ -481,7 +481,7 @@ function rapid.levelset.sphere(options) end
 ---@field radius? number  from the axis to the middle of the tube [number, m, above 0, default 1]
 ---@field tube? number  radius of the tube [number, m, above 0, default 0.25]
 ---@field center? rapid.Place  its middle [vec3, m, default {0, 0, 0}]
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field half_width? number  of the band, on each side of the surface [number, voxels, at least 1.5, default 3]
 
 ---A torus about the y axis.
@@ -1182,7 +1182,7 @@ function Node:randomize(params) end
 ---@class rapid.params.rasterize
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field file string  pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute [string, required]
----@field voxel? number  edge of a voxel [number, m, above 0, default 0.1]
+---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
 ---@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
 ---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
 ---@field attributes? string|string[]  vectors of which a grid has the mean of the points around, by their weights; {"v"} when not given [names]

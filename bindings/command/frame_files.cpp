@@ -9,6 +9,7 @@
 
 #include "bindings/command/part_options.h"
 #include "runtime/io/text_table.h"
+#include "runtime/memory_budget.h"
 #include "runtime/operators/rasterize.h"
 
 namespace rapid {
@@ -193,6 +194,16 @@ std::vector<std::string> FrameFiles::names() const
     return names;
 }
 
+// Each pattern of pictures keeps what it has drawn of the scene.
+void FrameFiles::require_picture_memory(std::size_t patterns) const
+{
+    constexpr double bytes_a_pixel = 34;  // in layers of the scene 31, in the picture 3
+    const double bytes = bytes_a_pixel * static_cast<double>(patterns) * picture_->width * picture_->height;
+    if (!fits_in_memory(bytes))
+        throw beyond_memory(fmt::format("pictures of {}x{}", picture_->width, picture_->height), bytes,
+                            "give a smaller --size");
+}
+
 void FrameFiles::check_film(const Format& format, const std::string& pattern) const
 {
     if (FramePattern(pattern).has_frame())
@@ -211,9 +222,11 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
         for (const PlannedAttribute& attribute : simulation.attributes)
             if (attribute.kept && !attribute.group && !of_scene.count(attribute.name)) unasked_.insert(attribute.name);
     std::set<std::string> patterns;
+    std::size_t of_pictures = 0;
     const auto check = [&](const std::string& pattern) {
         check_part(pattern);
         const Format& format = format_of(pattern);
+        if (format.film || format.extension == ".png") require_picture_memory(++of_pictures);
         if (format.film)
             check_film(format, pattern);
         else if (several_frames && !FramePattern(pattern).has_frame())
@@ -229,6 +242,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
             const std::string* pattern = file->second.get<std::string>();
             if (!pattern) continue;
             check(name_in_part(*pattern));
+            of_nodes_.push_back({name_in_part(*pattern), planned.node->name, planned.node->location});
             if (is_volume) volumes_[*pattern] = static_cast<const Rasterize*>(planned.op->fields());
         } catch (const Error& error) {
             throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()))
@@ -248,6 +262,21 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
             throw Error(fmt::format("-o {}: {}", target.text, error.message()));
         }
     }
+}
+
+void FrameFiles::claim(WrittenNames& names, const FrameSelection& frames) const
+{
+    for (const auto& [pattern, node, location] : of_nodes_) try {
+            names.add(FramePattern(pattern), "main", frames, fmt::format("node \"{}\"", node));
+        } catch (const Error& error) {
+            throw Error(fmt::format("file = \"{}\": {}", pattern, error.message())).in_node(node).at(location);
+        }
+    for (const Target& target : targets_)
+        for (const std::string& output : target.outputs) try {
+                names.add(FramePattern(target.to.pattern), output, frames, "-o " + target.text);
+            } catch (const Error& error) {
+                throw Error(fmt::format("-o {}: {}", target.text, error.message()));
+            }
 }
 
 void FrameFiles::resolve(Target& target, const Plan& plan) const

@@ -14,6 +14,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/part_record.h"
+#include "bindings/command/written_names.h"
 #include "bindings/host/picture_scene.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"
@@ -51,6 +52,9 @@ public:
     // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames,
     // or for no output of the graph; two that write the same files.
     void resolve(const Plan& plan, bool several_frames);
+
+    // Adds the names of all files. After resolve(). Error: one that another has, or that is read.
+    void claim(WrittenNames& names, const FrameSelection& frames) const;
 
     // The files of -o that a frame has, and how they are made besides: two of one path that are made alike are the
     // same.
@@ -107,6 +111,7 @@ private:
     void check_part(const std::string& pattern) const;
     void begin_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info);
     void write_part_records() const;
+    void require_picture_memory(std::size_t patterns) const;
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
     void remove_unasked(PointSet& points) const;
@@ -117,6 +122,11 @@ private:
 
     std::vector<Target> targets_;
     std::map<std::string, const Rasterize*> volumes_;  // by pattern; of the plan
+    struct NodePattern {
+        std::string pattern, node;
+        Location location;
+    };
+    std::vector<NodePattern> of_nodes_;
     std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
     std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
     std::unique_ptr<SceneOfPlan> scene_;

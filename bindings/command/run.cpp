@@ -18,6 +18,7 @@
 #include "bindings/command/signals.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/watch.h"
+#include "bindings/command/written_names.h"
 #include "bindings/host/threads.h"
 #include "runtime/files/output_file.h"
 #include "runtime/graph/coupling.h"
@@ -100,6 +101,7 @@ public:
         }
 
         return threads.run([&] {
+            claim_own_files();
             const std::unique_ptr<Session> session = graph_.load(
                 true, [&](const std::string& message) { report.abandon(status_failed, message); }, on_read());
             for (const std::string& warning : session->take_warnings()) report.warning(warning);
@@ -116,6 +118,7 @@ public:
                 record_->identify(read_->take());
             }
             files_.resolve(plan, !frames.single());
+            files_.claim(names_, frames);
             if (farm_.asked()) return submit(plan);
             events_.begin();
             if (cache_.asked()) {
@@ -191,10 +194,29 @@ private:
         return farm_.submit(std::move(job));
     }
 
+    // Those that are not of frames. Error: one of them is the graph, or two are one.
+    void claim_own_files()
+    {
+        names_.reads(graph_.file());
+        const auto claim = [&](const std::string& file, const std::string& option) {
+            if (file.empty()) return;
+            try {
+                names_.add(file, option);
+            } catch (const Error& error) {
+                throw Error(fmt::format("{} {}: {}", option, file, error.message()));
+            }
+        };
+        if (cache_.asked())
+            for (const char* name : {"journal", "events", ".lock"}) claim(cache_.folder() / name, "--cache");
+        claim(stats_, "--stats");
+        claim(profile_, "--profile");
+        claim(events_.path(), "--events");
+    }
+
     std::function<void(const std::filesystem::path& file)> on_read()
     {
-        if (!record_ && !cache_.asked()) return tell_ ? Watch::tell : nullptr;
         return [this](const std::filesystem::path& file) {
+            if (!computes_) names_.reads(file);
             if (record_) read_->add(file);
             if (cache_.asked()) cache_.was_read(file);
             if (tell_) Watch::tell(file);
@@ -241,6 +263,7 @@ private:
 
     int compute(Session& session, const Plan& plan, const FrameSelection& frames, RunReport& report, GracefulEnd& end)
     {
+        computes_ = true;
         try {
             Evaluator evaluator(
                 plan, [&](const std::string& pattern, const PointSet& points, const Frame& frame, double fps) {
@@ -331,6 +354,8 @@ private:
     std::optional<InputContents> read_;   // of a part
     std::string stats_, profile_;
     EventFile events_;
+    WrittenNames names_;
+    bool computes_ = false;  // frames: what they read is not noted
     RunCache cache_;
     UntrustedOptions untrusted_;
     bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false;

@@ -10,6 +10,7 @@
 #include "runtime/graph/coupling.h"
 #include "runtime/operators/written_points.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
+#include "runtime/shapes/level_set/least_voxel.h"
 #include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {
@@ -23,7 +24,7 @@ NodeType Rasterize::declare()
                "pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute")
         .required()
         .constant()
-        .param(&Rasterize::voxel, "voxel", 0.1, above(0), "m", "edge of a voxel")
+        .param(&Rasterize::voxel, "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
         .constant()
         .param(&Rasterize::radius, "radius", Value(), above(0), "m",
                "over which a point is spread, of at least a voxel; 1.5 voxels when not given")

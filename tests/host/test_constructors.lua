@@ -266,12 +266,12 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.grid.read(('x'):rep(300) .. '.vdb')"] = 'there is no file "xxx',
       ["rapid.levelset.from_mesh(two)"] = "mesh = points has the wrong type",
       ["rapid.levelset.from_mesh(rapid.mesh.box {}, { voxel = -1 })"] = "voxel = -1 is out of range; it must be " ..
-        "above 0",
+        "at least 2e-05",
       ["rapid.levelset.from_mesh(rapid.mesh.box { center = {0, 1e15, 0} })"] = 'mesh "box" reaches 1e+15 m from the ' ..
         "origin, more than 2^31 voxels of 0.1 m; put it nearer, and move what is made of it",
       ["rapid.levelset.from_mesh(rapid.mesh.box { center = {0, 1e8, 0} })"] = 'mesh "box" is flat: its size is 1 x ' ..
         "0 x 1 m; a level set needs an inside",
-      ["rapid.levelset.sphere { radius = 1, voxel = 1e-9 }"] = "a voxel of at least 0.000198 m stays below that",
+      ["rapid.levelset.sphere { radius = 1, voxel = 2e-5 }"] = "a voxel of at least 0.000198 m stays below that",
       ["rapid.levelset.sphere { radius = 1, voxel = 10 }"] = "use a voxel of at most 1 m",
       ["rapid.levelset.read 'none.vdb'"] = 'there is no file "none.vdb"',
       ["rapid.shape.plane { normal = {0, 0, 0} }"] = "normal of a plane = {0, 0, 0} has no direction; any length " ..

@@ -4,6 +4,8 @@
 #include "bindings/host/maker.h"
 #include "bindings/host/makers/grid_files.h"
 #include "bindings/host/makers/points_of_grid.h"
+#include "bindings/host/makers/written_vdb.h"
+#include "runtime/shapes/level_set/least_voxel.h"
 #include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {
@@ -73,6 +75,7 @@ struct WriteGrids {
             objects[name] = *object;
         }
         if (objects.empty()) throw Error("there is no grid to write; give { NAME = grid }");
+        require_vdb(path);
         if (context.may_write) write_grids(path, objects);
         return objects.begin()->second;
     }
@@ -104,7 +107,7 @@ struct GridFrom {
             .required()
             .param(&GridFrom::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
             .param(&GridFrom::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle")
-            .param(&GridFrom::voxel, "voxel", 0.1, above(0), "m", "between nodes")
+            .param(&GridFrom::voxel, "voxel", 0.1, at_least(least_voxel), "m", "between nodes")
             .param(&GridFrom::origin, "origin", Value(), any_number(), "m", "the lowest corner")
             .internal()
             .param(&GridFrom::nodes, "nodes", Value(), at_least(1), "", "along each axis")

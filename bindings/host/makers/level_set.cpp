@@ -10,7 +10,9 @@
 #include <tuple>
 
 #include "bindings/host/makers/grid_files.h"
+#include "bindings/host/makers/written_vdb.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set/least_voxel.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
@@ -27,7 +29,8 @@ struct Grid {
     template <class T>
     static void declare(MakerDeclaration<T>& declaration)
     {
-        declaration.param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, above(0), "m", "edge of a voxel")
+        declaration
+            .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
             .param(static_cast<double T::*>(&T::half_width), "half_width", 3.0, at_least(1.5), "voxels",
                    "of the band, on each side of the surface");
     }
@@ -239,7 +242,7 @@ struct ResampleLevelSet {
         return maker<ResampleLevelSet>("levelset.resample", "The same surface on voxels of another size.")
             .param(&ResampleLevelSet::levelset, "levelset", Value(), any_number(), "", "what to resample")
             .required()
-            .param(&ResampleLevelSet::voxel, "voxel", Value(), above(0), "m", "edge of a voxel")
+            .param(&ResampleLevelSet::voxel, "voxel", Value(), at_least(least_voxel), "m", "edge of a voxel")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return resample_level_set(levelset, voxel); }
@@ -299,6 +302,7 @@ struct WriteLevelSet {
     }
     ObjectPtr make(MakeContext& context) const
     {
+        require_vdb(path);
         if (context.may_write) levelset->write(path, grid);
         return levelset;
     }

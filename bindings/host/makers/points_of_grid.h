@@ -7,6 +7,7 @@
 #include "bindings/host/maker.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
+#include "runtime/shapes/level_set/least_voxel.h"
 
 namespace rapid {
 
@@ -24,7 +25,8 @@ struct PointsOfGrid {
             .param(static_cast<std::shared_ptr<const PointsObject> T::*>(&T::points), "points", Value(), any_number(),
                    "", "what is spread over the voxels")
             .required();
-        declaration.param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, above(0), "m", "edge of a voxel")
+        declaration
+            .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
             .param(static_cast<std::optional<PerPoint<float>> T::*>(&T::radius), "radius", Value(), above(0), "m",
                    "over which a point is spread, of at least a voxel; 1.5 voxels when not given")
             .param(static_cast<PerPoint<float> T::*>(&T::weight), "weight", 1.0, at_least(0), "",

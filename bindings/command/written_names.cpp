@@ -1,0 +1,102 @@
+#include "bindings/command/written_names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The same for all ways to the file, but for a link in its place, which a written file replaces.
+fs::path place_of(const fs::path& file)
+{
+    const fs::path full = fs::absolute(file);
+    std::error_code error;
+    const fs::path folder = fs::weakly_canonical(full.parent_path(), error);
+    return (error ? full.parent_path() : folder) / full.filename();
+}
+
+std::optional<int> number(std::int64_t frame)
+{
+    using limits = std::numeric_limits<int>;
+    if (frame < limits::min() || frame > limits::max()) return std::nullopt;
+    return static_cast<int>(frame);
+}
+
+// The frame whose file has this name.
+std::optional<int> frame_of(const std::string& name, const FramePattern& pattern)
+{
+    constexpr const char* digits = "0123456789";
+    for (std::size_t begin = 0, end; (begin = name.find_first_of(digits, begin)) != std::string::npos; begin = end) {
+        end = std::min(name.find_first_not_of(digits, begin), name.size());
+        // A minus sign may be one, or a part of the name; and so may be digits before the number.
+        for (std::size_t first = begin - (begin > 0 && name[begin - 1] == '-'); first < end; ++first) {
+            int frame = 0;
+            const auto parsed = std::from_chars(name.data() + first, name.data() + end, frame);
+            if (parsed.ec == std::errc() && pattern.expand(frame) == name) return frame;
+        }
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+void WrittenNames::reads(const fs::path& file) { read_.insert(place_of(file)); }
+
+void WrittenNames::add(const fs::path& file, std::string who)
+{
+    const fs::path place = place_of(file);
+    Writer writer{place.parent_path(), place.filename(), std::nullopt, {}, std::move(who)};
+    check(writer);
+    writers_.push_back(std::move(writer));
+}
+
+void WrittenNames::add(const FramePattern& pattern, std::string_view output, const FrameSelection& frames,
+                       std::string who)
+{
+    const fs::path place = place_of(pattern.of_output(output));
+    Writer writer{place.parent_path(), place.filename(), FramePattern(place.filename()), frames, std::move(who)};
+    if (!writer.pattern->has_frame()) writer.pattern.reset();
+    check(writer);
+    writers_.push_back(std::move(writer));
+}
+
+// The file's name where it is one of the writer's.
+std::optional<std::string> WrittenNames::name_of_file(const Writer& writer, const fs::path& file) const
+{
+    if (file.parent_path() != writer.folder) return std::nullopt;
+    const std::string name = file.filename();
+    if (!writer.pattern) return name == writer.name ? std::optional(name) : std::nullopt;
+    const std::optional<int> frame = frame_of(name, *writer.pattern);
+    return frame && writer.frames.contains(*frame) ? std::optional(name) : std::nullopt;
+}
+
+std::optional<std::string> WrittenNames::common_name(const Writer& a, const Writer& b) const
+{
+    if (!a.pattern) return name_of_file(b, a.folder / a.name);
+    if (!b.pattern) return name_of_file(a, b.folder / b.name);
+    if (a.folder != b.folder) return std::nullopt;
+    // Of patterns that differ in the number of digits the longest numbers are alike.
+    for (const std::int64_t frame : {a.frames.first, a.frames.last})
+        if (const auto at = number(frame); at && a.pattern->expand(*at) == b.pattern->expand(*at))
+            return a.pattern->expand(*at);
+    return std::nullopt;
+}
+
+void WrittenNames::check(const Writer& writer) const
+{
+    for (const Writer& other : writers_)
+        if (const auto name = common_name(writer, other))
+            throw Error(fmt::format("{} writes {}, too; give each a name of its own", other.who, *name));
+    for (const fs::path& file : read_)
+        if (const auto name = name_of_file(writer, file))
+            throw Error(fmt::format("the run reads {}; write to another name", *name));
+}
+
+}  // namespace rapid

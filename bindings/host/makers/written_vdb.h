@@ -1,0 +1,19 @@
+// The name of a .vdb file that a script writes.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+// Error: another extension; a script writes no other files than these, over those of the user.
+inline void require_vdb(const std::string& path)
+{
+    if (!path.ends_with(".vdb"))
+        throw Error(fmt::format("path = \"{}\": grids are written as .vdb; give a name such as \"surface.vdb\"", path));
+}
+
+}  // namespace rapid

@@ -1,0 +1,8 @@
+// The least edge of a voxel of a grid that is made. OpenVDB refuses a map whose determinant is below 1e-15 m³.
+#pragma once
+
+namespace rapid {
+
+constexpr double least_voxel = 2e-5;  // m
+
+}  // namespace rapid

@@ -63,6 +63,8 @@ local setter_text = {
 -- As Solve holds P and v within a frame.
 getter_text.vec3d, setter_text.vec3d = getter_text.vec3, setter_text.vec3
 
+local most_names = 65000 -- about; each is one of the 65,536 constants that a function has
+
 local operators = {
   "__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__concat", "__len", "__lt", "__le", "__call",
 }
@@ -354,7 +356,11 @@ return run, set_params
   function refuse.use(wanted, value)
     error(("p:rand takes %s, not %s"):format(wanted, describe.value(value)), 0)
   end
-  local make = assert(loadstring(table.concat(text, "\n"), "=[rapid runner]"))
+  local make = loadstring(table.concat(text, "\n"), "=[rapid runner]")
+  if not make then
+    error(("reads and writes %d attributes and groups; a kernel has at most about %d"):format(
+      #layout.columns + #layout.groups, most_names), 0)
+  end
   local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
   local holder = { values = {}, details = {} }
   local run, set_params = make(ffi, vec3, quat, kernel, pointer, shared.frame_type, shared.draw, shared.adopt,

@@ -105,6 +105,9 @@ local function make(native, load_node, numeric, shapes, studies)
       nodes[i] = math.floor(length / voxel + 1.5)
       if not (length >= 0 and nodes[i] < 2 ^ 15) then fault("size", "at least 0 m, and below 32,768 voxels") end
     end
+    local all = nodes[1] * nodes[2] * nodes[3]
+    local bytes = 48 * all -- of the list, which grows by halves
+    native.require_memory(("rapid.grid.from: %.3g nodes"):format(all), bytes, "give a larger voxel")
     local values, n = {}, 0
     for i = 0, nodes[1] - 1 do
       for j = 0, nodes[2] - 1 do

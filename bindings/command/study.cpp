@@ -31,6 +31,14 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+int read_repeat(const std::string& text)
+{
+    constexpr std::int64_t most = 100000;
+    const std::int64_t runs = read_whole("--repeat", text, 1);
+    if (runs > most) throw Error(fmt::format("--repeat = {}; it must be at most {}", runs, most));
+    return static_cast<int>(runs);
+}
+
 // One line on standard error: redrawn on a terminal, one a row elsewhere.
 class StudyProgress {
 public:
@@ -121,8 +129,7 @@ public:
             ->check(CLI::IsMember({"all", "last"}))
             ->type_name("all|last");
         app.add_option_function<std::string>(
-               "--repeat",
-               [this](const std::string& text) { repeat_ = static_cast<int>(read_whole("--repeat", text, 1)); },
+               "--repeat", [this](const std::string& text) { repeat_ = read_repeat(text); },
                fmt::format("timed runs of each row, of which the median is shown [default {}, or what the study says]",
                            defaults.repeat_runs))
             ->type_name("N");

@@ -10,6 +10,7 @@
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
 #include "runtime/at_node.h"
+#include "runtime/graph/make_node.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {
@@ -126,7 +127,7 @@ int make_node(State& state)
     copy_table(state.lua(), 2);
     const std::map<std::string, ObjectPtr> kernels = take_kernels(state, type, 2);
     return construct(state, [&]() -> ObjectPtr {
-        auto node = std::make_shared<Node>();
+        auto node = make_node();
         node->type = &type;
         node->location = where(state);
         node->serial = host.graph.nodes.size();

@@ -1,9 +1,13 @@
 #include "bindings/host/handle_memory.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <lua.hpp>
 
+#include "runtime/graph/node_handle.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/memory_budget.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/placed.h"
@@ -17,8 +21,11 @@ constexpr char counts_field[] = "rapid.handle_memory";  // in the registry
 
 constexpr std::size_t least_held = std::size_t{16} << 20;  // bytes that are not worth a collection
 
+constexpr std::size_t piece = std::size_t{64} << 20;  // bytes that are asked for at once
+
 struct Counts {
     std::size_t held = 0, most = least_held;
+    std::size_t left = piece;  // of the last one; the first is not asked for
 };
 
 Counts& counts_of(lua_State* L)
@@ -36,6 +43,8 @@ constexpr std::size_t bytes_of_upper_nodes = 8 * (32 * 32 * 32 + 16 * 16 * 16) *
 // Bytes of an object's arrays, roughly.
 std::size_t weight_of(const Object& object)
 {
+    constexpr std::size_t bytes_of_node = 1024;  // of a graph's
+    if (dynamic_cast<const NodeHandle*>(&object)) return bytes_of_node;
     // A level set is two grids of floats, OpenVDB's and the one for queries, whose blocks are about half full.
     constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
     constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // of grids that do not tell their size
@@ -63,9 +72,16 @@ void hold(lua_State* L, const Object& object)
     if (bytes == 0) return;
     Counts& counts = counts_of(L);
     counts.held += bytes;
-    if (counts.held <= counts.most) return;
+    const bool asks = counts.left < bytes, full = asks && !fits_in_memory(piece);
+    counts.left = asks ? piece : counts.left - bytes;
+    if (!full && counts.held <= counts.most) return;
     lua_gc(L, LUA_GCCOLLECT, 0);
     counts.most = std::max(least_held, 2 * counts.held);
+    if (!full) return;
+    malloc_trim(0);  // what the collector has let go
+    if (!fits_in_memory(piece))
+        throw beyond_memory("a further 64 MiB of nodes, level sets, meshes and points", piece,
+                            "let the scene make fewer");
 }
 
 void release(lua_State* L, const Object& object)

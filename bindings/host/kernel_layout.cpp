@@ -8,6 +8,7 @@
 #include "bindings/host/chunk.h"
 #include "bindings/host/kernel_lanes.h"
 #include "bindings/host/lua_text.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -63,6 +64,20 @@ rapid_chunk* push_chunk(lua_State* L, std::size_t pointers)
 
 void KernelLayout::make_writable(PointSet& points) const
 {
+    double bytes = 0;  // of columns that have had one value for all points
+    std::size_t expanded = 0;
+    const auto add = [&]<class T>(const Column<T>& column) {
+        if (!column.is_uniform()) return;
+        bytes += static_cast<double>(points.size()) * sizeof(T);
+        ++expanded;
+    };
+    for (const Entry& entry : columns)
+        if (entry.writable) std::visit(add, *points.find(entry.name));
+    for (const Entry& entry : groups)
+        if (entry.writable) add(points.group(entry.name));
+    if (!fits_in_memory(bytes))
+        throw beyond_memory(fmt::format("{} attributes and groups of {} points", expanded, points.size()), bytes,
+                            "let the kernel write fewer");
     for (const Entry& entry : columns)
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
     for (const Entry& entry : groups)

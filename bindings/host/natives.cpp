@@ -18,6 +18,7 @@
 #include "bindings/host/script_type.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/io/frame_pattern.h"
+#include "runtime/memory_budget.h"
 #include "runtime/points/point_names.h"
 #include "runtime/points/token.h"
 #include "runtime/printable.h"
@@ -60,6 +61,20 @@ int names_frames(State& state)
 {
     lua_pushboolean(state.lua(), FramePattern(text_at(state.lua(), 1)).has_frame());
     return 1;
+}
+
+// native.require_memory(what, bytes, remedy): an error where so many bytes are not free, or more than scripts may take.
+int require_memory(State& state)
+{
+    const double bytes = lua_tonumber(state.lua(), 2);
+    const std::string what = text_at(state.lua(), 1), remedy = text_at(state.lua(), 3);
+    if (const auto most = static_cast<double>(state.host().options().script_memory); bytes > most)
+        throw Error(
+            fmt::format("{} would take about {:.0f} MiB of Lua's memory, which has {:.0f}; {}, or set "
+                        "--script-memory",
+                        what, bytes / 0x1p20, most / 0x1p20, remedy));
+    if (!fits_in_memory(bytes)) throw beyond_memory(what, bytes, remedy);
+    return 0;
 }
 
 int kind_of(State& state)
@@ -232,6 +247,7 @@ void push_natives(State& state, const std::string& chunk_header)
                                       {"did_you_mean", native<suggest>},
                                       {"kind", native<kind_of>},
                                       {"names_frames", native<names_frames>},
+                                      {"require_memory", native<require_memory>},
                                       {"text", native<text_of_number>},
                                       {"number", native<number_of_text>},
                                       {"print", native<print_text>},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "runtime/graph/make_node.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {
@@ -45,7 +46,7 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
     result.file = graph.file;
     std::map<const Node*, NodePtr> replaced;
     for (const NodePtr& node : graph.nodes) {  // inputs come before their consumers
-        auto copy = std::make_shared<Node>(*node);
+        auto copy = make_node(*node);
         for (NodePtr& input : copy->inputs) input = replaced.at(input.get());
         if (const auto found = changes.find(node.get()); found != changes.end())
             for (const auto& [name, value] : found->second) copy->arguments[name] = value;

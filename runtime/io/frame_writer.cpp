@@ -171,6 +171,10 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
             write_points(path, points, frame);
     } catch (Error& error) {
         throw error.at({path, 0});
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {  // of a library
+        throw Error(error.what()).at({path, 0});
     }
     const double spent = stopwatch.seconds();
     std::error_code ignored;

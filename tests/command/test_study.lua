@@ -259,6 +259,8 @@ return rapid.create { points = rapid.points.grid { size = {0.6, 0.9, 0.3}, spaci
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,1 --reference 2"):find("has the value 1 twice", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --sweep attract.core=0,1 --reference solve.substeps=2")
       :find("are all left for the step along a line", 1, true))
+    assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --reference 4 --repeat 999999999999")
+      :find("--repeat = 999999999999; it must be at most 100000", 1, true))
     assert.truthy(message("orbit.lua"):find("the file returns no study", 1, true))
     assert.truthy(message("gone.lua --reference 5"):find("--reference goes with --sweep", 1, true))
     assert.truthy(message("none.lua"):find("none.lua: No such file", 1, true))

@@ -32,11 +32,18 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     // of 3 to 10, where a third to two thirds of a leaf is in the band.
     constexpr double bytes_a_voxel = 64;
 
-    const Vec3d across = bounds.sizes() / options.voxel + Vec3d::Constant(2 * options.half_width);  // voxels
-    const double in_band = area / (options.voxel * options.voxel) * 2 * options.half_width;
-    const double voxels = std::min(in_band, across.prod());
+    // Far from the surface leaves are whole.
+    constexpr double bytes_a_voxel_around = 16;
+
+    // Of a convex body the band outside is area h + M h² + 4/3 pi h³ (Steiner's formula), and M is at most that of the
+    // bounds, pi times the sum of their edges.
+    const double h = options.half_width;  // voxels
+    const Vec3d size = bounds.sizes() / options.voxel, across = size + Vec3d::Constant(2 * h);
+    const double in_band = area / (options.voxel * options.voxel) * 2 * h;
+    const double around = M_PI * size.sum() * h * h + 4.0 / 3 * M_PI * h * h * h;
+    const double near = std::min(in_band, across.prod()), voxels = std::min(near + around, across.prod());
     const double indexed = (across / BakedGrid::block + Vec3d::Constant(2)).prod();
-    const double bytes = voxels * bytes_a_voxel + indexed * sizeof(std::int32_t);
+    const double bytes = near * bytes_a_voxel + (voxels - near) * bytes_a_voxel_around + indexed * sizeof(std::int32_t);
 
     // The larger voxel for which the band (which shrinks with its square) and the index (with its cube) fit.
     const auto larger = [&](double band_excess, double index_excess) {

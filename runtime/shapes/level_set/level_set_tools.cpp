@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "runtime/error.h"
+#include "runtime/shapes/level_set/least_voxel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/placed.h"
 
@@ -164,6 +165,9 @@ LevelSetPtr moved(const LevelSetPtr& shape, const Pose& pose)
         return std::make_shared<PlacedLevelSet>(turned->rest(), pose * turned->pose());
     if (!pose.rotation.vec().isZero(0)) return std::make_shared<PlacedLevelSet>(shape, pose);
     const GridPtr grid = std::dynamic_pointer_cast<const GridLevelSet>(shape);
+    if (const double voxel = pose.scale * grid->voxel(); !(voxel >= least_voxel))
+        throw Error(fmt::format("the scaled level set would have voxels of {:g} m; they must be at least {:g} m", voxel,
+                                least_voxel));
     auto transform = grid->grid().transform().copy();
     transform->postScale(pose.scale);
     transform->postTranslate({pose.translation.x(), pose.translation.y(), pose.translation.z()});

@@ -1,8 +1,11 @@
 #include "runtime/shapes/level_set/placed.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
+#include "runtime/error.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 
 namespace rapid {
@@ -114,6 +117,16 @@ void PlacedLevelSet::write(const std::filesystem::path& path, const std::string&
     resample_level_set(std::make_shared<PlacedLevelSet>(rest(), pose()), voxel())->write(path, grid);
 }
 
-ShapePtr placed(const ShapePtr& rest, const Pose& pose) { return std::make_shared<PlacedOf<Shape>>(rest, pose); }
+ShapePtr placed(const ShapePtr& rest, const Pose& pose)
+{
+    constexpr int most = 1000;  // each asks the one that it moves, on the stack
+    int moves = 1;
+    for (const Shape* shape = rest.get(); const auto* outer = dynamic_cast<const PlacedOf<Shape>*>(shape); ++moves)
+        shape = outer->rest().get();
+    if (moves > most)
+        throw Error(fmt::format("a {} that is moved more than {} times; move it once, by a product of the motions",
+                                rest->kind(), most));
+    return std::make_shared<PlacedOf<Shape>>(rest, pose);
+}
 
 }  // namespace rapid

@@ -1,5 +1,7 @@
 #include "runtime/shapes/motion/motion.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -24,7 +26,17 @@ private:
 
 class ProductMotion final : public Motion {
 public:
-    ProductMotion(MotionPtr first, MotionPtr second) : first_(std::move(first)), second_(std::move(second)) {}
+    ProductMotion(MotionPtr first, MotionPtr second)
+        : first_(std::move(first)), second_(std::move(second)), factors_(factors_of(*first_) + factors_of(*second_))
+    {
+        // Each asks its factors, one inside of the other: the stack of a thread has room for some thousands.
+        constexpr double most = 1000;
+        if (factors_ > most)
+            throw Error(
+                fmt::format("a product of {:g} motions, of which some vary; at most {} are taken: compute them "
+                            "in one function of the frame",
+                            factors_, most));
+    }
     Pose at(const Frame& frame) const override { return first_->at(frame) * second_->at(frame); }
     FrameRange range() const override
     {
@@ -34,7 +46,14 @@ public:
     }
 
 private:
+    static double factors_of(const Motion& motion)
+    {
+        const auto* product = dynamic_cast<const ProductMotion*>(&motion);
+        return product ? product->factors_ : 1;
+    }
+
     MotionPtr first_, second_;
+    double factors_;  // a product with itself has twice as many
 };
 
 class BackwardMotion final : public Motion {

@@ -365,6 +365,13 @@ function conditions.ISF(at) return at.program:inverse(truth_of(reg(at, at.d))) e
 -- With a copy where the jump is taken.
 conditions.ISTC, conditions.ISFC = conditions.IST, conditions.ISF
 
+-- What a kernel does that no program does, by its instruction.
+local beyond = {
+  TNEW = "it makes a table", TDUP = "it makes a table", FNEW = "it makes a function", CAT = "it joins texts",
+  LEN = "it takes a length", LOOP = "it has a loop", ITERC = "it has a loop", ITERN = "it has a loop",
+  USETV = "it assigns an upvalue", UCLO = "it makes a function",
+}
+
 -- One instruction of a path. Returns "return" and values; "jump" and where; "branch", a flag and where; or nothing.
 local function step(at)
   local name = at.name
@@ -376,7 +383,7 @@ local function step(at)
     return "branch", flag, at.pc + 1 + rshift(jump, 16) - 0x7fff
   end
   if statements[name] then return nil, statements[name](at) end
-  if not effects[name] then give_up("it has a " .. name) end
+  if not effects[name] then give_up(beyond[name] or "it has the instruction " .. name) end
   local value = effects[name](at)
   if at.state then at.state.regs[at.a] = value end
 end

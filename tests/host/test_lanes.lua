@@ -186,8 +186,8 @@ return rapid.node { name = "swell", doc = "larger", params = { by = { "float", d
   it("tells why it is none", function()
     for body, reason in pairs {
       ["for k = 1, frame.number do p.heat = p.heat + k end"] = "it has a loop whose steps are not known",
-      ["local t = { p.heat } p.heat = t[1]"] = "it has a TNEW",
-      ["while true do p.heat = 1 break end"] = "it has a LOOP",
+      ["local t = { p.heat } p.heat = t[1]"] = "it makes a table",
+      ["while true do p.heat = 1 break end"] = "it has a loop",
     } do
       local _, _, none = both(head .. ("  :points(\"k\", function(p, frame)\n%s\nend) :solve {}"):format(body))
       assert.equal(1, #none)

@@ -279,6 +279,15 @@ void FrameFiles::claim(WrittenNames& names, const FrameSelection& frames) const
             }
 }
 
+void FrameFiles::claim(const std::filesystem::path& folder, const std::string& who) const
+{
+    for (const auto& [pattern, node, location] : of_nodes_) try {
+            claim_among_processes(folder, who, FramePattern(pattern).of_output("main"));
+        } catch (const Error& error) {
+            throw Error(fmt::format("file = \"{}\": {}", pattern, error.message())).in_node(node).at(location);
+        }
+}
+
 void FrameFiles::resolve(Target& target, const Plan& plan) const
 {
     std::vector<std::string> outputs;

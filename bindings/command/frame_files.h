@@ -55,6 +55,8 @@ public:
 
     // Adds the names of all files. After resolve(). Error: one that another has, or that is read.
     void claim(WrittenNames& names, const FrameSelection& frames) const;
+    // The same of the files of nodes, among processes (claim_among_processes).
+    void claim(const std::filesystem::path& folder, const std::string& who) const;
 
     // The files of -o that a frame has, and how they are made besides: two of one path that are made alike are the
     // same.

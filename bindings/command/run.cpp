@@ -57,6 +57,7 @@ public:
                      "the same");
         app.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
         untrusted_.declare(app, "graph");
+        app.add_option("--claims", claims_)->group("");  // internal: where rows of a wedge note what they write
         app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
         farm_.declare(app);
         app.add_option_function<std::string>(
@@ -119,6 +120,7 @@ public:
             }
             files_.resolve(plan, !frames.single());
             files_.claim(names_, frames);
+            if (!claims_.empty()) files_.claim(claims_, stats_);
             if (farm_.asked()) return submit(plan);
             events_.begin();
             if (cache_.asked()) {
@@ -230,6 +232,7 @@ private:
             std::filesystem::create_directories(cache_.folder());
             access.writable.push_back(cache_.folder());
         }
+        if (!claims_.empty()) access.writable.push_back(claims_);
         for (const std::string& file : {stats_, profile_, events_.path()}) {
             if (file.empty()) continue;
             access.writable.push_back(folder_of(file));
@@ -352,7 +355,7 @@ private:
     PartOptions part_;
     std::shared_ptr<PartRecord> record_;  // null where all points are simulated
     std::optional<InputContents> read_;   // of a part
-    std::string stats_, profile_;
+    std::string stats_, profile_, claims_;
     EventFile events_;
     WrittenNames names_;
     bool computes_ = false;  // frames: what they read is not noted

@@ -86,7 +86,11 @@ public:
         const auto statistics_of = [&](std::size_t row) { return statistics.path() / fmt::format("{}.json", row); };
         const int signal = run_processes(
             rows.size(), static_cast<int>(std::min(jobs_, static_cast<std::int64_t>(rows.size()))),
-            [&](std::size_t row) { return words_of(rows[row], statistics_of(row), folder, common); },
+            [&](std::size_t row) {
+                std::vector<std::string> words = words_of(rows[row], statistics_of(row), folder, common);
+                words.push_back("--claims=" + statistics.path().string());
+                return words;
+            },
             [&](std::size_t row, const EndedProcess& ended) { report.ended(row, ended, statistics_of(row)); });
         if (signal != 0) return signal;
         return report.finish() ? status_done : status_failed;

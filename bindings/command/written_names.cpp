@@ -1,12 +1,18 @@
 #include "bindings/command/written_names.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <limits>
 
 #include "runtime/error.h"
+#include "runtime/files/content_hash.h"
+#include "runtime/files/file_error.h"
+#include "runtime/files/input_file.h"
 
 namespace rapid {
 namespace {
@@ -97,6 +103,20 @@ void WrittenNames::check(const Writer& writer) const
     for (const fs::path& file : read_)
         if (const auto name = name_of_file(writer, file))
             throw Error(fmt::format("the run reads {}; write to another name", *name));
+}
+
+// A note is a file that only one process makes.
+void claim_among_processes(const fs::path& folder, const std::string& who, const fs::path& file)
+{
+    const fs::path note = folder / (hash_text(content_hash(place_of(file).native())) + ".claim");
+    const Descriptor made(::open(note.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (!made && errno != EEXIST) throw file_error(fmt::format("can't write {}", note.string()), errno);
+    if (made) {
+        if (::write(made.number(), who.data(), who.size()) != static_cast<ssize_t>(who.size()))
+            throw file_error(fmt::format("can't write {}", note.string()), errno);
+    } else if (InputFile(note).text() != who) {
+        throw Error("another row of the wedge writes it, too; put a parameter that is varied into its name");
+    }
 }
 
 }  // namespace rapid

@@ -40,4 +40,8 @@ private:
     std::vector<Writer> writers_;
 };
 
+// Among processes: notes in the folder that the file is that of `who`. Error: it is another's.
+void claim_among_processes(const std::filesystem::path& folder, const std::string& who,
+                           const std::filesystem::path& file);
+
 }  // namespace rapid

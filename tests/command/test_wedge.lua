@@ -132,6 +132,30 @@ describe("rapid wedge", function()
     end
   end)
 
+  it("fails of a row whose nodes write what another row's do", function()
+    folder:write("written.lua", [[
+local rapid = require "rapid"
+local rate = rapid.param("rate", 24, "points a second")
+local own = rapid.param("own", false, "whether a row has files of its own")
+return rapid.create {} :emit { source = rapid.shape.box {}, rate = rate }
+  :write { file = own and ("own_%d.####.ply"):format(rate) or "same.####.ply" } :solve {}
+]])
+    local function run(arguments)
+      return command.rapid("wedge written.lua -f 1-3 --vary rate=24,48 " .. arguments, { cwd = folder.path })
+    end
+    for _, more in ipairs { "", "--jobs 2", "--untrusted" } do
+      local same = run("--again " .. more)
+      assert.equal(1, same.status)
+      local told = same.stdout .. same.stderr
+      assert.truthy(told:find('file = "same.####.ply": another row of the wedge writes it, too; put a parameter that '
+        .. "is varied into its name", 1, true), told)
+    end
+    local own = run "--set own=true"
+    assert.equal("", own.stderr)
+    assert.equal(0, own.status)
+    assert.truthy(folder:read "own_24.0003.ply" ~= folder:read "own_48.0003.ply")
+  end)
+
   it("ends its rows with itself, and leaves whole files alone", function()
     local result = command.shell([[
       "$RAPID" wedge box.lua --vary rate=24000,48000 --jobs 2 -f 1-100000 -o "$PWD/long/{rate}.####.csv" &

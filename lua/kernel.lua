@@ -356,8 +356,9 @@ return run, set_params
   function refuse.use(wanted, value)
     error(("p:rand takes %s, not %s"):format(wanted, describe.value(value)), 0)
   end
-  local make = loadstring(table.concat(text, "\n"), "=[rapid runner]")
+  local make, message = loadstring(table.concat(text, "\n"), "=[rapid runner]")
   if not make then
+    if not message:find("constants", 1, true) then error(message, 0) end -- no memory
     error(("reads and writes %d attributes and groups; a kernel has at most about %d"):format(
       #layout.columns + #layout.groups, most_names), 0)
   end

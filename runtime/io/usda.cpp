@@ -234,7 +234,7 @@ std::string attribute_of_property(std::string_view name)
 Column<Token> texts_of(const UsdArray& array, std::size_t size)
 {
     std::vector<Token> texts(array.rows());
-    std::memcpy(static_cast<void*>(texts.data()), array.bytes.data(), array.bytes.size());
+    if (!texts.empty()) std::memcpy(static_cast<void*>(texts.data()), array.bytes.data(), array.bytes.size());
     if (texts.size() != size) return Column<Token>(size, texts[0], Token());
     return Column<Token>(std::span<const Token>(texts));
 }

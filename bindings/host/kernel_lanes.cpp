@@ -31,7 +31,7 @@ constexpr std::pair<std::string_view, LaneProgram::Function2> functions2[] = {
 
 // The functions below read fields of the table at the top of the stack.
 
-double number_of(lua_State* L, int place)
+double number_at(lua_State* L, int place)
 {
     lua_rawgeti(L, -1, place);
     const double number = lua_tonumber(L, -1);
@@ -84,7 +84,7 @@ std::vector<LaneInstruction> instructions_of(lua_State* L, const char* field)
         lua_getfield(L, -1, "op");
         const LaneOperation operation = lane_operation(text_at(L, -1));
         lua_pop(L, 1);
-        const auto operand = [&](int place) { return static_cast<std::uint16_t>(number_of(L, place)); };
+        const auto operand = [&](int place) { return static_cast<std::uint16_t>(number_at(L, place)); };
         if (!operation) throw Error("lua/lanes.lua has an operation that is none");
         code.push_back({operation, operand(1), operand(2), operand(3), operand(4), operand(5)});
     });
@@ -95,7 +95,7 @@ LaneProgram program_of(lua_State* L)
 {
     LaneProgram program;
     with_field(L, "constants", [&](int size) {
-        for (int k = 1; k <= size; ++k) program.constants.push_back(number_of(L, k));
+        for (int k = 1; k <= size; ++k) program.constants.push_back(number_at(L, k));
     });
     program.inputs = size_of(L, "inputs");
     program.slots = size_of(L, "slots");

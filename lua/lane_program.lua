@@ -7,7 +7,7 @@ jit.off(true, true) -- it runs once for a kernel
 
 local most_nodes = 4000
 
--- Where the program ends: the reason is for tests.
+-- The kernel is no program, or what a path does from here on is beyond it; the reason is told to who asks.
 local function give_up(reason)
   error({ reason = reason }, 0)
 end
@@ -43,7 +43,6 @@ end
 -- The node of an operation; the same for the same one. number: of a column, a group, a function, a constant.
 function Program:emit(op, a, b, c, number, varies)
   local key = ("%s %s %s %s %s"):format(op, a or "", b or "", c or "", number and ("%.17g"):format(number) or "")
-  if number == 0 and 1 / number < 0 then key = key .. "-" end
   local id = self.known[key]
   if id then return id end
   local nodes = self.nodes

@@ -5,7 +5,7 @@
 
 #include "bindings/host/kernel_moment.h"
 #include "runtime/elementary.h"
-#include "runtime/lanes/lane_program.h"
+#include "runtime/lanes/kernel_random.h"
 #include "runtime/noise.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"

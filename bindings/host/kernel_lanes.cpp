@@ -40,23 +40,16 @@ double number_at(lua_State* L, int place)
 }
 
 template <class Use>
-void with_field(lua_State* L, const char* field, const Use& use)
-{
-    lua_getfield(L, -1, field);
-    use(static_cast<int>(lua_objlen(L, -1)));
-    lua_pop(L, 1);
-}
-
-template <class Use>
 void each_element(lua_State* L, const char* field, const Use& use)
 {
-    with_field(L, field, [&](int size) {
-        for (int k = 1; k <= size; ++k) {
-            lua_rawgeti(L, -1, k);
-            use();
-            lua_pop(L, 1);
-        }
-    });
+    lua_getfield(L, -1, field);
+    const int size = static_cast<int>(lua_objlen(L, -1));
+    for (int k = 1; k <= size; ++k) {
+        lua_rawgeti(L, -1, k);
+        use();
+        lua_pop(L, 1);
+    }
+    lua_pop(L, 1);
 }
 
 std::size_t size_of(lua_State* L, const char* field)
@@ -94,9 +87,7 @@ std::vector<LaneInstruction> instructions_of(lua_State* L, const char* field)
 LaneProgram program_of(lua_State* L)
 {
     LaneProgram program;
-    with_field(L, "constants", [&](int size) {
-        for (int k = 1; k <= size; ++k) program.constants.push_back(number_at(L, k));
-    });
+    each_element(L, "constants", [&] { program.constants.push_back(lua_tonumber(L, -1)); });
     program.inputs = size_of(L, "inputs");
     program.slots = size_of(L, "slots");
     program.shared = instructions_of(L, "shared");

@@ -9,6 +9,7 @@
 
 #include "runtime/elementary.h"
 #include "runtime/items.h"
+#include "runtime/lanes/kernel_random.h"
 #include "runtime/lanes/lane_tile.h"
 
 namespace rapid {
@@ -122,14 +123,6 @@ bool call2(Tile& tile, const Now& now)
     const double *const a = tile.numbers(now.a), *const b = tile.numbers(now.b);
     std::transform(a, a + Tile::points, b, tile.numbers(now.to), tile.program.functions2[now.number]);
     return true;
-}
-
-// The key of the numbers of a frame.
-RandomKey key_in_frame(RandomKey key, double frame)
-{
-    const auto mixed = uniform4(key, std::bit_cast<std::uint64_t>(frame), ~std::uint64_t{0});
-    key.value ^= static_cast<std::uint64_t>(mixed[0] * 0x1p32) << 32 | static_cast<std::uint64_t>(mixed[1] * 0x1p32);
-    return key;
 }
 
 // t = kernel_random() of the use a and the frame b; c: whether all points share these
@@ -390,21 +383,6 @@ LaneOperation lane_operation(std::string_view name)
     const auto found = std::find_if(std::begin(operations), std::end(operations),
                                     [&](const auto& operation) { return operation.first == name; });
     return found == std::end(operations) ? nullptr : found->second;
-}
-
-double kernel_random(RandomKey key, std::uint64_t id, double use, double frame)
-{
-    // The points of a pass share the key: it takes as long as a number.
-    thread_local struct {
-        std::uint64_t random = 0;
-        double frame = 0;
-        RandomKey key;
-    } last;
-    if (frame != 0) {
-        if (last.random != key.value || last.frame != frame) last = {key.value, frame, key_in_frame(key, frame)};
-        key = last.key;
-    }
-    return uniform53(key, id, std::bit_cast<std::uint64_t>(use + 0.0));
 }
 
 }  // namespace rapid

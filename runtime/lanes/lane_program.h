@@ -70,9 +70,6 @@ struct LaneChunk {
     std::span<const double> inputs;
 };
 
-// The random number of a kernel (p:rand); frame: 0, or the frame's number where the numbers differ from frame to frame.
-double kernel_random(RandomKey key, std::uint64_t id, double use, double frame);
-
 // Runs programs, in memory of its own.
 class LaneRunner {
 public:

@@ -59,6 +59,7 @@ describe("a kernel as a program of lanes", function()
     ["functions of the C library"] = "p.heat = math.tan(p.P.x) + math.atan(p.P.y) + math.atan2(p.P.y, p.P.z + 0.01) "
       .. "+ math.log(1.5 + math.abs(p.P.x)) + math.log10(2 + p.P.x ^ 2) + math.tanh(p.P.z) + math.sinh(p.P.x) "
       .. "+ math.cosh(p.P.y) + math.asin(p:rand(1)) + math.acos(-p:rand(2))",
+    ["zeros of both signs"] = "p.heat = math.atan2(-0.0, -1) + 3 * math.atan2(0.0, -1) + p.P.x",
     ["angles that are large"] = "p.heat = math.sin(p.P.x * 1e5) + math.cos(p.P.y * 1e9)",
     ["the least and the largest"] = "p.heat = math.max(math.min(p.P.x, p.P.y, 0.5), p.P.z, -0.25)",
     ["vectors"] = "p.v = (p.P + p.v * 2 - tint) / 3 * p.P + -tint:cross(p.v) * p.P:dot(p.v)",
@@ -117,6 +118,21 @@ return rapid.node { name = "swell", doc = "larger", params = { by = { "float", d
     local lanes, single, none = both(text, {1, 5})
     assert.same({}, none)
     assert.same(single, lanes)
+  end)
+
+  it("follows a flag that chooses what it does, and changes", function()
+    scene.folder:write("grow.lua", [[
+local rapid = require "rapid"
+return rapid.node { name = "grow", doc = "larger, or smaller",
+  params = { up = { "bool", default = true, doc = "larger" } },
+  points = function(p, _, params) if params.up then p.heat = p.heat * 3 else p.heat = p.heat * 0.5 end end }
+]])
+    local text = head .. "  :grow { up = function(frame) return frame.number % 2 == 0 end } :solve {}"
+    for last = 2, 5 do
+      local lanes, single, none = both(text, {1, last})
+      assert.same({}, none)
+      assert.same(single, lanes)
+    end
   end)
 
   it("is none that writes a text, or another type", function()

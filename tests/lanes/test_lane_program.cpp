@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "runtime/lanes/kernel_random.h"
 #include "runtime/lanes/lane_program.h"
 #include "tests/test.h"
 

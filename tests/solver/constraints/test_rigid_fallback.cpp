@@ -129,6 +129,13 @@ TEST_CASE("what is linked to a point at rest, or drawn to a place, stays where i
     CHECK(body.kinetic() == 0);
 }
 
+static void give_up(Body& body)
+{
+    RigidFallback fallback;
+    fallback.begin(body.step);
+    fallback.apply(body.step, body.all, nullptr);
+}
+
 TEST_CASE("a body without a solution goes along with the surfaces that draw it, by their stiffness", "[rigid_fallback]")
 {
     Body body(3, 4, false);
@@ -142,10 +149,8 @@ TEST_CASE("a body without a solution goes along with the surfaces that draw it, 
     if (both) springs[2] = {1 * body.inverse_mass[2], rest.get(), 0.5};
     body.step.mobility = mobility;
     body.step.surface_springs = springs;
-    RigidFallback fallback;
-    fallback.begin(body.step);
     const std::vector<Vec3d> start = body.start;
-    fallback.apply(body.step, body.all, nullptr);
+    give_up(body);
     const Vec3d by = both ? Vec3d(0.75 * V) : V;
     for (const std::uint32_t i : body.all) {
         CHECK_THAT(body.places()[i], test::close_to(Vec3d(start[i] + 0.1 * by), 1e-12));
@@ -172,10 +177,8 @@ TEST_CASE("a body without a solution goes as a surface that accelerates and draw
     const std::vector<SurfaceSpring> springs(4, {1, falls.get(), 0.5});  // at the end of a sub-step of 0.1 s
     body.step.mobility = mobility;
     body.step.surface_springs = springs;
-    RigidFallback fallback;
-    fallback.begin(body.step);
     const std::vector<Vec3d> start = body.start;
-    fallback.apply(body.step, body.all, nullptr);
+    give_up(body);
     for (const std::uint32_t i : body.all) {
         CHECK_THAT(body.places()[i], test::close_to(Vec3d(start[i] + 0.5 * (0.25 - 0.16) * a), 1e-6));
         CHECK_THAT(body.v[i], test::close_to(Vec3d(0.5 * a), 1e-6));

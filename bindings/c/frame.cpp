@@ -45,7 +45,7 @@ int tell(rapid_error** to, SceneError error) noexcept
 
 rapid_frame* new_frame(SceneFrame frame)
 {
-    auto object = std::shared_ptr<OpenFrame>(new OpenFrame{std::move(frame), {}, {}, {}, {}, {}});
+    auto object = std::shared_ptr<OpenFrame>(new OpenFrame{std::move(frame), {}, {}, {}, {}, {}, {}, {}});
     return static_cast<rapid_frame*>(Frames::add(std::move(object)));
 }
 
@@ -186,6 +186,40 @@ int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value,
 int rapid_frame_write(rapid_frame* frame, const char* path, rapid_error** error)
 {
     return guarded(error, [&] { take(open_frame(frame)->frame.write(&not_null(path, "path"))); });
+}
+
+int rapid_frame_read(const char* path, rapid_frame** frame, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(frame, "frame") = nullptr;
+        *frame = new_frame(take(SceneFrame::read(&not_null(path, "path"))));
+    });
+}
+
+int rapid_frame_describe(rapid_frame* frame, const char** json, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(json, "json") = nullptr;
+        const auto open = open_frame(frame);
+        SceneReport report = take(open->frame.describe());
+        const std::lock_guard lock(open->mutex);
+        open->description = std::move(report.json);
+        *json = open->description.c_str();
+    });
+}
+
+int rapid_frame_compare(rapid_frame* frame, rapid_frame* with, double tolerance, int* same, const char** json,
+                        rapid_error** error)
+{
+    return guarded(error, [&] {
+        if (json) *json = nullptr;
+        const auto open = open_frame(frame);
+        FrameComparison found = take(open->frame.compare(open_frame(with)->frame, tolerance));
+        if (same) *same = found.same;
+        const std::lock_guard lock(open->mutex);
+        open->comparison = std::move(found.report.json);
+        if (json) *json = open->comparison.c_str();
+    });
 }
 
 int rapid_frame_release(rapid_frame* frame, rapid_error** error)

@@ -26,7 +26,7 @@ struct OpenScene {
 struct OpenFrame {
     SceneFrame frame;
     std::mutex mutex;  // of the texts
-    std::string names[4], statistics, picture;
+    std::string names[4], statistics, description, comparison, picture;
     std::map<std::string, SceneValue> details;
 };
 struct OpenError {

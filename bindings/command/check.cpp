@@ -9,8 +9,8 @@
 #include "bindings/command/graph_options.h"
 #include "bindings/command/races.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/threads.h"
 #include "runtime/report/statistics.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

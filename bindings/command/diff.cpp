@@ -8,10 +8,9 @@
 
 #include "bindings/command/cache_files.h"
 #include "bindings/command/command.h"
+#include "bindings/command/or_throw.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/threads.h"
-#include "runtime/io/compare.h"
-#include "runtime/io/format.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {
@@ -66,12 +65,17 @@ private:
         return value;
     }
 
+    FrameComparison compare(const std::string& a, const std::string& b) const
+    {
+        const SceneFrame of_a = or_throw(SceneFrame::read(a)), of_b = or_throw(SceneFrame::read(b));
+        return or_throw(of_a.compare(of_b, tolerance_));
+    }
+
     int compare_files() const
     {
-        const Comparison comparison = compare(read_points(a_), read_points(b_), tolerance_);
-        print(json_ ? to_json(comparison).dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
-                    : to_text(comparison));
-        return comparison.same ? status_done : status_failed;
+        const FrameComparison found = compare(a_, b_);
+        print(json_ ? ordered_json::parse(found.report.json).dump(2) + '\n' : found.report.text);
+        return found.same ? status_done : status_failed;
     }
 
     // A frame that only one sequence has is a difference.
@@ -85,15 +89,14 @@ private:
         std::size_t different = 0;
         ordered_json frames = ordered_json::array();
         for (const int frame : both) {
-            const Comparison comparison =
-                compare(read_points(a.frames.at(frame)), read_points(b.frames.at(frame)), tolerance_);
-            different += !comparison.same;
+            const FrameComparison found = compare(a.frames.at(frame), b.frames.at(frame));
+            different += !found.same;
             if (json_) {
                 ordered_json json = {{"frame", frame}};
-                json.update(to_json(comparison));
+                json.update(ordered_json::parse(found.report.json));
                 frames.push_back(std::move(json));
-            } else if (!comparison.same) {
-                print(fmt::format("frame {}\n{}", frame, to_text(comparison)));
+            } else if (!found.same) {
+                print(fmt::format("frame {}\n{}", frame, found.report.text));
             }
         }
         const bool same = different == 0 && only_a.empty() && only_b.empty();

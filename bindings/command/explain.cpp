@@ -10,10 +10,10 @@
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/threads.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/explain.h"
 #include "runtime/printable.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -6,8 +6,8 @@
 #include "bindings/command/graphviz.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/whole_file.h"
-#include "bindings/host/threads.h"
 #include "runtime/report/graph_picture.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -5,14 +5,12 @@
 
 #include "bindings/command/cache_files.h"
 #include "bindings/command/command.h"
+#include "bindings/command/or_throw.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/threads.h"
-#include "runtime/files/left_out.h"
-#include "runtime/io/describe.h"
-#include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/number_text.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {
@@ -46,23 +44,19 @@ public:
                 all.push_back(tell_snapshot(path));
                 continue;
             }
-            std::vector<std::string> dropped;
-            const PointSummary summary = threads.run([&, &file = path] {
-                const LeftOut left_out;
-                const PointSet points = read_points(file);
-                dropped = left_out.list();
-                return describe(points);
-            });
+            const SceneFrame points = threads.run([&, &file = path] { return or_throw(SceneFrame::read(file)); });
+            const SceneReport report = threads.run([&] { return or_throw(points.describe()); });
             if (json_) {
                 ordered_json json = {{"file", path.string()}};
                 if (cache.sequence) json["frame"] = frame;
-                json.update(to_json(summary));
-                json["left_out"] = dropped;
+                json.update(ordered_json::parse(report.json));
+                json["left_out"] = points.warnings();
                 all.push_back(std::move(json));
             } else {
                 if (cache.sequence) print(printable(path.string()) + "\n");
-                print(to_text(summary));
-                for (const std::string& what : dropped) print(fmt::format("left out    {}\n", printable(what)));
+                print(report.text);
+                for (const std::string& what : points.warnings())
+                    print(fmt::format("left out    {}\n", printable(what)));
             }
         }
         if (json_)

@@ -10,13 +10,13 @@
 #include "bindings/command/part_options.h"
 #include "bindings/command/part_record.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/threads.h"
 #include "runtime/first_error.h"
 #include "runtime/frame.h"
 #include "runtime/io/format.h"
 #include "runtime/io/frame_pattern.h"
 #include "runtime/io/merge_parts.h"
 #include "runtime/points/column_files.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -8,12 +8,12 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "bindings/host/threads.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/override.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/id_order.h"
 #include "runtime/stopwatch.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -7,8 +7,8 @@
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/threads.h"
 #include "runtime/report/biography.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -16,13 +16,13 @@
 #include "bindings/command/signals.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/host/modules.h"
-#include "bindings/host/threads.h"
 #include "bindings/view/requests.h"
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
 #include "runtime/files/output_file.h"
 #include "runtime/files/program_path.h"
 #include "runtime/memory_budget.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -2,10 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_error.h"
+#include "runtime/files/left_out.h"
+#include "runtime/io/compare.h"
+#include "runtime/io/describe.h"
 #include "runtime/io/format.h"
 #include "runtime/report/statistics.h"
 
@@ -182,6 +186,44 @@ Result<Done> SceneFrame::write(const std::string& path) const
         info.fps = fps();
         write_points(path, data_->result.outputs.at(output_), info);
         return Done();
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<SceneFrame> SceneFrame::read(const std::string& path)
+{
+    try {
+        auto data = std::make_shared<Data>();
+        const LeftOut left_out;
+        data->result.outputs.emplace("main", read_points(path));
+        data->result.fps.emplace("main", FrameInfo().fps);
+        data->result.time.emplace("main", 0);
+        data->warnings = left_out.list();
+        return SceneFrame(std::move(data), "main");
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<SceneReport> SceneFrame::describe() const
+{
+    try {
+        const PointSummary summary = rapid::describe(data_->result.outputs.at(output_));
+        return SceneReport{to_text(summary), to_json(summary)};
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<FrameComparison> SceneFrame::compare(const SceneFrame& other, double tolerance) const
+{
+    try {
+        if (!(tolerance >= 0) || !std::isfinite(tolerance))
+            refuse(fmt::format("tolerance = {}; it must be a number, at least 0", tolerance));
+        const Comparison found =
+            rapid::compare(data_->result.outputs.at(output_), other.data_->result.outputs.at(other.output_), tolerance);
+        return FrameComparison{found.same, {to_text(found), to_json(found)}};
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }

@@ -341,6 +341,17 @@ int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value,
 
 /* Writes a file of a format that Rapid knows, by the extension. */
 int rapid_frame_write(rapid_frame* frame, const char* path, rapid_error** error);
+/* The points of such a file as a frame, of number and time 0; of what the file holds besides there are RAPID_WARNINGS.
+ * *frame is to be released. */
+int rapid_frame_read(const char* path, rapid_frame** frame, rapid_error** error);
+/* How many points there are, their bounds, the range of each attribute, the groups: an object, as that of
+ * `rapid info --json`. It belongs to the frame, until it is described again. */
+int rapid_frame_describe(rapid_frame* frame, const char** json, rapid_error** error);
+/* Compares the points of two frames by their ids: *same is 1 where positions differ by at most `tolerance` times the
+ * diagonal of the bounds of both, other floats relatively, and all else is equal. *json is an object, as that of
+ * `rapid diff --json`, and belongs to `frame`, until it is compared again. Either may be NULL. */
+int rapid_frame_compare(rapid_frame* frame, rapid_frame* with, double tolerance, int* same, const char** json,
+                        rapid_error** error);
 /* A picture with the shapes of its scene, as the bytes of a .png; they belong to the frame until the next picture. */
 int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int height, const void** png, size_t* bytes,
                         rapid_error** error);

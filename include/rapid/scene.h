@@ -155,6 +155,18 @@ struct FrameStatisticsSummary {
     double seconds = 0, script_seconds = 0, solve_seconds = 0;  // wall time: in all, and of parts
 };
 
+// What is told of something.
+struct SceneReport {
+    std::string text;  // for people: lines, as the command prints them
+    std::string json;  // the same for programs, in one line
+};
+
+// What is different in two frames.
+struct FrameComparison {
+    bool same = true;    // within the tolerance
+    SceneReport report;  // as `rapid diff` prints it
+};
+
 // A computed frame: columns by name, shared with the scene until the scene writes them (copy-on-write). Copying one
 // copies a pointer. A frame that is released before the next advance() spares the scene a copy of the columns that it
 // changes.
@@ -197,6 +209,17 @@ public:
     // Writes the points to a file of a format that Rapid knows, by the extension; missing folders are made. The file
     // has its name when it is complete. Error: an unknown extension, with the known ones; the system's.
     Result<Done> write(const std::string& path) const;
+    // The points of such a file as a frame with the one output "main", of number and time 0; of what the file holds
+    // besides there are warnings(). Error: an extension that is unknown, or only written; the system's; a file that is
+    // damaged.
+    static Result<SceneFrame> read(const std::string& path);
+
+    // How many points there are, their bounds, the range of each attribute, the groups: as `rapid info` prints it.
+    Result<SceneReport> describe() const;
+    // Compares the points of this frame, called A, with those of another one, B, by their ids. Positions are the same
+    // within `tolerance` times the diagonal of the bounds of both, other floats relatively, all else when it is equal.
+    // Error: a tolerance that is negative or no number.
+    Result<FrameComparison> compare(const SceneFrame& other, double tolerance = 1e-6) const;
 
 private:
     friend class Scene;

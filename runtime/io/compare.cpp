@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <tuple>
 
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/id_order.h"
+#include "runtime/json_text.h"
 #include "runtime/parallel.h"
 #include "runtime/printable.h"
 
@@ -270,14 +270,13 @@ std::string group_text(const AttributeDifference& d, std::size_t width)
 }
 
 // JSON has no infinity: null stands for a difference that is not finite.
-nlohmann::ordered_json json_number(double value)
+// The name of a type; null of what a set lacks.
+void add_type(JsonText& json, const std::string& type)
 {
-    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
-
-nlohmann::ordered_json json_type(const std::string& type)
-{
-    return type.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(type);
+    if (type.empty())
+        json.value(nullptr);
+    else
+        json.value(type);
 }
 
 }  // namespace
@@ -296,29 +295,48 @@ std::string to_text(const Comparison& comparison)
     return text;
 }
 
-nlohmann::ordered_json to_json(const Comparison& comparison)
+std::string to_json(const Comparison& comparison)
 {
-    nlohmann::ordered_json json = {{"same", comparison.same},
-                                   {"points", {comparison.points_a, comparison.points_b}},
-                                   {"compared", comparison.compared},
-                                   {"only_a", comparison.only_a},
-                                   {"only_b", comparison.only_b},
-                                   {"tolerance", comparison.tolerance},
-                                   {"tolerance_P", comparison.tolerance_P}};
-    json["attributes"] = nlohmann::ordered_json::array();
-    for (const AttributeDifference& d : comparison.attributes)
-        json["attributes"].push_back({{"name", d.name},
-                                      {"types", {json_type(d.type_a), json_type(d.type_b)}},
-                                      {"max", json_number(d.max)},
-                                      {"rms", json_number(d.rms)},
-                                      {"p95", json_number(d.p95)},
-                                      {"worst_id", d.worst_id},
-                                      {"different", d.different},
-                                      {"same", d.same}});
-    json["groups"] = nlohmann::ordered_json::array();
-    for (const AttributeDifference& d : comparison.groups)
-        json["groups"].push_back({{"name", d.name}, {"different", d.different}, {"same", d.same}});
-    return json;
+    JsonText json;
+    json.begin_object();
+    json.member("same", comparison.same);
+    json.member("points", std::vector{comparison.points_a, comparison.points_b});
+    json.member("compared", comparison.compared);
+    json.member("only_a", comparison.only_a);
+    json.member("only_b", comparison.only_b);
+    json.member("tolerance", comparison.tolerance);
+    json.member("tolerance_P", comparison.tolerance_P);
+    json.key("attributes");
+    json.begin_list();
+    for (const AttributeDifference& d : comparison.attributes) {
+        json.begin_object();
+        json.member("name", d.name);
+        json.key("types");
+        json.begin_list();
+        add_type(json, d.type_a);
+        add_type(json, d.type_b);
+        json.end();
+        json.member("max", d.max);  // null: infinite
+        json.member("rms", d.rms);
+        json.member("p95", d.p95);
+        json.member("worst_id", d.worst_id);
+        json.member("different", d.different);
+        json.member("same", d.same);
+        json.end();
+    }
+    json.end();
+    json.key("groups");
+    json.begin_list();
+    for (const AttributeDifference& d : comparison.groups) {
+        json.begin_object();
+        json.member("name", d.name);
+        json.member("different", d.different);
+        json.member("same", d.same);
+        json.end();
+    }
+    json.end();
+    json.end();
+    return json.text();
 }
 
 }  // namespace rapid

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -45,6 +44,6 @@ struct Comparison {
 // difference, unless there are no points.
 Comparison compare(const PointSet& a, const PointSet& b, double tolerance = 1e-6);
 std::string to_text(const Comparison& comparison);
-nlohmann::ordered_json to_json(const Comparison& comparison);
+std::string to_json(const Comparison& comparison);  // an object, in one line
 
 }  // namespace rapid

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/text_table.h"
+#include "runtime/json_text.h"
 #include "runtime/printable.h"
 
 namespace rapid {
@@ -75,6 +75,11 @@ std::string byte_count(std::size_t bytes)
     return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
 }
 
+void add_corner(JsonText& json, const char* name, const Vec3f& P)
+{
+    json.member(name, std::vector{P.x(), P.y(), P.z()});
+}
+
 }  // namespace
 
 PointSummary describe(const PointSet& points)
@@ -129,28 +134,47 @@ std::string to_text(const PointSummary& summary)
     return text;
 }
 
-nlohmann::ordered_json to_json(const PointSummary& summary)
+std::string to_json(const PointSummary& summary)
 {
-    nlohmann::ordered_json json = {{"points", summary.points}, {"bytes", summary.bytes}};
+    JsonText json;
+    json.begin_object();
+    json.member("points", summary.points);
+    json.member("bytes", summary.bytes);
     if (!summary.bounds.isEmpty()) {
-        const Vec3f low = summary.bounds.min(), high = summary.bounds.max();
-        json["bounds"] = {{"min", {low.x(), low.y(), low.z()}}, {"max", {high.x(), high.y(), high.z()}}};
+        json.key("bounds");
+        json.begin_object();
+        add_corner(json, "min", summary.bounds.min());
+        add_corner(json, "max", summary.bounds.max());
+        json.end();
     }
-    json["attributes"] = nlohmann::ordered_json::array();
+    json.key("attributes");
+    json.begin_list();
     for (const AttributeSummary& a : summary.attributes) {
-        json["attributes"].push_back({{"name", a.name},
-                                      {"type", type_name(a.type)},
-                                      {"uniform", a.uniform},
-                                      {"min", a.min},
-                                      {"max", a.max},
-                                      {"not_finite", a.not_finite}});
-        if (a.type != AttributeType::String) continue;
-        json["attributes"].back()["texts"] = a.texts;
-        json["attributes"].back()["first_texts"] = a.first_texts;
+        json.begin_object();
+        json.member("name", a.name);
+        json.member("type", std::string(type_name(a.type)));
+        json.member("uniform", a.uniform);
+        json.member("min", a.min);
+        json.member("max", a.max);
+        json.member("not_finite", a.not_finite);
+        if (a.type == AttributeType::String) {
+            json.member("texts", a.texts);
+            json.member("first_texts", a.first_texts);
+        }
+        json.end();
     }
-    json["groups"] = nlohmann::ordered_json::array();
-    for (const GroupSummary& g : summary.groups) json["groups"].push_back({{"name", g.name}, {"points", g.members}});
-    return json;
+    json.end();
+    json.key("groups");
+    json.begin_list();
+    for (const GroupSummary& g : summary.groups) {
+        json.begin_object();
+        json.member("name", g.name);
+        json.member("points", g.members);
+        json.end();
+    }
+    json.end();
+    json.end();
+    return json.text();
 }
 
 }  // namespace rapid

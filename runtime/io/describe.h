@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -35,6 +34,6 @@ struct PointSummary {
 
 PointSummary describe(const PointSet& points);
 std::string to_text(const PointSummary& summary);
-nlohmann::ordered_json to_json(const PointSummary& summary);
+std::string to_json(const PointSummary& summary);  // an object, in one line
 
 }  // namespace rapid

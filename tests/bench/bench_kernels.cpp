@@ -18,7 +18,7 @@
 #include <random>
 
 #include "bindings/host/script_host.h"
-#include "bindings/host/threads.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

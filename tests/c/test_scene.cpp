@@ -4,12 +4,13 @@
 #include <thread>
 
 #include "include/rapid/rapid.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 namespace rapid {
 namespace {
 
-using Catch::Contains;
+using Catch::Contains, Catch::StartsWith;
 
 const char* const fall = R"(
 local rapid = require "rapid"
@@ -178,6 +179,29 @@ TEST_CASE("a column of texts is of tokens in C, in both directions", "[c]")
     rapid_offers_release(offers, nullptr);
 }
 
+TEST_CASE("points are written, read, described and compared in C", "[c]")
+{
+    const test::TemporaryFolder folder;
+    rapid_scene* scene = opened();
+    rapid_frame *first = nullptr, *second = nullptr, *read = nullptr;
+    REQUIRE(rapid_scene_advance(scene, &first, nullptr) == RAPID_OK);
+    REQUIRE(rapid_scene_advance(scene, &second, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_write(first, (folder / "fall.npz").c_str(), nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_read((folder / "fall.npz").c_str(), &read, nullptr) == RAPID_OK);
+    const char *json = nullptr, *of_read = nullptr;
+    REQUIRE(rapid_frame_describe(first, &json, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_describe(read, &of_read, nullptr) == RAPID_OK);
+    CHECK_THAT(json, StartsWith("{\"points\":"));
+    int same = -1;
+    REQUIRE(rapid_frame_compare(read, first, 0, &same, nullptr, nullptr) == RAPID_OK);
+    CHECK(same == 1);
+    REQUIRE(rapid_frame_compare(first, second, 0, &same, &json, nullptr) == RAPID_OK);
+    CHECK(same == 0);
+    CHECK_THAT(json, StartsWith("{\"same\":false,"));
+    for (rapid_frame* frame : {first, second, read}) rapid_frame_release(frame, nullptr);
+    rapid_scene_close(scene, nullptr);
+}
+
 TEST_CASE("wrong offers in C are errors by name", "[c]")
 {
     rapid_offers* offers = nullptr;
@@ -312,6 +336,14 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("call", [&](rapid_error** e) { return rapid_call_add_rod(nullptr, 0, 1, 1, 0, e); });
     refused("info", [&](rapid_error** e) { return rapid_frame_get_info(frame, nullptr, e); });
     refused("path", [&](rapid_error** e) { return rapid_frame_write(frame, nullptr, e); });
+    refused("path", [&](rapid_error** e) {
+        rapid_frame* read = nullptr;
+        return rapid_frame_read(nullptr, &read, e);
+    });
+    refused("frame", [&](rapid_error** e) { return rapid_frame_read("points.csv", nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_frame_describe(frame, nullptr, e); });
+    refused("frame", [&](rapid_error** e) { return rapid_frame_compare(frame, nullptr, 0, nullptr, nullptr, e); });
+    CHECK(rapid_frame_compare(frame, frame, 0, nullptr, nullptr, nullptr) == RAPID_OK);
     CHECK(rapid_scene_set(scene, nullptr, 0, nullptr) == RAPID_OK);
     rapid_frame_release(frame, nullptr);
     rapid_scene_close(scene, nullptr);

@@ -279,6 +279,25 @@ const std::vector<Function>& functions()
              const test::TemporaryFolder folder;
              return rapid_frame_write(h.frame, (folder / "fall.csv").c_str(), e);
          }},
+        {"rapid_frame_read", "",
+         [](const Handles&, rapid_error** e) {
+             const test::TemporaryFolder folder;
+             rapid_frame* frame = nullptr;
+             const int status =
+                 rapid_frame_read(folder.write("two.csv", "Px,Py,Pz\n0,0,0\n1,0,0\n").c_str(), &frame, e);
+             return released(rapid_frame_release, frame, status);
+         }},
+        {"rapid_frame_describe", "f",
+         [](const Handles& h, rapid_error** e) {
+             const char* json = nullptr;
+             return rapid_frame_describe(h.frame, &json, e);
+         }},
+        {"rapid_frame_compare", "f",
+         [](const Handles& h, rapid_error** e) {
+             int same = 0;
+             const char* json = nullptr;
+             return rapid_frame_compare(h.frame, h.frame, 0, &same, &json, e);
+         }},
         {"rapid_scene_picture", "sf",
          [](const Handles& h, rapid_error** e) {
              const void* png = nullptr;
@@ -484,6 +503,11 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("\"x\"", [&](auto e) { return rapid_frame_detail(h.frame, "x", &value, e); });
     refused(".xyz", [&](auto e) { return rapid_frame_write(h.frame, "points.xyz", e); });
     refused("/dev/null", [&](auto e) { return rapid_frame_write(h.frame, "/dev/null/points.csv", e); });
+    refused("nowhere.csv", [&](auto e) { return rapid_frame_read("nowhere.csv", &frame, e); });
+    refused(".png", [&](auto e) { return rapid_frame_read("points.png", &frame, e); });
+    for (const double wrong : {-1.0, double(NAN)})
+        refused("tolerance = ",
+                [&](auto e) { return rapid_frame_compare(h.frame, h.frame, wrong, nullptr, nullptr, e); });
     refused("column is NULL", [&](auto e) { return rapid_frame_group(h.frame, "all", nullptr, e); });
     refused("value is NULL", [&](auto e) { return rapid_frame_detail(h.frame, "count", nullptr, e); });
     for (const int width : {0, -1, 1 << 30})

@@ -96,6 +96,8 @@ void read(rapid_scene* scene, rapid_frame* frame)
     done("frame_get_info", rapid_frame_get_info(frame, &info, &error));
     done("frame_statistics", rapid_frame_statistics(frame, &words, &error));
     done("frame_names", rapid_frame_names(frame, RAPID_COLUMNS, &words, &error));
+    done("frame_describe", rapid_frame_describe(frame, &words, &error));
+    done("frame_compare", rapid_frame_compare(frame, frame, 0, nullptr, &words, &error));
     done("node_types", rapid_scene_node_types(scene, &words, &error));
     done("picture", rapid_scene_picture(scene, frame, 32, 18, &png, &bytes, &error));
     const int status = rapid_frame_column(frame, "nothing", &column, &error);

@@ -128,6 +128,28 @@ def ball(P, gradient, center=(0, 1, 0), radius=0.5):
         gradient[:] = d / numpy.maximum(length, 1e-300)[:, None]
     return length - radius
 
+    def test_points_are_read_described_and_compared(self):
+        scene = fall()
+        first, second = scene.advance(), scene.advance()
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "fall.bgeo"
+            first.write(path)
+            read = rapid.read(path)
+            with self.assertRaisesRegex(rapid.Error, "nothing.bgeo"):
+                rapid.read(path.with_name("nothing.bgeo"))
+        self.assertEqual((read.number, len(read), read.outputs), (0, 16, ["main"]))
+        numpy.testing.assert_array_equal(read["P"], first["P"])
+        self.assertEqual(read.describe(), first.describe() | {"bytes": read.describe()["bytes"]})
+        self.assertEqual(first.describe()["bounds"]["min"][1], 10)
+        self.assertTrue(read.compare(first, 0)["same"])
+        found = second.compare(first, 0)
+        self.assertFalse(found["same"])
+        self.assertAlmostEqual(found["attributes"][0]["max"], 9.81 / 2 / 24 ** 2, places=5)
+        with self.assertRaises(rapid.Error):
+            first.compare(second, -1)
+        with self.assertRaisesRegex(rapid.Error, "no scene"):
+            read.show()
+
 
 class Offers(unittest.TestCase):
     def test_points_of_arrays(self):

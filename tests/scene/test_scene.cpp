@@ -3,7 +3,9 @@
 #include "include/rapid/scene.h"
 
 #include <chrono>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <thread>
 
 #include "tests/files/temporary_folder.h"
@@ -536,6 +538,91 @@ TEST_CASE("a frame is shown as a picture, and written", "[scene]")
     const auto file = folder.path() / "points.csv";
     good(frame.write(file.string()));
     CHECK(std::filesystem::file_size(file) > 10 * frame.size());
+}
+
+TEST_CASE("points that were written are read, to the bit", "[scene]")
+{
+    const TemporaryFolder folder;
+    Scene scene = opened(cloud);
+    const SceneFrame frame = good(scene.advance_to(4));
+    REQUIRE(frame.size() > 1000);
+    good(frame.write(folder / "cloud.bgeo"));
+    const SceneFrame read = good(SceneFrame::read(folder / "cloud.bgeo"));
+    CHECK(read.outputs() == std::vector<std::string>{"main"});
+    CHECK(read.number() == 0);
+    CHECK(read.time() == 0);
+    CHECK(read.warnings().empty());
+    CHECK(read.details().empty());
+    CHECK(read.statistics().points == frame.size());
+    CHECK(read.columns() == frame.columns());
+    const SceneColumn P = *frame.column("P"), P_read = *read.column("P");
+    REQUIRE(P_read.count == P.count);
+    for (std::size_t i = 0; i < P.count; ++i) REQUIRE(std::memcmp(P.at<float>(i), P_read.at<float>(i), 12) == 0);
+    CHECK(good(frame.compare(read, 0)).same);
+    good(read.write(folder / "again.csv"));
+    CHECK(good(SceneFrame::read(folder / "again.csv")).size() == frame.size());
+    CHECK_THAT(scene.picture(read).error().message, Contains("another scene"));
+}
+
+TEST_CASE("what of a file is no point is told", "[scene]")
+{
+    const TemporaryFolder folder;
+    const SceneFrame read = good(SceneFrame::read(folder.write(
+        "corner.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")));
+    CHECK(read.size() == 3);
+    CHECK(read.warnings() == std::vector<std::string>{"its 1 elements \"face\""});
+}
+
+TEST_CASE("a file that can't be read is an error that names it", "[scene]")
+{
+    const TemporaryFolder folder;
+    const auto fault = [](const std::string& file) {
+        const Result<SceneFrame> read = SceneFrame::read(file);
+        REQUIRE_FALSE(read);
+        CHECK(read.error().kind == SceneError::WrongCall);
+        return read.error().text();
+    };
+    CHECK_THAT(fault(folder / "nothing.bgeo"), StartsWith((folder / "nothing.bgeo").string()));
+    CHECK_THAT(fault(folder / "nothing.png"), Contains(".png file holds no points"));
+    CHECK_THAT(fault(folder / "nothing.xyz"), Contains(".bgeo") && Contains(".csv"));
+    CHECK_THAT(fault(""), Contains(".bgeo"));
+    CHECK_THAT(fault(folder.write("torn.bgeo", "BgeoV")), Contains("torn.bgeo"));
+}
+
+TEST_CASE("a frame is described", "[scene]")
+{
+    Scene scene = opened(
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 1, 2}, {3, 5, 7}}, heat = {2, 2} } } :solve {}");
+    const SceneReport report = good(good(scene.advance()).describe());
+    CHECK_THAT(report.json, StartsWith(R"({"points":2,)"));
+    CHECK_THAT(report.json, Contains(R"("bounds":{"min":[0.0,1.0,2.0],"max":[3.0,5.0,7.0]})"));
+    CHECK_THAT(report.json, Contains(R"({"name":"heat","type":"float","uniform":true,"min":[2.0],"max":[2.0])"));
+    CHECK_THAT(report.text, Contains("bounds      0 1 2  to  3 5 7\n") && Contains("2 everywhere"));
+}
+
+TEST_CASE("frames are compared by the ids of their points, within a tolerance", "[scene]")
+{
+    const char* const text =
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {3, 4, 0}} } }"
+        ":points('move', function(p, frame) if frame.number == 2 and p.id == 1 then p.P = p.P + vec3(1, 0, 0) end end)"
+        ":solve {}";
+    Scene scene = opened(text);
+    const SceneFrame a = good(scene.advance()), b = good(scene.advance());
+    const FrameComparison found = good(a.compare(b));
+    CHECK_FALSE(found.same);
+    CHECK_THAT(found.report.json, StartsWith(R"({"same":false,"points":[2,2],"compared":2,)"));
+    CHECK_THAT(found.report.json, Contains(R"("max":1.0)") && Contains(R"("worst_id":1)"));
+    CHECK_THAT(found.report.text, StartsWith("different: 2 and 2 points"));
+    CHECK(good(a.compare(a, 0)).same);
+    // 1 m, where the diagonal of the bounds of both is sqrt(32).
+    CHECK_FALSE(good(a.compare(b, 0.99 / std::sqrt(32))).same);
+    CHECK(good(a.compare(b, 1.01 / std::sqrt(32))).same);
+    for (const double wrong : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+        CHECK(a.compare(b, wrong).error().kind == SceneError::WrongCall);
 }
 
 TEST_CASE("node types and nodes are listed", "[scene]")

@@ -20,7 +20,8 @@ from ._library import (Column, Error, Find, FrameInfo, Log, Node, Options, Param
 
 from ._offers import Constraint, Edit, Force, Held, Mesh, Points, Shape, from_numpy, make_offers
 
-__all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy"]
+__all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy",
+           "read"]
 __version__ = library.rapid_version().decode()
 
 _types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8, numpy.uint32]
@@ -131,8 +132,21 @@ class Frame:
         """Writes the points to a file of a format that Rapid knows, by the extension."""
         call("frame_write", self._handle.value, str(path).encode())
 
+    def describe(self):
+        """What `rapid info` tells: how many points there are, their bounds, the range of each attribute, the groups."""
+        return json.loads(get("frame_describe", self._handle.value, c_char_p()).value)
+
+    def compare(self, other, tolerance=1e-6):
+        """What `rapid diff` tells of the differences to another frame, between points of the same id; whether there are
+        none beyond the tolerance is in ["same"]."""
+        text = c_char_p()
+        call("frame_compare", self._handle.value, other._handle.value, tolerance, None, byref(text))
+        return json.loads(text.value)
+
     def show(self, width=640, height=360):
         """A picture, with the shapes of the scene."""
+        if self._scene is None:
+            raise Error("wrong call", "the frame was read from a file, and has no scene to be shown with")
         data, size = c_void_p(), c_size_t()
         call("scene_picture", self._scene._handle.value, self._handle.value, width, height, byref(data), byref(size))
         return Picture(ctypes.string_at(data.value, size.value))
@@ -168,6 +182,13 @@ class _Memory:
         self._frame = frame
         self.__array_interface__ = {"version": 3, "data": (address, True), "shape": shape, "strides": strides,
                                     "typestr": dtype.str}
+
+
+def read(path):
+    """The points of a file of a format that Rapid knows, by the extension, as a Frame of number 0."""
+    handle = c_void_p()
+    call("frame_read", str(path).encode(), byref(handle))
+    return Frame(handle, None)
 
 
 class Snapshot:

@@ -11,9 +11,51 @@ thread_local const Cancellation* of_thread = nullptr;
 
 const Cancellation* Cancellation::current() { return of_thread; }
 
+void Cancellation::request(const std::string& why)
+{
+    const std::lock_guard lock(mutex_);
+    if (!is_requested()) why_ = why;
+    requested_.store(true, std::memory_order_relaxed);
+}
+
+void Cancellation::forget()
+{
+    const std::lock_guard lock(mutex_);
+    requested_.store(false, std::memory_order_relaxed);
+}
+
+void Cancellation::fail() const
+{
+    const std::lock_guard lock(mutex_);
+    throw Error(why_);
+}
+
 void Cancellation::check_current()
 {
     if (of_thread) of_thread->check();
+}
+
+Error Cancellation::error(const std::string& message) const
+{
+    Error result(message);
+    const std::lock_guard lock(mutex_);
+    if (place_) result.in_node(place_->node_).at(place_->location_);
+    return result;
+}
+
+Cancellation::Place::Place(const std::string& node, const Location& location)
+    : of_(of_thread), node_(node), location_(location)
+{
+    if (!of_) return;
+    const std::lock_guard lock(of_->mutex_);
+    before_ = std::exchange(of_->place_, this);
+}
+
+Cancellation::Place::~Place()
+{
+    if (!of_) return;
+    const std::lock_guard lock(of_->mutex_);
+    of_->place_ = before_;
 }
 
 Cancellation::Scope::Scope(const Cancellation* cancellation) : before_(std::exchange(of_thread, cancellation)) {}

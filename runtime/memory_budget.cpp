@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
 
-std::atomic<std::uint64_t> budget{0};             // 0: not yet known
+std::atomic<std::uint64_t> budget{0};  // 0: not yet known
+std::atomic<bool> is_budget_set{false};
 thread_local std::uint64_t budget_of_thread = 0;  // 0: that of the process
 
 // The first number of a file; none where there is none, as in "max".
@@ -74,11 +75,6 @@ std::uint64_t free_in_groups()
     return least;
 }
 
-std::string gibibytes(double bytes)
-{
-    return bytes < 0x1p30 ? fmt::format("{:.0f} MiB", bytes / 0x1p20) : fmt::format("{:.1f} GiB", bytes / 0x1p30);
-}
-
 }  // namespace
 
 std::uint64_t memory_budget()
@@ -92,15 +88,20 @@ std::uint64_t memory_budget()
     return bytes;
 }
 
-void set_memory_budget(std::uint64_t bytes) { budget = bytes; }
+void set_memory_budget(std::uint64_t bytes)
+{
+    budget = bytes;
+    is_budget_set = true;
+}
+
+bool is_memory_limited() { return budget_of_thread != 0 || is_budget_set; }
 
 MemoryBudget::MemoryBudget(std::uint64_t bytes) : before_(std::exchange(budget_of_thread, bytes)) {}
 MemoryBudget::~MemoryBudget() { budget_of_thread = before_; }
 
 bool fits_in_memory(double bytes)
 {
-    constexpr double negligible = 64 << 20;
-    if (bytes < negligible) return true;
+    if (bytes < static_cast<double>(negligible_memory)) return true;
     return static_cast<double>(own_memory()) + bytes <= static_cast<double>(memory_budget());
 }
 
@@ -108,7 +109,12 @@ Error beyond_memory(const std::string& what, double bytes, const std::string& re
 {
     const double most = static_cast<double>(memory_budget()), used = static_cast<double>(own_memory());
     return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set --memory", what,
-                             gibibytes(bytes), gibibytes(std::max(0.0, most - used)), gibibytes(most), remedy));
+                             memory_text(bytes), memory_text(std::max(0.0, most - used)), memory_text(most), remedy));
+}
+
+std::string memory_text(double bytes)
+{
+    return bytes < 0x1p30 ? fmt::format("{:.0f} MiB", bytes / 0x1p20) : fmt::format("{:.1f} GiB", bytes / 0x1p30);
 }
 
 }  // namespace rapid

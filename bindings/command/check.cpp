@@ -1,12 +1,12 @@
 // rapid check: finds all errors that can be found before the first frame, and stiff nodes, without running a frame;
 // with --races, runs frames to find kernels that keep state from point to point.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
+#include "bindings/command/memory_limit.h"
 #include "bindings/command/races.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/report/statistics.h"
@@ -45,11 +45,9 @@ public:
             throw Error("-f chooses the frames of --races; without it no frame is run: give both, or leave it out");
         Threads threads(races_ ? 1 : common.threads);
         return threads.run([&] {
-            const auto on_timeout = [&](const std::string& message) {
-                print_error(Error(message), common.verbose);
-                _exit(status_failed);
-            };
-            const std::unique_ptr<Session> session = graph_.load(false, on_timeout);
+            const auto end = end_at_limit(common);
+            const MemoryLimit limit(graph_.file(), end);
+            const std::unique_ptr<Session> session = graph_.load(false, end);
             for (const std::string& warning : session->take_warnings()) print_warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = races_;  // an attribute that no file needs may show the race
@@ -61,7 +59,7 @@ public:
             if (races_ && frames_.last < plan.first_frame())
                 throw Error(
                     fmt::format("-f {} ends before the scene begins, at frame {}", frames_text_, plan.first_frame()));
-            if (races_ && !is_free_of_races(plan, options, on_timeout, common.verbose)) return status_failed;
+            if (races_ && !is_free_of_races(plan, options, end, common.verbose)) return status_failed;
             print(text_of(*session, plan));
             if (!races_) print(advice_on(plan));
             return status_done;

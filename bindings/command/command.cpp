@@ -1,12 +1,14 @@
 #include "bindings/command/command.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 
+#include "runtime/files/output_file.h"
 #include "runtime/printable.h"
 
 namespace rapid {
@@ -59,6 +61,15 @@ void print_warning(const std::string& warning)
     constexpr std::size_t most = 4000;  // bytes, as of an error
     const std::string text = fmt::format("warning: {}\n", printable(shortened(warning, most)));
     std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+std::function<void(const std::string& message)> end_at_limit(const CommonOptions& common)
+{
+    return [verbose = common.verbose](const std::string& message) {
+        print_error(Error(message), verbose);
+        remove_unfinished_files();
+        _exit(status_failed);
+    };
 }
 
 std::int64_t read_whole(const std::string& option, const std::string& text, std::int64_t least)

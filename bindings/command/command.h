@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -50,6 +51,9 @@ void print(std::string_view text);
 // Writes the error to standard error, and with --verbose its trace. Above a progress bar, if there is one.
 void print_error(const Error& error, bool verbose);
 void print_warning(const std::string& warning);
+
+// For limits that are reached in the middle of something, from any thread: prints the message and ends the process.
+std::function<void(const std::string& message)> end_at_limit(const CommonOptions& common);
 
 // Parse values of options. Errors quote the value and say which would be right.
 std::int64_t read_whole(const std::string& option, const std::string& text, std::int64_t least);

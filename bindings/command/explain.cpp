@@ -1,6 +1,5 @@
 // rapid explain: which parts of a scene are kept or left out, and why; and which ones a scene needs over another one.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -9,6 +8,7 @@
 #include "bindings/command/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
+#include "bindings/command/memory_limit.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/explain.h"
@@ -217,11 +217,9 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            const auto on_timeout = [&](const std::string& message) {
-                print_error(Error(message), common.verbose);
-                _exit(status_failed);
-            };
-            const Explanation here = explained(*graph_.load(false, on_timeout));
+            const auto end = end_at_limit(common);
+            const MemoryLimit limit(graph_.file(), end);
+            const Explanation here = explained(*graph_.load(false, end));
             if (against_.empty()) {
                 ordered_json json = json_of(here);
                 if (state_after_) json["state"] = state_;
@@ -229,7 +227,7 @@ public:
                             : text_of(here) + text_of_state());
                 return status_done;
             }
-            const Explanation there = explained(*graph_.load_other(against_, on_timeout));
+            const Explanation there = explained(*graph_.load_other(against_, end));
             const Explanation more = surplus(here, there), less = surplus(there, here);
             if (json_)
                 print(ordered_json{{"graph", graph_.file()},

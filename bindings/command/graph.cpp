@@ -4,6 +4,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/graphviz.h"
+#include "bindings/command/memory_limit.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/whole_file.h"
 #include "runtime/report/graph_picture.h"
@@ -44,6 +45,7 @@ public:
                 "-o {}: dot, a program of its own, lays it out, which --untrusted forbids; write .dot", file_));
         Threads threads(common.threads);
         return threads.run([&] {
+            const MemoryLimit limit(graph_.file(), end_at_limit(common));
             const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
             PlanOptions options;
             options.seed = graph_.seed();

@@ -1,7 +1,6 @@
 #include "bindings/command/graph_options.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "runtime/memory_budget.h"
 
@@ -55,10 +54,7 @@ std::unique_ptr<Session> GraphOptions::load(bool may_write, std::function<void(c
 
 std::unique_ptr<Session> GraphOptions::load_to_look_at(const CommonOptions& common) const
 {
-    std::unique_ptr<Session> session = load(false, [&common](const std::string& message) {
-        print_error(Error(message), common.verbose);
-        _exit(status_failed);
-    });
+    std::unique_ptr<Session> session = load(false, end_at_limit(common));
     for (const std::string& warning : session->take_warnings()) print_warning(warning);
     return session;
 }

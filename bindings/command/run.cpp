@@ -11,6 +11,7 @@
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graceful_end.h"
 #include "bindings/command/graph_options.h"
+#include "bindings/command/memory_limit.h"
 #include "bindings/command/part_options.h"
 #include "bindings/command/part_record.h"
 #include "bindings/command/run_cache.h"
@@ -103,8 +104,9 @@ public:
 
         return threads.run([&] {
             claim_own_files();
-            const std::unique_ptr<Session> session = graph_.load(
-                true, [&](const std::string& message) { report.abandon(status_failed, message); }, on_read());
+            const auto abandon = [&](const std::string& message) { report.abandon(status_failed, message); };
+            const MemoryLimit limit(graph_.file(), abandon);
+            const std::unique_ptr<Session> session = graph_.load(true, abandon, on_read());
             for (const std::string& warning : session->take_warnings()) report.warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
             options.keep_all = keep_all_;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
+#include "bindings/command/memory_limit.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/override.h"
 #include "runtime/io/compare.h"
@@ -52,6 +53,15 @@ json to_event(const Study& study)
             {"repeat_runs", study.repeat_runs}};
 }
 
+// The parent tells it.
+std::function<void(const std::string& message)> end_at_limit(const TellParent& tell)
+{
+    return [tell](const std::string& message) {
+        tell({{"failed", message}, {"refused", false}});
+        _exit(status_done);
+    };
+}
+
 // One scene: its graph, and the session that its scripts live in.
 struct Scene {
     std::unique_ptr<Session> session;
@@ -63,10 +73,7 @@ Scene load(const StudySource& source, const Knobs& knobs, const TellParent& tell
 {
     SessionOptions options = source.session;
     if (!source.is_graph) options.knobs = knobs;
-    options.on_timeout = [tell](const std::string& message) {
-        tell({{"failed", message}, {"refused", false}});
-        _exit(status_done);  // the parent knows
-    };
+    options.on_timeout = end_at_limit(tell);
     Scene scene;
     scene.session = std::make_unique<Session>(source.file, std::move(options));
     scene.graph = source.is_graph ? with_arguments(scene.session->graph(), knobs) : scene.session->graph();
@@ -196,7 +203,10 @@ void guarded(const StudySource& source, const TellParent& tell, const std::funct
     bool started = false;
     std::string failed;
     try {
-        threads.run([&] { work(started); });
+        threads.run([&] {
+            const MemoryLimit limit(source.file, end_at_limit(tell));
+            work(started);
+        });
         return;
     } catch (const std::bad_alloc&) {
         failed = "out of memory";

@@ -6,6 +6,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
+#include "bindings/command/memory_limit.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/report/biography.h"
 #include "runtime/threads.h"
@@ -49,6 +50,7 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
+            const MemoryLimit limit(graph_.file(), end_at_limit(common));
             const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
             PlanOptions options;
             options.seed = graph_.seed();

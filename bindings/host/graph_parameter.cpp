@@ -65,9 +65,10 @@ int declare_parameter(State& state)
     ScriptHost& host = state.host();
     if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param takes a name, a default and a line of documentation");
     const std::string name = text_at(state.lua(), 1);
-    const auto known = std::find_if(host.parameters.begin(), host.parameters.end(),
-                                    [&](const Session::Parameter& p) { return p.name == name; });
-    if (known != host.parameters.end() && !state.is_main()) {
+    const auto place = host.parameter_places.find(name);
+    const Session::Parameter* const known =
+        place == host.parameter_places.end() ? nullptr : &host.parameters[place->second];
+    if (known && !state.is_main()) {
         push(state, known->value);
         return 1;
     }
@@ -84,7 +85,7 @@ int declare_parameter(State& state)
         throw Error(
             fmt::format("rapid.param(\"{}\"): the default is {}; it must be a number, a boolean, a string or a vec3",
                         name, describe(fallback)));
-    if (known != host.parameters.end()) {
+    if (known) {
         if (describe(known->fallback) != describe(fallback))
             throw Error(
                 fmt::format("rapid.param(\"{}\"): its default was {} before and is {} here; give each parameter "
@@ -95,6 +96,7 @@ int declare_parameter(State& state)
     }
     const auto setting = host.options().set.find(name);
     const Value value = setting == host.options().set.end() ? fallback : parse_setting(name, setting->second, fallback);
+    host.parameter_places.emplace(name, host.parameters.size());
     host.parameters.push_back({name, text_at(state.lua(), 3), value, fallback});
     push(state, value);
     return 1;

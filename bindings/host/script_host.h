@@ -5,6 +5,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -29,6 +30,7 @@ public:
     Graph graph;
     Registry registry;
     std::vector<Session::Parameter> parameters;
+    std::map<std::string, std::size_t> parameter_places;  // by name
     std::vector<std::string> warnings;
     const std::shared_ptr<Interruption> shared_interruption;
     Interruption& interruption;

@@ -18,6 +18,7 @@
 #include "bindings/scene/scene_error.h"
 #include "runtime/cancellation.h"
 #include "runtime/memory_budget.h"
+#include "runtime/memory_watch.h"
 #include "runtime/picture/frame_picture.h"
 #include "runtime/picture/png_file.h"
 
@@ -104,10 +105,8 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             return std::move(*value);
         } catch (...) {
             SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
-            if (error.message.find(Cancellation::text) != std::string::npos) {
-                error.kind = SceneError::Cancelled;
-                cancellation.forget();
-            }
+            if (error.message.find(Cancellation::text) != std::string::npos) error.kind = SceneError::Cancelled;
+            if (error.kind == SceneError::Cancelled || error.kind == SceneError::OutOfMemory) cancellation.forget();
             return error;
         }
     }
@@ -227,6 +226,12 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         const Scripts running(*this);
         const Cancellation::Scope scope(&cancellation);
         cancellation.check();
+        const MemoryWatch watch(
+            [this](const std::string& message) {
+                cancellation.request(message);
+                session->interrupt(message);
+            },
+            {});
         auto data = std::make_shared<SceneFrame::Data>();
         try {
             data->result = evaluator->advance();

@@ -227,6 +227,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
 
     const Context context(*this, planned, left, frame);
     const Evaluation& evaluation = *context.evaluation;
+    const Cancellation::Place place(node.name, node.location);
     return at_node(node.name, node.location, [&] {
         if (input_) input_(node, evaluation.frame, inputs);
         const double begin = frame_clock_.seconds();

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "runtime/memory_budget.h"
 #include "runtime/parallel.h"
 #include "runtime/points/members.h"
 #include "runtime/points/neighbours.h"
@@ -45,6 +46,7 @@ public:
         if (const auto* own = points.find<float>("dt")) own_dt_ = own->read();
 
         const Strided<std::uint8_t> members = members_of(points, interaction.group);
+        require_memory(points.size());
         std::vector<Vec3f> places;
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!members[i] || (!at.dead.empty() && at.dead[i])) continue;
@@ -79,6 +81,15 @@ public:
     std::span<const std::uint32_t> members() const { return members_; }
 
 private:
+    // Of as many members as there are points, each in a cell of its own.
+    static void require_memory(std::size_t points)
+    {
+        constexpr double bytes_a_point = 160;  // measured: places, cells, weights, headings, kicks
+        const double bytes = bytes_a_point * static_cast<double>(points);
+        if (!fits_in_memory(bytes))
+            throw beyond_memory(fmt::format("the neighbourhoods of {} points", points), bytes, "let it act on fewer");
+    }
+
     // What a radius that holds all points costs grows with the square of their number, and ends in no lifetime.
     // Estimated from the neighbours of a few members, where it could be too much at all.
     void require_affordable(double steps, int kicks) const

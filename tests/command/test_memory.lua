@@ -1,5 +1,6 @@
 -- --memory: what would need more is refused before it is begun, with numbers and the parameter that would mend it.
 local command = require "testing.command"
+local json = require "dkjson"
 local scene = require "testing.scene"
 
 local grid = "rapid.points.grid { size = {40, 40, 40}, spacing = 1 }"
@@ -24,6 +25,9 @@ local needs = {
   ["return rapid.create { points = " .. grid .. " } :contact { radius = 1e9 } :solve {}"] =
     '^scene%.lua:1: node "contact1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would take about 305%.2 ' ..
     "GiB, .* give a smaller radius, or set %-%-memory",
+  ["return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1 / 190 } } " ..
+    ":interact { radius = 0.001, cohesion = 1 } :solve {}"] = '^scene%.lua:1: node "interact1": the neighbourhoods ' ..
+    "of 6859000 points would take about 1%.0 GiB, and %d+ MiB are free of 1%.0 GiB; let it act on fewer, or set ",
   ["return rapid.create { points = " .. grid .. " } :contact { radius = 3 } :solve {}"] =
     'node "contact1": radius = 3 m: about 4%.[4-9]e%+07 pairs of 64000 points would take about [67]%.%d GiB',
   ["return rapid.create { points = " .. grid .. " } :clump { radius = 1e9 } :solve {}"] =
@@ -37,6 +41,25 @@ describe("--memory", function()
       local result = scene.command("run", text, "-f 1-3 --quiet --memory 1G")
       assert.truthy(result.status == 1 or result.status == 2, text)
       assert.match(expected, result.stderr)
+    end
+  end)
+
+  it("ends what takes more than anybody has estimated, and tells where", function()
+    for text, expected in pairs {
+      [ [[return rapid.create { points = two } :detail("d", function(points, frame)
+  for i = 1, 1e6 do points.detail[("x"):rep(100) .. i .. "_" .. frame.number] = i end
+end) :solve {}]] ] = '^scene%.lua:1: node "d": the run takes [23]%d%d MiB of memory, and may take 200 MiB; ',
+      [ [[local n = rapid.create { points = two } :solve {}
+for i = 1, 8000 do n = n:merge(rapid.create { points = two } :solve {}) end
+return n]] ] = "^scene%.lua: the run takes [23]%d%d MiB of memory, and may take 200 MiB; ",
+      [ [[local t = {}
+for i = 1, 1e8 do t[i] = { i } end]] ] = "^scene%.lua: the run takes [23]%d%d MiB of memory, and may take 200 MiB; ",
+    } do
+      local result = scene.command("run", text, "-f 1-20 --quiet --memory 200M --script-memory 4G --stats peak.json")
+      assert.match(expected .. ".*or set %-%-memory\n$", result.stderr)
+      assert.equal(1, result.status)
+      local peak = json.decode(scene.folder:read "peak.json").peak_bytes
+      assert.truthy(peak < 400 * 2 ^ 20, peak)
     end
   end)
 

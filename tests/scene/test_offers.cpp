@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "include/rapid/scene.h"
 #include "tests/test.h"
@@ -38,8 +37,6 @@ std::string bits_of(const SceneFrame& frame, const char* name)
         bits.append(static_cast<const char*>(column.data) + i * column.stride, 4 * column.components);
     return bits;
 }
-
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 HostShape ball(const std::array<double, 3>& center, double radius)
 {

@@ -481,6 +481,28 @@ TEST_CASE("limits of memory are errors of the scene that has them", "[scene]")
     good(Scene::open_text("grid.lua", grid));
 }
 
+TEST_CASE("a scene whose frames take more memory than it has is an error, and goes on", "[scene]")
+{
+    // Texts of details, a few hundred MiB in each frame, which nobody estimates.
+    const std::string growing =
+        "local rapid = require 'rapid'\n"
+        "local large = rapid.param('large', 1)\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }\n"
+        "  :detail('d', function(points, frame)\n"
+        "    for i = 1, large do points.detail[('x'):rep(100) .. i .. '_' .. frame.number] = i end\n"
+        "  end) :solve {}";
+    SceneOptions options;
+    options.memory = 1;  // 128 MiB are let pass
+    options.set = {{"large", 1e6}};
+    Scene scene = opened(growing, options);
+    const SceneError error = scene.advance_to(9).error();
+    CHECK_THAT(error.message, Contains("the run takes") && Contains("or set --memory"));
+    CHECK(error.kind == SceneError::OutOfMemory);
+    CHECK(error.node == "d");
+    good(scene.set("large", 1.0));
+    CHECK(good(scene.advance_to(4)).size() == 1);
+}
+
 TEST_CASE("scenes on threads of their own give the bits of one after the other", "[scene][threads]")
 {
     const auto bits = [](int seed) {

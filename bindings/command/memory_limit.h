@@ -1,0 +1,31 @@
+// What --memory ends: a command that takes more than it may.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "runtime/cancellation.h"
+#include "runtime/memory_watch.h"
+
+namespace rapid {
+
+// For as long as it lives, what this thread runs ends with an Error of the node where the process takes more memory
+// than --memory gives it. file: the graph. end: called from another thread where that comes too late; it must not
+// return.
+class MemoryLimit {
+public:
+    MemoryLimit(const std::string& file, const std::function<void(const std::string& message)>& end)
+        : watch_([this](const std::string& message) { cancellation_.request(message); },
+                 [this, file, end](const std::string& message) {
+                     end(cancellation_.error(message).at({file, 0}).what());
+                 })
+    {
+    }
+
+private:
+    Cancellation cancellation_;
+    Cancellation::Scope scope_{&cancellation_};
+    MemoryWatch watch_;
+};
+
+}  // namespace rapid

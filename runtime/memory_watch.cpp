@@ -1,0 +1,95 @@
+#include "runtime/memory_watch.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <malloc.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <utility>
+
+#include "runtime/memory_budget.h"
+
+namespace rapid {
+namespace {
+
+constexpr double look_seconds = 0.005;  // in which a run takes some 10 MB
+constexpr double grace_seconds = 1;
+
+// The process's memory that is no file's: libraries and files that are mapped can be let go by the system.
+class OwnMemory {
+public:
+    OwnMemory() : file_(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {}
+    ~OwnMemory()
+    {
+        if (file_ >= 0) ::close(file_);
+    }
+    OwnMemory(const OwnMemory&) = delete;
+    OwnMemory& operator=(const OwnMemory&) = delete;
+
+    // 0 where the system does not say.
+    std::uint64_t bytes() const
+    {
+        std::array<char, 128> text{};
+        unsigned long resident = 0, shared = 0;
+        if (::pread(file_, text.data(), text.size() - 1, 0) <= 0) return 0;
+        if (std::sscanf(text.data(), "%*u %lu %lu", &resident, &shared) != 2) return 0;
+        return (resident - std::min(resident, shared)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    }
+
+private:
+    int file_;
+};
+
+}  // namespace
+
+MemoryWatch::MemoryWatch(Tell beyond, Tell too_late) : beyond_(std::move(beyond)), too_late_(std::move(too_late))
+{
+    if (!is_memory_limited()) return;
+    const std::uint64_t most = std::max(memory_budget(), OwnMemory().bytes() + 2 * negligible_memory);
+    thread_ = std::thread([this, most] { watch(most); });
+}
+
+MemoryWatch::~MemoryWatch()
+{
+    {
+        const std::lock_guard lock(mutex_);
+        is_over_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+}
+
+bool MemoryWatch::ends_within(double seconds)
+{
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return is_over_; });
+}
+
+void MemoryWatch::watch(std::uint64_t most)
+{
+    const OwnMemory memory;
+    std::uint64_t bytes = 0;
+    do {
+        if (ends_within(look_seconds)) return;
+        bytes = memory.bytes();
+        if (bytes <= most) continue;
+        malloc_trim(0);  // what has been freed is the process's still
+        bytes = memory.bytes();
+    } while (bytes <= most);
+
+    const std::string message = fmt::format(
+        "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set "
+        "--memory",
+        memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)));
+    beyond_(message);
+    if (!too_late_) return;
+    for (double waited = 0; waited < grace_seconds && memory.bytes() <= most + most / 16; waited += look_seconds)
+        if (ends_within(look_seconds)) return;
+    too_late_(message);
+}
+
+}  // namespace rapid

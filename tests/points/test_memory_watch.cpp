@@ -1,0 +1,82 @@
+#include "runtime/memory_watch.h"
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+#include <vector>
+
+#include "runtime/memory_budget.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Catch::Matchers::Contains;
+
+struct Told {
+    std::atomic<int> beyond = 0, too_late = 0;
+    std::string message;
+
+    bool waits_for(const std::atomic<int>& count) const
+    {
+        for (int i = 0; i < 4000 && count == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        return count != 0;
+    }
+};
+
+// Takes so many MiB while it is watched; with `leave`, no longer than until it is asked to end.
+void take(Told& told, std::size_t mebibytes, bool leave)
+{
+    const MemoryWatch watch(
+        [&](const std::string& message) {
+            told.message = message;
+            ++told.beyond;
+        },
+        [&](const std::string&) { ++told.too_late; });
+    const std::vector<char> memory(mebibytes << 20, 1);
+    if (leave)
+        told.waits_for(told.beyond);
+    else
+        told.waits_for(told.too_late);
+}
+
+}  // namespace
+
+TEST_CASE("a run is asked to end where it takes more than its budget, and once more where it does not", "[memory]")
+{
+    const MemoryBudget budget(1);
+    Told leaves, stays;
+    take(leaves, 130, true);
+    CHECK(leaves.beyond == 1);
+    CHECK(leaves.too_late == 0);
+    CHECK_THAT(leaves.message, Contains("the run takes") && Contains("or set --memory"));
+    take(stays, 300, false);
+    CHECK(stays.beyond == 1);
+    CHECK(stays.too_late == 1);
+}
+
+TEST_CASE("little memory is let pass whatever the budget", "[memory]")
+{
+    const MemoryBudget budget(1);
+    int told = 0;
+    {
+        const MemoryWatch watch([&](const std::string&) { ++told; }, {});
+        const std::vector<char> memory(std::size_t{32} << 20, 1);
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    CHECK(told == 0);
+}
+
+TEST_CASE("memory is not watched where nobody has set a budget", "[memory]")
+{
+    REQUIRE_FALSE(is_memory_limited());
+    int told = 0;
+    {
+        const MemoryWatch watch([&](const std::string&) { ++told; }, {});
+        const std::vector<char> memory(std::size_t{200} << 20, 1);
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    CHECK(told == 0);
+}
+
+}  // namespace rapid

@@ -35,6 +35,7 @@ int tell(rapid_error** to, SceneError error) noexcept
     if (to) try {
             auto object = std::make_shared<OpenError>();
             object->text = error.text();
+            object->stack = SceneError::script_stack();
             object->error = std::move(error);
             *to = static_cast<rapid_error*>(Errors::add(std::move(object)));
         } catch (...) {
@@ -76,6 +77,11 @@ const char* rapid_error_text(const rapid_error* error)
 {
     return text_of(
         error, [](const OpenError& open) -> auto& { return open.text; });
+}
+const char* rapid_error_stack(const rapid_error* error)
+{
+    return text_of(
+        error, [](const OpenError& open) -> auto& { return open.stack; });
 }
 int rapid_error_line(const rapid_error* error)
 {

@@ -21,7 +21,7 @@ namespace rapid {
 struct OpenScene {
     Scene scene;
     std::atomic<bool> is_busy = false;
-    std::string node_types, warnings;
+    std::string node_types, warnings, graph, lives;
 };
 struct OpenFrame {
     SceneFrame frame;
@@ -31,7 +31,7 @@ struct OpenFrame {
 };
 struct OpenError {
     SceneError error;
-    std::string text;
+    std::string text, stack;
 };
 
 struct OpenOffers {

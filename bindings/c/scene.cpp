@@ -67,7 +67,7 @@ int open_into(rapid_scene** scene, rapid_error** error, const auto& open)
 {
     return guarded(error, [&] {
         not_null(scene, "scene") = nullptr;
-        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), false, {}, {}});
+        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), false, {}, {}, {}, {}});
         *scene = static_cast<rapid_scene*>(Scenes::add(std::move(object)));
     });
 }
@@ -226,6 +226,38 @@ int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** er
         const SceneCall open(scene);
         open->warnings = joined(open.scene().warnings());
         *text = open->warnings.c_str();
+    });
+}
+
+int rapid_scene_graph(rapid_scene* scene, int form, const char** text, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(text, "text") = nullptr;
+        const SceneCall open(scene);
+        if (form < RAPID_GRAPH_DOT || form > RAPID_GRAPH_JSON)
+            refuse(
+                fmt::format("form = {}; it must be one of RAPID_GRAPH_DOT, RAPID_GRAPH_SVG, RAPID_GRAPH_JSON", form));
+        open->graph = take(open.scene().graph(static_cast<GraphForm>(form)));
+        *text = open->graph.c_str();
+    });
+}
+
+int rapid_scene_trace(rapid_scene* scene, const int64_t* ids, size_t count, const char* create, int64_t first,
+                      int64_t last, const char** json, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(json, "json") = nullptr;
+        if (count > 0) not_null(ids, "ids");
+        const SceneCall open(scene);
+        TraceOptions options;
+        options.ids.assign(ids, ids + count);
+        if (create) options.create = create;
+        options.first = first;
+        options.last = last;
+        SceneTrace trace = take(open.scene().trace(options));
+        open->lives = std::move(trace.lives.json);
+        *json = open->lives.c_str();
+        if (trace.fault) throw Refusal{*trace.fault};
     });
 }
 

@@ -2,12 +2,11 @@
 #include <fmt/format.h>
 
 #include "bindings/command/command.h"
-#include "bindings/command/graph_options.h"
-#include "bindings/command/graphviz.h"
 #include "bindings/command/memory_limit.h"
+#include "bindings/command/or_throw.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/whole_file.h"
-#include "runtime/report/graph_picture.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -46,25 +45,21 @@ public:
         Threads threads(common.threads);
         return threads.run([&] {
             const MemoryLimit limit(graph_.file(), end_at_limit(common));
-            const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
-            PlanOptions options;
-            options.seed = graph_.seed();
-            const Plan plan(session->graph(), options);
-            for (const std::string& warning : plan.warnings) print_warning(warning);
-            const GraphPicture picture = picture_of(plan);
-            const std::string dot = to_dot(picture);
+            Scene scene = graph_.open(common);
+            const GraphForm form = extension == ".svg"    ? GraphForm::Svg
+                                   : extension == ".json" ? GraphForm::Json
+                                                          : GraphForm::Dot;
+            const std::string text = or_throw(scene.graph(form));
             if (file_.empty())
-                print(dot);
+                print(text);
             else
-                write_whole(file_, extension == ".svg"    ? lay_out(dot, "svg")
-                                   : extension == ".json" ? to_json(picture, lay_out(dot, "json")) + '\n'
-                                                          : dot);
+                write_whole(file_, form == GraphForm::Json ? text + '\n' : text);
             return status_done;
         });
     }
 
 private:
-    GraphOptions graph_;
+    SceneArguments graph_;
     std::string file_;
     UntrustedOptions untrusted_;
 };

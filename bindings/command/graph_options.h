@@ -1,34 +1,26 @@
-// The options that all commands share which load a graph, and how it is loaded.
+// Sessions of the commands that load a graph by themselves.
 #pragma once
 
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
-#include "bindings/command/command.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/host/session.h"
 
 namespace rapid {
 
-class GraphOptions {
+class GraphOptions : public SceneArguments {
 public:
-    void declare(CLI::App& app);
-
-    const std::string& file() const { return file_; }
-    const std::optional<std::uint64_t>& seed() const { return seed_; }
-    const SessionOptions& session() const { return session_; }
+    SessionOptions session() const;
 
     // The sessions that are loaded from now on keep their state (SessionOptions).
-    void keep_state() { session_.keeps_state = true; }
+    void keep_state() { keeps_state_ = true; }
 
     // Error: the file or a --set is wrong. may_write, on_timeout, on_read: see SessionOptions.
     std::unique_ptr<Session> load(bool may_write, std::function<void(const std::string& message)> on_timeout,
                                   std::function<void(const std::filesystem::path& file)> on_read = {}) const;
-    // The same for a command that only looks at the graph: its warnings are printed, and a script that runs into its
-    // timeout ends the process.
-    std::unique_ptr<Session> load_to_look_at(const CommonOptions& common) const;
     // Another graph, with the same limits; --set applies to the first one only.
     std::unique_ptr<Session> load_other(const std::string& file,
                                         std::function<void(const std::string& message)> on_timeout) const;
@@ -37,9 +29,7 @@ public:
                                         std::function<void(const std::string& message)> on_timeout) const;
 
 private:
-    std::string file_;
-    SessionOptions session_;
-    std::optional<std::uint64_t> seed_;
+    bool keeps_state_ = false;
 };
 
 }  // namespace rapid

@@ -4,10 +4,13 @@
 #include <utility>
 
 #include "include/rapid/scene.h"
+#include "runtime/error.h"
 
 namespace rapid {
 
-// Error: what a call says, with its place. std::bad_alloc, std::runtime_error: what a library says.
+// The error of the last call on this thread, with its place and the script's call stack.
+Error as_error(const SceneError& error);
+// as_error(), or std::bad_alloc or std::runtime_error where it is a library's.
 [[noreturn]] void throw_error(const SceneError& error);
 
 template <class T>

@@ -13,7 +13,7 @@ namespace rapid {
 namespace {
 
 // The points after a node, at a frame.
-struct Result {
+struct NodePoints {
     std::string node;
     Location location;
     std::int64_t frame;
@@ -21,7 +21,7 @@ struct Result {
 };
 
 struct Difference {
-    const Result* result;           // of the run in order, the first that differs
+    const NodePoints* result;       // of the run in order, the first that differs
     std::string what, here, there;  // "heat of point id 3", "1", "2"
 };
 
@@ -115,9 +115,9 @@ void advance_all(Evaluator& evaluator, const Plan& plan, const FrameSelection& f
     for (std::int64_t frame = plan.first_frame(); frame <= frames.last; ++frame) evaluator.advance();
 }
 
-std::vector<Result> results_in_order(const Plan& plan, const FrameSelection& frames)
+std::vector<NodePoints> results_in_order(const Plan& plan, const FrameSelection& frames)
 {
-    std::vector<Result> results;
+    std::vector<NodePoints> results;
     Evaluator evaluator(plan, {}, [&](const Node& node, std::int64_t frame, const PointSet& points) {
         if (frames.contains(frame)) results.push_back({node.name, node.location, frame, points});
     });
@@ -130,7 +130,7 @@ struct Trials {
     const PlanOptions& options;
     const FrameSelection& frames;
     const std::function<void(const std::string& message)>& on_timeout;
-    const std::vector<Result>& expected;
+    const std::vector<NodePoints>& expected;
 
     // Computes the frames in another order, and compares the result of each node.
     std::optional<Difference> run(const KernelOrder& order) const
@@ -141,7 +141,7 @@ struct Trials {
         std::size_t next = 0;
         Evaluator evaluator(plan, {}, [&](const Node&, std::int64_t frame, const PointSet& points) {
             if (!frames.contains(frame)) return;
-            const Result& result = expected[next++];
+            const NodePoints& result = expected[next++];
             if (first) return;
             first = compare(result.points, points);
             if (first) first->result = &result;
@@ -181,10 +181,10 @@ std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan
 Races find_races(const GraphOptions& graph, const Plan& plan, const PlanOptions& options, const FrameSelection& frames,
                  const std::function<void(const std::string& message)>& on_timeout)
 {
-    const std::vector<Result> expected = results_in_order(plan, frames);
+    const std::vector<NodePoints> expected = results_in_order(plan, frames);
     Races races;
     races.compared =
-        std::any_of(expected.begin(), expected.end(), [](const Result& result) { return !result.points.empty(); });
+        std::any_of(expected.begin(), expected.end(), [](const NodePoints& result) { return !result.points.empty(); });
     const Trials trials{graph, options, frames, on_timeout, expected};
     for (const KernelOrder::Sequence sequence : {KernelOrder::Reversed, KernelOrder::TwoStates}) {
         const KernelOrder order{sequence, ""};

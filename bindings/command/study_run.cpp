@@ -63,24 +63,24 @@ std::function<void(const std::string& message)> end_at_limit(const TellParent& t
 }
 
 // One scene: its graph, and the session that its scripts live in.
-struct Scene {
+struct StudyScene {
     std::unique_ptr<Session> session;
     Graph graph;
 };
 
 // Without knobs a study file makes no scene, and a graph is the scene itself.
-Scene load(const StudySource& source, const Knobs& knobs, const TellParent& tell)
+StudyScene load(const StudySource& source, const Knobs& knobs, const TellParent& tell)
 {
     SessionOptions options = source.session;
     if (!source.is_graph) options.knobs = knobs;
     options.on_timeout = end_at_limit(tell);
-    Scene scene;
+    StudyScene scene;
     scene.session = std::make_unique<Session>(source.file, std::move(options));
     scene.graph = source.is_graph ? with_arguments(scene.session->graph(), knobs) : scene.session->graph();
     return scene;
 }
 
-Plan plan_of(const Scene& scene, const StudySource& source, const Study& study)
+Plan plan_of(const StudyScene& scene, const StudySource& source, const Study& study)
 {
     Plan plan(scene.graph, {source.seed, {}});
     if (study.first < plan.first_frame())
@@ -256,7 +256,7 @@ void describe_study(const StudySource& source, const Study& asked, bool default_
         if (source.is_graph) {
             // Loads it with the knobs of a row, so that a misspelt node is found before any run.
             Knobs knobs = study.rows().front();
-            const Scene scene = load(source, knobs, tell);
+            const StudyScene scene = load(source, knobs, tell);
             const Plan plan(scene.graph, {source.seed, {}});
             if (default_frames) {
                 study.last += plan.first_frame() - study.first;
@@ -273,7 +273,7 @@ void run_reference(const StudySource& source, const Study& study, const Knobs& k
                    const TellParent& tell)
 {
     guarded(source, tell, [&](bool& started) {
-        const Scene scene = load(source, knobs, tell);
+        const StudyScene scene = load(source, knobs, tell);
         const Plan plan = plan_of(scene, source, study);
         started = true;
         run_frames(plan, study,
@@ -286,7 +286,7 @@ void run_row(const StudySource& source, const Study& study, const Knobs& knobs, 
              const TellParent& tell)
 {
     guarded(source, tell, [&](bool& started) {
-        const Scene scene = load(source, knobs, tell);
+        const StudyScene scene = load(source, knobs, tell);
         Measure measure(study, *scene.session);
         std::vector<double> seconds;
         // The first run warms caches, compiled kernels and the allocator, and measures the error: each run of a scene

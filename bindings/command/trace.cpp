@@ -5,10 +5,10 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/graph_options.h"
 #include "bindings/command/memory_limit.h"
+#include "bindings/command/or_throw.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
-#include "runtime/report/biography.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -51,44 +51,22 @@ public:
         Threads threads(common.threads);
         return threads.run([&] {
             const MemoryLimit limit(graph_.file(), end_at_limit(common));
-            const std::unique_ptr<Session> session = graph_.load_to_look_at(common);
-            PlanOptions options;
-            options.seed = graph_.seed();
-            options.keep_steps = true;
-            const Plan plan(session->graph(), options);
-            Biographer biographer(plan, ids_, create_);
-            const std::int64_t start = plan.first_frame();
+            Scene scene = graph_.open(common);
+            const std::int64_t start = scene.first_frame();
             const FrameSelection frames = frames_.value_or(FrameSelection{start, start + default_frames - 1});
             if (frames.last < start)
                 throw Error(fmt::format("-f: frame {} is before the scene's first, {}", frames.last, start));
-            Evaluator evaluator(plan, {}, biographer.results());
-            evaluator.leave_out_errors();
-            biographer.watch(evaluator);
-            int status = status_done;
-            try {
-                while (evaluator.next_frame() <= frames.last) biographer.add(evaluator.advance());
-            } catch (const Error& error) {
-                print_error(error, common.verbose);
-                status = status_failed;  // what is known until then is told
-            }
-            return tell(biographer.lives(), frames) ? status : std::max<int>(status, status_failed);
+            const SceneTrace trace = or_throw(scene.trace({ids_, create_, frames.first, frames.last, frames.step}));
+            if (trace.fault) print_error(as_error(*trace.fault), common.verbose);
+            for (const std::int64_t id : trace.unborn)
+                print_warning(fmt::format("no point has the id {} up to frame {}", id, frames.last));
+            print(json_ ? trace.lives.json + '\n' : trace.lives.text);
+            return trace.fault || trace.lives.text.empty() ? status_failed : status_done;
         });
     }
 
 private:
-    // Whether there was any.
-    bool tell(std::vector<Biography> lives, const FrameSelection& frames) const
-    {
-        for (Biography& life : lives)
-            std::erase_if(life.steps, [&](const Biography::Step& step) { return !frames.contains(step.frame); });
-        for (const std::int64_t id : ids_)
-            if (std::none_of(lives.begin(), lives.end(), [&](const Biography& life) { return life.id == id; }))
-                print_warning(fmt::format("no point has the id {} up to frame {}", id, frames.last));
-        print(json_ ? to_json(lives) + '\n' : to_text(lives));
-        return !lives.empty();
-    }
-
-    GraphOptions graph_;
+    SceneArguments graph_;
     std::vector<std::int64_t> ids_;
     std::string create_;
     std::optional<FrameSelection> frames_;

@@ -2,23 +2,13 @@
 #include "include/rapid/scene.h"
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <mutex>
 #include <utility>
 
-#include "bindings/host/offers.h"
-#include "bindings/host/picture_scene.h"
-#include "bindings/host/session.h"
 #include "bindings/scene/host_object.h"
-#include "bindings/scene/scene_data.h"
-#include "bindings/scene/scene_error.h"
-#include "runtime/cancellation.h"
-#include "runtime/memory_budget.h"
-#include "runtime/memory_watch.h"
+#include "bindings/scene/scene_impl.h"
 #include "runtime/picture/frame_picture.h"
 #include "runtime/picture/png_file.h"
 
@@ -35,14 +25,6 @@ std::string text_of(const SceneValue& value)
     return fmt::format("{},{},{}", x, y, z);
 }
 
-SceneValue value_in_header(const Value& value)
-{
-    if (const auto* number = value.get<double>()) return *number;
-    if (const auto* boolean = value.get<bool>()) return *boolean;
-    if (const auto* vector = value.get<Vec3d>()) return std::array<double, 3>{(*vector)[0], (*vector)[1], (*vector)[2]};
-    return *value.get<std::string>();
-}
-
 SceneNodeType described(const NodeType& type)
 {
     SceneNodeType result{type.name, type.doc, {}};
@@ -53,222 +35,6 @@ SceneNodeType described(const NodeType& type)
     }
     return result;
 }
-
-}  // namespace
-
-// One scene. Its session is run again for other parameters; plan and evaluator for each start.
-struct [[gnu::visibility("hidden")]] Scene::Impl
-{
-    std::string file;
-    std::optional<std::string> text;
-    SceneOptions options;
-    std::map<std::string, std::string> settings;  // of parameters, by name
-    std::shared_ptr<Offers> offers = std::make_shared<Offers>();
-
-    std::unique_ptr<Session> session;
-    std::vector<SceneParameter> parameters;
-    std::vector<SceneNode> nodes;
-    std::vector<std::string> warnings;
-    std::unique_ptr<Plan> plan;
-    std::unique_ptr<Evaluator> evaluator;  // null behind an error
-    std::unique_ptr<SceneOfPlan> picture_scene;
-    std::int64_t next = 1;
-    bool has_advanced = false;
-
-    std::optional<tbb::task_arena> arena;
-    std::atomic<bool> is_busy = false;
-    std::atomic<bool> is_late = false;  // a script has been stopped in this call
-
-    // What cancel() may do while another thread is in a call.
-    Cancellation cancellation;
-    std::mutex scripts_mutex;
-    Session* scripts = nullptr;  // that an advance runs now
-
-    // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors.
-    template <class F>
-    auto call(SceneError::Kind kind, const F& f)->Result<decltype(f())>
-    {
-        if (is_busy.exchange(true)) return busy();
-        struct Free {
-            std::atomic<bool>& is_busy;
-            ~Free() { is_busy = false; }
-        } const free{is_busy};
-        try {
-            std::optional<decltype(f())> value;
-            const auto run = [&] {
-                const MemoryBudget budget(options.memory);
-                if (session) session->use_from_this_thread();
-                // Of the loops of this scene no thread that waits takes up another scene.
-                tbb::this_task_arena::isolate([&] { value.emplace(f()); });
-            };
-            arena ? arena->execute(run) : run();
-            return std::move(*value);
-        } catch (...) {
-            SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
-            if (error.message.find(Cancellation::text) != std::string::npos) error.kind = SceneError::Cancelled;
-            if (error.kind == SceneError::Cancelled || error.kind == SceneError::OutOfMemory) cancellation.forget();
-            return error;
-        }
-    }
-
-    SessionOptions session_options(const std::map<std::string, std::string>& set)
-    {
-        SessionOptions result;
-        result.set = set;
-        result.script_timeout = options.script_seconds;
-        result.script_memory = options.script_memory;
-        result.text = text;
-        for (const std::string& path : options.paths) result.paths.emplace_back(path);
-        result.interruptible = true;
-        result.on_timeout = [this](const std::string&) { is_late = true; };
-        result.offers = offers;
-        result.quiet = !options.log;
-        if (options.log)
-            result.on_print = [log = options.log](const std::string& printed) {
-                std::string line = printed;
-                if (!line.empty() && line.back() == '\n') line.pop_back();
-                call_program("log", log, LogLevel::Print, line);
-            };
-        if (options.find_module)
-            result.find_module = [find = options.find_module](const std::string& name) {
-                return call_program("find_module", find, name);
-            };
-        if (options.find_file)
-            result.find_file = [find = options.find_file](const std::string& path) {
-                return call_program("find_file", find, path);
-            };
-        return result;
-    }
-
-    void tell(const std::vector<std::string>& texts) const
-    {
-        if (!options.log) return;
-        for (const std::string& line : texts) call_program("log", options.log, LogLevel::Warning, line);
-    }
-
-    void take_offers()
-    {
-        for (const auto& [name, object] : options.objects)
-            offers->objects[name] = make_object(name, object, options.guard_callbacks);
-        for (const HostNode& node : options.nodes)
-            offers->node_types.push_back(make_type(node, options.guard_callbacks));
-        options.objects.clear();
-        options.nodes.clear();
-    }
-
-    // Runs the file with these settings. The scene is as it was where that fails.
-    void load(std::map<std::string, std::string> set)
-    {
-        auto fresh = std::make_unique<Session>(file, session_options(set));
-        auto fresh_plan = std::make_unique<Plan>(fresh->graph(), plan_options());
-        std::vector<std::string> told = fresh->take_warnings();
-        told.insert(told.end(), fresh_plan->warnings.begin(), fresh_plan->warnings.end());
-        picture_scene.reset();
-        evaluator.reset();
-        plan.reset();
-        session = std::move(fresh);
-        settings = std::move(set);
-        warnings = std::move(told);
-        describe_scene();
-        start(std::move(fresh_plan));
-        tell(warnings);
-    }
-
-    PlanOptions plan_options() const
-    {
-        PlanOptions result;
-        result.seed = options.seed;
-        result.keep_all = options.keep_all;
-        return result;
-    }
-
-    void describe_scene()
-    {
-        parameters.clear();
-        for (const Session::Parameter& parameter : session->parameters())
-            parameters.push_back(
-                {parameter.name, parameter.doc, value_in_header(parameter.value), value_in_header(parameter.fallback)});
-        nodes.clear();
-        for (const NodePtr& node : session->graph().nodes)
-            nodes.push_back({node->name, node->type->name, node->location.file, node->location.line});
-    }
-
-    // By which snapshots know their graph.
-    std::vector<std::string> node_names() const
-    {
-        std::vector<std::string> names;
-        for (const SceneNode& node : nodes) names.push_back(node.type + ' ' + node.name);
-        return names;
-    }
-
-    // A new run of the graph: operators keep state, and belong to a plan.
-    void start(std::unique_ptr<Plan> fresh)
-    {
-        evaluator.reset();
-        picture_scene.reset();
-        plan = std::move(fresh);
-        evaluator = std::make_unique<Evaluator>(*plan);
-        if (!options.estimate_errors) evaluator->leave_out_errors();
-        next = plan->first_frame();
-        has_advanced = false;
-    }
-
-    // Scripts that were stopped do not run again.
-    void start_again()
-    {
-        cancellation.forget();
-        if (session->interrupted() != Interruption::None) return load(settings);
-        start(std::make_unique<Plan>(session->graph(), plan_options()));
-    }
-
-    SceneFrame advance()
-    {
-        const Scripts running(*this);
-        const Cancellation::Scope scope(&cancellation);
-        cancellation.check();
-        const MemoryWatch watch(
-            [this](const std::string& message) {
-                cancellation.request(message);
-                session->interrupt(message);
-            },
-            {});
-        auto data = std::make_shared<SceneFrame::Data>();
-        try {
-            data->result = evaluator->advance();
-        } catch (...) {
-            evaluator.reset();
-            throw;
-        }
-        data->warnings = session->take_warnings();
-        data->warnings.insert(data->warnings.end(), data->result.warnings.begin(), data->result.warnings.end());
-        data->scene = this;
-        next = evaluator->next_frame();
-        has_advanced = true;
-        tell(data->warnings);
-        const auto& outputs = data->result.outputs;
-        const std::string output = outputs.count("main") ? "main" : outputs.begin()->first;
-        return SceneFrame(std::move(data), output);
-    }
-
-    // For as long as it lives, cancel() stops scripts.
-    struct Scripts {
-        Impl& impl;
-        explicit Scripts(Impl& of) : impl(of) { set(impl.session.get()); }
-        ~Scripts() { set(nullptr); }
-        void set(Session* to)
-        {
-            const std::lock_guard lock(impl.scripts_mutex);
-            impl.scripts = to;
-        }
-    };
-
-    void refuse_unless_ready() const
-    {
-        if (!evaluator) refuse("the scene's last frame failed; call restart(), restore() or set() first");
-    }
-};
-
-namespace {
 
 std::optional<SceneError> fault_of(const SceneOptions& options)
 {
@@ -288,11 +54,7 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
-Result<Scene> Scene::open(const std::string& file, SceneOptions options)
-{
-    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
-    return open_any(file, std::nullopt, std::move(options));
-}
+Result<Scene> Scene::open(const std::string& file, SceneOptions options) { return open(file, std::move(options), {}); }
 
 Result<Scene> Scene::open_text(const std::string& name, const std::string& text, SceneOptions options)
 {
@@ -300,7 +62,20 @@ Result<Scene> Scene::open_text(const std::string& name, const std::string& text,
     return open_any(name, text, std::move(options));
 }
 
+Result<Scene> Scene::open(const std::string& file, SceneOptions options,
+                          std::function<void(const std::string& message)> late)
+{
+    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
+    return open_with(file, std::nullopt, std::move(options), std::move(late));
+}
+
 Result<Scene> Scene::open_any(const std::string& file, std::optional<std::string> text, SceneOptions options)
+{
+    return open_with(file, std::move(text), std::move(options), {});
+}
+
+Result<Scene> Scene::open_with(const std::string& file, std::optional<std::string> text, SceneOptions options,
+                               std::function<void(const std::string& message)> late)
 {
     if (std::optional<SceneError> fault = fault_of(options)) return std::move(*fault);
     try {
@@ -308,6 +83,7 @@ Result<Scene> Scene::open_any(const std::string& file, std::optional<std::string
         impl->file = file;
         impl->text = std::move(text);
         impl->options = std::move(options);
+        impl->late = std::move(late);
         if (impl->options.threads > 0) impl->arena.emplace(impl->options.threads);
         std::map<std::string, std::string> set;
         for (const auto& [name, value] : impl->options.set) set[name] = text_of(value);

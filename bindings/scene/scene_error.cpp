@@ -7,6 +7,8 @@
 namespace rapid {
 namespace {
 
+thread_local std::string last_script_stack;
+
 // Whether it is of memory that the system or a limit refuses. Errors pass through Lua as their text, so that is all
 // that tells: Rapid's (runtime/at_node.h), LuaJIT's, and those of the limits. "C++ exception" is LuaJIT's word for one
 // that passes through it: functions for Lua turn theirs into errors (guarded()), so it is one for which there was no
@@ -28,8 +30,11 @@ std::string SceneError::text() const
     return place + message;
 }
 
+std::string SceneError::script_stack() { return last_script_stack; }
+
 SceneError wrong_call(std::string message)
 {
+    last_script_stack.clear();
     SceneError error;
     error.kind = SceneError::WrongCall;
     error.message = std::move(message);
@@ -38,6 +43,7 @@ SceneError wrong_call(std::string message)
 
 SceneError busy()
 {
+    last_script_stack.clear();
     SceneError error;
     error.kind = SceneError::Busy;
     error.message =
@@ -53,17 +59,21 @@ SceneError caught_error(SceneError::Kind kind)
     } catch (const Refusal& refusal) {
         return refusal.error;
     } catch (const Error& error) {
+        last_script_stack = error.trace();
         result.kind = is_of_memory(error.message()) ? SceneError::OutOfMemory : kind;
         result.message = error.message();
         result.file = error.location().file;
         result.line = error.location().line;
         result.node = error.node();
     } catch (const std::bad_alloc&) {
+        last_script_stack.clear();
         result.kind = SceneError::OutOfMemory;
         result.message = "out of memory";
     } catch (const std::exception& error) {
+        last_script_stack.clear();
         result.message = error.what();
     } catch (...) {
+        last_script_stack.clear();
         result.message = "an exception that is no std::exception";
     }
     return result;

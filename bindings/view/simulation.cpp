@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "bindings/command/graphviz.h"
 #include "bindings/view/run.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/format.h"
 #include "runtime/report/biography.h"
+#include "runtime/report/graphviz.h"
 
 namespace rapid {
 namespace {

@@ -61,6 +61,8 @@ const char* rapid_error_file(const rapid_error* error);    /* "" where there is 
 int rapid_error_line(const rapid_error* error);            /* from 1; 0 where there is none */
 const char* rapid_error_node(const rapid_error* error);    /* "" where there is none */
 const char* rapid_error_text(const rapid_error* error);    /* FILE:LINE: node "NAME": MESSAGE, of what is known */
+/* The calls of the script in which it was raised, a line each, the innermost first; "" where it was in no script. */
+const char* rapid_error_stack(const rapid_error* error);
 int rapid_error_status(const rapid_error* error);
 void rapid_error_free(rapid_error* error);
 
@@ -208,6 +210,20 @@ int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_erro
 int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error);
 int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error** error);
 int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
+
+/* How a graph is given: in Graphviz's language; as a picture; as nodes and edges with their places, an object, as
+ * `rapid graph -o FILE.json` writes it. */
+enum { RAPID_GRAPH_DOT = 0, RAPID_GRAPH_SVG = 1, RAPID_GRAPH_JSON = 2 };
+/* The graph of the scene: form = RAPID_GRAPH_DOT, ... The others need Graphviz's program `dot`. *text belongs to the
+ * scene, until the next call of this function. */
+int rapid_scene_graph(rapid_scene* scene, int form, const char** text, rapid_error** error);
+/* The lives of points: births, what each node changed, forces, contacts, deaths and why, in the frames from `first` to
+ * `last`. ids: shape [count]. create: the name of the node that makes them; NULL: each. Goes to the start, and computes
+ * the frames beside the scene, which then is at its start. *json is a list, as `rapid trace --json` prints it, behind
+ * RAPID_FAILED_FRAME, too, with what is known until then; it belongs to the scene, until the next call of this
+ * function. */
+int rapid_scene_trace(rapid_scene* scene, const int64_t* ids, size_t count, const char* create, int64_t first,
+                      int64_t last, const char** json, rapid_error** error);
 
 /* ---- What a program offers to its scenes: meshes, points and shapes, which they take as rapid.host "NAME" (a setting
  * "host:NAME" gives one to a parameter of a node), and nodes. Arrays are copied.

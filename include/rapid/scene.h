@@ -55,6 +55,9 @@ struct SceneError {
 
     // FILE:LINE: node "NAME": MESSAGE, of what is known.
     std::string text() const;
+    // Of the last error that a function of this header returned on this thread: the calls of the script in which it was
+    // raised, a line each, the innermost first; empty where it was in no script.
+    static std::string script_stack();
 };
 
 // A T or the error that kept it from being made.
@@ -288,6 +291,27 @@ struct PictureSize {
     int width = 640, height = 360;  // pixels, from 1 to 16384
 };
 
+// How Scene::graph() gives a graph.
+enum class GraphForm {
+    Dot,   // in Graphviz's language
+    Svg,   // a picture
+    Json,  // nodes and edges with their places: an object, as `rapid graph -o FILE.json` writes it (docs/cli.md)
+};
+
+// Of Scene::trace().
+struct TraceOptions {
+    std::vector<std::int64_t> ids;                // of the points
+    std::string create;                           // the name of the node that makes them; empty: each
+    std::int64_t first = 1, last = 48, step = 1;  // the frames that are told
+};
+
+// The lives of points: births, what each node changed, forces, contacts, deaths and why.
+struct SceneTrace {
+    SceneReport lives;                 // of those that were born, as `rapid trace` prints it; the JSON is a list
+    std::vector<std::int64_t> unborn;  // ids that no point had up to the last frame
+    std::optional<SceneError> fault;   // why a frame before the last one failed; the lives are told until then
+};
+
 // A scene in Lua that is run frame by frame.
 class Scene {
 public:
@@ -296,6 +320,11 @@ public:
     // OutOfMemory.
     static Result<Scene> open(const std::string& file, SceneOptions options = {});
     static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
+    // late: told, with the error's text, of each script that takes longer than script_seconds, before it is stopped: for
+    // a program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On a
+    // thread of Rapid's; what it throws is dropped.
+    static Result<Scene> open(const std::string& file, SceneOptions options,
+                              std::function<void(const std::string& message)> late);
 
     // What is moved from may only be assigned to, or end.
     Scene(Scene&&) noexcept;
@@ -339,6 +368,14 @@ public:
     // set() forget it.
     void cancel();
 
+    // The graph of the scene, with what is left out and why. Error of Svg and Json: Graphviz's program `dot`, which lays
+    // them out, is not there.
+    Result<std::string> graph(GraphForm form);
+    // Tells of points by their ids: goes to the start, and computes the frames up to the last one beside the scene,
+    // which then is at its start; where a script had to be stopped it is to be restarted. Error: no ids; no such create, with the nearest name; a last frame
+    // before the first one.
+    Result<SceneTrace> trace(const TraceOptions& options);
+
     // The bytes of a .png of a frame of this scene, with its shapes; the camera is fitted to the frame unless the scene
     // has one.
     Result<std::string> picture(const SceneFrame& frame, PictureSize size = {});
@@ -347,6 +384,8 @@ private:
     struct Impl;
     explicit Scene(std::unique_ptr<Impl> impl);
     static Result<Scene> open_any(const std::string& file, std::optional<std::string> text, SceneOptions options);
+    static Result<Scene> open_with(const std::string& file, std::optional<std::string> text, SceneOptions options,
+                                   std::function<void(const std::string& message)> late);
     std::unique_ptr<Impl> impl_;
 };
 

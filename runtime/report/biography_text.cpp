@@ -2,15 +2,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <nlohmann/json.hpp>
-
 #include "runtime/graph/evaluation.h"
+#include "runtime/json_text.h"
 #include "runtime/report/biography.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
 
 template <class V>
 std::string text_of_vector(const V& x)
@@ -30,55 +27,121 @@ std::string text_of(const AttributeValue& value)
 }
 
 template <class V>
-ordered_json json_of_vector(const V& x)
+std::vector<typename V::Scalar> numbers_of(const V& x)
 {
     return {x.x(), x.y(), x.z()};
 }
 
-ordered_json json_of(const AttributeValue& value)
+void add_json(JsonText& json, const AttributeValue& value)
 {
-    if (const auto* x = std::get_if<float>(&value)) return *x;
-    if (const auto* x = std::get_if<Vec3f>(&value)) return json_of_vector(*x);
-    if (const auto* x = std::get_if<std::int32_t>(&value)) return *x;
-    if (const auto* x = std::get_if<std::int64_t>(&value)) return *x;
-    if (const auto* x = std::get_if<Token>(&value)) return std::string(x->text());
+    if (const auto* x = std::get_if<float>(&value)) return json.value(*x);
+    if (const auto* x = std::get_if<Vec3f>(&value)) return json.value(numbers_of(*x));
+    if (const auto* x = std::get_if<std::int32_t>(&value)) return json.value(*x);
+    if (const auto* x = std::get_if<std::int64_t>(&value)) return json.value(*x);
+    if (const auto* x = std::get_if<Token>(&value)) return json.value(std::string(x->text()));
     const Quatf& q = std::get<Quatf>(value);
-    return {q.x(), q.y(), q.z(), q.w()};
+    json.value(std::vector{q.x(), q.y(), q.z(), q.w()});
 }
 
-ordered_json json_of(const std::optional<Biography::Moment>& moment)
+void add_json(JsonText& json, const std::optional<Biography::Moment>& moment)
 {
-    if (!moment) return nullptr;
-    return {{"frame", moment->frame},         {"time", moment->time}, {"P", json_of_vector(moment->P)},
-            {"v", json_of_vector(moment->v)}, {"node", moment->node}, {"why", moment->why}};
+    if (!moment) return json.value(nullptr);
+    json.begin_object();
+    json.member("frame", moment->frame);
+    json.member("time", moment->time);
+    json.member("P", numbers_of(moment->P));
+    json.member("v", numbers_of(moment->v));
+    json.member("node", moment->node);
+    json.member("why", moment->why);
+    json.end();
 }
 
-ordered_json json_of(const Biography::Step& step)
+void add_json(JsonText& json, const Biography::Edit& edit)
 {
-    ordered_json edits = ordered_json::array(), forces = ordered_json::array(), contacts = ordered_json::array();
-    for (const Biography::Edit& edit : step.edits) {
-        ordered_json changes = ordered_json::object();
-        for (const auto& [name, values] : edit.changes)
-            changes[name] = {{"before", json_of(values.first)}, {"after", json_of(values.second)}};
-        edits.push_back({{"node", edit.node}, {"changes", changes}, {"removed", edit.removed}});
+    json.begin_object();
+    json.member("node", edit.node);
+    json.key("changes");
+    json.begin_object();
+    for (const auto& [name, values] : edit.changes) {
+        json.key(name);
+        json.begin_object();
+        json.key("before");
+        add_json(json, values.first);
+        json.key("after");
+        add_json(json, values.second);
+        json.end();
     }
-    for (const Biography::Force& force : step.forces)
-        forces.push_back({{"node", force.node}, {"acceleration", json_of_vector(force.a)}});
-    for (const Biography::Contact& contact : step.contacts)
-        contacts.push_back({{"node", contact.node},
-                            {"time", contact.time},
-                            {"P", json_of_vector(contact.P)},
-                            {"normal", json_of_vector(contact.normal)},
-                            {"speed", contact.speed},
-                            {"impulse", contact.impulse}});
-    ordered_json values = nullptr;
+    json.end();
+    json.member("removed", edit.removed);
+    json.end();
+}
+
+void add_json(JsonText& json, const Biography::Force& force)
+{
+    json.begin_object();
+    json.member("node", force.node);
+    json.member("acceleration", numbers_of(force.a));
+    json.end();
+}
+
+void add_json(JsonText& json, const Biography::Contact& contact)
+{
+    json.begin_object();
+    json.member("node", contact.node);
+    json.member("time", contact.time);
+    json.member("P", numbers_of(contact.P));
+    json.member("normal", numbers_of(contact.normal));
+    json.member("speed", contact.speed);
+    json.member("impulse", contact.impulse);
+    json.end();
+}
+
+void add_json(JsonText& json, const Biography::Step& step);
+
+template <class T>
+void add_list(JsonText& json, const char* name, const std::vector<T>& all)
+{
+    json.key(name);
+    json.begin_list();
+    for (const T& one : all) add_json(json, one);
+    json.end();
+}
+
+void add_json(JsonText& json, const Biography::Step& step)
+{
+    json.begin_object();
+    json.member("frame", step.frame);
+    json.member("time", step.time);
+    json.key("values");
     if (step.values) {
-        values = ordered_json::object();
-        for (const auto& [name, value] : *step.values) values[name] = json_of(value);
+        json.begin_object();
+        for (const auto& [name, value] : *step.values) {
+            json.key(name);
+            add_json(json, value);
+        }
+        json.end();
+    } else {
+        json.value(nullptr);
     }
-    return {
-        {"frame", step.frame}, {"time", step.time},    {"values", values},      {"edits", edits},
-        {"forces", forces},    {"contacts", contacts}, {"asleep", step.asleep}, {"contacts_known", step.has_contacts}};
+    add_list(json, "edits", step.edits);
+    add_list(json, "forces", step.forces);
+    add_list(json, "contacts", step.contacts);
+    json.member("asleep", step.asleep);
+    json.member("contacts_known", step.has_contacts);
+    json.end();
+}
+
+void add_json(JsonText& json, const Biography& life)
+{
+    json.begin_object();
+    json.member("id", life.id);
+    json.member("simulation", life.simulation);
+    json.key("birth");
+    add_json(json, life.birth);
+    json.key("death");
+    add_json(json, life.death);
+    add_list(json, "steps", life.steps);
+    json.end();
 }
 
 std::string line(std::int64_t frame, double time, const std::string& what)
@@ -147,17 +210,11 @@ std::string to_text(const std::vector<Biography>& lives)
 
 std::string to_json(const std::vector<Biography>& lives)
 {
-    ordered_json json = ordered_json::array();
-    for (const Biography& life : lives) {
-        ordered_json steps = ordered_json::array();
-        for (const Biography::Step& step : life.steps) steps.push_back(json_of(step));
-        json.push_back({{"id", life.id},
-                        {"simulation", life.simulation},
-                        {"birth", json_of(life.birth)},
-                        {"death", json_of(life.death)},
-                        {"steps", steps}});
-    }
-    return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+    JsonText json;
+    json.begin_list();
+    for (const Biography& life : lives) add_json(json, life);
+    json.end();
+    return json.text();
 }
 
 }  // namespace rapid

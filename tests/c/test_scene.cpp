@@ -315,6 +315,15 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("frame", [&](rapid_error** e) { return rapid_scene_next_frame(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_save(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_restore(scene, nullptr, e); });
+    refused("text", [&](rapid_error** e) { return rapid_scene_graph(scene, RAPID_GRAPH_DOT, nullptr, e); });
+    refused("json", [&](rapid_error** e) {
+        const std::int64_t id = 0;
+        return rapid_scene_trace(scene, &id, 1, nullptr, 1, 2, nullptr, e);
+    });
+    refused("ids", [&](rapid_error** e) {
+        const char* json = nullptr;
+        return rapid_scene_trace(scene, nullptr, 1, nullptr, 1, 2, &json, e);
+    });
     refused("name", [&](rapid_error** e) {
         auto column = sized<rapid_column>();
         return rapid_frame_column(frame, nullptr, &column, e);

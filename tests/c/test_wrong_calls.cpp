@@ -223,6 +223,17 @@ const std::vector<Function>& functions()
          [](const Handles& h, rapid_error** e) { return rapid_offers_release(h.offers, e); }},
         {"rapid_scene_offer", "so",
          [](const Handles& h, rapid_error** e) { return rapid_scene_offer(h.scene, h.offers, e); }},
+        {"rapid_scene_graph", "s",
+         [](const Handles& h, rapid_error** e) {
+             const char* text = nullptr;
+             return rapid_scene_graph(h.scene, RAPID_GRAPH_DOT, &text, e);
+         }},
+        {"rapid_scene_trace", "s",
+         [](const Handles& h, rapid_error** e) {
+             const std::int64_t id = 0;
+             const char* json = nullptr;
+             return rapid_scene_trace(h.scene, &id, 1, "create1", 1, 4, &json, e);
+         }},
         {"rapid_frame_output", "f",
          [](const Handles& h, rapid_error** e) {
              rapid_frame* frame = nullptr;
@@ -330,9 +341,9 @@ TEST_CASE("the table has all functions of the header", "[c]")
     std::ifstream file(RAPID_SOURCE_DIR "/include/rapid/rapid.h");
     const std::string header(std::istreambuf_iterator<char>(file), {});
     // Those that take no handle, or take NULL for one.
-    std::set<std::string> known = {"rapid_version",    "rapid_error_message", "rapid_error_file",
-                                   "rapid_error_line", "rapid_error_node",    "rapid_error_text",
-                                   "rapid_error_free", "rapid_error_status",  "rapid_call_add_rod"};
+    std::set<std::string> known = {
+        "rapid_version",    "rapid_error_message", "rapid_error_file",   "rapid_error_line",   "rapid_error_node",
+        "rapid_error_text", "rapid_error_free",    "rapid_error_status", "rapid_call_add_rod", "rapid_error_stack"};
     for (const Function& function : functions()) known.insert(function.name);
     std::set<std::string> declared;
     const std::regex declaration(R"((?:^|\n)(?:int|void|const char\*) (rapid_\w+)\()");
@@ -496,6 +507,13 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("frame 0", [&](auto e) { return rapid_scene_advance_to(h.scene, 0, &frame, e); });
     refused("frame 2", [&](auto e) { return rapid_scene_advance_to(h.scene, 2, &frame, e); });
     refused("\"other\"", [&](auto e) { return rapid_frame_output(h.frame, "other", &frame, e); });
+    refused("form = 3", [&](auto e) { return rapid_scene_graph(h.scene, 3, &text, e); });
+    refused("form = -1", [&](auto e) { return rapid_scene_graph(h.scene, -1, &text, e); });
+    const std::int64_t id = 0;
+    refused("no ids", [&](auto e) { return rapid_scene_trace(h.scene, nullptr, 0, nullptr, 1, 2, &text, e); });
+    refused("frame 0", [&](auto e) { return rapid_scene_trace(h.scene, &id, 1, nullptr, 0, 0, &text, e); });
+    refused("did you mean \"create1\"",
+            [&](auto e) { return rapid_scene_trace(h.scene, &id, 1, "create", 1, 2, &text, e); });
     refused("what = 4", [&](auto e) { return rapid_frame_names(h.frame, 4, &lines, e); });
     refused("did you mean \"heat\"", [&](auto e) { return rapid_frame_column(h.frame, "haet", &column, e); });
     refused("\"al\"", [&](auto e) { return rapid_frame_group(h.frame, "al", &column, e); });

@@ -96,6 +96,7 @@ void read(rapid_scene* scene, rapid_frame* frame)
     done("frame_get_info", rapid_frame_get_info(frame, &info, &error));
     done("frame_statistics", rapid_frame_statistics(frame, &words, &error));
     done("frame_names", rapid_frame_names(frame, RAPID_COLUMNS, &words, &error));
+    done("scene_graph", rapid_scene_graph(scene, RAPID_GRAPH_DOT, &words, &error));
     done("frame_describe", rapid_frame_describe(frame, &words, &error));
     done("frame_compare", rapid_frame_compare(frame, frame, 0, nullptr, &words, &error));
     done("node_types", rapid_scene_node_types(scene, &words, &error));
@@ -118,6 +119,9 @@ void run(rapid_offers* offers)
         done("advance", rapid_scene_advance(scene, nullptr, &error));
         done("restore", rapid_scene_restore(scene, snapshot, &error));
     }
+    const int64_t id = 0;
+    const char* lives = nullptr;
+    done("trace", rapid_scene_trace(scene, &id, 1, nullptr, 1, 2, &lives, &error));
     const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
     done("set", rapid_scene_set(scene, &height, 1, &error));
     done("restart", rapid_scene_restart(scene, &error));

@@ -263,6 +263,9 @@ class Scenes(unittest.TestCase):
                          ("wrong.lua", 2, "wrong scene"))
         with self.assertRaisesRegex(rapid.Error, "nowhere.lua"):
             rapid.Scene("nowhere.lua")
+        with self.assertRaises(rapid.Error) as caught:
+            rapid.Scene("deep.lua", text="local function inner() error 'here' end\ninner()")
+        self.assertLess(caught.exception.stack.find("deep.lua:1"), caught.exception.stack.find("deep.lua:2"))
 
     def test_nodes_and_their_types(self):
         scene = fall()
@@ -270,6 +273,21 @@ class Scenes(unittest.TestCase):
                          ["create", "attribute", "points", "detail", "gravity", "solve"])
         units = {one["name"]: one["unit"] for one in scene.node_types["gravity"]["parameters"]}
         self.assertEqual(units, {"group": "", "g": "m/s²"})
+
+    def test_the_graph_and_the_lives_of_points(self):
+        scene = fall()
+        self.assertTrue(scene.graph("dot").startswith("digraph"))
+        self.assertIn("<svg", scene.graph())
+        self.assertEqual([node["name"] for node in scene.graph("json")["nodes"]], [node["name"] for node in scene.nodes])
+        with self.assertRaises(ValueError):
+            scene.graph("png")
+        scene.advance_to(5)
+        life, = scene.trace([3], 2, 4)
+        self.assertEqual((life["id"], [step["frame"] for step in life["steps"]]), (3, [2, 3, 4]))
+        self.assertAlmostEqual(life["steps"][2]["values"]["P"][1], 10 - 9.81 / 2 / 8 ** 2, places=5)
+        self.assertEqual(scene.next_frame, 1)
+        with self.assertRaisesRegex(rapid.Error, "did you mean"):
+            scene.trace([3], 1, 2, create="creat1")
 
     def test_snapshots(self):
         scene = fall()

@@ -345,6 +345,24 @@ class Scene:
     def restore(self, snapshot):
         self._call("scene_restore", self._handle.value, snapshot._handle.value)
 
+    def graph(self, form="svg"):
+        """The scene's graph: "dot" in Graphviz's language, "svg" as a picture, "json" as nodes and edges with their
+        places. All but "dot" need Graphviz's program `dot`."""
+        forms = ["dot", "svg", "json"]
+        if form not in forms:
+            raise ValueError(f"form = {form!r}; it must be one of {', '.join(forms)}")
+        text = c_char_p()
+        call("scene_graph", self._handle.value, forms.index(form), byref(text))
+        return json.loads(text.value) if form == "json" else text.value.decode()
+
+    def trace(self, ids, first, last, create=None):
+        """The lives of points by their ids, as `rapid trace --json` tells them, in the frames from first to last; create:
+        the name of the node that makes them. The scene is then at its start."""
+        text, places = c_char_p(), (c_int64 * len(ids))(*(int(one) for one in ids))
+        self._call("scene_trace", self._handle.value, places, len(ids), create.encode() if create else None, first, last,
+                   byref(text))
+        return json.loads(text.value)
+
     def cancel(self):
         """Ends the advance that is running in another thread, or else the next one."""
         call("scene_cancel", self._handle.value)

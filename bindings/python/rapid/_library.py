@@ -109,7 +109,7 @@ def _load():
 
 library = _load()
 
-_texts = ["message", "file", "node", "text"]
+_texts = ["message", "file", "node", "text", "stack"]
 for _text in _texts:
     getattr(library, f"rapid_error_{_text}").restype = c_char_p
     getattr(library, f"rapid_error_{_text}").argtypes = [c_void_p]
@@ -163,6 +163,8 @@ for _name, _types in {
         "offers_node": [c_void_p, POINTER(NodeType)],
         "call_add_rod": [POINTER(Call), c_int64, c_int64, c_double, c_double],
         "scene_offer": [c_void_p, c_void_p],
+        "scene_graph": [c_void_p, c_int, _text],
+        "scene_trace": [c_void_p, POINTER(c_int64), c_size_t, c_char_p, c_int64, c_int64, _text],
         "offers_release": [c_void_p],
         "scene_picture": [c_void_p, c_void_p, c_int, c_int, POINTER(c_void_p), POINTER(c_size_t)],
         "frame_release": [c_void_p]}.items():
@@ -170,10 +172,12 @@ for _name, _types in {
 
 
 class Error(RuntimeError):
-    """What went wrong: str() has FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line, node and kind."""
+    """What went wrong: str() has FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line, node and kind;
+    stack has the calls of the script in which it was raised, the innermost first."""
 
-    def __init__(self, kind, message, file="", line=0, node="", text=None):
+    def __init__(self, kind, message, file="", line=0, node="", text=None, stack=""):
         super().__init__(text or message)
+        self.stack = stack
         self.kind, self.message, self.file, self.line, self.node = kind, message, file, line, node
 
 
@@ -184,9 +188,9 @@ def call(name, *arguments):
     if status == 0:
         return
     try:
-        message, file, node, text = (getattr(library, f"rapid_error_{part}")(fault).decode()
-                                     for part in ("message", "file", "node", "text"))
-        raise Error(STATUS.get(status, str(status)), message, file, library.rapid_error_line(fault), node, text)
+        message, file, node, text, stack = (getattr(library, f"rapid_error_{part}")(fault).decode()
+                                            for part in _texts)
+        raise Error(STATUS.get(status, str(status)), message, file, library.rapid_error_line(fault), node, text, stack)
     finally:
         library.rapid_error_free(fault)
 

@@ -1,4 +1,4 @@
-#include "bindings/command/graphviz.h"
+#include "runtime/report/graphviz.h"
 
 #include <fmt/format.h>
 #include <spawn.h>

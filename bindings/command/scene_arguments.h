@@ -1,0 +1,35 @@
+// The options that all commands share which open a scene, and how it is opened.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "bindings/command/command.h"
+#include "include/rapid/scene.h"
+
+namespace rapid {
+
+class SceneArguments {
+public:
+    void declare(CLI::App& app);
+
+    const std::string& file() const { return file_; }
+    const std::optional<std::uint64_t>& seed() const { return options_.seed; }
+    // --set, by name.
+    const std::map<std::string, std::string>& settings() const { return settings_; }
+    // --script-timeout, --script-memory.
+    const SceneOptions& options() const { return options_; }
+
+    // Opens the scene of a command that writes none of its files; what scripts print is printed, and so are warnings. A
+    // script that runs into its timeout ends the process, now or in a later frame. Error: the file or a --set is wrong.
+    Scene open(const CommonOptions& common) const;
+
+private:
+    std::string file_;
+    std::map<std::string, std::string> settings_;
+    SceneOptions options_;
+};
+
+}  // namespace rapid

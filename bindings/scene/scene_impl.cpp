@@ -1,0 +1,156 @@
+#include "bindings/scene/scene_impl.h"
+
+#include "bindings/scene/host_object.h"
+
+namespace rapid {
+namespace {
+
+SceneValue value_in_header(const Value& value)
+{
+    if (const auto* number = value.get<double>()) return *number;
+    if (const auto* boolean = value.get<bool>()) return *boolean;
+    if (const auto* vector = value.get<Vec3d>()) return std::array<double, 3>{(*vector)[0], (*vector)[1], (*vector)[2]};
+    return *value.get<std::string>();
+}
+
+}  // namespace
+
+SessionOptions Scene::Impl::session_options(const std::map<std::string, std::string>& set)
+{
+    SessionOptions result;
+    result.set = set;
+    result.script_timeout = options.script_seconds;
+    result.script_memory = options.script_memory;
+    result.text = text;
+    for (const std::string& path : options.paths) result.paths.emplace_back(path);
+    result.interruptible = true;
+    result.on_timeout = [this](const std::string& message) {
+        is_late = true;
+        if (late) try {
+                late(message);
+            } catch (...) {  // on a thread that has no caller
+            }
+    };
+    result.offers = offers;
+    result.quiet = !options.log;
+    if (options.log)
+        result.on_print = [log = options.log](const std::string& printed) {
+            std::string line = printed;
+            if (!line.empty() && line.back() == '\n') line.pop_back();
+            call_program("log", log, LogLevel::Print, line);
+        };
+    if (options.find_module)
+        result.find_module = [find = options.find_module](const std::string& name) {
+            return call_program("find_module", find, name);
+        };
+    if (options.find_file)
+        result.find_file = [find = options.find_file](const std::string& path) {
+            return call_program("find_file", find, path);
+        };
+    return result;
+}
+
+void Scene::Impl::tell(const std::vector<std::string>& texts) const
+{
+    if (!options.log) return;
+    for (const std::string& line : texts) call_program("log", options.log, LogLevel::Warning, line);
+}
+
+void Scene::Impl::take_offers()
+{
+    for (const auto& [name, object] : options.objects)
+        offers->objects[name] = make_object(name, object, options.guard_callbacks);
+    for (const HostNode& node : options.nodes) offers->node_types.push_back(make_type(node, options.guard_callbacks));
+    options.objects.clear();
+    options.nodes.clear();
+}
+
+void Scene::Impl::load(std::map<std::string, std::string> set)
+{
+    auto fresh = std::make_unique<Session>(file, session_options(set));
+    std::vector<std::string> told = fresh->take_warnings();
+    tell(told);  // the plan may fail for what they warn of
+    auto fresh_plan = std::make_unique<Plan>(fresh->graph(), plan_options());
+    tell(fresh_plan->warnings);
+    told.insert(told.end(), fresh_plan->warnings.begin(), fresh_plan->warnings.end());
+    picture_scene.reset();
+    evaluator.reset();
+    plan.reset();
+    session = std::move(fresh);
+    settings = std::move(set);
+    warnings = std::move(told);
+    describe_scene();
+    start(std::move(fresh_plan));
+}
+
+PlanOptions Scene::Impl::plan_options() const
+{
+    PlanOptions result;
+    result.seed = options.seed;
+    result.keep_all = options.keep_all;
+    return result;
+}
+
+void Scene::Impl::describe_scene()
+{
+    parameters.clear();
+    for (const Session::Parameter& parameter : session->parameters())
+        parameters.push_back(
+            {parameter.name, parameter.doc, value_in_header(parameter.value), value_in_header(parameter.fallback)});
+    nodes.clear();
+    for (const NodePtr& node : session->graph().nodes)
+        nodes.push_back({node->name, node->type->name, node->location.file, node->location.line});
+}
+
+std::vector<std::string> Scene::Impl::node_names() const
+{
+    std::vector<std::string> names;
+    for (const SceneNode& node : nodes) names.push_back(node.type + ' ' + node.name);
+    return names;
+}
+
+void Scene::Impl::start(std::unique_ptr<Plan> fresh)
+{
+    evaluator.reset();
+    picture_scene.reset();
+    plan = std::move(fresh);
+    evaluator = std::make_unique<Evaluator>(*plan);
+    if (!options.estimate_errors) evaluator->leave_out_errors();
+    next = plan->first_frame();
+    has_advanced = false;
+}
+
+void Scene::Impl::start_again()
+{
+    cancellation.forget();
+    if (session->interrupted() != Interruption::None) return load(settings);
+    start(std::make_unique<Plan>(session->graph(), plan_options()));
+}
+
+SceneFrame Scene::Impl::advance()
+{
+    const Running running(*this);
+    auto data = std::make_shared<SceneFrame::Data>();
+    try {
+        data->result = evaluator->advance();
+    } catch (...) {
+        evaluator.reset();
+        throw;
+    }
+    data->warnings = session->take_warnings();
+    data->warnings.insert(data->warnings.end(), data->result.warnings.begin(), data->result.warnings.end());
+    data->scene = this;
+    next = evaluator->next_frame();
+    has_advanced = true;
+    tell(data->warnings);
+    const auto& outputs = data->result.outputs;
+    const std::string output = outputs.count("main") ? "main" : outputs.begin()->first;
+    return SceneFrame(std::move(data), output);
+}
+
+void Scene::Impl::refuse_unless_ready() const
+{
+    if (!evaluator) refuse("the scene's last frame failed; call restart(), restore() or set() first");
+}
+
+}  // namespace rapid

@@ -1,0 +1,142 @@
+// What a scene is made of.
+#pragma once
+
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings/host/offers.h"
+#include "bindings/host/picture_scene.h"
+#include "bindings/host/session.h"
+#include "bindings/scene/scene_data.h"
+#include "bindings/scene/scene_error.h"
+#include "include/rapid/scene.h"
+#include "runtime/cancellation.h"
+#include "runtime/graph/evaluate.h"
+#include "runtime/memory_budget.h"
+#include "runtime/memory_watch.h"
+
+namespace rapid {
+
+// One scene. Its session is run again for other parameters; plan and evaluator for each start.
+struct [[gnu::visibility("hidden")]] Scene::Impl
+{
+    std::string file;
+    std::optional<std::string> text;
+    SceneOptions options;
+    std::map<std::string, std::string> settings;  // of parameters, by name
+    std::shared_ptr<Offers> offers = std::make_shared<Offers>();
+
+    std::unique_ptr<Session> session;
+    std::vector<SceneParameter> parameters;
+    std::vector<SceneNode> nodes;
+    std::vector<std::string> warnings;
+    std::unique_ptr<Plan> plan;
+    std::unique_ptr<Evaluator> evaluator;  // null behind an error
+    std::unique_ptr<SceneOfPlan> picture_scene;
+    std::int64_t next = 1;
+    bool has_advanced = false;
+
+    std::optional<tbb::task_arena> arena;
+    std::atomic<bool> is_busy = false;
+    std::atomic<bool> is_late = false;  // a script has been stopped in this call
+
+    // What cancel() may do while another thread is in a call.
+    Cancellation cancellation;
+    std::mutex scripts_mutex;
+    Session* scripts = nullptr;  // that an advance runs now
+
+    std::function<void(const std::string& message)> late;  // Scene::open(); may be empty
+
+    // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors.
+    template <class F>
+    auto call(SceneError::Kind kind, const F& f)->Result<decltype(f())>
+    {
+        if (is_busy.exchange(true)) return busy();
+        struct Free {
+            std::atomic<bool>& is_busy;
+            ~Free() { is_busy = false; }
+        } const free{is_busy};
+        try {
+            std::optional<decltype(f())> value;
+            const auto run = [&] {
+                const MemoryBudget budget(options.memory);
+                if (session) session->use_from_this_thread();
+                // Of the loops of this scene no thread that waits takes up another scene.
+                tbb::this_task_arena::isolate([&] { value.emplace(f()); });
+            };
+            arena ? arena->execute(run) : run();
+            return std::move(*value);
+        } catch (...) {
+            SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
+            if (error.message.find(Cancellation::text) != std::string::npos) error.kind = SceneError::Cancelled;
+            if (error.kind == SceneError::Cancelled || error.kind == SceneError::OutOfMemory) cancellation.forget();
+            return error;
+        }
+    }
+
+    SessionOptions session_options(const std::map<std::string, std::string>& set);
+    PlanOptions plan_options() const;
+    void tell(const std::vector<std::string>& texts) const;
+    void take_offers();
+    // Runs the file with these settings. The scene is as it was where that fails.
+    void load(std::map<std::string, std::string> set);
+    void describe_scene();
+    // By which snapshots know their graph.
+    std::vector<std::string> node_names() const;
+    // A new run of the graph: operators keep state, and belong to a plan.
+    void start(std::unique_ptr<Plan> fresh);
+    // Scripts that were stopped do not run again.
+    void start_again();
+    SceneFrame advance();
+    // Of points from the first frame on. fault: what ended it before the last one; null: nothing did.
+    struct Traced {
+        SceneTrace trace;
+        std::exception_ptr fault;
+        bool is_late = false;
+    };
+    Traced trace(const TraceOptions& asked);
+    void refuse_unless_ready() const;
+
+    // For as long as it lives, cancel() stops scripts.
+    struct Scripts {
+        Impl& impl;
+        explicit Scripts(Impl& of) : impl(of) { set(impl.session.get()); }
+        ~Scripts() { set(nullptr); }
+        void set(Session* to)
+        {
+            const std::lock_guard lock(impl.scripts_mutex);
+            impl.scripts = to;
+        }
+    };
+    // For as long as it lives, frames are computed, which end when it is cancelled or takes more memory than its limit.
+    struct Running {
+        Scripts scripts;
+        Cancellation::Scope scope;
+        MemoryWatch watch;
+        // Error: it was cancelled before.
+        explicit Running(Impl& impl)
+            : scripts(impl),
+              scope(&impl.cancellation),
+              watch(
+                  [&impl](const std::string& message) {
+                      impl.cancellation.request(message);
+                      impl.session->interrupt(message);
+                  },
+                  {})
+        {
+            impl.cancellation.check();
+        }
+    };
+};
+
+}  // namespace rapid

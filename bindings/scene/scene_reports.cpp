@@ -1,0 +1,84 @@
+// What is told of a scene: its graph as a picture, and the lives of single points.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+
+#include "bindings/scene/scene_impl.h"
+#include "runtime/report/biography.h"
+#include "runtime/report/graph_picture.h"
+#include "runtime/report/graphviz.h"
+
+namespace rapid {
+
+Result<std::string> Scene::graph(GraphForm form)
+{
+    return impl_->call(SceneError::WrongCall, [&] {
+        const GraphPicture picture = picture_of(*impl_->plan);
+        std::string dot = to_dot(picture);
+        switch (form) {
+            case GraphForm::Dot:
+                return dot;
+            case GraphForm::Svg:
+                return lay_out(dot, "svg");
+            case GraphForm::Json:
+                return to_json(picture, lay_out(dot, "json"));
+        }
+        refuse(fmt::format("the form is {}; it must be one of GraphForm", static_cast<int>(form)));
+    });
+}
+
+Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
+{
+    const Running running(*this);
+    PlanOptions with_steps = plan_options();
+    with_steps.keep_steps = true;
+    const Plan traced(session->graph(), with_steps);
+    Biographer biographer(traced, asked.ids, asked.create);
+    if (asked.last < traced.first_frame())
+        refuse(fmt::format("frame {} is before the scene's first, {}", asked.last, traced.first_frame()));
+    Evaluator run(traced, {}, biographer.results());
+    run.leave_out_errors();
+    biographer.watch(run);
+    Traced result;
+    try {
+        while (run.next_frame() <= asked.last) biographer.add(run.advance());
+    } catch (const Error& error) {
+        if (error.message().find(Cancellation::text) != std::string::npos) throw;
+        result.fault = std::current_exception();
+        result.is_late = is_late.exchange(false);
+        cancellation.forget();                                                // of a limit of memory
+        if (session->interrupted() != Interruption::None) evaluator.reset();  // its scripts do not run again
+    }
+    session->take_warnings();  // of frames, which the run tells
+
+    std::vector<Biography> lives = biographer.lives();
+    for (const std::int64_t id : asked.ids)
+        if (std::none_of(lives.begin(), lives.end(), [&](const Biography& life) { return life.id == id; }))
+            result.trace.unborn.push_back(id);
+    for (Biography& life : lives)
+        std::erase_if(life.steps, [&](const Biography::Step& step) {
+            return step.frame < asked.first || step.frame > asked.last || (step.frame - asked.first) % asked.step != 0;
+        });
+    result.trace.lives = {to_text(lives), to_json(lives)};
+    return result;
+}
+
+Result<SceneTrace> Scene::trace(const TraceOptions& options)
+{
+    Result<Impl::Traced> traced = impl_->call(SceneError::WrongCall, [&] {
+        if (options.ids.empty()) refuse("there are no ids; give those of the points that are to be told of");
+        if (options.step < 1) refuse(fmt::format("step = {}; it must be at least 1", options.step));
+        impl_->start_again();
+        return impl_->trace(options);
+    });
+    if (!traced) return traced.error();
+    if (traced->fault) try {
+            std::rethrow_exception(traced->fault);
+        } catch (...) {
+            traced->trace.fault = caught_error(traced->is_late ? SceneError::TooLong : SceneError::FailedFrame);
+        }
+    return std::move(traced->trace);
+}
+
+}  // namespace rapid

@@ -1,0 +1,168 @@
+// What is told of a scene: its graph, the lives of points, scripts that are late, and where in a script an error was.
+#include <atomic>
+#include <cmath>
+
+#include "include/rapid/scene.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Catch::Contains, Catch::StartsWith;
+
+Scene opened(const std::string& text, SceneOptions options = {})
+{
+    Result<Scene> scene = Scene::open_text("told.lua", "local rapid = require 'rapid'\n" + text, std::move(options));
+    if (!scene) FAIL(scene.error().text());
+    return std::move(*scene);
+}
+
+template <class T>
+T good(Result<T> result)
+{
+    if (!result) FAIL(result.error().text());
+    return std::move(*result);
+}
+
+const char* const ball =
+    "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {5, 1, 0}}, life = {0.5, 9} } }"
+    ":gravity {} :collide { name = 'floor', shape = rapid.shape.plane {}, bounce = 0.5 } :solve {}";
+
+float height(const SceneFrame& frame, std::size_t i) { return frame.column("P")->at<float>(i)[1]; }
+
+}  // namespace
+
+TEST_CASE("the graph of a scene has its nodes, and an edge back from Solve", "[reports]")
+{
+    Scene scene = opened(
+        "rapid.create { name = 'spare' } :drag { linear = 1 }\n"
+        "return rapid.create {} :gravity { name = 'down' } :solve {}");
+    const std::string dot = good(scene.graph(GraphForm::Dot));
+    CHECK_THAT(dot, StartsWith("digraph") && Contains("down") && Contains("n2 -> n0") && Contains("spare"));
+    CHECK_THAT(good(scene.graph(GraphForm::Svg)), Contains("<svg") && Contains("down"));
+    const std::string json = good(scene.graph(GraphForm::Json));
+    CHECK_THAT(json, Contains(R"("name":"down","type":"gravity")") && Contains(R"("x":)"));
+    CHECK_THAT(json, Contains(R"("why":"no output comes from it")"));
+    CHECK(scene.graph(static_cast<GraphForm>(7)).error().kind == SceneError::WrongCall);
+    CHECK(good(scene.advance()).number() == 1);  // a scene that is looked at goes on
+}
+
+TEST_CASE("the graph of a scene whose frame failed is there", "[reports]")
+{
+    Scene scene = opened(
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }"
+        ":points('fails', function(p) error 'no more' end) :solve {}");
+    REQUIRE_FALSE(scene.advance_to(3));
+    CHECK_THAT(good(scene.graph(GraphForm::Dot)), Contains("fails"));
+}
+
+TEST_CASE("a life has birth, contacts and death at the moments of the formula", "[reports]")
+{
+    Scene scene = opened(ball);
+    const SceneTrace trace = good(scene.trace({{0, 77}, "", 1, 24, 1}));
+    CHECK(trace.unborn == std::vector<std::int64_t>{77});
+    CHECK_FALSE(trace.fault);
+    const std::string& json = trace.lives.json;
+    CHECK_THAT(json, StartsWith(R"([{"id":0,"simulation":"create1","birth":{"frame":1,"time":0.0,"P":[0.0,1.0,0.0])"));
+    const std::size_t contact = json.find(R"({"node":"floor","time":)");
+    REQUIRE(contact != std::string::npos);
+    CHECK(std::stod(json.substr(contact + 23)) == Approx(std::sqrt(2 / 9.81)).epsilon(1e-6));
+    CHECK_THAT(json, Contains(R"("death":{"frame":13,"time":0.5)"));
+    CHECK_THAT(trace.lives.text, StartsWith("point 0 of create1\n") && Contains("its life was over"));
+}
+
+TEST_CASE("only the frames that are asked for are told", "[reports]")
+{
+    Scene scene = opened(ball);
+    const std::string json = good(scene.trace({{1}, "create1", 3, 9, 3})).lives.json;
+    for (int frame = 2; frame <= 10; ++frame) {
+        const bool is_told = json.find(R"({"frame":)" + std::to_string(frame) + R"(,"time")") != std::string::npos;
+        CHECK(is_told == (frame % 3 == 0));
+    }
+}
+
+TEST_CASE("behind a trace a scene is at its start, and gives the bits that it gave before", "[reports]")
+{
+    Scene scene = opened(ball);
+    const float before = height(good(scene.advance_to(7)), 1);
+    good(scene.trace({{0}, "", 1, 30, 1}));
+    CHECK(scene.next_frame() == scene.first_frame());
+    CHECK(height(good(scene.advance_to(7)), 1) == before);
+}
+
+TEST_CASE("a wrong trace is an error, and one that fails half-way tells what is known", "[reports]")
+{
+    Scene scene = opened(ball);
+    CHECK_THAT(scene.trace({{0}, "creat1", 1, 9, 1}).error().message, Contains("did you mean \"create1\""));
+    CHECK_THAT(scene.trace({{0}, "", 1, 0, 1}).error().message, Contains("before the scene's first"));
+    CHECK_THAT(scene.trace({{0}, "", 1, 9, 0}).error().message, Contains("step = 0"));
+    CHECK_THAT(scene.trace({{}, "", 1, 2, 1}).error().message, Contains("there are no ids"));
+
+    Scene failing = opened(
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }\n"
+        ":points('fails', function(p, frame) if frame.number == 3 then error 'no more' end end)"
+        ":solve {}");
+    const SceneTrace trace = good(failing.trace({{0}, "", 1, 9, 1}));
+    REQUIRE(trace.fault);
+    CHECK(trace.fault->kind == SceneError::FailedFrame);
+    CHECK(trace.fault->line == 3);
+    CHECK_THAT(SceneError::script_stack(), Contains("told.lua:3"));
+    CHECK_THAT(trace.lives.json, Contains(R"({"frame":2,"time")"));
+    CHECK(failing.next_frame() == 1);
+    CHECK(good(failing.advance_to(2)).number() == 2);
+}
+
+TEST_CASE("a trace is cancelled, and refused within another call", "[reports]")
+{
+    SceneError::Kind inside{};
+    Scene* self = nullptr;
+    SceneOptions options;
+    options.log = [&](LogLevel, const std::string&) {
+        if (!self) return;
+        inside = self->trace({{0}, "", 1, 2, 1}).error().kind;
+        self->cancel();
+    };
+    Scene scene = opened(
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }"
+        ":detail('told', function(points, frame) print(frame.number) end) :solve {}",
+        options);
+    self = &scene;
+    CHECK(scene.trace({{0}, "", 1, 50, 1}).error().kind == SceneError::Cancelled);
+    CHECK(inside == SceneError::Busy);
+    self = nullptr;
+    CHECK(good(scene.trace({{0}, "", 1, 5, 1})).lives.text.size() > 10);
+}
+
+TEST_CASE("the calls of a script are told of the last error of a thread", "[reports]")
+{
+    const Result<Scene> wrong = Scene::open_text("deep.lua",
+                                                 "local function inner() error 'here' end\n"
+                                                 "local function outer() inner(); return 1 end\nouter()\n");
+    REQUIRE_FALSE(wrong);
+    const std::string stack = SceneError::script_stack();
+    CHECK(stack.find("deep.lua:1") < stack.find("deep.lua:2"));
+    CHECK(stack.find("deep.lua:2") < stack.find("deep.lua:3"));
+    REQUIRE_FALSE(Scene::open(""));
+    CHECK(SceneError::script_stack().empty());
+}
+
+TEST_CASE("a program is told of a script that is late, before it is stopped", "[reports]")
+{
+    const test::TemporaryFolder folder;
+    const std::string file = folder.write("late.lua", "while true do end");
+    SceneOptions options;
+    options.script_seconds = 0.2;
+    std::atomic<int> told = 0;
+    std::string text;
+    const Result<Scene> scene = Scene::open(file, options, [&](const std::string& message) {
+        if (told++ == 0) text = message;
+        throw 1;  // is dropped
+    });
+    REQUIRE_FALSE(scene);
+    CHECK(scene.error().kind == SceneError::TooLong);
+    CHECK(told >= 1);
+    CHECK_THAT(text, Contains("runs for more than 0.2 s"));
+}
+
+}  // namespace rapid

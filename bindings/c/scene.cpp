@@ -325,6 +325,20 @@ int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error*
     return guarded(error, [&] { not_null(bytes, "bytes") = open_snapshot(snapshot)->size(); });
 }
 
+int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error** error)
+{
+    return guarded(error, [&] { take(open_snapshot(snapshot)->write(&not_null(path, "path"))); });
+}
+
+int rapid_snapshot_read(const char* path, rapid_snapshot** snapshot, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(snapshot, "snapshot") = nullptr;
+        auto read = std::make_shared<SceneSnapshot>(take(SceneSnapshot::read(&not_null(path, "path"))));
+        *snapshot = static_cast<rapid_snapshot*>(Snapshots::add(std::move(read)));
+    });
+}
+
 int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error)
 {
     return guarded(error, [&] {

@@ -7,9 +7,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/or_throw.h"
 #include "bindings/command/untrusted.h"
-#include "runtime/io/state_file.h"
 #include "runtime/printable.h"
-#include "runtime/report/number_text.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -40,8 +38,12 @@ public:
         const CacheFiles cache = find_cache(file_);
         ordered_json all = ordered_json::array();
         for (const auto& [frame, path] : cache.frames) {
-            if (StateFile::is_one(path)) {
-                all.push_back(tell_snapshot(path));
+            if (SceneSnapshot::is_file(path)) {
+                const SceneReport report = or_throw(SceneSnapshot::describe(path));
+                ordered_json json = {{"file", path.string()}};
+                json.update(ordered_json::parse(report.json));
+                if (!json_) print(report.text);
+                all.push_back(std::move(json));
                 continue;
             }
             const SceneFrame points = threads.run([&, &file = path] { return or_throw(SceneFrame::read(file)); });
@@ -66,46 +68,6 @@ public:
     }
 
 private:
-    ordered_json tell_snapshot(const std::filesystem::path& path) const
-    {
-        try {
-            const StateFile file(path);
-            ordered_json json = {{"file", path.string()}};
-            json.update(file.header());
-            json.erase("blocks");
-            json["bytes"] = file.bytes();
-            if (!json_) print(text_of(json));
-            return json;
-        } catch (Error& error) {
-            throw error.at({path.string(), 0});
-        } catch (const ordered_json::exception&) {
-            throw Error("its header is not that of a snapshot").at({path.string(), 0});
-        }
-    }
-
-    static std::string text_of(const ordered_json& snapshot)
-    {
-        const auto word = [](const ordered_json& value) {
-            return value.is_string() ? value.get<std::string>() : value.dump();
-        };
-        std::string text = fmt::format("{}: a snapshot, {} bytes\n", word(snapshot.at("file")),
-                                       with_separators(snapshot.at("bytes").get<std::uint64_t>()));
-        const auto add = [&](const char* key, const char* what) {
-            if (!snapshot.contains(key)) return;
-            for (const auto& [name, value] : snapshot.at(key).items())
-                text += fmt::format("  {}  {}\n", name, fmt::format(fmt::runtime(what), word(value)));
-        };
-        if (snapshot.contains("graph"))
-            text += fmt::format("of {} after frame {}\n", word(snapshot.at("graph")), word(snapshot.at("frame")));
-        text += "simulations\n";
-        add("simulations", "{} bytes");
-        text += "nodes that keep something\n";
-        add("nodes", "{} bytes");
-        text += "fingerprint\n";
-        add("fingerprint", "{}");
-        return text;
-    }
-
     std::string file_;
     bool json_ = false;
     UntrustedOptions untrusted_;

@@ -178,7 +178,8 @@ Result<SceneSnapshot> Scene::save()
         if (!impl_->has_advanced) refuse("no frame has been computed; advance() first");
         auto data = std::make_shared<SceneSnapshot::Data>();
         data->snapshot = impl_->evaluator->save();
-        data->nodes = impl_->node_names();
+        data->file = impl_->file;
+        data->nodes = impl_->hash_of_nodes();
         return SceneSnapshot(std::move(data));
     });
 }
@@ -186,7 +187,7 @@ Result<SceneSnapshot> Scene::save()
 Result<Done> Scene::restore(const SceneSnapshot& snapshot)
 {
     return impl_->call(SceneError::WrongCall, [&] {
-        if (snapshot.data_->nodes != impl_->node_names())
+        if (snapshot.data_->nodes != impl_->hash_of_nodes())
             refuse("the snapshot is of another graph; restore it in a scene with the same nodes");
         impl_->start_again();
         try {

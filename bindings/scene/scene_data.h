@@ -23,7 +23,8 @@ struct SceneFrame::Data {
 
 struct SceneSnapshot::Data {
     Snapshot snapshot;
-    std::vector<std::string> nodes;  // of the graph, by type and name
+    std::string file;   // of the scene
+    std::string nodes;  // a hash of those of the graph, by type and name
 };
 
 SceneValue value_of(const DetailValue& detail);

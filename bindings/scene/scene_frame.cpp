@@ -229,8 +229,4 @@ Result<FrameComparison> SceneFrame::compare(const SceneFrame& other, double tole
     }
 }
 
-SceneSnapshot::SceneSnapshot(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
-std::int64_t SceneSnapshot::frame() const { return data_->snapshot.frame; }
-std::size_t SceneSnapshot::size() const { return data_->snapshot.size(); }
-
 }  // namespace rapid

@@ -1,6 +1,9 @@
 #include "bindings/scene/scene_impl.h"
 
+#include <fmt/format.h>
+
 #include "bindings/scene/host_object.h"
+#include "runtime/files/content_hash.h"
 
 namespace rapid {
 namespace {
@@ -102,11 +105,11 @@ void Scene::Impl::describe_scene()
         nodes.push_back({node->name, node->type->name, node->location.file, node->location.line});
 }
 
-std::vector<std::string> Scene::Impl::node_names() const
+std::string Scene::Impl::hash_of_nodes() const
 {
-    std::vector<std::string> names;
-    for (const SceneNode& node : nodes) names.push_back(node.type + ' ' + node.name);
-    return names;
+    std::string all;
+    for (const SceneNode& node : nodes) all += fmt::format("{} {}\n", node.type, node.name);
+    return hash_text(content_hash(all));
 }
 
 void Scene::Impl::start(std::unique_ptr<Plan> fresh)

@@ -92,7 +92,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     void load(std::map<std::string, std::string> set);
     void describe_scene();
     // By which snapshots know their graph.
-    std::vector<std::string> node_names() const;
+    std::string hash_of_nodes() const;
     // A new run of the graph: operators keep state, and belong to a plan.
     void start(std::unique_ptr<Plan> fresh);
     // Scripts that were stopped do not run again.

@@ -209,6 +209,10 @@ int rapid_scene_save(rapid_scene* scene, rapid_snapshot** snapshot, rapid_error*
 int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_error** error);
 int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error);
 int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error** error);
+/* Writes a file, which has its name when it is complete, or reads one, which this build of Rapid has written. *snapshot
+ * is to be released. */
+int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error** error);
+int rapid_snapshot_read(const char* path, rapid_snapshot** snapshot, rapid_error** error);
 int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
 
 /* How a graph is given: in Graphviz's language; as a picture; as nodes and edges with their places, an object, as

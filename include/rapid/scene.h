@@ -239,6 +239,18 @@ public:
     std::int64_t frame() const;  // the last one computed before it was taken
     std::size_t size() const;    // bytes
 
+    // Writes it to a file, which has its name when it is complete; missing folders are made. Error: the system's.
+    Result<Done> write(const std::string& path) const;
+    // Error: the system's; a file that is of something else, damaged, of another build of Rapid, or of a run of the
+    // command.
+    static Result<SceneSnapshot> read(const std::string& path);
+
+    // Whether a file begins as one of a snapshot, of a scene or of `rapid run --cache`, does.
+    static bool is_file(const std::string& path);
+    // What such a file says of itself, as `rapid info` prints it. Error: the system's; a file that is of something else,
+    // or damaged.
+    static Result<SceneReport> describe(const std::string& path);
+
 private:
     friend class Scene;
     struct Data;

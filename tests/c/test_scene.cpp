@@ -346,6 +346,12 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("info", [&](rapid_error** e) { return rapid_frame_get_info(frame, nullptr, e); });
     refused("path", [&](rapid_error** e) { return rapid_frame_write(frame, nullptr, e); });
     refused("path", [&](rapid_error** e) {
+        rapid_snapshot* read = nullptr;
+        return rapid_snapshot_read(nullptr, &read, e);
+    });
+    refused("snapshot", [&](rapid_error** e) { return rapid_snapshot_read("fall.state", nullptr, e); });
+    refused("snapshot", [&](rapid_error** e) { return rapid_snapshot_write(nullptr, "fall.state", e); });
+    refused("path", [&](rapid_error** e) {
         rapid_frame* read = nullptr;
         return rapid_frame_read(nullptr, &read, e);
     });

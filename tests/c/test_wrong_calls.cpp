@@ -184,6 +184,21 @@ const std::vector<Function>& functions()
              std::uint64_t bytes = 0;
              return rapid_snapshot_bytes(h.snapshot, &bytes, e);
          }},
+        {"rapid_snapshot_write", "n",
+         [](const Handles& h, rapid_error** e) {
+             const test::TemporaryFolder folder;
+             return rapid_snapshot_write(h.snapshot, (folder / "fall.state").c_str(), e);
+         }},
+        {"rapid_snapshot_read", "",
+         [](const Handles&, rapid_error** e) {
+             const test::TemporaryFolder folder;
+             const Opened other;
+             const std::string file = folder / "fall.state";
+             REQUIRE(rapid_snapshot_write(other.snapshot, file.c_str(), nullptr) == RAPID_OK);
+             rapid_snapshot* snapshot = nullptr;
+             const int status = rapid_snapshot_read(file.c_str(), &snapshot, e);
+             return released(rapid_snapshot_release, snapshot, status);
+         }},
         {"rapid_snapshot_release", "n",
          [](const Handles& h, rapid_error** e) { return rapid_snapshot_release(h.snapshot, e); }},
         {"rapid_offers_new", "",
@@ -521,6 +536,9 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("\"x\"", [&](auto e) { return rapid_frame_detail(h.frame, "x", &value, e); });
     refused(".xyz", [&](auto e) { return rapid_frame_write(h.frame, "points.xyz", e); });
     refused("/dev/null", [&](auto e) { return rapid_frame_write(h.frame, "/dev/null/points.csv", e); });
+    rapid_snapshot* snapshot = nullptr;
+    refused("nowhere.state", [&](auto e) { return rapid_snapshot_read("nowhere.state", &snapshot, e); });
+    refused("/dev/null", [&](auto e) { return rapid_snapshot_write(h.snapshot, "/dev/null/fall.state", e); });
     refused("nowhere.csv", [&](auto e) { return rapid_frame_read("nowhere.csv", &frame, e); });
     refused(".png", [&](auto e) { return rapid_frame_read("points.png", &frame, e); });
     for (const double wrong : {-1.0, double(NAN)})

@@ -82,7 +82,6 @@ const std::set<std::string> commands_from_inside = {
     "bindings/command/frame_files.cpp",
     "bindings/command/frame_record.cpp",
     "bindings/command/graph_options.cpp",
-    "bindings/command/info.cpp",
     "bindings/command/main.cpp",
     "bindings/command/merge.cpp",
     "bindings/command/new.cpp",

@@ -297,6 +297,16 @@ class Scenes(unittest.TestCase):
         later = scene.advance_to(7)["P"].copy()
         scene.restore(snapshot)
         numpy.testing.assert_array_equal(scene.advance_to(7)["P"], later)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "fall.state"
+            snapshot.write(path)
+            read = rapid.Snapshot.read(path)
+            with self.assertRaisesRegex(rapid.Error, "nothing.state"):
+                rapid.Snapshot.read(path.with_name("nothing.state"))
+        other = fall()
+        other.restore(read)
+        self.assertEqual(other.next_frame, 4)
+        numpy.testing.assert_array_equal(other.advance_to(7)["P"], later)
 
     def test_callbacks(self):
         printed, frames = [], []

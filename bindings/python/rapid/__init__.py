@@ -205,6 +205,16 @@ class Snapshot:
         """Bytes."""
         return get("snapshot_bytes", self._handle.value, c_uint64()).value
 
+    def write(self, path):
+        """Writes it to a file, for Snapshot.read()."""
+        call("snapshot_write", self._handle.value, str(path).encode())
+
+    @staticmethod
+    def read(path):
+        handle = c_void_p()
+        call("snapshot_read", str(path).encode(), byref(handle))
+        return Snapshot(handle)
+
 
 class Scene:
     """A scene of a file, or with text= of a text, whose messages name it so.

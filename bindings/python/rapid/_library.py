@@ -140,6 +140,8 @@ for _name, _types in {
         "scene_restore": [c_void_p, c_void_p],
         "snapshot_frame": [c_void_p, POINTER(c_int64)],
         "snapshot_bytes": [c_void_p, POINTER(c_uint64)],
+        "snapshot_write": [c_void_p, c_char_p],
+        "snapshot_read": [c_char_p, _handle],
         "snapshot_release": [c_void_p],
         "frame_output": [c_void_p, c_char_p, _handle],
         "frame_names": [c_void_p, c_int, _text],

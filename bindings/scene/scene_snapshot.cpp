@@ -1,0 +1,118 @@
+// Snapshots, in memory and in files.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "bindings/scene/scene_data.h"
+#include "bindings/scene/scene_error.h"
+#include "runtime/graph/abi.h"
+#include "runtime/io/state_file.h"
+#include "runtime/points/state_archive.h"
+#include "runtime/report/number_text.h"
+
+namespace rapid {
+namespace {
+
+constexpr char what_it_is[] = "snapshot of a scene";
+
+// What a file says of itself: the members of its header but those of its form.
+CheckedJson told_of(const std::string& path)
+{
+    const StateFile file(path);
+    CheckedJson json = file.header();
+    json.erase("blocks");
+    json["bytes"] = file.bytes();
+    return json;
+}
+
+std::string text_of(const std::string& path, const CheckedJson& told)
+{
+    const auto word = [](const CheckedJson& value) {
+        return value.is_string() ? value.get<std::string>() : value.dump();
+    };
+    std::string text =
+        fmt::format("{}: a snapshot, {} bytes\n", path, with_separators(told.at("bytes").get<std::uint64_t>()));
+    const auto add = [&](const char* key, const char* unit) {
+        if (!told.contains(key)) return;
+        for (const auto& [name, value] : told.at(key).items())
+            text += fmt::format("  {}  {}{}\n", name, word(value), unit);
+    };
+    if (told.contains("graph"))
+        text += fmt::format("of {} after frame {}\n", word(told.at("graph")), word(told.at("frame")));
+    text += "simulations\n";
+    add("simulations", " bytes");
+    text += "nodes that keep something\n";
+    add("nodes", " bytes");
+    text += "fingerprint\n";
+    add("fingerprint", "");
+    return text;
+}
+
+// What f gives of a file. Error: with the file.
+template <class F>
+auto of_file(const std::string& path, const F& f) -> Result<decltype(f())>
+{
+    try {
+        try {
+            return f();
+        } catch (Error& error) {
+            throw error.at({path, 0});
+        } catch (const nlohmann::json::exception&) {
+            throw Error("its header is not that of a snapshot").at({path, 0});
+        }
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+}  // namespace
+
+SceneSnapshot::SceneSnapshot(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+std::int64_t SceneSnapshot::frame() const { return data_->snapshot.frame; }
+std::size_t SceneSnapshot::size() const { return data_->snapshot.size(); }
+
+Result<Done> SceneSnapshot::write(const std::string& path) const
+{
+    return of_file(path, [&] {
+        const Snapshot& snapshot = data_->snapshot;
+        CheckedJson header = {{"what", what_it_is}, {"graph", data_->file}, {"frame", snapshot.frame}};
+        for (const auto& [name, state] : snapshot.simulations) header["simulations"][name] = state.size();
+        for (const auto& [name, state] : snapshot.nodes) header["nodes"][name] = state.size();
+        header["fingerprint"] = {{"Rapid", RAPID_ABI}, {"nodes", data_->nodes}};
+        OutputFile file(path);
+        write_state(file, std::move(header), state_of(snapshot));
+        file.finish();
+        return Done();
+    });
+}
+
+Result<SceneSnapshot> SceneSnapshot::read(const std::string& path)
+{
+    return of_file(path, [&] {
+        const StateFile file(path);
+        if (file.header().at("what") != what_it_is)
+            throw Error("it is of a run of the command, which goes on from it by itself: rapid run --cache");
+        const CheckedJson& fingerprint = file.header().at("fingerprint");
+        if (fingerprint.at("Rapid") != RAPID_ABI)
+            throw Error(fmt::format("it is of Rapid {}, and this is {}; write it anew",
+                                    fingerprint.at("Rapid").get<std::string>(), RAPID_ABI));
+        auto data = std::make_shared<Data>();
+        data->file = file.header().at("graph").get<std::string>();
+        data->nodes = fingerprint.at("nodes").get<std::string>();
+        rapid::restore(data->snapshot, file.state());
+        return SceneSnapshot(std::move(data));
+    });
+}
+
+bool SceneSnapshot::is_file(const std::string& path) { return StateFile::is_one(path); }
+
+Result<SceneReport> SceneSnapshot::describe(const std::string& path)
+{
+    return of_file(path, [&] {
+        const CheckedJson told = told_of(path);
+        return SceneReport{text_of(path, told), told.dump(-1, ' ', false, CheckedJson::error_handler_t::replace)};
+    });
+}
+
+}  // namespace rapid

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <cerrno>
 #include <climits>
+#include <csignal>
 #include <cstring>
 #include <deque>
 #include <mutex>
@@ -141,6 +142,28 @@ Entry* claim_entry()
 }
 
 }  // namespace
+
+namespace {
+
+std::array<std::atomic<pid_t>, 16> writing_programs{};  // 0: none
+static_assert(std::atomic<pid_t>::is_always_lock_free, "a signal handler reads them");
+
+}  // namespace
+
+WritingProgram::WritingProgram(pid_t program)
+{
+    for (std::atomic<pid_t>& place : writing_programs) {
+        pid_t none = 0;
+        if (!place.compare_exchange_strong(none, program)) continue;
+        place_ = &place;
+        return;
+    }
+}
+
+WritingProgram::~WritingProgram()
+{
+    if (place_) *place_ = 0;
+}
 
 // A random name, which is removed with the object, or by remove_unfinished_files(), unless it was given away.
 class OutputFile::HiddenName {
@@ -324,6 +347,8 @@ void remove_unfinished_files() noexcept
     ending = true;
     for (Entry* entry = entries.load(); entry; entry = entry->next)
         if (entry->state == Entry::Named) ::unlink(entry->name);
+    for (const std::atomic<pid_t>& program : writing_programs)
+        if (const pid_t writing = program) ::kill(writing, SIGKILL);
 }
 
 }  // namespace rapid

@@ -9,6 +9,9 @@
 // Errors name the system's reason, not the file (file_error.h).
 #pragma once
 
+#include <sys/types.h>
+
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -65,8 +68,21 @@ bool is_own_file(const std::filesystem::path& path);
 // From now on a file is on the disk when finish() returns (fsync), so that it outlasts a power cut.
 void make_files_durable();
 
-// Removes all unfinished files and prevents further ones: for a signal handler or a watchdog that ends the process
-// next. Async-signal-safe.
+// Another program that writes an unfinished file, and that remove_unfinished_files() ends. For as long as it lives the
+// program is not waited for. Of more than 16 the others end by themselves.
+class WritingProgram {
+public:
+    explicit WritingProgram(pid_t program);
+    ~WritingProgram();
+    WritingProgram(const WritingProgram&) = delete;
+    WritingProgram& operator=(const WritingProgram&) = delete;
+
+private:
+    std::atomic<pid_t>* place_ = nullptr;
+};
+
+// Removes all unfinished files, ends the programs that write them, and prevents further ones: for a signal handler or a
+// watchdog that ends the process next. Async-signal-safe.
 void remove_unfinished_files() noexcept;
 
 }  // namespace rapid

@@ -134,6 +134,7 @@ Film::Film(OutputFile& file, std::string_view extension, int width, int height, 
         ffmpeg_ = -1;
         throw Error(fmt::format("{} can't be started: {}", program, std::strerror(failed)));
     }
+    writing_.emplace(ffmpeg_);
 }
 
 Film::~Film()
@@ -164,6 +165,10 @@ void Film::finish()
 
 int Film::wait()
 {
+    siginfo_t ended = {};  // its number is another program's when it has been waited for
+    while (waitid(P_PID, static_cast<id_t>(ffmpeg_), &ended, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
+    }
+    writing_.reset();
     int status = 0;
     while (waitpid(ffmpeg_, &status, 0) < 0 && errno == EINTR) {
     }

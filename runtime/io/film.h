@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "runtime/files/output_file.h"
@@ -36,6 +37,7 @@ private:
     Descriptor frames_;    // to ffmpeg's input
     Descriptor messages_;  // what it says, a file without a name
     pid_t ffmpeg_ = -1;    // -1: it has ended
+    std::optional<WritingProgram> writing_;
 };
 
 // Error: there is no ffmpeg on the PATH, with the package that has it.

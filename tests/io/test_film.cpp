@@ -1,6 +1,10 @@
 #include "runtime/io/film.h"
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <array>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -47,6 +51,27 @@ private:
 };
 
 }  // namespace
+
+TEST_CASE("ffmpeg ends with a run that a signal ends", "[io][film]")
+{
+    const TemporaryFolder folder;
+    // In a process of its own: the call is for one that ends.
+    const pid_t run = fork();
+    if (run == 0) {
+        alarm(20);  // else it would wait for ever
+        OutputFile file(folder / "a.webm");
+        Film film(file, ".webm", width, height, 25);
+        film.add(grey(0));
+        remove_unfinished_files();
+        siginfo_t ended = {};
+        const bool waited = waitid(P_ALL, 0, &ended, WEXITED | WNOWAIT) == 0;
+        _exit(waited && ended.si_code == CLD_KILLED && ended.si_status == SIGKILL ? 0 : 1);
+    }
+    int status = 0;
+    REQUIRE(waitpid(run, &status, 0) == run);
+    CHECK(status == 0);
+    CHECK(file_names(folder.path()).empty());
+}
 
 TEST_CASE("a film has the pictures that it was given, in their order", "[io][film]")
 {

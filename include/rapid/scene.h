@@ -303,6 +303,19 @@ struct PictureSize {
     int width = 640, height = 360;  // pixels, from 1 to 16384
 };
 
+// The documentation of a type of node.
+struct NodeDocument {
+    std::string name, doc;  // `:NAME { ... }`, and a sentence
+    SceneReport page;       // parameters, and what it reads, writes and makes, as `rapid nodes NAME` prints it
+};
+
+// What scenes are made of.
+struct NodeDocuments {
+    std::vector<NodeDocument> types;    // native ones, Rapid's own in Lua, and those that are found; in order of name
+    std::vector<std::string> warnings;  // of files that define a node with a mistake in it
+    std::string annotations;            // all that scenes are written with, for the Lua language server
+};
+
 // How Scene::graph() gives a graph.
 enum class GraphForm {
     Dot,   // in Graphviz's language
@@ -342,6 +355,9 @@ public:
     Scene(Scene&&) noexcept;
     Scene& operator=(Scene&&) noexcept;
     ~Scene();  // not while a call of another thread is running
+
+    // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on RAPID_PATH.
+    static Result<NodeDocuments> documents();
 
     // In the order in which the scene declares them.
     const std::vector<SceneParameter>& parameters() const;

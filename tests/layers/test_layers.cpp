@@ -73,7 +73,6 @@ const std::set<std::string> small_tools = {
 // Sources of the command that know more of Rapid than a program can: each is to be built on include/rapid alone, and no
 // other one comes to them.
 const std::set<std::string> commands_from_inside = {
-    "bindings/command/annotations.cpp",
     "bindings/command/cache_files.cpp",
     "bindings/command/check.cpp",
     "bindings/command/event_file.cpp",
@@ -85,8 +84,6 @@ const std::set<std::string> commands_from_inside = {
     "bindings/command/main.cpp",
     "bindings/command/merge.cpp",
     "bindings/command/new.cpp",
-    "bindings/command/nodes.cpp",
-    "bindings/command/param_facts.cpp",
     "bindings/command/part_options.cpp",
     "bindings/command/part_record.cpp",
     "bindings/command/point_store.cpp",

@@ -1,4 +1,5 @@
 // What is told of a scene: its graph, the lives of points, scripts that are late, and where in a script an error was.
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
@@ -32,6 +33,21 @@ const char* const ball =
 float height(const SceneFrame& frame, std::size_t i) { return frame.column("P")->at<float>(i)[1]; }
 
 }  // namespace
+
+TEST_CASE("what scenes are made of is documented without a scene", "[reports]")
+{
+    const NodeDocuments documents = good(Scene::documents());
+    CHECK(documents.types.size() > 40);
+    CHECK(std::is_sorted(documents.types.begin(), documents.types.end(),
+                         [](const auto& a, const auto& b) { return a.name < b.name; }));
+    const auto gravity = std::find_if(documents.types.begin(), documents.types.end(),
+                                      [](const NodeDocument& type) { return type.name == "gravity"; });
+    REQUIRE(gravity != documents.types.end());
+    CHECK_THAT(gravity->page.text, StartsWith(":gravity{...}\n") && Contains("default {0, -9.81, 0}"));
+    CHECK_THAT(gravity->page.json,
+               StartsWith(R"({"name":"gravity","doc":)") && Contains(R"("default":[0.0,-9.81,0.0])"));
+    CHECK_THAT(documents.annotations, StartsWith("---@meta") && Contains("function Node:gravity(params) end"));
+}
 
 TEST_CASE("the graph of a scene has its nodes, and an edge back from Solve", "[reports]")
 {

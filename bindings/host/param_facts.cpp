@@ -1,4 +1,4 @@
-#include "bindings/command/param_facts.h"
+#include "bindings/host/param_facts.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "bindings/command/annotations.h"
+#include "bindings/host/annotations.h"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <set>
 #include <sstream>
 
-#include "bindings/command/param_facts.h"
 #include "bindings/host/maker.h"
 #include "bindings/host/modules.h"
+#include "bindings/host/param_facts.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {

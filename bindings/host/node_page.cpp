@@ -1,0 +1,101 @@
+#include "bindings/host/node_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "bindings/host/param_facts.h"
+#include "runtime/json_text.h"
+
+namespace rapid {
+namespace {
+
+// A default in JSON; a value that JSON has no form for is written as in messages.
+void add_value(JsonText& json, const Value& value)
+{
+    if (value.is_nil()) return json.value(nullptr);
+    if (const bool* truth = value.get<bool>()) return json.value(*truth);
+    if (const double* number = value.get<double>(); number && std::isfinite(*number)) return json.value(*number);
+    if (const std::string* text = value.get<std::string>()) return json.value(*text);
+    if (const Vec3d* v = value.get<Vec3d>()) return json.value(std::vector{v->x(), v->y(), v->z()});
+    json.value(describe(value));
+}
+
+void add_param(JsonText& json, const Param& param)
+{
+    json.begin_object();
+    json.member("name", param.name);
+    json.member("type", param.type);
+    json.key("default");
+    add_value(json, param.fallback);
+    if (std::isfinite(param.range.lo)) json.member("min", param.range.lo);
+    if (param.range.lo_excluded) json.member("above_min", true);
+    if (std::isfinite(param.range.hi)) json.member("max", param.range.hi);
+    if (!param.choices.empty()) json.member("choices", param.choices);
+    json.member("unit", param.unit);
+    json.member("doc", param.doc);
+    json.member("required", param.required);
+    json.member("per_point", param.per_point);
+    json.member("of_the_frame", param.of_the_frame);
+    json.end();
+}
+
+std::vector<std::string> made_by(const NodeType& type)
+{
+    std::vector<std::string> names;
+    for (const AttributeSpec& spec : type.uses.makes) names.push_back(spec.name);
+    return names;
+}
+
+}  // namespace
+
+std::string json_of(const NodeType& type)
+{
+    JsonText json;
+    json.begin_object();
+    json.member("name", type.name);
+    json.member("doc", type.doc);
+    json.key("params");
+    json.begin_list();
+    for (const Param& param : type.params)
+        if (!param.internal) add_param(json, param);
+    json.end();
+    json.key("other_params");
+    if (type.rest)
+        json.value(type.rest->doc);
+    else
+        json.value(nullptr);
+    json.member("reads", type.uses.reads);
+    json.member("writes", type.uses.writes);
+    json.member("makes", made_by(type));
+    json.end();
+    return json.text();
+}
+
+std::string page_of(const NodeType& type)
+{
+    const std::string call = type.kind == NodeKind::Source ? "rapid." + type.name : ":" + type.name;
+    std::string text = fmt::format("{}{{...}}\n{}\n", call, type.doc);
+    std::size_t width = std::string_view("name").size();
+    for (const Param& param : type.params) width = std::max(width, param.name.size());
+    text += '\n';
+    for (const Param& param : type.params) {
+        if (param.internal) continue;
+        text += fmt::format("  {:{}}  {} {}\n", param.name, width, param.doc, facts_of(param));
+    }
+    if (!type.find("name"))
+        text += fmt::format("  {:{}}  what the node is called in messages [string]\n", "name", width);
+    if (type.rest) text += fmt::format("  {:{}}  {} [{}]\n", "...", width, type.rest->doc, type.rest->type);
+
+    const auto names = [&](std::string_view what, const std::vector<std::string>& list) {
+        if (!list.empty()) text += fmt::format("\n{} {}", what, fmt::join(list, ", "));
+    };
+    names("reads", type.uses.reads);
+    names("writes", type.uses.writes);
+    names("makes", made_by(type));
+    if (text.back() != '\n') text += '\n';
+    return text;
+}
+
+}  // namespace rapid

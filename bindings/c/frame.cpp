@@ -46,7 +46,7 @@ int tell(rapid_error** to, SceneError error) noexcept
 
 rapid_frame* new_frame(SceneFrame frame)
 {
-    auto object = std::shared_ptr<OpenFrame>(new OpenFrame{std::move(frame), {}, {}, {}, {}, {}, {}, {}});
+    auto object = std::shared_ptr<OpenFrame>(new OpenFrame{std::move(frame), {}, {}, {}, {}, {}, {}, {}, {}});
     return static_cast<rapid_frame*>(Frames::add(std::move(object)));
 }
 
@@ -143,6 +143,17 @@ int rapid_frame_statistics(rapid_frame* frame, const char** json, rapid_error** 
         const std::lock_guard lock(open->mutex);
         if (open->statistics.empty()) open->statistics = open->frame.statistics_json();
         *json = open->statistics.c_str();
+    });
+}
+
+int rapid_frame_profile(rapid_frame* frame, const char** json, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(json, "json") = nullptr;
+        const auto open = open_frame(frame);
+        const std::lock_guard lock(open->mutex);
+        if (open->profile.empty()) open->profile = open->frame.profile_json();
+        *json = open->profile.c_str();
     });
 }
 

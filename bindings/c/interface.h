@@ -21,12 +21,12 @@ namespace rapid {
 struct OpenScene {
     Scene scene;
     std::atomic<bool> is_busy = false;
-    std::string node_types, warnings, graph, lives;
+    std::string node_types, warnings, explanation, graph, lives;
 };
 struct OpenFrame {
     SceneFrame frame;
     std::mutex mutex;  // of the texts
-    std::string names[4], statistics, description, comparison, picture;
+    std::string names[4], statistics, profile, description, comparison, picture;
     std::map<std::string, SceneValue> details;
 };
 struct OpenError {

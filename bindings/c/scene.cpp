@@ -67,7 +67,7 @@ int open_into(rapid_scene** scene, rapid_error** error, const auto& open)
 {
     return guarded(error, [&] {
         not_null(scene, "scene") = nullptr;
-        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), false, {}, {}, {}, {}});
+        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), false, {}, {}, {}, {}, {}});
         *scene = static_cast<rapid_scene*>(Scenes::add(std::move(object)));
     });
 }
@@ -148,6 +148,11 @@ using namespace rapid;
 
 extern "C" {
 
+int rapid_load_plugin(const char* file, rapid_error** error)
+{
+    return guarded(error, [&] { take(Scene::load_plugin(&not_null(file, "file"))); });
+}
+
 int rapid_scene_open(const char* file, const rapid_options* options, rapid_scene** scene, rapid_error** error)
 {
     return open_into(scene, error, [&] { return Scene::open(&not_null(file, "file"), options_of(options)); });
@@ -226,6 +231,25 @@ int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** er
         const SceneCall open(scene);
         open->warnings = joined(open.scene().warnings());
         *text = open->warnings.c_str();
+    });
+}
+
+int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(json, "json") = nullptr;
+        const SceneCall open(scene);
+        open->explanation = take(open.scene().explain()).json;
+        *json = open->explanation.c_str();
+    });
+}
+
+int rapid_scene_points_behind(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
+                              rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(frame, "frame") = nullptr;
+        *frame = new_frame(take(SceneCall(scene).scene().points_behind(&not_null(node, "node"), number)));
     });
 }
 

@@ -12,9 +12,9 @@
 #include <optional>
 
 #include "bindings/command/command.h"
+#include "bindings/command/or_throw.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/files/output_file.h"
-#include "runtime/graph/plugin.h"
 
 namespace rapid {
 namespace {
@@ -158,8 +158,8 @@ int run_command(Command& command, const CommonOptions& common)
         auto* const confined = dynamic_cast<Confined*>(&command);
         if (confined) confined->confine(common);
         if (!confined || confined->takes_plugins()) {
-            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) load_plugins(path);
-            for (const std::string& file : common.plugins) load_plugin(file);
+            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) or_throw(Scene::load_plugins(path));
+            for (const std::string& file : common.plugins) or_throw(Scene::load_plugin(file));
         }
         return finish(command.run(common));
     } catch (const Error& error) {

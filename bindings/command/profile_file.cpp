@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "runtime/report/frame_profile.h"
+
 namespace rapid {
 namespace {
 
@@ -17,19 +19,6 @@ constexpr int frames_row = 1, passes_row = 2, files_row = 3;  // "threads" of th
 std::string event_text(const ordered_json& event)
 {
     return event.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
-
-const char* stage_name(NodeWork::Stage stage)
-{
-    switch (stage) {
-        case NodeWork::Stage::Graph:
-            return "graph";
-        case NodeWork::Stage::Script:
-            return "script";
-        case NodeWork::Stage::Solve:
-            return "solve";
-    }
-    return "";
 }
 
 ordered_json row_name(int row, const std::string& name)
@@ -92,8 +81,8 @@ void ProfileFile::add(const FrameResult& result)
                      {"collisions", result.figures.collisions}};
     append(event_text(frame));
     for (const NodeWork& work : result.work) {
-        ordered_json pass = complete(fmt::format("{}", fmt::join(work.nodes, " + ")), stage_name(work.stage),
-                                     passes_row, begin + 1e6 * work.begin, 1e6 * work.seconds);
+        ordered_json pass = complete(fmt::format("{}", fmt::join(work.nodes, " + ")), name_of(work.stage), passes_row,
+                                     begin + 1e6 * work.begin, 1e6 * work.seconds);
         pass["args"] = {{"frame", result.frame},
                         {"nodes", work.nodes},
                         {"points", work.points},

@@ -1,4 +1,4 @@
-// What scenes are made of, without a scene.
+// Types of nodes, without a scene.
 #include <utility>
 
 #include "bindings/host/annotations.h"
@@ -6,8 +6,25 @@
 #include "bindings/host/own_nodes.h"
 #include "bindings/scene/scene_error.h"
 #include "include/rapid/scene.h"
+#include "runtime/graph/plugin.h"
 
 namespace rapid {
+namespace {
+
+Result<Done> loaded(const std::string& from, void (*load)(const std::string&))
+{
+    try {
+        load(from);
+        return Done();
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+}  // namespace
+
+Result<Done> Scene::load_plugin(const std::string& file) { return loaded(file, rapid::load_plugin); }
+Result<Done> Scene::load_plugins(const std::string& path) { return loaded(path, rapid::load_plugins); }
 
 Result<NodeDocuments> Scene::documents()
 {

@@ -11,6 +11,7 @@
 #include "runtime/io/compare.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
+#include "runtime/report/frame_profile.h"
 #include "runtime/report/statistics.h"
 
 namespace rapid {
@@ -176,6 +177,8 @@ std::string SceneFrame::statistics_json() const
     const std::size_t begin = line.find('{'), end = line.rfind('}');
     return line.substr(begin, end - begin + 1);
 }
+
+std::string SceneFrame::profile_json() const { return rapid::profile_json(data_->result); }
 
 Result<Done> SceneFrame::write(const std::string& path) const
 {

@@ -105,6 +105,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         bool is_late = false;
     };
     Traced trace(const TraceOptions& asked);
+    SceneFrame points_behind(const std::string& node, std::int64_t frame);
     void refuse_unless_ready() const;
 
     // For as long as it lives, cancel() stops scripts.

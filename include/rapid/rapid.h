@@ -54,6 +54,10 @@ typedef struct rapid_offers rapid_offers;
 /* "1.0.0", of the library. */
 const char* rapid_version(void);
 
+/* Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes that
+ * are opened later, in the whole process. Not while another thread opens a scene. */
+int rapid_load_plugin(const char* file, rapid_error** error);
+
 /* ---- Errors. All take NULL, for which they return "" and 0. */
 
 const char* rapid_error_message(const rapid_error* error); /* what is wrong; what would be right */
@@ -215,6 +219,13 @@ int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error
 int rapid_snapshot_read(const char* path, rapid_snapshot** snapshot, rapid_error** error);
 int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
 
+/* What the plan of the scene keeps and leaves out, and why: an object, as `rapid explain --json` prints it. It belongs to
+ * the scene, until the next call of this function. */
+int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** error);
+/* The points as they leave a node in a frame, as a frame with the only output of the node's name: goes to the start, and
+ * computes the frames up to this one beside the scene, which then is at its start. *frame is to be released. */
+int rapid_scene_points_behind(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
+                              rapid_error** error);
 /* How a graph is given: in Graphviz's language; as a picture; as nodes and edges with their places, an object, as
  * `rapid graph -o FILE.json` writes it. */
 enum { RAPID_GRAPH_DOT = 0, RAPID_GRAPH_SVG = 1, RAPID_GRAPH_JSON = 2 };
@@ -350,6 +361,10 @@ typedef struct rapid_frame_info {
 int rapid_frame_get_info(rapid_frame* frame, rapid_frame_info* info, rapid_error** error);
 /* The frame's object in the file of `rapid run --stats`. */
 int rapid_frame_statistics(rapid_frame* frame, const char** json, rapid_error** error);
+
+/* Where its time went: a list, a member for each pass over the points, in order: "nodes", "stage" ("graph", "script",
+ * "solve"), "begin" and "seconds" since the frame's beginning, "points" and "bytes" of the result. */
+int rapid_frame_profile(rapid_frame* frame, const char** json, rapid_error** error);
 
 /* An attribute, or a group; its memory belongs to the frame. Takes some nanoseconds, however many points there are. */
 int rapid_frame_column(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);

@@ -206,6 +206,10 @@ public:
     FrameStatisticsSummary statistics() const;
     // The frame's object in the file of `rapid run --stats` (docs/cli.md), as one line of JSON.
     std::string statistics_json() const;
+    // Where its time went: a list in one line of JSON, a member for each pass over the points, in order: "nodes" (those
+    // that went over them together), "stage" ("graph", "script", "solve"), "begin" and "seconds" (s, since the frame's
+    // beginning), "points" and "bytes" of the result.
+    std::string profile_json() const;
     // What nodes warned of in this frame.
     std::vector<std::string> warnings() const;
 
@@ -356,6 +360,13 @@ public:
     Scene& operator=(Scene&&) noexcept;
     ~Scene();  // not while a call of another thread is running
 
+    // Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes that
+    // are opened later, in the whole process. Not while another thread opens a scene. load_plugins(): from files and
+    // folders, a list separated by colons, as RAPID_PLUGIN_PATH. Error: a file that can't be read or loaded, is no
+    // plugin, was built with other headers, or has a node of a name that is taken.
+    static Result<Done> load_plugin(const std::string& file);
+    static Result<Done> load_plugins(const std::string& path);
+
     // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on RAPID_PATH.
     static Result<NodeDocuments> documents();
 
@@ -396,6 +407,9 @@ public:
     // set() forget it.
     void cancel();
 
+    // What the plan of the scene keeps and leaves out, and why: nodes, attributes with their bytes a point, functions of
+    // the frame, stages of Solve, as `rapid explain` prints it.
+    Result<SceneReport> explain();
     // The graph of the scene, with what is left out and why. Error of Svg and Json: Graphviz's program `dot`, which lays
     // them out, is not there.
     Result<std::string> graph(GraphForm form);
@@ -403,6 +417,11 @@ public:
     // which then is at its start; where a script had to be stopped it is to be restarted. Error: no ids; no such create, with the nearest name; a last frame
     // before the first one.
     Result<SceneTrace> trace(const TraceOptions& options);
+
+    // The points as they leave a node in a frame, as one with the only output of the node's name: goes to the start, and
+    // computes the frames up to this one beside the scene, as trace(). Error: no such node, with the nearest name; one
+    // that is left out; a frame before the first one.
+    Result<SceneFrame> points_behind(const std::string& node, std::int64_t frame);
 
     // The bytes of a .png of a frame of this scene, with its shapes; the camera is fitted to the frame unless the scene
     // has one.

@@ -315,6 +315,13 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("frame", [&](rapid_error** e) { return rapid_scene_next_frame(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_save(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_restore(scene, nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_scene_explain(scene, nullptr, e); });
+    refused("node", [&](rapid_error** e) {
+        rapid_frame* behind = nullptr;
+        return rapid_scene_points_behind(scene, nullptr, 2, &behind, e);
+    });
+    refused("frame", [&](rapid_error** e) { return rapid_scene_points_behind(scene, "solve1", 2, nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_frame_profile(frame, nullptr, e); });
     refused("text", [&](rapid_error** e) { return rapid_scene_graph(scene, RAPID_GRAPH_DOT, nullptr, e); });
     refused("json", [&](rapid_error** e) {
         const std::int64_t id = 0;

@@ -238,6 +238,17 @@ const std::vector<Function>& functions()
          [](const Handles& h, rapid_error** e) { return rapid_offers_release(h.offers, e); }},
         {"rapid_scene_offer", "so",
          [](const Handles& h, rapid_error** e) { return rapid_scene_offer(h.scene, h.offers, e); }},
+        {"rapid_scene_explain", "s",
+         [](const Handles& h, rapid_error** e) {
+             const char* json = nullptr;
+             return rapid_scene_explain(h.scene, &json, e);
+         }},
+        {"rapid_scene_points_behind", "s",
+         [](const Handles& h, rapid_error** e) {
+             rapid_frame* frame = nullptr;
+             const int status = rapid_scene_points_behind(h.scene, "gravity1", 3, &frame, e);
+             return released(rapid_frame_release, frame, status);
+         }},
         {"rapid_scene_graph", "s",
          [](const Handles& h, rapid_error** e) {
              const char* text = nullptr;
@@ -269,6 +280,11 @@ const std::vector<Function>& functions()
          [](const Handles& h, rapid_error** e) {
              const char* json = nullptr;
              return rapid_frame_statistics(h.frame, &json, e);
+         }},
+        {"rapid_frame_profile", "f",
+         [](const Handles& h, rapid_error** e) {
+             const char* json = nullptr;
+             return rapid_frame_profile(h.frame, &json, e);
          }},
         {"rapid_frame_column", "f",
          [](const Handles& h, rapid_error** e) {
@@ -356,9 +372,10 @@ TEST_CASE("the table has all functions of the header", "[c]")
     std::ifstream file(RAPID_SOURCE_DIR "/include/rapid/rapid.h");
     const std::string header(std::istreambuf_iterator<char>(file), {});
     // Those that take no handle, or take NULL for one.
-    std::set<std::string> known = {
-        "rapid_version",    "rapid_error_message", "rapid_error_file",   "rapid_error_line",   "rapid_error_node",
-        "rapid_error_text", "rapid_error_free",    "rapid_error_status", "rapid_call_add_rod", "rapid_error_stack"};
+    std::set<std::string> known = {"rapid_version",     "rapid_error_message", "rapid_error_file",
+                                   "rapid_error_line",  "rapid_error_node",    "rapid_error_text",
+                                   "rapid_error_free",  "rapid_error_status",  "rapid_call_add_rod",
+                                   "rapid_error_stack", "rapid_load_plugin"};
     for (const Function& function : functions()) known.insert(function.name);
     std::set<std::string> declared;
     const std::regex declaration(R"((?:^|\n)(?:int|void|const char\*) (rapid_\w+)\()");
@@ -522,6 +539,12 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("frame 0", [&](auto e) { return rapid_scene_advance_to(h.scene, 0, &frame, e); });
     refused("frame 2", [&](auto e) { return rapid_scene_advance_to(h.scene, 2, &frame, e); });
     refused("\"other\"", [&](auto e) { return rapid_frame_output(h.frame, "other", &frame, e); });
+    refused("did you mean \"solve1\"",
+            [&](auto e) { return rapid_scene_points_behind(h.scene, "solve", 2, &frame, e); });
+    refused("frame 0", [&](auto e) { return rapid_scene_points_behind(h.scene, "solve1", 0, &frame, e); });
+    refused("nowhere.so", [&](auto e) { return rapid_load_plugin("nowhere.so", e); });
+    refused("it is no plugin of Rapid", [&](auto e) { return rapid_load_plugin("/proc/self/exe", e); });
+    refused("file is NULL", [&](auto e) { return rapid_load_plugin(nullptr, e); });
     refused("form = 3", [&](auto e) { return rapid_scene_graph(h.scene, 3, &text, e); });
     refused("form = -1", [&](auto e) { return rapid_scene_graph(h.scene, -1, &text, e); });
     const std::int64_t id = 0;

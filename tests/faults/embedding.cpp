@@ -96,6 +96,8 @@ void read(rapid_scene* scene, rapid_frame* frame)
     done("frame_get_info", rapid_frame_get_info(frame, &info, &error));
     done("frame_statistics", rapid_frame_statistics(frame, &words, &error));
     done("frame_names", rapid_frame_names(frame, RAPID_COLUMNS, &words, &error));
+    done("frame_profile", rapid_frame_profile(frame, &words, &error));
+    done("scene_explain", rapid_scene_explain(scene, &words, &error));
     done("scene_graph", rapid_scene_graph(scene, RAPID_GRAPH_DOT, &words, &error));
     done("frame_describe", rapid_frame_describe(frame, &words, &error));
     done("frame_compare", rapid_frame_compare(frame, frame, 0, nullptr, &words, &error));
@@ -121,6 +123,9 @@ void run(rapid_offers* offers)
     }
     const int64_t id = 0;
     const char* lives = nullptr;
+    rapid_frame* behind = nullptr;
+    if (done("points_behind", rapid_scene_points_behind(scene, "solve1", 2, &behind, &error)))
+        done("frame_release", rapid_frame_release(behind, &error));
     done("trace", rapid_scene_trace(scene, &id, 1, nullptr, 1, 2, &lives, &error));
     const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
     done("set", rapid_scene_set(scene, &height, 1, &error));

@@ -81,7 +81,6 @@ const std::set<std::string> commands_from_inside = {
     "bindings/command/frame_files.cpp",
     "bindings/command/frame_record.cpp",
     "bindings/command/graph_options.cpp",
-    "bindings/command/main.cpp",
     "bindings/command/merge.cpp",
     "bindings/command/new.cpp",
     "bindings/command/part_options.cpp",

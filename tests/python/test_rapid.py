@@ -281,7 +281,14 @@ class Scenes(unittest.TestCase):
         self.assertEqual([node["name"] for node in scene.graph("json")["nodes"]], [node["name"] for node in scene.nodes])
         with self.assertRaises(ValueError):
             scene.graph("png")
-        scene.advance_to(5)
+        frame = scene.advance_to(5)
+        self.assertIn(["solve1"], [work["nodes"] for work in frame.profile])
+        kept = {node["name"]: node["kept"] for node in scene.explain()["nodes"]}
+        self.assertTrue(all(kept.values()))
+        behind = scene.points_behind("gravity1", 3)
+        self.assertEqual((behind.number, behind.outputs, len(behind)), (3, ["gravity1"], 16))
+        with self.assertRaisesRegex(rapid.Error, "did you mean"):
+            scene.points_behind("gravty1", 3)
         life, = scene.trace([3], 2, 4)
         self.assertEqual((life["id"], [step["frame"] for step in life["steps"]]), (3, [2, 3, 4]))
         self.assertAlmostEqual(life["steps"][2]["values"]["P"][1], 10 - 9.81 / 2 / 8 ** 2, places=5)

@@ -49,6 +49,77 @@ TEST_CASE("what scenes are made of is documented without a scene", "[reports]")
     CHECK_THAT(documents.annotations, StartsWith("---@meta") && Contains("function Node:gravity(params) end"));
 }
 
+TEST_CASE("a plan tells what it keeps and leaves out", "[reports]")
+{
+    Scene scene = opened(
+        "rapid.create { name = 'spare' } :drag { linear = 1 }\n"
+        "return rapid.create {} :attribute { heat = 1 } :gravity { name = 'down' } :solve {}");
+    const SceneReport report = good(scene.explain());
+    CHECK_THAT(report.json, StartsWith(R"({"nodes":[{"name":"create2","type":"create","kept":true,)"));
+    CHECK_THAT(report.json, Contains(R"("name":"spare","type":"create","kept":false)"));
+    CHECK_THAT(report.json, Contains(R"({"name":"heat","simulation":"create2","kept":true,"bytes_per_point":4,)"));
+    CHECK_THAT(report.text, StartsWith("KEPT\n nodes\n") && Contains("LEFT OUT") && Contains("spare"));
+}
+
+TEST_CASE("the points behind a node are those before it, changed by its formula", "[reports]")
+{
+    Scene scene = opened(
+        "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {5, 1, 0}} } } :attribute { heat = 2 }"
+        ":points('warm', function(p) p.heat = p.heat * 3 end) :points('cull', function(p) if p.id == 1 then p:kill() "
+        "end "
+        "end) :gravity {} :solve {} :points('later', function(p) p.heat = 0 end)");
+    const float height_before = height(good(scene.advance_to(3)), 0);
+    const SceneFrame warm = good(scene.points_behind("warm", 3));
+    CHECK(warm.outputs() == std::vector<std::string>{"warm"});
+    CHECK(warm.number() == 3);
+    CHECK(warm.time() == Approx(2 / 24.0));
+    CHECK(warm.fps() == 24);
+    REQUIRE(warm.size() == 1);  // the other one died in frame 2
+    CHECK(*warm.column("heat")->at<float>(0) == 18);
+    CHECK(good(scene.points_behind("warm", 2)).size() == 2);
+    CHECK(good(scene.points_behind("cull", 2)).size() == 1);
+    CHECK(*good(scene.points_behind("solve1", 3)).column("heat")->at<float>(0) == 18);
+    CHECK(*good(scene.points_behind("later", 3)).column("heat")->at<float>(0) == 0);
+    CHECK_THAT(good(scene.picture(warm)), StartsWith("\x89PNG"));
+    CHECK(scene.next_frame() == 1);
+    CHECK(height(good(scene.advance_to(3)), 0) == height_before);
+}
+
+TEST_CASE("points behind no node, or before the first frame, are an error", "[reports]")
+{
+    Scene scene = opened(
+        "rapid.create { name = 'spare' } :drag { linear = 1 }\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }\n"
+        ":points('warm', function(p, frame) if frame.number == 4 then error 'hot' end end) :solve {}");
+    const auto fault = [&](const char* node, std::int64_t frame) {
+        const Result<SceneFrame> points = scene.points_behind(node, frame);
+        REQUIRE_FALSE(points);
+        return points.error();
+    };
+    CHECK_THAT(fault("worm", 2).message, Contains("did you mean \"warm\""));
+    CHECK_THAT(fault("spare", 2).message, Contains("left out"));
+    CHECK_THAT(fault("warm", 0).message, Contains("before the scene's first"));
+    CHECK(fault("worm", 2).kind == SceneError::WrongCall);
+    const SceneError late = fault("solve1", 5);
+    CHECK(late.kind == SceneError::FailedFrame);
+    CHECK(late.line == 4);
+    CHECK(good(scene.advance_to(3)).size() == 1);
+}
+
+TEST_CASE("a frame tells where its time went, and no more than there was", "[reports]")
+{
+    Scene scene = opened(ball);
+    const SceneFrame frame = good(scene.advance_to(3));
+    const std::string json = frame.profile_json();
+    CHECK_THAT(json, StartsWith("[{\"nodes\":[\"") && Contains(R"("nodes":["solve1"],"stage":"solve","begin":)"));
+    const std::string mark = "\"seconds\":";
+    double sum = 0;
+    for (std::size_t at = json.find(mark); at != std::string::npos; at = json.find(mark, at + 1))
+        sum += std::stod(json.substr(at + mark.size()));
+    CHECK(sum > 0);
+    CHECK(sum <= frame.statistics().seconds);
+}
+
 TEST_CASE("the graph of a scene has its nodes, and an edge back from Solve", "[reports]")
 {
     Scene scene = opened(

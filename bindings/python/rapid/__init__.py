@@ -21,7 +21,7 @@ from ._library import (Column, Error, Find, FrameInfo, Log, Node, Options, Param
 from ._offers import Constraint, Edit, Force, Held, Mesh, Points, Shape, from_numpy, make_offers
 
 __all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy",
-           "read"]
+           "load_plugin", "read"]
 __version__ = library.rapid_version().decode()
 
 _types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8, numpy.uint32]
@@ -128,6 +128,11 @@ class Frame:
         """What `rapid run --stats` writes of a frame."""
         return json.loads(get("frame_statistics", self._handle.value, c_char_p()).value)
 
+    @property
+    def profile(self):
+        """Where its time went: [{"nodes", "stage", "begin", "seconds", "points", "bytes"}], a pass over the points each."""
+        return json.loads(get("frame_profile", self._handle.value, c_char_p()).value)
+
     def write(self, path):
         """Writes the points to a file of a format that Rapid knows, by the extension."""
         call("frame_write", self._handle.value, str(path).encode())
@@ -182,6 +187,11 @@ class _Memory:
         self._frame = frame
         self.__array_interface__ = {"version": 3, "data": (address, True), "shape": shape, "strides": strides,
                                     "typestr": dtype.str}
+
+
+def load_plugin(path):
+    """Loads types of nodes from a library that is built against the runtime's headers, for scenes that are opened later."""
+    call("load_plugin", str(path).encode())
 
 
 def read(path):
@@ -354,6 +364,17 @@ class Scene:
 
     def restore(self, snapshot):
         self._call("scene_restore", self._handle.value, snapshot._handle.value)
+
+    def explain(self):
+        """What the plan keeps and leaves out, and why, as `rapid explain --json` tells it."""
+        return json.loads(get("scene_explain", self._handle.value, c_char_p()).value)
+
+    def points_behind(self, node, frame):
+        """The points as they leave a node in a frame, as a Frame with the output of the node's name. The scene is then at
+        its start."""
+        handle = c_void_p()
+        self._call("scene_points_behind", self._handle.value, node.encode(), frame, byref(handle))
+        return Frame(handle, self)
 
     def graph(self, form="svg"):
         """The scene's graph: "dot" in Graphviz's language, "svg" as a picture, "json" as nodes and edges with their

@@ -120,6 +120,7 @@ library.rapid_version.restype = c_char_p
 _handle = POINTER(c_void_p)
 _text = POINTER(c_char_p)
 for _name, _types in {
+        "load_plugin": [c_char_p],
         "scene_open": [c_char_p, POINTER(Options), _handle],
         "scene_open_text": [c_char_p, c_char_p, POINTER(Options), _handle],
         "scene_close": [c_void_p],
@@ -147,6 +148,7 @@ for _name, _types in {
         "frame_names": [c_void_p, c_int, _text],
         "frame_get_info": [c_void_p, POINTER(FrameInfo)],
         "frame_statistics": [c_void_p, _text],
+        "frame_profile": [c_void_p, _text],
         "frame_column": [c_void_p, c_char_p, POINTER(Column)],
         "frame_group": [c_void_p, c_char_p, POINTER(Column)],
         "frame_expanded": [c_void_p, c_char_p, POINTER(Column)],
@@ -165,6 +167,8 @@ for _name, _types in {
         "offers_node": [c_void_p, POINTER(NodeType)],
         "call_add_rod": [POINTER(Call), c_int64, c_int64, c_double, c_double],
         "scene_offer": [c_void_p, c_void_p],
+        "scene_explain": [c_void_p, _text],
+        "scene_points_behind": [c_void_p, c_char_p, c_int64, _handle],
         "scene_graph": [c_void_p, c_int, _text],
         "scene_trace": [c_void_p, POINTER(c_int64), c_size_t, c_char_p, c_int64, c_int64, _text],
         "offers_release": [c_void_p],

@@ -25,6 +25,17 @@ double sine(double x) { return is_reduced(x) ? elementary::sine(x, 0) : std::sin
 double cosine(double x) { return is_reduced(x) ? elementary::sine(x, 1) : std::cos(x); }
 double exponential(double x) { return elementary::exponential(x); }
 
+SineAndCosine sine_and_cosine(double x)
+{
+    if (!is_reduced(x)) return {std::sin(x), std::cos(x)};
+    const elementary::Quarters<double> reduced(x);
+    const double of_sine = elementary::sine_of_rest(reduced.r, reduced.tail);
+    const double of_cosine = elementary::cosine_of_rest(reduced.r, reduced.tail);
+    const bool is_odd = (reduced.n & 1) != 0;
+    const double sine = is_odd ? of_cosine : of_sine, cosine = is_odd ? of_sine : of_cosine;
+    return {(reduced.n & 2) != 0 ? -sine : sine, ((reduced.n + 1) & 2) != 0 ? -cosine : cosine};
+}
+
 Doubles sine(const Doubles& x)
 {
     return sine_of_lanes(x, 0, [](double beyond) { return std::sin(beyond); });

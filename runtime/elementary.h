@@ -130,6 +130,11 @@ double sine(double x);
 double cosine(double x);
 double exponential(double x);
 
+struct SineAndCosine {
+    double sine, cosine;
+};
+SineAndCosine sine_and_cosine(double x);
+
 // The same of each lane.
 Doubles sine(const Doubles& x);
 Doubles cosine(const Doubles& x);

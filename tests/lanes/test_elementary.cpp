@@ -32,6 +32,12 @@ bool is_alike_in_lanes(double (*one)(double), Doubles (*eight)(const Doubles&), 
     return true;
 }
 
+bool is_alike_together(double x)
+{
+    const auto [s, c] = sine_and_cosine(x);
+    return std::isnan(s) ? std::isnan(sine(x)) : same_bits(s, sine(x)) && same_bits(c, cosine(x));
+}
+
 Doubles sine_of_eight(const Doubles& x) { return sine(x); }
 Doubles cosine_of_eight(const Doubles& x) { return cosine(x); }
 Doubles exponential_of_eight(const Doubles& x) { return exponential(x); }
@@ -101,9 +107,10 @@ TEST_CASE("at the ends of its range the exponential function is 0, infinite, or 
     CHECK(sine(1e9) == std::sin(1e9));
 }
 
-TEST_CASE("eight at a time they have the bits of one", "[elementary]")
+TEST_CASE("eight at a time, or sine and cosine together, they have the bits of one", "[elementary]")
 {
     rc::prop("any number", [](double x) {
+        RC_ASSERT(is_alike_together(x));
         RC_ASSERT(is_alike_in_lanes(sine, sine_of_eight, x));
         RC_ASSERT(is_alike_in_lanes(cosine, cosine_of_eight, x));
         RC_ASSERT(is_alike_in_lanes(exponential, exponential_of_eight, x));
@@ -113,6 +120,7 @@ TEST_CASE("eight at a time they have the bits of one", "[elementary]")
         std::uniform_real_distribution<double> numbers(-most, most);
         for (int k = 0; k < 2000; ++k) {
             const double x = numbers(engine);
+            REQUIRE(is_alike_together(x));
             REQUIRE(is_alike_in_lanes(sine, sine_of_eight, x));
             REQUIRE(is_alike_in_lanes(cosine, cosine_of_eight, x));
             REQUIRE(is_alike_in_lanes(exponential, exponential_of_eight, x));

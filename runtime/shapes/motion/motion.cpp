@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/elementary.h"
 #include "runtime/error.h"
 
 namespace rapid {
@@ -109,18 +110,11 @@ Vec3d turn(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
     return sine > 0 ? Vec3d(2 * std::atan2(sine, q.w()) / sine * q.vec()) : Vec3d(Vec3d::Zero());
 }
 
-Eigen::Quaterniond turned_by(const Vec3d& rotation)
-{
-    const double angle = rotation.norm();
-    if (!(angle > 0)) return Eigen::Quaterniond::Identity();
-    return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation / angle));
-}
-
 // The piece through three poses, the second in the middle of the time.
 MotionTrack::Piece through(double begin, double end, const Pose& from, const Pose& middle, const Pose& to)
 {
     const double T = end - begin;
-    MotionTrack::Piece piece{begin, end, from, Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), 0};
+    MotionTrack::Piece piece{begin, end, from, Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero(), 0, 0};
     if (!(T > 0)) return piece;
     const Vec3d chord = to.translation - from.translation;
     Vec3d sag = from.translation + to.translation - 2 * middle.translation;
@@ -131,6 +125,8 @@ MotionTrack::Piece through(double begin, double end, const Pose& from, const Pos
     piece.a = 4 / (T * T) * sag;
     piece.v = chord / T - 0.5 * T * piece.a;
     piece.spin = turn(from.rotation, to.rotation) / T;
+    piece.rate = piece.spin.norm();
+    if (piece.rate > 0) piece.axis = piece.spin / piece.rate;
     piece.growth = (to.scale - from.scale) / T;
     return piece;
 }
@@ -212,8 +208,13 @@ MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys)
 Pose MotionTrack::Piece::at(double s) const
 {
     const double t = s - begin;
-    return {pose.translation + t * (v + 0.5 * t * a), (turned_by(t * spin) * pose.rotation).normalized(),
-            pose.scale + t * growth};
+    Pose now{pose.translation + t * (v + 0.5 * t * a), pose.rotation, pose.scale + t * growth};
+    if (rate > 0) {
+        const auto [sine, cosine] = sine_and_cosine(0.5 * t * rate);
+        const Vec3d vec = sine * axis;
+        now.rotation = Eigen::Quaterniond(cosine, vec.x(), vec.y(), vec.z()) * pose.rotation;
+    }
+    return now;
 }
 
 VelocityField MotionTrack::Piece::velocity_at(double s) const

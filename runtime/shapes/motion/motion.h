@@ -61,6 +61,8 @@ public:
         Pose pose;          // at its beginning
         Vec3d v, a;         // of the translation: m/s at its beginning, m/s²
         Vec3d spin;         // angular velocity, rad/s
+        Vec3d axis;         // unit vector along the spin; 0 where there is none
+        double rate;        // rad/s about the axis
         double growth;      // of the scale, 1/s
 
         Pose at(double s) const;

@@ -6,10 +6,11 @@
 namespace rapid {
 
 RelativePath::RelativePath(const MotionTrack::Piece& piece, const Path& path, double first, double last)
-    : piece_(&piece), path_(&path)
+    : piece_(&piece), path_(&path), first_(first), begin_(arm_at(first))
 {
     const double T = last - first;
-    const Arm begin = arm_at(first), end = arm_at(last);
+    const Arm& begin = begin_;
+    const Arm end = arm_at(last);
     const double k = std::min(begin.scale, end.scale), growth = std::abs(piece.growth) / k;
     const double turning = piece.spin.norm(), a = (path.a - piece.a).norm();
     // The relative velocity is linear in time, so it is fastest at an end; the path between is off its chord by
@@ -27,7 +28,7 @@ RelativePath::RelativePath(const MotionTrack::Piece& piece, const Path& path, do
 
 RelativePath::State RelativePath::at(double s) const
 {
-    const Arm f = arm_at(s);
+    const Arm f = s == first_ ? begin_ : arm_at(s);
     const Eigen::Quaterniond back = f.rotation.conjugate();
     const Vec3d slip = f.relative_velocity - piece_->spin.cross(f.arm) - piece_->growth / f.scale * f.arm;
     return {back * f.arm / f.scale, back * slip / f.scale, f.scale, f.rotation, piece_->growth / (f.scale * f.scale)};

@@ -40,6 +40,8 @@ private:
 
     const MotionTrack::Piece* piece_;
     const Path* path_;
+    double first_;
+    Arm begin_;  // at the first time, which is asked for most
     double acceleration_, level_speed_, level_acceleration_;
 };
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "bindings/command/untrusted.h"
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 
 namespace rapid {
 

@@ -8,8 +8,8 @@
 #include <tuple>
 #include <type_traits>
 
+#include "runtime/files/frame_pattern.h"
 #include "runtime/io/format.h"
-#include "runtime/io/frame_pattern.h"
 #include "runtime/operators/emit/parent_paths.h"
 
 namespace rapid {

@@ -8,8 +8,8 @@
 #include "bindings/command/part_options.h"
 #include "bindings/command/whole_file.h"
 #include "runtime/checked_json.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
-#include "runtime/io/frame_pattern.h"
 
 namespace rapid {
 namespace {

@@ -20,10 +20,10 @@
 #include "bindings/command/untrusted.h"
 #include "bindings/command/watch.h"
 #include "bindings/command/written_names.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/files/output_file.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/evaluate.h"
-#include "runtime/io/frame_pattern.h"
 #include "runtime/threads.h"
 
 namespace rapid {

@@ -10,7 +10,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/whole_file.h"
 #include "runtime/checked_json.h"
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/picture/contact_sheet.h"
 #include "runtime/picture/png_file.h"
 #include "runtime/printable.h"

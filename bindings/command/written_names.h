@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "bindings/command/frame_selection.h"
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 
 namespace rapid {
 

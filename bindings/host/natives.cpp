@@ -17,7 +17,7 @@
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
 #include "runtime/files/content_hash.h"
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/memory_budget.h"
 #include "runtime/points/point_names.h"
 #include "runtime/points/token.h"

@@ -219,11 +219,11 @@ int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error
 int rapid_snapshot_read(const char* path, rapid_snapshot** snapshot, rapid_error** error);
 int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
 
-/* What the plan of the scene keeps and leaves out, and why: an object, as `rapid explain --json` prints it. It belongs to
- * the scene, until the next call of this function. */
+/* What the plan of the scene keeps and leaves out, and why: an object, as `rapid explain --json` prints it. It belongs
+ * to the scene, until the next call of this function. */
 int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** error);
-/* The points as they leave a node in a frame, as a frame with the only output of the node's name: goes to the start, and
- * computes the frames up to this one beside the scene, which then is at its start. *frame is to be released. */
+/* The points as they leave a node in a frame, as a frame with the only output of the node's name: goes to the start,
+ * and computes the frames up to this one beside the scene, which then is at its start. *frame is to be released. */
 int rapid_scene_points_behind(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
                               rapid_error** error);
 /* How a graph is given: in Graphviz's language; as a picture; as nodes and edges with their places, an object, as

@@ -251,8 +251,8 @@ public:
 
     // Whether a file begins as one of a snapshot, of a scene or of `rapid run --cache`, does.
     static bool is_file(const std::string& path);
-    // What such a file says of itself, as `rapid info` prints it. Error: the system's; a file that is of something else,
-    // or damaged.
+    // What such a file says of itself, as `rapid info` prints it. Error: the system's; a file that is of something
+    // else, or damaged.
     static Result<SceneReport> describe(const std::string& path);
 
 private:
@@ -349,9 +349,9 @@ public:
     // OutOfMemory.
     static Result<Scene> open(const std::string& file, SceneOptions options = {});
     static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
-    // late: told, with the error's text, of each script that takes longer than script_seconds, before it is stopped: for
-    // a program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On a
-    // thread of Rapid's; what it throws is dropped.
+    // late: told, with the error's text, of each script that takes longer than script_seconds, before it is stopped:
+    // for a program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On
+    // a thread of Rapid's; what it throws is dropped.
     static Result<Scene> open(const std::string& file, SceneOptions options,
                               std::function<void(const std::string& message)> late);
 
@@ -360,14 +360,15 @@ public:
     Scene& operator=(Scene&&) noexcept;
     ~Scene();  // not while a call of another thread is running
 
-    // Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes that
-    // are opened later, in the whole process. Not while another thread opens a scene. load_plugins(): from files and
-    // folders, a list separated by colons, as RAPID_PLUGIN_PATH. Error: a file that can't be read or loaded, is no
+    // Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes
+    // that are opened later, in the whole process. Not while another thread opens a scene. load_plugins(): from files
+    // and folders, a list separated by colons, as RAPID_PLUGIN_PATH. Error: a file that can't be read or loaded, is no
     // plugin, was built with other headers, or has a node of a name that is taken.
     static Result<Done> load_plugin(const std::string& file);
     static Result<Done> load_plugins(const std::string& path);
 
-    // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on RAPID_PATH.
+    // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on
+    // RAPID_PATH.
     static Result<NodeDocuments> documents();
 
     // In the order in which the scene declares them.
@@ -407,20 +408,20 @@ public:
     // set() forget it.
     void cancel();
 
-    // What the plan of the scene keeps and leaves out, and why: nodes, attributes with their bytes a point, functions of
-    // the frame, stages of Solve, as `rapid explain` prints it.
+    // What the plan of the scene keeps and leaves out, and why: nodes, attributes with their bytes a point, functions
+    // of the frame, stages of Solve, as `rapid explain` prints it.
     Result<SceneReport> explain();
-    // The graph of the scene, with what is left out and why. Error of Svg and Json: Graphviz's program `dot`, which lays
-    // them out, is not there.
+    // The graph of the scene, with what is left out and why. Error of Svg and Json: Graphviz's program `dot`, which
+    // lays them out, is not there.
     Result<std::string> graph(GraphForm form);
     // Tells of points by their ids: goes to the start, and computes the frames up to the last one beside the scene,
-    // which then is at its start; where a script had to be stopped it is to be restarted. Error: no ids; no such create, with the nearest name; a last frame
-    // before the first one.
+    // which then is at its start; where a script had to be stopped it is to be restarted. Error: no ids; no such
+    // create, with the nearest name; a last frame before the first one.
     Result<SceneTrace> trace(const TraceOptions& options);
 
-    // The points as they leave a node in a frame, as one with the only output of the node's name: goes to the start, and
-    // computes the frames up to this one beside the scene, as trace(). Error: no such node, with the nearest name; one
-    // that is left out; a frame before the first one.
+    // The points as they leave a node in a frame, as one with the only output of the node's name: goes to the start,
+    // and computes the frames up to this one beside the scene, as trace(). Error: no such node, with the nearest name;
+    // one that is left out; a frame before the first one.
     Result<SceneFrame> points_behind(const std::string& node, std::int64_t frame);
 
     // The bytes of a .png of a frame of this scene, with its shapes; the camera is fitted to the frame unless the scene

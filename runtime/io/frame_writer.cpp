@@ -3,6 +3,7 @@
 #include <system_error>
 #include <utility>
 
+#include "runtime/io/selected_attributes.h"
 #include "runtime/picture/frame_picture.h"
 #include "runtime/stopwatch.h"
 

@@ -17,9 +17,9 @@
 #include <thread>
 #include <vector>
 
+#include "runtime/files/frame_pattern.h"
 #include "runtime/io/film.h"
 #include "runtime/io/format.h"
-#include "runtime/io/frame_pattern.h"
 #include "runtime/picture/picture_fit.h"
 
 namespace rapid {

@@ -73,7 +73,6 @@ const std::set<std::string> small_tools = {
 // Sources of the command that know more of Rapid than a program can: each is to be built on include/rapid alone, and no
 // other one comes to them.
 const std::set<std::string> commands_from_inside = {
-    "bindings/command/cache_files.cpp",
     "bindings/command/check.cpp",
     "bindings/command/event_file.cpp",
     "bindings/command/explain.cpp",
@@ -104,7 +103,6 @@ const std::set<std::string> commands_from_inside = {
     "bindings/command/wedge.cpp",
     "bindings/command/wedge_report.cpp",
     "bindings/command/wedge_rows.cpp",
-    "bindings/command/written_names.cpp",
     "bindings/view/film.cpp",
     "bindings/view/frame_cache.cpp",
     "bindings/view/frame_message.cpp",

@@ -1,6 +1,6 @@
 #include "bindings/host/makers/grid_files.h"
 
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 
 namespace rapid {
 namespace {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "bindings/host/makers/sequence_options.h"
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/motion/animated.h"
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "bindings/host/makers/sequence_options.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/files/left_out.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/io/format.h"
-#include "runtime/io/frame_pattern.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {

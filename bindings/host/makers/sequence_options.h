@@ -7,8 +7,8 @@
 #include <string>
 
 #include "bindings/host/maker.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/frame_sequence.h"
-#include "runtime/io/frame_pattern.h"
 
 namespace rapid {
 

@@ -1,4 +1,4 @@
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 
 #include <fmt/format.h>
 
@@ -6,6 +6,8 @@
 #include <charconv>
 #include <climits>
 #include <system_error>
+
+#include "runtime/error.h"
 
 namespace rapid {
 namespace {
@@ -166,26 +168,6 @@ OutputTarget parse_output_target(const std::string& text)
         begin = end + 1;
     }
     return target;
-}
-
-PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names)
-{
-    for (const std::string& name : names)
-        if (!points.has(name) && !points.find_group(name)) {
-            std::vector<std::string> known = points.column_names();
-            for (const std::string& group : points.group_names()) known.push_back(group);
-            throw Error(
-                fmt::format("there is no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
-        }
-    const auto wanted = [&](const std::string& name) {
-        return name == "P" || name == "v" || name == "id" || std::find(names.begin(), names.end(), name) != names.end();
-    };
-    PointSet selected = points;
-    for (const std::string& name : points.column_names())
-        if (!wanted(name)) selected.remove(name);
-    for (const std::string& name : points.group_names())
-        if (!wanted(name)) selected.remove_group(name);
-    return selected;
 }
 
 }  // namespace rapid

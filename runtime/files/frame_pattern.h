@@ -9,8 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/points/point_set.h"
-
 namespace rapid {
 
 class FramePattern {
@@ -50,8 +48,5 @@ struct OutputTarget {
     std::optional<std::vector<std::string>> attributes;
 };
 OutputTarget parse_output_target(const std::string& text);
-
-// The points with only P, v, id and the named attributes and groups. Error: an unknown name, with the nearest.
-PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names);
 
 }  // namespace rapid

@@ -1,12 +1,14 @@
-#include "runtime/io/frame_pattern.h"
+#include "runtime/files/frame_pattern.h"
 
-#include "tests/io/random_points.h"
+#include <fstream>
+
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
 using namespace rapid::test;
 
-TEST_CASE("every way to write a frame number in a name is expanded and padded", "[io][pattern]")
+TEST_CASE("every way to write a frame number in a name is expanded and padded", "[files][pattern]")
 {
     const auto name = [](const char* pattern, int frame) { return FramePattern(pattern).expand(frame); };
     CHECK(name("a.####.vdb", 7) == "a.0007.vdb");
@@ -24,7 +26,7 @@ TEST_CASE("every way to write a frame number in a name is expanded and padded", 
     CHECK(FramePattern("{output}/{output}.##.vdb").expand(1, "sparks") == "sparks/sparks.01.vdb");
 }
 
-TEST_CASE("a pattern that is not one frame number in a file's name is refused", "[io][pattern]")
+TEST_CASE("a pattern that is not one frame number in a file's name is refused", "[files][pattern]")
 {
     CHECK(error_of([] { FramePattern("a.%s.vdb"); }) == "\"a.%s.vdb\": the % must be a frame number such as %04d");
     CHECK(error_of([] { FramePattern("a.##.$F4.vdb"); }) == "\"a.##.$F4.vdb\" has two frame numbers; it must have one");
@@ -32,7 +34,7 @@ TEST_CASE("a pattern that is not one frame number in a file's name is refused", 
           "\"####/a.vdb\": the frame number must be in the name of the file, not of its folder");
 }
 
-TEST_CASE("the existing files of a sequence are those that the pattern would write", "[io][pattern]")
+TEST_CASE("the existing files of a sequence are those that the pattern would write", "[files][pattern]")
 {
     const TemporaryFolder folder;
     for (const char* name :
@@ -49,7 +51,7 @@ TEST_CASE("the existing files of a sequence are those that the pattern would wri
     CHECK(FramePattern((folder / "b.0003.vdb").string()).existing().size() == 1);
 }
 
-TEST_CASE("the attributes behind an output's file name are told from colons in the name", "[io][pattern]")
+TEST_CASE("the attributes behind an output's file name are told from colons in the name", "[files][pattern]")
 {
     const OutputTarget plain = parse_output_target("out/a.####.vdb");
     CHECK(plain.pattern == "out/a.####.vdb");
@@ -63,19 +65,7 @@ TEST_CASE("the attributes behind an output's file name are told from colons in t
     CHECK(parse_output_target("a.vdb:").attributes->empty());
 }
 
-TEST_CASE("selected attributes are P, v, id and the named ones, groups too", "[io][pattern]")
-{
-    const PointSet points = random_points({.size = 5});
-
-    const PointSet selected = select_attributes(points, {"age", "hot"});
-
-    CHECK(selected.column_names() == std::vector<std::string>{"P", "age", "id", "v"});
-    CHECK(selected.group_names() == std::vector<std::string>{"hot"});
-    CHECK(error_of([&] { select_attributes(points, {"agee"}); }) ==
-          "there is no attribute or group \"agee\" to write; did you mean \"age\"?");
-}
-
-TEST_CASE("a part has its name in place of {part}, or before the frame's number", "[io][pattern]")
+TEST_CASE("a part has its name in place of {part}, or before the frame's number", "[files][pattern]")
 {
     const auto part = [](const char* pattern) { return with_part(pattern, "03of16"); };
     CHECK(part("out/a.####.vdb") == "out/a_part03of16.####.vdb");
@@ -88,7 +78,7 @@ TEST_CASE("a part has its name in place of {part}, or before the frame's number"
     CHECK(part("{part}/{output}.{part}.####.vdb") == "03of16/{output}.03of16.####.vdb");
 }
 
-TEST_CASE("a sequence has a name of its own, without the number and what parts it off", "[io][pattern]")
+TEST_CASE("a sequence has a name of its own, without the number and what parts it off", "[files][pattern]")
 {
     CHECK(FramePattern("out/a.####.vdb").without_frame() == "out/a.vdb");
     CHECK(FramePattern("out/{output}_$F.vdb").without_frame("left") == "out/left.vdb");

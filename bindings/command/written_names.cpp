@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // The same for all ways to the file, but for a link in its place, which a written file replaces.
-fs::path place_of(const fs::path& file)
+fs::path true_path(const fs::path& file)
 {
     const fs::path full = fs::absolute(file);
     std::error_code error;
@@ -53,11 +53,11 @@ std::optional<int> frame_of(const std::string& name, const FramePattern& pattern
 
 }  // namespace
 
-void WrittenNames::reads(const fs::path& file) { read_.insert(place_of(file)); }
+void WrittenNames::reads(const fs::path& file) { read_.insert(true_path(file)); }
 
 void WrittenNames::add(const fs::path& file, std::string who)
 {
-    const fs::path place = place_of(file);
+    const fs::path place = true_path(file);
     Writer writer{place.parent_path(), place.filename(), std::nullopt, {}, std::move(who)};
     check(writer);
     writers_.push_back(std::move(writer));
@@ -66,7 +66,7 @@ void WrittenNames::add(const fs::path& file, std::string who)
 void WrittenNames::add(const FramePattern& pattern, std::string_view output, const FrameSelection& frames,
                        std::string who)
 {
-    const fs::path place = place_of(pattern.of_output(output));
+    const fs::path place = true_path(pattern.of_output(output));
     Writer writer{place.parent_path(), place.filename(), FramePattern(place.filename()), frames, std::move(who)};
     if (!writer.pattern->has_frame()) writer.pattern.reset();
     check(writer);
@@ -108,7 +108,7 @@ void WrittenNames::check(const Writer& writer) const
 // A note is a file that only one process makes.
 void claim_among_processes(const fs::path& folder, const std::string& who, const fs::path& file)
 {
-    const fs::path note = folder / (hash_text(content_hash(place_of(file).native())) + ".claim");
+    const fs::path note = folder / (hash_text(content_hash(true_path(file).native())) + ".claim");
     const Descriptor made(::open(note.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!made && errno != EEXIST) throw file_error(fmt::format("can't write {}", note.string()), errno);
     if (made) {

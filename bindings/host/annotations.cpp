@@ -139,7 +139,7 @@ std::string point_fields()
     return text;
 }
 
-std::string node_of(const NodeType& type)
+std::string annotated(const NodeType& type)
 {
     const bool source = type.kind == NodeKind::Source;
     std::string text =
@@ -224,7 +224,7 @@ std::string annotations_of(const Registry& registry)
     if (!text) throw Error("can't be read: Rapid's own Lua files are missing").at({path.string(), 0});
     text->erase(0, text->find("---@meta"));
     std::string nodes;
-    for (const NodeType* type : registry.types()) nodes += node_of(*type);
+    for (const NodeType* type : registry.types()) nodes += annotated(*type);
     fill_in(*text, "makers", [](const std::set<std::string>& excepted) { return makers_but(excepted); });
     fill_in(*text, "point_fields", [](const auto&) { return point_fields(); });
     fill_in(*text, "nodes", [&](const auto&) { return nodes; });

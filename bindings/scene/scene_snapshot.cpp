@@ -26,7 +26,7 @@ CheckedJson told_of(const std::string& path)
     return json;
 }
 
-std::string text_of(const std::string& path, const CheckedJson& told)
+std::string told_as_text(const std::string& path, const CheckedJson& told)
 {
     const auto word = [](const CheckedJson& value) {
         return value.is_string() ? value.get<std::string>() : value.dump();
@@ -111,7 +111,7 @@ Result<SceneReport> SceneSnapshot::describe(const std::string& path)
 {
     return of_file(path, [&] {
         const CheckedJson told = told_of(path);
-        return SceneReport{text_of(path, told), told.dump(-1, ' ', false, CheckedJson::error_handler_t::replace)};
+        return SceneReport{told_as_text(path, told), told.dump(-1, ' ', false, CheckedJson::error_handler_t::replace)};
     });
 }
 

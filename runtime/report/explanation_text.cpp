@@ -48,7 +48,7 @@ std::string shown(const Explanation::ExplainedAttribute& attribute, const Explan
     return several ? fmt::format("{} of {}", attribute.name, attribute.simulation) : attribute.name;
 }
 
-std::string text_of(const Explanation& plan, bool kept)
+std::string text_of_half(const Explanation& plan, bool kept)
 {
     Rows nodes, attributes, stages;
     for (const auto& node : plan.nodes)
@@ -71,7 +71,7 @@ std::string text_of(const Explanation& plan, bool kept)
            stages.text(" stages");
 }
 
-void add_json(JsonText& json, const Explanation::ExplainedNode& node)
+void add_part(JsonText& json, const Explanation::ExplainedNode& node)
 {
     json.begin_object();
     json.member("name", node.name);
@@ -83,7 +83,7 @@ void add_json(JsonText& json, const Explanation::ExplainedNode& node)
     json.end();
 }
 
-void add_json(JsonText& json, const Explanation::ExplainedAttribute& attribute)
+void add_part(JsonText& json, const Explanation::ExplainedAttribute& attribute)
 {
     json.begin_object();
     json.member("name", attribute.name);
@@ -95,7 +95,7 @@ void add_json(JsonText& json, const Explanation::ExplainedAttribute& attribute)
     json.end();
 }
 
-void add_json(JsonText& json, const Explanation::ExplainedFunction& function)
+void add_part(JsonText& json, const Explanation::ExplainedFunction& function)
 {
     json.begin_object();
     json.member("name", function.name);
@@ -104,7 +104,7 @@ void add_json(JsonText& json, const Explanation::ExplainedFunction& function)
     json.end();
 }
 
-void add_json(JsonText& json, const Explanation::ExplainedStage& stage)
+void add_part(JsonText& json, const Explanation::ExplainedStage& stage)
 {
     json.begin_object();
     json.member("name", stage.name);
@@ -113,7 +113,7 @@ void add_json(JsonText& json, const Explanation::ExplainedStage& stage)
     json.end();
 }
 
-void add_json(JsonText& json, const Explanation::ExplainedCoupling& coupling)
+void add_part(JsonText& json, const Explanation::ExplainedCoupling& coupling)
 {
     json.begin_object();
     json.member("name", coupling.name);
@@ -126,7 +126,7 @@ void add_members(JsonText& json, const char* name, const std::vector<T>& all)
 {
     json.key(name);
     json.begin_list();
-    for (const T& one : all) add_json(json, one);
+    for (const T& one : all) add_part(json, one);
     json.end();
 }
 
@@ -164,16 +164,16 @@ std::string json_of_surplus(const Explanation& surplus)
 
 std::string to_text(const Explanation& plan)
 {
-    std::string text = text_of(plan, true);
+    std::string text = text_of_half(plan, true);
     Rows functions;
     for (const auto& function : plan.functions) functions.add(function.name, function.called, function.between);
     text += functions.text(" functions of the frame");
     text += " passes over the points\n";
     for (const std::vector<std::string>& pass : plan.passes) text += fmt::format("  {}\n", fmt::join(pass, ", "));
-    if (plan.couplings.empty()) return text + " parts: yes (run --part, --sample)\n" + text_of(plan, false);
+    if (plan.couplings.empty()) return text + " parts: yes (run --part, --sample)\n" + text_of_half(plan, false);
     Rows couplings;
     for (const auto& coupling : plan.couplings) couplings.add(coupling.name, "", coupling.what);
-    return text + couplings.text(" parts: no, because") + text_of(plan, false);
+    return text + couplings.text(" parts: no, because") + text_of_half(plan, false);
 }
 
 Explanation surplus(const Explanation& one, const Explanation& other)

@@ -9,6 +9,7 @@
 #include "bindings/view/run.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/format.h"
+#include "runtime/points/spare_pages.h"
 #include "runtime/report/biography.h"
 #include "runtime/report/graphviz.h"
 
@@ -18,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t most_ending = 2;
+constexpr std::size_t most_spare = 32;  // columns of frames that have been replaced, whose pages serve the next
 
 fs::file_time_type changed_at(const fs::path& file)
 {
@@ -38,6 +40,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
     : options_(std::move(options)), changed_(std::move(changed)), store_(options_.memory)
 {
     status_.version = 1;
+    SparePages::all().keep(most_spare);
     if (!options_.cache.empty()) cache_ = std::make_unique<FrameCache>(options_.cache);
     if (!is_sequence()) {
         begin();

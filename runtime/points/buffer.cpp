@@ -3,15 +3,14 @@
 #include <sys/mman.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
-#include <mutex>
 #include <new>
 #include <utility>
 
 #include "runtime/points/column_files.h"
+#include "runtime/points/spare_pages.h"
 
 namespace rapid {
 namespace {
@@ -30,59 +29,10 @@ std::size_t stagger()
 
 std::size_t whole_pages(std::size_t bytes) { return (bytes + page - 1) / page * page; }
 
-// Pages that were given back, for who next needs about as many: columns that come and go in every frame would else have
-// the system clear theirs again each time, page by page.
-class SparePages {
-public:
-    struct Block {
-        void* begin = nullptr;
-        std::size_t bytes = 0;
-    };
-
-    // At least so many bytes, and at most twice as many; null where there are none.
-    Block take(std::size_t bytes)
-    {
-        const std::lock_guard lock(mutex_);
-        Block* smallest = nullptr;
-        for (Block& block : blocks_)
-            if (block.bytes >= bytes && block.bytes / 2 <= bytes && (!smallest || block.bytes < smallest->bytes))
-                smallest = &block;
-        return smallest ? std::exchange(*smallest, {}) : Block();
-    }
-
-    void give(Block block)
-    {
-        if (block.bytes <= most / blocks_.size()) {
-            const std::lock_guard lock(mutex_);
-            const auto empty = std::find_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return !b.begin; });
-            if (empty == blocks_.end()) {
-                std::swap(block, blocks_[next_]);
-                next_ = (next_ + 1) % blocks_.size();
-            } else {
-                std::swap(block, *empty);
-            }
-        }
-        if (block.begin) munmap(block.begin, block.bytes);
-    }
-
-private:
-    static constexpr std::size_t most = std::size_t{1} << 26;  // bytes, of all
-
-    std::mutex mutex_;
-    std::array<Block, 4> blocks_;
-    std::size_t next_ = 0;  // of those that are there, to make room
-};
-
-SparePages& spare_pages()
-{
-    static auto* pages = new SparePages;  // for buffers that outlive what is static
-    return *pages;
-}
-
 SparePages::Block new_pages(std::size_t bytes)
 {
     if (void* in_file = map_in_file(bytes)) return {in_file, bytes};
-    SparePages::Block block = spare_pages().take(bytes);
+    SparePages::Block block = SparePages::all().take(bytes);
     if (block.begin) return block;
     block = {mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes};
     if (block.begin == MAP_FAILED) throw std::bad_alloc();
@@ -162,7 +112,7 @@ void Buffer::release()
 {
     if (mapped_ && unmap_in_file(block_, block_bytes_)) return;
     if (mapped_)
-        spare_pages().give({block_, block_bytes_});
+        SparePages::all().give({block_, block_bytes_});
     else
         std::free(block_);
 }

@@ -1,5 +1,6 @@
 """Graphs and runs of sizes that are used, for long."""
-from bench import go, statistics, test
+from bench import go, test
+from client import Client
 
 
 @test
@@ -33,3 +34,22 @@ def scrubbing_grows_nothing(bench):
     before = bench.view.memory()
     browser.promise(scrub)
     assert bench.view.memory() - before < 4 << 20, bench.view.memory() - before
+
+
+@test
+def a_run_takes_the_pages_of_the_one_before(bench):
+    def faults():
+        with open(f"/proc/{bench.view.process.pid}/stat", encoding="ascii") as file:
+            return int(file.read().rsplit(")", 1)[1].split()[7])
+
+    bench.open("""local rapid = require "rapid"
+local rate = rapid.param("rate", 1e6, "points a second")
+return rapid.create { fps = 24, seed = 3 } :emit { source = rapid.mesh.torus {}, rate = rate, life = 0.1 } :gravity {}
+  :solve {}""", "-f", "1-40")
+    client = Client(bench.view)
+    values = client.until_done()["values"]
+    first = faults()
+    client.ask("set", values={**values, "rate": 1000001})
+    client.until_done(run=2)
+    client.close()
+    assert faults() - first < first / 5, (first, faults() - first)

@@ -1,0 +1,64 @@
+"""A page without a browser: the viewer's WebSocket, by hand."""
+import json
+import socket
+import time
+
+from browser import PATIENCE
+
+
+def open_socket(view):
+    """The socket behind the answer to the upgrade."""
+    raw = socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE)
+    raw.sendall((f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nOrigin: http://127.0.0.1:{view.port}\r\n"
+                 f"Cookie: rapid_{view.port}={view.token}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n").encode())
+    head = b""
+    while b"\r\n\r\n" not in head:
+        head += raw.recv(1)
+    assert b" 101 " in head.split(b"\r\n")[0], head
+    return raw
+
+
+def frame_of(text, opcode=1):
+    data, mask = text.encode(), b"\0\0\0\0"
+    size = len(data)
+    length = bytes([0x80 | size]) if size < 126 else bytes([0xfe]) + size.to_bytes(2, "big") if size < 65536 else (
+        bytes([0xff]) + size.to_bytes(8, "big"))
+    return bytes([0x80 | opcode]) + length + mask + data
+
+
+class Client:
+    """One request at a time."""
+
+    def __init__(self, view):
+        self.raw = open_socket(view)
+        self.file = self.raw.makefile("rb")
+
+    def ask(self, what, **given):
+        """The answer: an object, or the bytes of a frame."""
+        self.raw.sendall(frame_of(json.dumps({"re": 1, "do": what, **given})))
+        opcode, size = self.file.read(2)
+        if size >= 126:
+            size = int.from_bytes(self.file.read(2 if size == 126 else 8), "big")
+        data = self.file.read(size)
+        return json.loads(data) if opcode == 0x81 else data
+
+    def until_done(self, run=1, pulls=False):
+        """The status of a run that is done. pulls: its newest frames, shapes and figures, as the page does."""
+        version = 0
+        while True:
+            status = self.ask("status", since=version, graph=1)
+            version = status["version"]
+            if pulls and status["ready"]:
+                newest = status["ready"][-1][1]
+                self.ask("frame", frame=newest)
+                self.ask("shapes", frame=newest, known=[1, 2, 3, 4])
+                self.ask("figures", after=newest - 1)
+            if status["run"] >= run and status["state"] == "done":
+                return status
+            assert status["state"] in ("starting", "computing"), status["state"]
+            time.sleep(0.03 if pulls else 0.3)
+
+    def close(self):
+        self.file.close()
+        self.raw.close()

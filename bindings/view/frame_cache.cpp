@@ -155,7 +155,7 @@ void CachedRun::read_index(const InputContents& contents)
             const bool is_same = std::all_of(read.begin(), read.end(), [&](const auto& one) {
                 return InputContents::is_content(one.first) && contents.content_of(one.first) == one.second;
             });
-            if (is_whole && is_same) known_[number] = std::move(known);
+            if (is_whole && is_same && Json::accept(known.statistics)) known_[number] = std::move(known);
         } catch (const nlohmann::json::exception&) {
             continue;
         }

@@ -196,13 +196,16 @@ void add_colours(Message& message, const PointSet& points, const FrameWish& wish
     const auto* Cd = points.find<Vec3f>("Cd");
     if (Cd && (wish.colour.empty() || wish.colour == "Cd")) {
         message.header()["colour"] = "Cd";
-        message.add<std::uint8_t>(
-            "colour", "u8", 3 * points.size(), [from = Cd->read(), count = points.size()](std::span<std::uint8_t> to) {
-                for (std::size_t k = 0; k < count; ++k)
-                    for (int axis = 0; axis < 3; ++axis)
-                        to[3 * k + axis] =
-                            static_cast<std::uint8_t>(255 * std::clamp(from[k][axis], 0.0f, 1.0f) + 0.5f);
-            });
+        message.add<std::uint8_t>("colour", "u8", 3 * points.size(), [from = Cd->read()](std::span<std::uint8_t> to) {
+            const auto* values = reinterpret_cast<const float*>(from.data);
+            const std::size_t same = from.stride == 0 ? 3 : to.size();  // values that are not repeated
+            // Over single numbers, without branches: the loop is vectorised.
+            for (std::size_t j = 0; j < std::min(same, to.size()); ++j) {
+                const float bounded = values[j] > 0 ? std::min(values[j], 1.0f) : 0;  // not a number: 0
+                to[j] = static_cast<std::uint8_t>(static_cast<std::int32_t>(255 * bounded + 0.5f));
+            }
+            for (std::size_t j = same; j < to.size(); ++j) to[j] = to[j - 3];
+        });
         return;
     }
     const std::string name = wish.colour.empty() ? "speed" : wish.colour;

@@ -21,12 +21,12 @@ export class Figures {
   constructor(root, { go }) {
     this.root = element("div", { id: "figures" });
     root.append(this.root);
-    this.known = [];
+    this.known = null;
     this.byFrame = new Map();
     this.charts = charts.map(([name, of, lines]) => {
       const canvas = element("canvas", { title: `${name || "seconds by stage"}: a click goes to the frame` }), value = element("span", { class: "number" });
       const names = lines.map(([line, tint]) => element("span", { class: line ? `line ${tint}` : "" }, line || name));
-      const chart = { of, lines, names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
+      const chart = { of, lines, curves: [], names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
       canvas.addEventListener("click", (event) => {
         const box = canvas.getBoundingClientRect();
         go(Math.round(this.first + ((event.clientX - box.left) / box.width) * (this.last - this.first)));
@@ -34,6 +34,7 @@ export class Figures {
       this.root.append(chart.box);
       return chart;
     });
+    this.know([]);
     new ResizeObserver(() => this.draw()).observe(this.root);
   }
 
@@ -41,8 +42,25 @@ export class Figures {
 
   // statistics: of all frames, in order; the list grows, or is another one.
   know(statistics) {
-    if (statistics !== this.known) { this.known = statistics; this.byFrame.clear(); }
-    for (let k = this.byFrame.size; k < statistics.length; ++k) this.byFrame.set(statistics[k].frame, statistics[k]);
+    if (statistics !== this.known) {
+      this.known = statistics;
+      this.byFrame.clear();
+      for (const chart of this.charts) chart.curves = chart.lines.map(() => ({ values: [], least: 0, high: -Infinity, isZero: true }));
+    }
+    // Each frame is read once: of ten thousand all were read again for each that was shown.
+    for (let k = this.byFrame.size; k < statistics.length; ++k) {
+      const f = statistics[k];
+      this.byFrame.set(f.frame, f);
+      for (const { lines, curves } of this.charts)
+        lines.forEach(([, , read], line) => {
+          const curve = curves[line], v = read(f);
+          if (typeof v !== "number") return;
+          curve.values.push([f.frame, v]);
+          curve.least = Math.min(curve.least, v);
+          curve.high = Math.max(curve.high, v);
+          curve.isZero &&= v === 0;
+        });
+    }
   }
 
   show(statistics, first, last, frame) {
@@ -55,27 +73,25 @@ export class Figures {
     if (this.root.offsetParent === null) return;
     const shown = [];
     for (const chart of this.charts) {
-      const lines = chart.lines.map(([, , read]) => this.known.map((f) => [f.frame, read(f)]).filter(([, v]) => typeof v === "number"));
-      chart.box.hidden = lines.every((values) => values.every(([, v]) => v === 0));
-      if (!chart.box.hidden) shown.push([chart, lines]);
+      chart.box.hidden = chart.curves.every((curve) => curve.isZero);
+      if (!chart.box.hidden) shown.push(chart);
     }
     // Rows that are full: no empty place at the end.
     const most = Math.max(1, Math.floor(this.root.clientWidth / (22 * 12 * unit()))), rows = Math.ceil(shown.length / most);
     const columns = Math.max(1, Math.ceil(shown.length / Math.max(1, rows)));
     this.root.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
-    shown.forEach(([{ box }], k) => { box.style.gridColumn = k === shown.length - 1 ? `span ${1 + columns * rows - shown.length}` : ""; });
-    for (const [chart, lines] of shown) this.drawLines(chart, lines);
+    shown.forEach(({ box }, k) => { box.style.gridColumn = k === shown.length - 1 ? `span ${1 + columns * rows - shown.length}` : ""; });
+    for (const chart of shown) this.drawCurves(chart);
   }
 
-  drawLines(chart, lines) {
-    let high = -Infinity, least = 0;
-    for (const values of lines) for (const [, v] of values) { high = Math.max(high, v); least = Math.min(least, v); }
+  drawCurves(chart) {
+    const { curves } = chart, high = Math.max(...curves.map((curve) => curve.high)), least = Math.min(...curves.map((curve) => curve.least));
     const { context, width, height } = prepare(chart.canvas);
     const x = (f) => ((f - this.first) / Math.max(1, this.last - this.first)) * width, y = (v) => height - 2 - ((v - least) / (high - least || 1)) * (height - 6);
     context.strokeStyle = colour("line");
     context.strokeRect(0, y(0), width, 0);
     context.lineWidth = 1.3;
-    lines.forEach((values, k) => {
+    curves.forEach(({ values }, k) => {
       context.strokeStyle = colour(chart.lines[k][1]);
       context.beginPath();
       // Of frames that share a column of pixels the least and the largest value.
@@ -98,7 +114,7 @@ export class Figures {
     // Of several lines each has its value behind its name; one that is always 0 has neither.
     if (here.length > 1)
       chart.lines.forEach(([line], k) => {
-        chart.names[k].hidden = lines[k].every(([, v]) => v === 0);
+        chart.names[k].hidden = curves[k].isZero;
         chart.names[k].textContent = `${line} ${here[k]}`;
       });
   }

@@ -153,12 +153,14 @@ export class Graph {
   figures(statistics) {
     this.statistics = statistics;
     if (!this.facts || !statistics?.nodes) return;
-    for (const { fact, node } of this.facts.values()) if (fact.textContent !== node.type) fact.textContent = node.type;
+    const texts = new Map();
     for (const work of statistics.nodes)
-      work.nodes.forEach((name, k) => {
-        const known = this.facts.get(name);
-        if (known) known.fact.textContent = `${count(work.points)} · ${k === 0 ? seconds(work.seconds) : "fused"}`;
-      });
+      work.nodes.forEach((name, k) => texts.set(name, `${count(work.points)} · ${k === 0 ? seconds(work.seconds) : "fused"}`));
+    // Only what has changed: of each text that is set the page is laid out again.
+    for (const [name, { fact, node }] of this.facts) {
+      const text = texts.get(name) ?? node.type;
+      if (fact.textContent !== text) fact.textContent = text;
+    }
   }
 
   node(name) { return this.picture?.nodes.find((node) => node.name === name); }

@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most = std::size_t{1} << 26;  // bytes, of all
+constexpr std::size_t most_spare_bytes = std::size_t{1} << 26;
 
 void unmap(SparePages::Block block)
 {
@@ -43,12 +43,12 @@ SparePages::Block SparePages::take(std::size_t bytes)
 
 void SparePages::give(Block block)
 {
-    if (block.bytes > most / 4) return unmap(block);
+    if (block.bytes > most_spare_bytes / 4) return unmap(block);
     const std::lock_guard lock(mutex_);
     bytes_ += block.bytes;
     const auto empty = std::find_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return !b.begin; });
     if (empty != blocks_.end()) std::swap(block, *empty);
-    while (block.begin || bytes_ > most) {  // others make room, in turn
+    while (block.begin || bytes_ > most_spare_bytes) {  // others make room, in turn
         std::swap(block, blocks_[next_]);
         next_ = (next_ + 1) % blocks_.size();
         bytes_ -= block.bytes;

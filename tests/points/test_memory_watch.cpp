@@ -1,5 +1,7 @@
 #include "runtime/memory_watch.h"
 
+#include <malloc.h>
+
 #include <atomic>
 #include <chrono>
 #include <thread>
@@ -27,6 +29,7 @@ struct Told {
 // Takes so many MiB while it is watched; with `leave`, no longer than until it is asked to end.
 void take(Told& told, std::size_t mebibytes, bool leave)
 {
+    malloc_trim(0);  // what other tests have freed, which the watch would have the process give back
     const MemoryWatch watch(
         [&](const std::string& message) {
             told.message = message;

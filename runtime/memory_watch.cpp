@@ -9,6 +9,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <utility>
 
 #include "runtime/memory_budget.h"
@@ -46,10 +47,11 @@ private:
 
 }  // namespace
 
-MemoryWatch::MemoryWatch(Tell beyond, Tell too_late) : beyond_(std::move(beyond)), too_late_(std::move(too_late))
+MemoryWatch::MemoryWatch(std::uint64_t at_first, Tell beyond, Tell too_late)
+    : beyond_(std::move(beyond)), too_late_(std::move(too_late))
 {
     if (!is_memory_limited()) return;
-    const std::uint64_t most = std::max(memory_budget(), OwnMemory().bytes() + 2 * negligible_memory);
+    const std::uint64_t most = std::max(memory_budget(), at_first + 2 * negligible_memory);
     thread_ = std::thread([this, most] { watch(most); });
 }
 
@@ -62,6 +64,8 @@ MemoryWatch::~MemoryWatch()
     changed_.notify_all();
     if (thread_.joinable()) thread_.join();
 }
+
+std::uint64_t MemoryWatch::now() { return OwnMemory().bytes(); }
 
 bool MemoryWatch::ends_within(double seconds)
 {
@@ -81,15 +85,22 @@ void MemoryWatch::watch(std::uint64_t most)
         bytes = memory.bytes();
     } while (bytes <= most);
 
-    const std::string message = fmt::format(
-        "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set "
-        "--memory",
-        memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)));
-    beyond_(message);
+    std::string message = "out of memory";
+    try {
+        message = fmt::format(
+            "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set "
+            "--memory",
+            memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)));
+        beyond_(message);
+    } catch (const std::exception&) {  // on a thread that has no caller
+    }
     if (!too_late_) return;
     for (double waited = 0; waited < grace_seconds && memory.bytes() <= most + most / 16; waited += look_seconds)
         if (ends_within(look_seconds)) return;
-    too_late_(message);
+    try {
+        too_late_(message);
+    } catch (const std::exception&) {
+    }
 }
 
 }  // namespace rapid

@@ -15,10 +15,11 @@ namespace rapid {
 class MemoryLimit {
 public:
     MemoryLimit(const std::string& file, const std::function<void(const std::string& message)>& end)
-        : watch_([this](const std::string& message) { cancellation_.request(message); },
-                 [this, file, end](const std::string& message) {
-                     end(cancellation_.error(message).at({file, 0}).what());
-                 })
+        : watch_(
+              MemoryWatch::now(), [this](const std::string& message) { cancellation_.request(message); },
+              [this, file, end](const std::string& message) {
+                  end(cancellation_.error(message).at({file, 0}).what());
+              })
     {
     }
 

@@ -105,7 +105,7 @@ public:
         return threads.run([&] {
             claim_own_files();
             const auto abandon = [&](const std::string& message) { report.abandon(status_failed, message); };
-            const MemoryLimit limit(graph_.file(), abandon);
+            std::optional<MemoryLimit> limit(std::in_place, graph_.file(), abandon);
             const std::unique_ptr<Session> session = graph_.load(true, abandon, on_read());
             for (const std::string& warning : session->take_warnings()) report.warning(warning);
             PlanOptions options = files_.plan_options(graph_.seed());
@@ -130,7 +130,7 @@ public:
                 report.set_cache(&cache_);
             }
             report.begin(plan.first_frame(), frames.last);
-            return compute(*session, plan, frames, report, end);
+            return compute(*session, plan, frames, report, end, limit);
         });
     }
 
@@ -266,7 +266,9 @@ private:
         return options;
     }
 
-    int compute(Session& session, const Plan& plan, const FrameSelection& frames, RunReport& report, GracefulEnd& end)
+    // limit: ends when the last frame is computed; files that are written then are no reason to grow.
+    int compute(Session& session, const Plan& plan, const FrameSelection& frames, RunReport& report, GracefulEnd& end,
+                std::optional<MemoryLimit>& limit)
     {
         computes_ = true;
         try {
@@ -292,6 +294,7 @@ private:
                 if (end.signal() != 0) return interrupted(result.frame, report, end.signal());
                 for (const std::string& warning : cache_.take_warnings()) report.warning(warning, result.frame);
             }
+            limit.reset();
             if (cache_.first_due())  // what an earlier run has computed behind it
                 for (const FrameRecord* record : cache_.records(last + 1, frames.last))
                     report.known_frame(*record, false);
@@ -301,9 +304,11 @@ private:
             report.finish();
             return status_done;
         } catch (const Error& error) {
+            limit.reset();
             finish_files(error, report);
             return report.fail(error);
         } catch (const std::exception& error) {  // of a library
+            limit.reset();
             const Error known(dynamic_cast<const std::bad_alloc*>(&error) ? "out of memory" : error.what());
             finish_files(known, report);
             return report.fail(known);

@@ -50,8 +50,7 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            const MemoryLimit limit(graph_.file(), end_at_limit(common));
-            Scene scene = graph_.open(common);
+            Scene scene = open(common);
             const std::int64_t start = scene.first_frame();
             const FrameSelection frames = frames_.value_or(FrameSelection{start, start + default_frames - 1});
             if (frames.last < start)
@@ -66,6 +65,13 @@ public:
     }
 
 private:
+    // The limit of memory: frames are watched by the scene, which knows the node.
+    Scene open(const CommonOptions& common) const
+    {
+        const MemoryLimit limit(graph_.file(), end_at_limit(common));
+        return graph_.open(common);
+    }
+
     SceneArguments graph_;
     std::vector<std::int64_t> ids_;
     std::string create_;

@@ -37,7 +37,7 @@ Result<NodeDocuments> Scene::documents()
         result.annotations = annotations_of(all.registry);
         return result;
     } catch (...) {
-        return caught_error(SceneError::Unexpected);
+        return caught_error(SceneError::WrongScene);
     }
 }
 

@@ -4,10 +4,25 @@
 
 #include <new>
 
+#include "runtime/of_thread.h"
+
 namespace rapid {
 namespace {
 
-thread_local std::string last_script_stack;
+thread_local OfThread<std::string> last_script_stack;
+
+// Where memory does not do for it there is none.
+void keep_script_stack(const std::string& stack) noexcept
+{
+    try {
+        *last_script_stack = stack;
+    } catch (const std::bad_alloc&) {
+        try {
+            (*last_script_stack).clear();
+        } catch (const std::bad_alloc&) {  // it has never been kept
+        }
+    }
+}
 
 // Whether it is of memory that the system or a limit refuses. Errors pass through Lua as their text, so that is all
 // that tells: Rapid's (runtime/at_node.h), LuaJIT's, and those of the limits. "C++ exception" is LuaJIT's word for one
@@ -30,11 +45,11 @@ std::string SceneError::text() const
     return place + message;
 }
 
-std::string SceneError::script_stack() { return last_script_stack; }
+std::string SceneError::script_stack() { return *last_script_stack; }
 
 SceneError wrong_call(std::string message)
 {
-    last_script_stack.clear();
+    keep_script_stack({});
     SceneError error;
     error.kind = SceneError::WrongCall;
     error.message = std::move(message);
@@ -43,7 +58,7 @@ SceneError wrong_call(std::string message)
 
 SceneError busy()
 {
-    last_script_stack.clear();
+    keep_script_stack({});
     SceneError error;
     error.kind = SceneError::Busy;
     error.message =
@@ -59,21 +74,21 @@ SceneError caught_error(SceneError::Kind kind)
     } catch (const Refusal& refusal) {
         return refusal.error;
     } catch (const Error& error) {
-        last_script_stack = error.trace();
+        keep_script_stack(error.trace());
         result.kind = is_of_memory(error.message()) ? SceneError::OutOfMemory : kind;
         result.message = error.message();
         result.file = error.location().file;
         result.line = error.location().line;
         result.node = error.node();
     } catch (const std::bad_alloc&) {
-        last_script_stack.clear();
+        keep_script_stack({});
         result.kind = SceneError::OutOfMemory;
         result.message = "out of memory";
     } catch (const std::exception& error) {
-        last_script_stack.clear();
+        keep_script_stack({});
         result.message = error.what();
     } catch (...) {
-        last_script_stack.clear();
+        keep_script_stack({});
         result.message = "an exception that is no std::exception";
     }
     return result;

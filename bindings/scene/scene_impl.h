@@ -48,6 +48,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
 
     std::optional<tbb::task_arena> arena;
     std::atomic<bool> is_busy = false;
+    std::uint64_t memory_at_first = MemoryWatch::now();
     std::atomic<bool> is_late = false;  // a script has been stopped in this call
 
     // What cancel() may do while another thread is in a call.
@@ -128,12 +129,12 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         explicit Running(Impl& impl)
             : scripts(impl),
               scope(&impl.cancellation),
-              watch(
-                  [&impl](const std::string& message) {
-                      impl.cancellation.request(message);
-                      impl.session->interrupt(message);
-                  },
-                  {})
+              watch(impl.memory_at_first,
+                    [&impl](const std::string& message) {
+                        impl.session->interrupt(message);
+                        impl.cancellation.request(message);
+                    },
+                    {})
         {
             impl.cancellation.check();
         }

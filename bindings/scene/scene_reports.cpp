@@ -53,21 +53,22 @@ Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
     try {
         while (run.next_frame() <= asked.last) biographer.add(run.advance());
     } catch (const Error& error) {
+        if (session->interrupted() != Interruption::None) evaluator.reset();  // its scripts do not run again
         if (error.message().find(Cancellation::text) != std::string::npos) throw;
         result.fault = std::current_exception();
         result.is_late = is_late.exchange(false);
-        cancellation.forget();                                                // of a limit of memory
-        if (session->interrupted() != Interruption::None) evaluator.reset();  // its scripts do not run again
+        cancellation.forget();  // of a limit of memory
     }
     session->take_warnings();  // of frames, which the run tells
 
+    const std::int64_t first = std::max(asked.first, traced.first_frame());
     std::vector<Biography> lives = biographer.lives();
     for (const std::int64_t id : asked.ids)
         if (std::none_of(lives.begin(), lives.end(), [&](const Biography& life) { return life.id == id; }))
             result.trace.unborn.push_back(id);
     for (Biography& life : lives)
         std::erase_if(life.steps, [&](const Biography::Step& step) {
-            return step.frame < asked.first || step.frame > asked.last || (step.frame - asked.first) % asked.step != 0;
+            return step.frame < first || step.frame > asked.last || (step.frame - first) % asked.step != 0;
         });
     result.trace.lives = {to_text(lives), to_json(lives)};
     return result;

@@ -204,7 +204,9 @@ int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** err
 int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error);
 int rapid_scene_advance_to(rapid_scene* scene, int64_t number, rapid_frame** frame, rapid_error** error);
 int rapid_scene_restart(rapid_scene* scene, rapid_error** error);
-/* Ends the advance that is running, or else the next one, with RAPID_CANCELLED. From any thread. */
+/* Ends the advance, trace or points_behind that is running, or else the next one, with RAPID_CANCELLED. From any
+ * thread.
+ */
 int rapid_scene_cancel(rapid_scene* scene, rapid_error** error);
 
 /* All that the next frames depend on, after at least one frame. The frames behind a restore are to the bit those behind
@@ -235,8 +237,8 @@ int rapid_scene_graph(rapid_scene* scene, int form, const char** text, rapid_err
 /* The lives of points: births, what each node changed, forces, contacts, deaths and why, in the frames from `first` to
  * `last`. ids: shape [count]. create: the name of the node that makes them; NULL: each. Goes to the start, and computes
  * the frames beside the scene, which then is at its start. *json is a list, as `rapid trace --json` prints it, behind
- * RAPID_FAILED_FRAME, too, with what is known until then; it belongs to the scene, until the next call of this
- * function. */
+ * RAPID_FAILED_FRAME, RAPID_TOO_LONG and RAPID_OUT_OF_MEMORY of a frame, too, with what is known until then; it belongs
+ * to the scene, until the next call of this function. */
 int rapid_scene_trace(rapid_scene* scene, const int64_t* ids, size_t count, const char* create, int64_t first,
                       int64_t last, const char** json, rapid_error** error);
 

@@ -403,7 +403,7 @@ public:
     Result<SceneSnapshot> save();
     Result<Done> restore(const SceneSnapshot& snapshot);
 
-    // Ends the advance that is running, or else the next one, with the error Cancelled: in a
+    // Ends the advance, trace or points_behind that is running, or else the next one, with the error Cancelled: in a
     // frame at the next chunk of points or sub-step, and at once in a script. From any thread. restart(), restore() and
     // set() forget it.
     void cancel();

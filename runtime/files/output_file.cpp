@@ -156,6 +156,7 @@ WritingProgram::WritingProgram(pid_t program)
         pid_t none = 0;
         if (!place.compare_exchange_strong(none, program)) continue;
         place_ = &place;
+        if (ending) ::kill(program, SIGKILL);  // nobody looks again
         return;
     }
 }

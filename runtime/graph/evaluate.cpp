@@ -254,6 +254,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
         add_work(first, last, begin, scripts_before, result.points, frame);
         if (planned.once) kept_[first] = result;
         if (result_) result_(node, next_, result.points);
+        Cancellation::check_current();  // of memory that this node has taken
         return result;
     });
 }

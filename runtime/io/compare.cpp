@@ -269,7 +269,6 @@ std::string group_text(const AttributeDifference& d, std::size_t width)
     return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
 }
 
-// JSON has no infinity: null stands for a difference that is not finite.
 // The name of a type; null of what a set lacks.
 void add_type(JsonText& json, const std::string& type)
 {

@@ -46,10 +46,13 @@ public:
         if (const auto* own = points.find<float>("dt")) own_dt_ = own->read();
 
         const Strided<std::uint8_t> members = members_of(points, interaction.group);
-        require_memory(points.size());
+        const auto takes_part = [&](std::size_t i) { return members[i] && (at.dead.empty() || !at.dead[i]); };
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) count += takes_part(i);
+        require_memory(count);
         std::vector<Vec3f> places;
         for (std::size_t i = 0; i < points.size(); ++i) {
-            if (!members[i] || (!at.dead.empty() && at.dead[i])) continue;
+            if (!takes_part(i)) continue;
             if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve reports it, with the point's name
                 members_.clear();
                 return;
@@ -81,7 +84,7 @@ public:
     std::span<const std::uint32_t> members() const { return members_; }
 
 private:
-    // Of as many members as there are points, each in a cell of its own.
+    // Of points each in a cell of its own.
     static void require_memory(std::size_t points)
     {
         constexpr double bytes_a_point = 160;  // measured: places, cells, weights, headings, kicks

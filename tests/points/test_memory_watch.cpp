@@ -31,6 +31,7 @@ void take(Told& told, std::size_t mebibytes, bool leave)
 {
     malloc_trim(0);  // what other tests have freed, which the watch would have the process give back
     const MemoryWatch watch(
+        MemoryWatch::now(),
         [&](const std::string& message) {
             told.message = message;
             ++told.beyond;
@@ -48,14 +49,17 @@ void take(Told& told, std::size_t mebibytes, bool leave)
 TEST_CASE("a run is asked to end where it takes more than its budget, and once more where it does not", "[memory]")
 {
     const MemoryBudget budget(1);
-    Told leaves, stays;
+    Told leaves, stays, grows;
     take(leaves, 130, true);
     CHECK(leaves.beyond == 1);
     CHECK(leaves.too_late == 0);
     CHECK_THAT(leaves.message, Contains("the run takes") && Contains("or set --memory"));
-    take(stays, 300, false);
+    take(stays, 130, false);
     CHECK(stays.beyond == 1);
     CHECK(stays.too_late == 1);
+    take(grows, 300, false);
+    CHECK(grows.beyond == 1);
+    CHECK(grows.too_late == 1);
 }
 
 TEST_CASE("little memory is let pass whatever the budget", "[memory]")
@@ -63,7 +67,7 @@ TEST_CASE("little memory is let pass whatever the budget", "[memory]")
     const MemoryBudget budget(1);
     int told = 0;
     {
-        const MemoryWatch watch([&](const std::string&) { ++told; }, {});
+        const MemoryWatch watch(MemoryWatch::now(), [&](const std::string&) { ++told; }, {});
         const std::vector<char> memory(std::size_t{32} << 20, 1);
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
@@ -75,7 +79,7 @@ TEST_CASE("memory is not watched where nobody has set a budget", "[memory]")
     REQUIRE_FALSE(is_memory_limited());
     int told = 0;
     {
-        const MemoryWatch watch([&](const std::string&) { ++told; }, {});
+        const MemoryWatch watch(MemoryWatch::now(), [&](const std::string&) { ++told; }, {});
         const std::vector<char> memory(std::size_t{200} << 20, 1);
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }

@@ -218,6 +218,9 @@ TEST_CASE("a trace is cancelled, and refused within another call", "[reports]")
     CHECK(scene.trace({{0}, "", 1, 50, 1}).error().kind == SceneError::Cancelled);
     CHECK(inside == SceneError::Busy);
     self = nullptr;
+    CHECK_THAT(scene.advance().error().message, Contains("call restart()"));
+    good(scene.restart());
+    good(scene.advance());
     CHECK(good(scene.trace({{0}, "", 1, 5, 1})).lives.text.size() > 10);
 }
 

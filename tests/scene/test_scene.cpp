@@ -501,6 +501,10 @@ TEST_CASE("a scene whose frames take more memory than it has is an error, and go
     CHECK(error.node == "d");
     good(scene.set("large", 1.0));
     CHECK(good(scene.advance_to(4)).size() == 1);
+
+    // Little more in each frame.
+    good(scene.set("large", 3e4));
+    CHECK(scene.advance_to(60).error().kind == SceneError::OutOfMemory);
 }
 
 TEST_CASE("scenes on threads of their own give the bits of one after the other", "[scene][threads]")

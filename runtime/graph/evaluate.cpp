@@ -104,7 +104,8 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     for (std::size_t first = 0, last = 0; first < plan_.nodes.size(); first = last + 1) {
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
-        Cancellation::check_current();
+        // Asked for since the last node: of no node, but of the scene's file.
+        name_errors({}, {plan_.nodes[first].node->location.file, 0}, [] { Cancellation::check_current(); });
         // The hooks and checked declarations take one node after the other.
         if (!result_ && !input_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);

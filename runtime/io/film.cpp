@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -12,10 +11,12 @@
 #include <csignal>
 #include <cstring>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/error.h"
 #include "runtime/files/program_path.h"
+#include "runtime/files/start_program.h"
 
 namespace rapid {
 namespace {
@@ -57,29 +58,6 @@ std::vector<std::string> encoder_for(std::string_view extension)
     return arguments;
 }
 
-struct SpawnActions {
-    posix_spawn_file_actions_t actions;
-    posix_spawnattr_t attributes;
-
-    SpawnActions()
-    {
-        posix_spawn_file_actions_init(&actions);
-        posix_spawnattr_init(&attributes);
-        // Signals as a program expects them: those of this thread may be blocked, for a thread that waits for them.
-        sigset_t none, all;
-        sigemptyset(&none);
-        sigfillset(&all);
-        posix_spawnattr_setsigmask(&attributes, &none);
-        posix_spawnattr_setsigdefault(&attributes, &all);
-        posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    }
-    ~SpawnActions()
-    {
-        posix_spawn_file_actions_destroy(&actions);
-        posix_spawnattr_destroy(&attributes);
-    }
-};
-
 }  // namespace
 
 void require_ffmpeg() { path_of_ffmpeg(); }
@@ -111,9 +89,6 @@ Film::Film(OutputFile& file, std::string_view extension, int width, int height, 
     for (std::string& word : encoder_for(extension)) words.push_back(std::move(word));
     // By its descriptor: the file has no name yet.
     for (const char* word : {"-y", "/proc/self/fd/3"}) words.emplace_back(word);
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
 
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
@@ -123,17 +98,11 @@ Film::Film(OutputFile& file, std::string_view extension, int width, int height, 
     messages_ = Descriptor(memfd_create("ffmpeg", MFD_CLOEXEC));
     if (!messages_) throw Error(fmt::format("no connection to ffmpeg: {}", std::strerror(errno)));
 
-    SpawnActions spawn;
-    posix_spawn_file_actions_adddup2(&spawn.actions, messages_.number(), STDERR_FILENO);
-    posix_spawn_file_actions_adddup2(&spawn.actions, messages_.number(), STDOUT_FILENO);
-    posix_spawn_file_actions_adddup2(&spawn.actions, theirs.number(), input);
-    posix_spawn_file_actions_adddup2(&spawn.actions, file.descriptor(), output);
-    const int failed =
-        posix_spawn(&ffmpeg_, program.c_str(), &spawn.actions, &spawn.attributes, arguments.data(), environ);
-    if (failed) {
-        ffmpeg_ = -1;
-        throw Error(fmt::format("{} can't be started: {}", program, std::strerror(failed)));
-    }
+    ffmpeg_ = start_program(program, std::move(words),
+                            {{messages_.number(), STDERR_FILENO},
+                             {messages_.number(), STDOUT_FILENO},
+                             {theirs.number(), input},
+                             {file.descriptor(), output}});
     writing_.emplace(ffmpeg_);
 }
 
@@ -169,11 +138,7 @@ int Film::wait()
     while (waitid(P_PID, static_cast<id_t>(ffmpeg_), &ended, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
     }
     writing_.reset();
-    int status = 0;
-    while (waitpid(ffmpeg_, &status, 0) < 0 && errno == EINTR) {
-    }
-    ffmpeg_ = -1;
-    return status;
+    return wait_for_program(std::exchange(ffmpeg_, -1));
 }
 
 void Film::fail()

@@ -1,18 +1,17 @@
 #include "runtime/report/graphviz.h"
 
 #include <fmt/format.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 
 #include "runtime/error.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/program_path.h"
+#include "runtime/files/start_program.h"
 
 namespace rapid {
 namespace {
@@ -59,31 +58,10 @@ std::string lay_out(const std::string& graph, const std::string& format)
     if (program.empty())
         throw Error("graphs are laid out by dot, which is not here; install it (apt install graphviz), or write .dot");
 
-    posix_spawn_file_actions_t actions;
-    posix_spawnattr_t attributes;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawnattr_init(&attributes);
-    posix_spawn_file_actions_adddup2(&actions, input.number(), STDIN_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, output.number(), STDOUT_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, messages.number(), STDERR_FILENO);
-    // Signals as a program expects them: those of this thread may be blocked.
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    std::string name = "dot", option = "-T" + format;
-    char* const arguments[] = {name.data(), option.data(), nullptr};
-    pid_t child = -1;
-    const int failed = posix_spawn(&child, program.c_str(), &actions, &attributes, arguments, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-    if (failed) throw Error(fmt::format("dot can't be started: {}", std::strerror(failed)));
-
-    int status = 0;
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-    }
+    const pid_t dot = start_program(
+        program, {"dot", "-T" + format},
+        {{input.number(), STDIN_FILENO}, {output.number(), STDOUT_FILENO}, {messages.number(), STDERR_FILENO}});
+    const int status = wait_for_program(dot);
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw Error(fmt::format("dot failed: {}", read_all(messages)));
     return read_all(output);
 }

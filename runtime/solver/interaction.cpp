@@ -51,6 +51,8 @@ public:
         for (std::size_t i = 0; i < points.size(); ++i) count += takes_part(i);
         require_memory(count);
         std::vector<Vec3f> places;
+        places.reserve(count);
+        members_.reserve(count);
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!takes_part(i)) continue;
             if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve reports it, with the point's name

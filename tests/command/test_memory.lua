@@ -63,6 +63,27 @@ for i = 1, 1e8 do t[i] = { i } end]] ] = "^scene%.lua: the run takes [23]%d%d Mi
     end
   end)
 
+  it("leaves to trace the lives that are known when it is reached", function()
+    local result = scene.command("trace", [[return rapid.create { points = two } :detail("d", function(points, frame)
+  for i = 1, frame.number > 3 and 1e6 or 0 do points.detail[("x"):rep(50) .. i .. "_" .. frame.number] = i end
+end) :solve {}]], "--id 0 -f 1-9 --memory 200M --script-memory 4G")
+    assert.match('^scene%.lua:1: node "d": the run takes 2%d%d MiB of memory, and may take 200 MiB; ', result.stderr)
+    assert.equal(1, result.status)
+    assert.match("^point 0 of create1\n.*\n +3 +0%.08333 s ", result.stdout)
+  end)
+
+  it("counts the neighbourhoods of a group, not those of all points", function()
+    local text = "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1 / 80 } } " ..
+      ":group { name = 'few', where = function(p) return p.id < %s end } " ..
+      ":interact { group = 'few', radius = 0.01, cohesion = 1 } :solve {}"
+    local few = scene.command("run", text:format "10", "-f 1-2 --quiet --memory 110M")
+    assert.equal("", few.stderr)
+    assert.equal(0, few.status)
+    local all = scene.command("run", text:format "1e9", "-f 1-2 --quiet --memory 110M")
+    assert.match('^scene%.lua:1: node "interact1": the neighbourhoods of 512000 points would take about 78 MiB, ',
+      all.stderr)
+  end)
+
   it("is what is free where it is not given", function()
     local result = scene.command("run", "return rapid.create {} :emit { source = rapid.mesh.box {}, count = 2e9 } " ..
       ":solve {}", "-f 1-3 --quiet")

@@ -21,6 +21,14 @@ describe("rapid nodes", function()
     end
   end)
 
+  it("ends with status 2 and the folder where Rapid's own files in Lua are missing", function()
+    local folder = command.folder()
+    command.shell('cp "$RAPID" rapid', { cwd = folder.path })
+    local result = command.shell("./rapid nodes", { cwd = folder.path })
+    assert.match("Rapid's Lua files are missing; they belong into share/rapid/lua", result.stderr)
+    assert.equal(2, result.status)
+  end)
+
   it("has the nodes of the simulation chain", function()
     local known = {}
     for _, node in ipairs(all) do known[node.name] = node end

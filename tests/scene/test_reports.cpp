@@ -5,25 +5,18 @@
 
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
 #include "tests/test.h"
 
 namespace rapid {
 namespace {
 
 using Catch::Contains, Catch::StartsWith;
+using test::good;
 
 Scene opened(const std::string& text, SceneOptions options = {})
 {
-    Result<Scene> scene = Scene::open_text("told.lua", "local rapid = require 'rapid'\n" + text, std::move(options));
-    if (!scene) FAIL(scene.error().text());
-    return std::move(*scene);
-}
-
-template <class T>
-T good(Result<T> result)
-{
-    if (!result) FAIL(result.error().text());
-    return std::move(*result);
+    return test::opened("local rapid = require 'rapid'\n" + text, std::move(options), "told.lua");
 }
 
 const char* const ball =

@@ -9,13 +9,14 @@
 #include <thread>
 
 #include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
 #include "tests/test.h"
 
 namespace rapid {
 namespace {
 
 using Catch::Contains, Catch::EndsWith, Catch::StartsWith;
-using test::TemporaryFolder;
+using test::TemporaryFolder, test::good, test::opened;
 
 // A cloud that kernels, births, deaths and a floor change; P, v, id, age, life, heat; the group "hot"; a detail value.
 const std::string cloud = R"(
@@ -36,20 +37,6 @@ return rapid.create { fps = 24, seed = 3 }
   :collide { shape = rapid.shape.plane {}, bounce = 0.4 }
   :solve { substeps = 2 }
 )";
-
-Scene opened(const std::string& text, SceneOptions options = {})
-{
-    Result<Scene> scene = Scene::open_text("cloud.lua", text, std::move(options));
-    if (!scene) FAIL(scene.error().text());
-    return std::move(*scene);
-}
-
-template <class T>
-T good(Result<T> result)
-{
-    if (!result) FAIL(result.error().text());
-    return std::move(*result);
-}
 
 // All values of a frame as text of their bits.
 std::string bits_of(const SceneFrame& frame)

@@ -4,12 +4,14 @@
 
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
 #include "tests/test.h"
 
 namespace rapid {
 namespace {
 
 using Catch::Contains, Catch::StartsWith;
+using test::good;
 
 const std::string cloud = R"(
 local rapid = require "rapid"
@@ -21,14 +23,7 @@ return rapid.create { fps = 24, seed = 3 }
   :solve { substeps = 2 }
 )";
 
-template <class T>
-T good(Result<T> result)
-{
-    if (!result) FAIL(result.error().text());
-    return std::move(*result);
-}
-
-Scene opened(const std::string& text = cloud) { return good(Scene::open_text("cloud.lua", text)); }
+Scene opened(const std::string& text = cloud) { return test::opened(text); }
 
 }  // namespace
 

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include "bindings/command/command.h"
-#include "bindings/command/frame_files.h"
+#include "bindings/run/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/memory_limit.h"
-#include "bindings/command/races.h"
+#include "bindings/run/races.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/report/statistics.h"
 #include "runtime/threads.h"

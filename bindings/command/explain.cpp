@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "bindings/command/frame_files.h"
+#include "bindings/run/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/memory_limit.h"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 #include "runtime/checked_json.h"
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "bindings/command/slurm.h"
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 
 namespace rapid {
 namespace {

@@ -6,7 +6,7 @@
 #include "bindings/command/or_throw.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 #include "runtime/threads.h"
 
 namespace rapid {

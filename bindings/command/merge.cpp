@@ -8,7 +8,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/part_options.h"
-#include "bindings/command/part_record.h"
+#include "bindings/run/part_record.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/first_error.h"

@@ -7,10 +7,10 @@
 #include <string>
 
 #include "bindings/command/command.h"
-#include "bindings/command/frame_files.h"
-#include "bindings/command/profile_file.h"
-#include "bindings/command/run_cache.h"
-#include "bindings/command/statistics_file.h"
+#include "bindings/run/frame_files.h"
+#include "bindings/run/profile_file.h"
+#include "bindings/run/run_cache.h"
+#include "bindings/run/statistics_file.h"
 #include "runtime/report/frame_warnings.h"
 #include "runtime/report/progress.h"
 #include "runtime/report/totals.h"

@@ -51,7 +51,9 @@ Scene SceneArguments::open(const CommonOptions& common) const
     options.log = [](LogLevel level, const std::string& text) {
         level == LogLevel::Print ? print(text + '\n') : print_warning(text);
     };
-    return or_throw(Scene::open(file_, std::move(options), end_at_limit(common)));
+    SceneHooks hooks;
+    hooks.late = end_at_limit(common);
+    return or_throw(Scene::open(file_, std::move(options), std::move(hooks)));
 }
 
 }  // namespace rapid

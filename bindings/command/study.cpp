@@ -20,7 +20,7 @@
 #include "bindings/command/study_run.h"
 #include "bindings/command/swept_setting.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 #include "bindings/host/graph_parameter.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"

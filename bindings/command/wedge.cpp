@@ -8,7 +8,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/farm_options.h"
-#include "bindings/command/frame_files.h"
+#include "bindings/run/frame_files.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "bindings/command/process_pool.h"

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/picture/contact_sheet.h"

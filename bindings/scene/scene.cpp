@@ -54,7 +54,7 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
-Result<Scene> Scene::open(const std::string& file, SceneOptions options) { return open(file, std::move(options), {}); }
+Result<Scene> Scene::open(const std::string& file, SceneOptions options) { return open(file, std::move(options), SceneHooks()); }
 
 Result<Scene> Scene::open_text(const std::string& name, const std::string& text, SceneOptions options)
 {
@@ -62,11 +62,10 @@ Result<Scene> Scene::open_text(const std::string& name, const std::string& text,
     return open_any(name, text, std::move(options));
 }
 
-Result<Scene> Scene::open(const std::string& file, SceneOptions options,
-                          std::function<void(const std::string& message)> late)
+Result<Scene> Scene::open(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
     if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
-    return open_with(file, std::nullopt, std::move(options), std::move(late));
+    return open_with(file, std::nullopt, std::move(options), std::move(hooks));
 }
 
 Result<Scene> Scene::open_any(const std::string& file, std::optional<std::string> text, SceneOptions options)
@@ -75,7 +74,7 @@ Result<Scene> Scene::open_any(const std::string& file, std::optional<std::string
 }
 
 Result<Scene> Scene::open_with(const std::string& file, std::optional<std::string> text, SceneOptions options,
-                               std::function<void(const std::string& message)> late)
+                               SceneHooks hooks)
 {
     if (std::optional<SceneError> fault = fault_of(options)) return std::move(*fault);
     try {
@@ -83,7 +82,7 @@ Result<Scene> Scene::open_with(const std::string& file, std::optional<std::strin
         impl->file = file;
         impl->text = std::move(text);
         impl->options = std::move(options);
-        impl->late = std::move(late);
+        impl->hooks = std::move(hooks);
         if (impl->options.threads > 0) impl->arena.emplace(impl->options.threads);
         std::map<std::string, std::string> set;
         for (const auto& [name, value] : impl->options.set) set[name] = text_of(value);

@@ -16,6 +16,15 @@ SceneValue value_in_header(const Value& value)
     return *value.get<std::string>();
 }
 
+// On a thread that may have no caller.
+void call_hook(const std::function<void(const std::string& text)>& hook, const std::string& text)
+{
+    if (hook) try {
+            hook(text);
+        } catch (...) {
+        }
+}
+
 }  // namespace
 
 SessionOptions Scene::Impl::session_options(const std::map<std::string, std::string>& set)
@@ -29,11 +38,11 @@ SessionOptions Scene::Impl::session_options(const std::map<std::string, std::str
     result.interruptible = true;
     result.on_timeout = [this](const std::string& message) {
         is_late = true;
-        if (late) try {
-                late(message);
-            } catch (...) {  // on a thread that has no caller
-            }
+        call_hook(hooks.late, message);
     };
+    if (hooks.reads)
+        result.on_read = [this](const std::filesystem::path& path) { call_hook(hooks.reads, path.string()); };
+    result.keeps_state = hooks.keep_state;
     result.offers = offers;
     result.quiet = !options.log;
     if (options.log)
@@ -119,6 +128,7 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
     plan = std::move(fresh);
     evaluator = std::make_unique<Evaluator>(*plan);
     if (!options.estimate_errors) evaluator->leave_out_errors();
+    if (hooks.tell_points) evaluator->tell_points();
     next = plan->first_frame();
     has_advanced = false;
 }

@@ -33,6 +33,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::string file;
     std::optional<std::string> text;
     SceneOptions options;
+    SceneHooks hooks;
     std::map<std::string, std::string> settings;  // of parameters, by name
     std::shared_ptr<Offers> offers = std::make_shared<Offers>();
 
@@ -56,7 +57,6 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::mutex scripts_mutex;
     Session* scripts = nullptr;  // that an advance runs now
 
-    std::function<void(const std::string& message)> late;  // Scene::open(); may be empty
 
     // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors.
     template <class F>

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/fingerprint.h"
-#include "bindings/command/snapshot_writer.h"
+#include "bindings/run/fingerprint.h"
+#include "bindings/run/snapshot_writer.h"
 #include "bindings/view/frame_store.h"
 #include "runtime/files/file_error.h"
 #include "runtime/graph/snapshot.h"

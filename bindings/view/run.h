@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "bindings/command/fingerprint.h"
+#include "bindings/run/fingerprint.h"
 #include "bindings/view/simulation.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/snapshot.h"

@@ -302,6 +302,22 @@ struct SceneOptions {
     bool keep_all = false;                             // leaves no attribute out, to the same bits
 };
 
+// What a program needs that runs scenes of others, besides SceneOptions.
+struct SceneHooks {
+    // Told, with the error's text, of each script that takes longer than script_seconds, before it is stopped: for a
+    // program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On a
+    // thread of Rapid's; what it throws is dropped.
+    std::function<void(const std::string& message)> late;
+    // Told of each file before it is read, and of each place where a module or a node was looked for. On any thread;
+    // what it throws is dropped.
+    std::function<void(const std::string& path)> reads;
+    // Refuses what no snapshot can hold, such as a function of the frame that counts in a local variable: for programs
+    // that go on in another process.
+    bool keep_state = false;
+    // The points behind a solve have the columns "error" (m, where it is estimated), "substeps" and "asleep".
+    bool tell_points = false;
+};
+
 // Of Scene::picture().
 struct PictureSize {
     int width = 640, height = 360;  // pixels, from 1 to 16384
@@ -349,11 +365,7 @@ public:
     // OutOfMemory.
     static Result<Scene> open(const std::string& file, SceneOptions options = {});
     static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
-    // late: told, with the error's text, of each script that takes longer than script_seconds, before it is stopped:
-    // for a program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On
-    // a thread of Rapid's; what it throws is dropped.
-    static Result<Scene> open(const std::string& file, SceneOptions options,
-                              std::function<void(const std::string& message)> late);
+    static Result<Scene> open(const std::string& file, SceneOptions options, SceneHooks hooks);
 
     // What is moved from may only be assigned to, or end.
     Scene(Scene&&) noexcept;
@@ -433,7 +445,7 @@ private:
     explicit Scene(std::unique_ptr<Impl> impl);
     static Result<Scene> open_any(const std::string& file, std::optional<std::string> text, SceneOptions options);
     static Result<Scene> open_with(const std::string& file, std::optional<std::string> text, SceneOptions options,
-                                   std::function<void(const std::string& message)> late);
+                                   SceneHooks hooks);
     std::unique_ptr<Impl> impl_;
 };
 

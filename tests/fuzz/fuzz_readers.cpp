@@ -15,8 +15,8 @@
 #include <string_view>
 
 #include "bindings/command/farm_job.h"
-#include "bindings/command/part_record.h"
-#include "bindings/command/piece_log.h"
+#include "bindings/run/part_record.h"
+#include "bindings/run/piece_log.h"
 #include "runtime/error.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"

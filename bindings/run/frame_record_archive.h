@@ -2,7 +2,7 @@
 // compile before it is here.
 #pragma once
 
-#include "bindings/command/frame_record.h"
+#include "bindings/run/frame_record.h"
 #include "runtime/points/state_archive.h"
 
 namespace rapid {

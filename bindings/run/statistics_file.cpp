@@ -1,4 +1,4 @@
-#include "bindings/command/statistics_file.h"
+#include "bindings/run/statistics_file.h"
 
 #include <utility>
 

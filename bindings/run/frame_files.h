@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "bindings/command/command.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/part_record.h"
-#include "bindings/command/written_names.h"
+#include "runtime/files/frame_selection.h"
+#include "bindings/run/part_record.h"
+#include "bindings/run/written_names.h"
 #include "bindings/host/picture_scene.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"

@@ -1,4 +1,4 @@
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 
 #include "runtime/files/output_file.h"
 

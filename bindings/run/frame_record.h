@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/fingerprint.h"
+#include "bindings/run/fingerprint.h"
 #include "runtime/picture/picture_fit.h"
 #include "runtime/report/statistics.h"
 

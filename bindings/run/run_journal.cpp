@@ -1,4 +1,4 @@
-#include "bindings/command/run_journal.h"
+#include "bindings/run/run_journal.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "bindings/command/frame_record_archive.h"
+#include "bindings/run/frame_record_archive.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/output_file.h"

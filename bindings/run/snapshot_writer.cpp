@@ -1,4 +1,4 @@
-#include "bindings/command/snapshot_writer.h"
+#include "bindings/run/snapshot_writer.h"
 
 #include <fmt/format.h>
 

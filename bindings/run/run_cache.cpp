@@ -1,4 +1,4 @@
-#include "bindings/command/run_cache.h"
+#include "bindings/run/run_cache.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "bindings/command/frame_selection.h"
+#include "runtime/files/frame_selection.h"
 #include "bindings/command/graph_options.h"
 #include "runtime/graph/plan.h"
 

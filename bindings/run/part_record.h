@@ -12,7 +12,7 @@
 #include <optional>
 #include <string>
 
-#include "bindings/command/frame_selection.h"
+#include "runtime/files/frame_selection.h"
 #include "runtime/points/subset.h"
 
 namespace rapid {

@@ -1,4 +1,4 @@
-#include "bindings/command/piece_log.h"
+#include "bindings/run/piece_log.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "bindings/command/part_record.h"
+#include "bindings/run/part_record.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bindings/command/part_options.h"
-#include "bindings/command/whole_file.h"
+#include "runtime/files/whole_file.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"

@@ -1,4 +1,4 @@
-#include "bindings/command/frame_record.h"
+#include "bindings/run/frame_record.h"
 
 #include <sys/stat.h>
 

@@ -1,4 +1,4 @@
-#include "bindings/command/profile_file.h"
+#include "bindings/run/profile_file.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bindings/command/frame_selection.h"
+#include "runtime/files/frame_selection.h"
 #include "runtime/files/frame_pattern.h"
 
 namespace rapid {

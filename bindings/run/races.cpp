@@ -1,4 +1,4 @@
-#include "bindings/command/races.h"
+#include "bindings/run/races.h"
 
 #include <fmt/format.h>
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/frame_record.h"
+#include "bindings/run/frame_record.h"
 #include "runtime/files/file_error.h"
 #include "runtime/points/saved_state.h"
 

@@ -1,4 +1,4 @@
-#include "bindings/command/event_file.h"
+#include "bindings/run/event_file.h"
 
 #include <fmt/format.h>
 

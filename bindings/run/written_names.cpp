@@ -1,4 +1,4 @@
-#include "bindings/command/written_names.h"
+#include "bindings/run/written_names.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-#include "bindings/command/fingerprint.h"
+#include "bindings/run/fingerprint.h"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bindings/command/command.h"
-#include "bindings/command/piece_log.h"
+#include "bindings/run/piece_log.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/point_file.h"
 

@@ -1,4 +1,4 @@
-#include "bindings/command/frame_files.h"
+#include "bindings/run/frame_files.h"
 
 #include <fmt/format.h>
 

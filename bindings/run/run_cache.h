@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/event_file.h"
-#include "bindings/command/frame_files.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/run_journal.h"
-#include "bindings/command/snapshot_writer.h"
+#include "bindings/run/event_file.h"
+#include "bindings/run/frame_files.h"
+#include "runtime/files/frame_selection.h"
+#include "bindings/run/run_journal.h"
+#include "bindings/run/snapshot_writer.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {

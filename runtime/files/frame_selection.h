@@ -1,0 +1,15 @@
+// Frames that are chosen from a sequence: first, last and step.
+#pragma once
+
+#include <cstdint>
+
+namespace rapid {
+
+struct FrameSelection {
+    std::int64_t first, last, step = 1;
+
+    bool contains(std::int64_t frame) const { return frame >= first && frame <= last && (frame - first) % step == 0; }
+    bool single() const { return first + step > last; }
+};
+
+}  // namespace rapid

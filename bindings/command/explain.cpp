@@ -4,13 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "bindings/run/frame_files.h"
+#include "bindings/command/file_options.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/graph_options.h"
 #include "bindings/command/memory_limit.h"
+#include "bindings/command/or_throw.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
-#include "runtime/graph/evaluate.h"
-#include "runtime/report/explanation_text.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -48,83 +47,44 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            const auto end = end_at_limit(common);
-            const MemoryLimit limit(graph_.file(), end);
-            const Explanation here = explained(*graph_.load(false, end));
-            if (against_.empty()) {
-                ordered_json json = ordered_json::parse(to_json(here));
-                if (state_after_) json["state"] = state_;
-                print(json_ ? json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n'
-                            : to_text(here) + text_of_state());
+            const MemoryLimit limit(graph_.file(), end_at_limit(common));
+            Scene scene = graph_.open(common);
+            if (!against_.empty()) {
+                Scene other = graph_.open_other(against_, common);
+                const SceneReport more = or_throw(explain_difference(scene, files_.files(), other));
+                print(json_ ? indented(ordered_json::parse(more.json)) : more.text);
                 return status_done;
             }
-            const Explanation there = explained(*graph_.load_other(against_, end));
-            const Explanation more = surplus(here, there), less = surplus(there, here);
-            if (json_)
-                print(ordered_json{{"graph", graph_.file()},
-                                   {"against", against_},
-                                   {"only_graph", ordered_json::parse(json_of_surplus(more))},
-                                   {"only_against", ordered_json::parse(json_of_surplus(less))},
-                                   {"bytes_per_point", {here.bytes_per_point(), there.bytes_per_point()}}}
-                          .dump(2, ' ', false, ordered_json::error_handler_t::replace) +
-                      '\n');
-            else
-                print(text_of_surplus(graph_.file(), against_, more) + '\n' +
-                      text_of_surplus(against_, graph_.file(), less) +
-                      fmt::format("\nbytes a point at most: {} and {}\n", here.bytes_per_point(),
-                                  there.bytes_per_point()));
+            const SceneReport kept = or_throw(explain_outputs(scene, files_.files()));
+            std::optional<SceneReport> state;
+            if (state_after_) {
+                if (*state_after_ < scene.first_frame())
+                    throw Error(fmt::format("--state {}: it is before the scene's first frame, {}", *state_after_,
+                                            scene.first_frame()));
+                state = or_throw(explain_state(scene, files_.files(), *state_after_));
+            }
+            if (json_) {
+                ordered_json json = ordered_json::parse(kept.json);
+                if (state) json["state"] = ordered_json::parse(state->json);
+                print(indented(json));
+            } else {
+                print(kept.text + (state ? state->text : ""));
+            }
             return status_done;
         });
     }
 
 private:
-    Explanation explained(Session& session)
+    static std::string indented(const ordered_json& json)
     {
-        for (const std::string& warning : session.take_warnings()) print_warning(warning);
-        PlanOptions options = files_.plan_options(graph_.seed());
-        // Without -o: as an output that names no attributes.
-        if (files_.names().empty()) options.all_made = true;
-        const Plan plan(session.graph(), options);
-        for (const std::string& warning : plan.warnings) print_warning(warning);
-        files_.resolve(plan, true);
-        Explanation explanation = explain(plan, files_.names());
-        if (state_after_ && against_.empty()) find_state(plan);
-        return explanation;
+        return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n';
     }
 
-    // Bytes by name: of the points of each Create, and of each node that keeps something.
-    void find_state(const Plan& plan)
-    {
-        Evaluator evaluator(plan, [](auto&&...) {});
-        if (*state_after_ < plan.first_frame())
-            throw Error(
-                fmt::format("--state {}: it is before the scene's first frame, {}", *state_after_, plan.first_frame()));
-        while (evaluator.next_frame() <= *state_after_) evaluator.advance();
-        const Snapshot snapshot = evaluator.save();
-        state_ = {{"frame", snapshot.frame}};
-        for (const auto& [name, state] : snapshot.simulations) state_["simulations"][name] = state.size();
-        for (const auto& [name, state] : snapshot.nodes) state_["nodes"][name] = state.size();
-    }
-
-    std::string text_of_state() const
-    {
-        if (!state_after_) return {};
-        std::vector<KeptBytes> kept;
-        for (const char* of : {"simulations", "nodes"})
-            if (state_.contains(of))
-                for (const auto& [name, size] : state_.at(of).items())
-                    kept.push_back(
-                        {name, size.get<std::size_t>(),
-                         of == std::string_view("nodes") ? "of the node" : "points, ids and what is adopted"});
-        return to_text(fmt::format("\nSTATE after frame {}", *state_after_), kept);
-    }
-
-    GraphOptions graph_;
-    FrameFiles files_;
+    SceneArguments graph_;
+    FileOptions files_;
     std::string against_;
     UntrustedOptions untrusted_;
     std::optional<std::int64_t> state_after_;  // a frame
-    ordered_json state_;
     bool json_ = false;
 };
 RAPID_COMMAND(Explain);

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "runtime/files/whole_file.h"
 #include "runtime/checked_json.h"
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/whole_file.h"
 
 namespace rapid {
 namespace {

@@ -7,9 +7,8 @@
 #include <set>
 
 #include "bindings/command/command.h"
-#include "bindings/command/part_options.h"
-#include "bindings/run/part_record.h"
 #include "bindings/command/untrusted.h"
+#include "bindings/run/part_record.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/first_error.h"
 #include "runtime/frame.h"
@@ -154,8 +153,10 @@ private:
             const int number = part.record.part.number;
             const auto [place, is_new] = parts.emplace(number, std::move(part));
             if (!is_new)
-                problems.push_back(fmt::format("part {} is there twice: {} and {}", name_of(place->second.record.part),
-                                               place->second.text, pattern));
+                problems.push_back(
+                    fmt::format("part {} is there twice: {} and {}",
+                                part_name(place->second.record.part.number, place->second.record.part.count),
+                                place->second.text, pattern));
             if (!with) with = &place->second.record, first = pattern;
         }
         if (with) find_missing(parts, with->part.count, problems);
@@ -170,7 +171,7 @@ private:
     {
         std::vector<std::string> missing;
         for (int number = 1; number <= count; ++number)
-            if (!parts.count(number) && missing.size() <= most_missing) missing.push_back(name_of({number, count}));
+            if (!parts.count(number) && missing.size() <= most_missing) missing.push_back(part_name(number, count));
         if (missing.size() > most_missing) missing.back() = "and more";
         if (!missing.empty())
             problems.push_back(

@@ -4,6 +4,8 @@
 
 #include <charconv>
 
+#include "runtime/files/frame_pattern.h"
+
 namespace rapid {
 namespace {
 
@@ -15,7 +17,7 @@ std::optional<int> whole(std::string_view text)
     return number;
 }
 
-Part read_part(const std::string& text)
+RunPart read_part(const std::string& text)
 {
     const std::size_t slash = text.find('/');
     const std::optional<int> number = whole(text.substr(0, slash));
@@ -47,12 +49,6 @@ void PartOptions::declare(CLI::App& app)
            "--sample", [this](const std::string& text) { sample_ = read_sample(text); },
            "simulates this part of the points, 0.01 for a hundredth: a preview with the same ids and paths")
         ->type_name("FRACTION");
-}
-
-std::string name_of(const Part& part)
-{
-    const std::string count = fmt::format("{}", part.count);
-    return fmt::format("{:0{}}of{}", part.number, count.size(), count);
 }
 
 }  // namespace rapid

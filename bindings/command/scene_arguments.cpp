@@ -2,10 +2,22 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "bindings/command/or_throw.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
+namespace {
+
+Scene opened(const std::string& file, SceneOptions options, const CommonOptions& common)
+{
+    SceneHooks hooks;
+    hooks.late = end_at_limit(common);
+    return or_throw(Scene::open(file, std::move(options), std::move(hooks)));
+}
+
+}  // namespace
 
 void SceneArguments::declare(CLI::App& app)
 {
@@ -44,16 +56,23 @@ void SceneArguments::declare(CLI::App& app)
         ->type_name("BYTES");
 }
 
-Scene SceneArguments::open(const CommonOptions& common) const
+SceneOptions SceneArguments::scene_options() const
 {
     SceneOptions options = options_;
     options.set.assign(settings_.begin(), settings_.end());
     options.log = [](LogLevel level, const std::string& text) {
         level == LogLevel::Print ? print(text + '\n') : print_warning(text);
     };
-    SceneHooks hooks;
-    hooks.late = end_at_limit(common);
-    return or_throw(Scene::open(file_, std::move(options), std::move(hooks)));
+    return options;
+}
+
+Scene SceneArguments::open(const CommonOptions& common) const { return opened(file_, scene_options(), common); }
+
+Scene SceneArguments::open_other(const std::string& file, const CommonOptions& common) const
+{
+    SceneOptions options = scene_options();
+    options.set.clear();
+    return opened(file, std::move(options), common);
 }
 
 }  // namespace rapid

@@ -22,9 +22,13 @@ public:
     // --script-timeout, --script-memory.
     const SceneOptions& options() const { return options_; }
 
-    // Opens the scene of a command that writes none of its files; what scripts print is printed, and so are warnings. A
-    // script that runs into its timeout ends the process, now or in a later frame. Error: the file or a --set is wrong.
+    // With the settings; what scripts print is printed, and so are warnings.
+    SceneOptions scene_options() const;
+    // Opens the scene of a command that writes none of its files. A script that runs into its timeout ends the process,
+    // now or in a later frame. Error: the file or a --set is wrong.
     Scene open(const CommonOptions& common) const;
+    // Another one, with the same limits; --set is for the first one only.
+    Scene open_other(const std::string& file, const CommonOptions& common) const;
 
 private:
     std::string file_;

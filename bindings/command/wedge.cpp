@@ -8,10 +8,11 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/farm_options.h"
-#include "bindings/run/frame_files.h"
+#include "bindings/command/file_options.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/graph_options.h"
+#include "bindings/command/or_throw.h"
 #include "bindings/command/process_pool.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
 #include "bindings/command/wedge_report.h"
 #include "bindings/command/wedge_rows.h"
@@ -73,8 +74,8 @@ public:
     int run(const CommonOptions& common) override
     {
         const std::vector<WedgeRow> rows = wedge_rows(settings_, zip_, files_.names());
-        const std::vector<fs::path> folders = files_.folders();
-        const fs::path folder = folders.empty() ? fs::path(".") : folders.front();
+        const std::vector<std::string> folders = or_throw(output_folders(files_.files()));
+        const fs::path folder = folders.empty() ? "." : folders.front();
         if (cache_.empty() && !every_.empty())
             throw Error("--cache-every says how often a --cache is written; give one");
         farm_.check();
@@ -207,8 +208,8 @@ private:
     }
 
     CLI::App* app_ = nullptr;
-    GraphOptions graph_;
-    FrameFiles files_;
+    SceneArguments graph_;
+    FileOptions files_;
     UntrustedOptions untrusted_;
     std::vector<SweptSetting> settings_;
     std::optional<FrameSelection> frames_;

@@ -102,19 +102,6 @@ bool holds_events(const Format& format) { return format.read && !format.places_a
 
 }  // namespace
 
-void EventFile::declare(CLI::App& app)
-{
-    app.add_option("--events", path_,
-                   "writes births, contacts and deaths with their places and times as points (any format that can be "
-                   "read: .csv, .bgeo, .npz, ...)")
-        ->type_name("FILE");
-}
-
-void EventFile::take_part(const std::string& part)
-{
-    if (!path_.empty()) path_ = with_part(path_, part);
-}
-
 void EventFile::begin()
 {
     if (path_.empty()) return;

@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "bindings/command/command.h"
 #include "bindings/run/piece_log.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/point_file.h"
@@ -15,12 +14,10 @@ namespace rapid {
 
 class EventFile {
 public:
-    void declare(CLI::App& app);
+    // path: empty where nobody asks for it.
+    explicit EventFile(std::string path) : path_(std::move(path)) {}
 
-    // Empty where nobody asks for it.
     const std::string& path() const { return path_; }
-    // The events of a part of the points, "03of16".
-    void take_part(const std::string& part);
     // Before the first frame. Error: no format that can be one file of points; a file that can't be written.
     void begin();
 

@@ -3,60 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
-#include "bindings/command/part_options.h"
 #include "runtime/io/text_table.h"
 #include "runtime/memory_budget.h"
 #include "runtime/operators/rasterize.h"
 
 namespace rapid {
 namespace {
-
-// "1,2.5,-3": numbers alone, between commas.
-std::vector<double> read_numbers(const std::string& text)
-{
-    std::vector<double> numbers;
-    const char* at = text.data();
-    const char* const end = at + text.size();
-    while (true) {
-        double number = 0;
-        const auto parsed = std::from_chars(at, end, number);
-        if (parsed.ec != std::errc() || !std::isfinite(number)) return {};
-        numbers.push_back(number);
-        if (parsed.ptr == end) return numbers;
-        if (*parsed.ptr != ',') return {};
-        at = parsed.ptr + 1;
-    }
-}
-
-void read_camera(const std::string& text, PictureOptions& picture)
-{
-    const std::vector<double> n = read_numbers(text);
-    const bool right = (n.size() == 6 || n.size() == 7) && (n.size() == 6 || (n[6] > 0 && n[6] < 180));
-    if (!right || Vec3d(n[0], n[1], n[2]) == Vec3d(n[3], n[4], n[5]))
-        throw Error(
-            fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
-                        "another that it looks at, and its vertical angle of view, in degrees",
-                        text));
-    picture.position = Vec3d(n[0], n[1], n[2]);
-    picture.target = Vec3d(n[3], n[4], n[5]);
-    if (n.size() == 7) picture.fov = n[6] * M_PI / 180;
-}
-
-void read_size(const std::string& text, PictureOptions& picture)
-{
-    constexpr int most = 16384;  // pixels an edge: a picture of 3 GiB
-    const char* const end = text.data() + text.size();
-    const auto width = std::from_chars(text.data(), end, picture.width);
-    const bool has_x = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
-    const auto height = has_x ? std::from_chars(width.ptr + 1, end, picture.height) : width;
-    if (!has_x || height.ec != std::errc() || height.ptr != end || std::min(picture.width, picture.height) < 1 ||
-        std::max(picture.width, picture.height) > most)
-        throw Error(fmt::format("--size = \"{}\"; it must be WIDTHxHEIGHT, each from 1 to {}", text, most));
-}
 
 int frame_number(std::int64_t number)
 {
@@ -74,36 +29,22 @@ std::string key_of(const OutputTarget& to)
 
 }  // namespace
 
-void FrameFiles::declare(CLI::App& app)
+FrameFiles::FrameFiles(const std::vector<std::string>& outputs, PictureOptions picture)
+    : picture_(std::make_shared<const PictureOptions>(std::move(picture)))
 {
-    app.add_option_function<std::vector<std::string>>(
-           "-o,--output",
-           [this](const std::vector<std::string>& texts) {
-               for (const std::string& text : texts) targets_.push_back({parse_output_target(text), text, {}});
-           },
-           "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
-           ".usda .npz .obj .csv .png, films: .mp4 .webm .gif); "
-           "attributes behind a colon are written besides P, v and id, without them all are")
-        ->type_name("PATTERN[:ATTR,ATTR]")
-        ->allow_extra_args(false);
-    app.add_option_function<std::string>(
-           "--camera", [this](const std::string& text) { read_camera(text, *picture_); },
-           "for pictures: the camera's place, what it looks at, and its vertical angle of view in degrees")
-        ->type_name("PX,PY,PZ,TX,TY,TZ[,FOV]");
-    app.add_option_function<std::string>(
-           "--size", [this](const std::string& text) { read_size(text, *picture_); }, "for pictures [default 1280x720]")
-        ->type_name("WIDTHxHEIGHT");
+    for (const std::string& text : outputs) targets_.push_back({parse_output_target(text), text, {}});
 }
 
-std::vector<std::filesystem::path> FrameFiles::folders() const
+std::vector<std::filesystem::path> folders_of(const std::vector<std::string>& outputs)
 {
     std::vector<std::filesystem::path> folders;
-    for (const Target& target : targets_) {
-        std::filesystem::path folder = target.to.pattern.substr(0, target.to.pattern.find_first_of("#{$"));
+    for (const std::string& text : outputs) {
+        const std::string pattern = parse_output_target(text).pattern;
+        std::filesystem::path folder = pattern.substr(0, pattern.find_first_of("#{$"));
         folder = folder.has_parent_path() ? folder.parent_path() : std::filesystem::path(".");
         std::error_code error;
         std::filesystem::create_directories(folder, error);
-        if (error) throw Error(fmt::format("-o {}: can't make {}: {}", target.text, folder.string(), error.message()));
+        if (error) throw Error(fmt::format("-o {}: can't make {}: {}", text, folder.string(), error.message()));
         folders.push_back(folder);
     }
     return folders;
@@ -117,7 +58,7 @@ void FrameFiles::take_part(std::shared_ptr<const PartRecord> record)
 
 std::string FrameFiles::name_in_part(const std::string& pattern) const
 {
-    return part_ ? with_part(pattern, name_of(part_->part)) : pattern;
+    return part_ ? with_part(pattern, part_name(part_->part.number, part_->part.count)) : pattern;
 }
 
 void FrameFiles::check_part(const std::string& pattern) const
@@ -179,12 +120,6 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
             options.all_made = true;
     }
     return options;
-}
-
-bool FrameFiles::makes_films() const
-{
-    return std::any_of(targets_.begin(), targets_.end(),
-                       [](const Target& target) { return format_of(target.to.pattern).film; });
 }
 
 std::vector<std::string> FrameFiles::names() const

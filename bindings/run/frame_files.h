@@ -11,11 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/command/command.h"
-#include "runtime/files/frame_selection.h"
+#include "bindings/host/picture_scene.h"
 #include "bindings/run/part_record.h"
 #include "bindings/run/written_names.h"
-#include "bindings/host/picture_scene.h"
+#include "runtime/files/frame_selection.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"
 
@@ -23,24 +22,21 @@ namespace rapid {
 
 struct Rasterize;
 
+// The folders that files of -o go to, which are made where they are missing; of a pattern with a part that changes from
+// output to output, the one above. Error: one can't be made; a text that is no -o.
+std::vector<std::filesystem::path> folders_of(const std::vector<std::string>& outputs);
+
 class FrameFiles {
 public:
-    // -o, --camera, --size.
-    void declare(CLI::App& app);
+    // outputs: texts of -o. Error: one is none.
+    FrameFiles(const std::vector<std::string>& outputs, PictureOptions picture);
 
-    // The folders that -o writes to, which are made where they are missing; of a pattern with a part that changes from
-    // output to output, the one above. Error: one can't be made.
-    std::vector<std::filesystem::path> folders() const;
-
-    // The files are those of a part. Before folders() and all below. record: what is known of it before the run; its
+    // The files are those of a part. Before all below. record: what is known of it before the run; its
     // identity may grow until finish().
     void take_part(std::shared_ptr<const PartRecord> record);
 
     // Options of the plan, which must keep all attributes that -o names.
     PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
-
-    // Whether -o asks for films, which a program of its own writes.
-    bool makes_films() const;
 
     // What `rapid merge` makes of the parts of a run: its -o, and the pattern of the parts. After resolve(). Error: a
     // picture, which can't be put together; a name with {part}.
@@ -130,7 +126,7 @@ private:
     };
     std::vector<NodePattern> of_nodes_;
     std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
-    std::shared_ptr<PictureOptions> picture_ = std::make_shared<PictureOptions>();
+    std::shared_ptr<const PictureOptions> picture_;
     std::unique_ptr<SceneOfPlan> scene_;
 
     std::shared_ptr<const PartRecord> part_;  // null where all points are simulated

@@ -5,11 +5,11 @@
 #include <limits>
 #include <vector>
 
-#include "bindings/command/part_options.h"
-#include "runtime/files/whole_file.h"
 #include "runtime/checked_json.h"
+#include "runtime/error.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/whole_file.h"
 
 namespace rapid {
 namespace {

@@ -126,16 +126,15 @@ std::vector<NodePoints> results_in_order(const Plan& plan, const FrameSelection&
 }
 
 struct Trials {
-    const GraphOptions& graph;
+    const LoadInOrder& load;
     const PlanOptions& options;
     const FrameSelection& frames;
-    const std::function<void(const std::string& message)>& on_timeout;
     const std::vector<NodePoints>& expected;
 
     // Computes the frames in another order, and compares the result of each node.
     std::optional<Difference> run(const KernelOrder& order) const
     {
-        const std::unique_ptr<Session> session = graph.load_again(order, on_timeout);
+        const std::unique_ptr<Session> session = load(order);
         const Plan plan(session->graph(), options);
         std::optional<Difference> first;
         std::size_t next = 0;
@@ -178,14 +177,13 @@ std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan
 
 }  // namespace
 
-Races find_races(const GraphOptions& graph, const Plan& plan, const PlanOptions& options, const FrameSelection& frames,
-                 const std::function<void(const std::string& message)>& on_timeout)
+Races find_races(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const FrameSelection& frames)
 {
     const std::vector<NodePoints> expected = results_in_order(plan, frames);
     Races races;
     races.compared =
         std::any_of(expected.begin(), expected.end(), [](const NodePoints& result) { return !result.points.empty(); });
-    const Trials trials{graph, options, frames, on_timeout, expected};
+    const Trials trials{load, options, frames, expected};
     for (const KernelOrder::Sequence sequence : {KernelOrder::Reversed, KernelOrder::TwoStates}) {
         const KernelOrder order{sequence, ""};
         const std::optional<Difference> seen = trials.run(order);

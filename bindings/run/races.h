@@ -7,11 +7,12 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "bindings/host/session.h"
 #include "runtime/files/frame_selection.h"
-#include "bindings/command/graph_options.h"
 #include "runtime/graph/plan.h"
 
 namespace rapid {
@@ -21,9 +22,9 @@ struct Races {
     bool compared = false;       // whether there was a point in these frames
 };
 
-// plan: of a session in the order of the points, on one thread. frames: those that are compared; all before them are
-// computed. Error: one that a frame raises.
-Races find_races(const GraphOptions& graph, const Plan& plan, const PlanOptions& options, const FrameSelection& frames,
-                 const std::function<void(const std::string& message)>& on_timeout);
+// plan: of a session in the order of the points, on one thread; load: gives another one of the same scene, in another
+// order. frames: those that are compared; all before them are computed. Error: one that a frame raises.
+using LoadInOrder = std::function<std::unique_ptr<Session>(const KernelOrder& order)>;
+Races find_races(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const FrameSelection& frames);
 
 }  // namespace rapid

@@ -55,29 +55,6 @@ std::string shown_error(const std::string& file, const std::exception& error)
 
 }  // namespace
 
-void RunCache::declare(CLI::App& app)
-{
-    app.add_option("--cache", folder_,
-                   "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame that "
-                   "is still to be computed; frames that are there already are left as they are")
-        ->type_name("DIR");
-    app.add_option_function<std::string>(
-           "--cache-every", [this](const std::string& text) { every_ = read_whole("--cache-every", text, 0); },
-           "a snapshot after every N-th frame, and the last [default 10]; 0: none")
-        ->type_name("N");
-    app.add_flag("--again", again_, "computes and writes all frames, whatever the cache holds");
-    app.add_option_function<std::string>(
-           "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
-           "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
-        ->type_name("SECONDS");
-    app.add_flag("--cache-replace", replaces_)->group("");  // internal, of wedge: another run's cache is no error
-}
-
-void RunCache::check() const
-{
-    if (!asked() && again_) throw Error("--again says what to do with a --cache; give one, or leave it out");
-}
-
 void RunCache::set_graph(const fs::path& graph)
 {
     graph_ = graph;

@@ -11,23 +11,29 @@
 
 #include "bindings/run/event_file.h"
 #include "bindings/run/frame_files.h"
-#include "runtime/files/frame_selection.h"
 #include "bindings/run/run_journal.h"
 #include "bindings/run/snapshot_writer.h"
+#include "runtime/files/frame_selection.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
 
 class RunCache {
 public:
-    void declare(CLI::App& app);
+    struct Options {
+        std::filesystem::path folder;  // empty: there is no cache
+        std::int64_t every = 10;       // frames; 0: no snapshots
+        bool again = false;            // computes all, whatever the folder has
+        bool replaces = false;         // another run's cache is no error
+    };
+    explicit RunCache(Options options)
+        : folder_(std::move(options.folder)), every_(options.every), again_(options.again), replaces_(options.replaces)
+    {
+    }
 
     bool asked() const { return !folder_.empty(); }
     bool keeps_snapshots() const { return asked() && every_ > 0; }
     const std::filesystem::path& folder() const { return folder_; }
-    double grace() const { return grace_; }
-    // Error: options that say nothing without --cache.
-    void check() const;
 
     // A file that the graph reads, before it is read.
     void was_read(const std::filesystem::path& file);
@@ -77,10 +83,11 @@ private:
     bool load(std::int64_t frame, const std::filesystem::path& file, Evaluator& evaluator, EventFile& events);
     void add(const FrameRecord& record);
 
-    std::filesystem::path folder_, graph_;
-    std::int64_t every_ = 10;
-    bool again_ = false, replaces_ = false;
-    double grace_ = 20;  // s
+    const std::filesystem::path folder_;
+    const std::int64_t every_;
+    bool again_;
+    const bool replaces_;
+    std::filesystem::path graph_;
 
     Descriptor lock_;
     std::unique_ptr<InputContents> read_;

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/files/frame_selection.h"
 #include "runtime/files/frame_pattern.h"
+#include "runtime/files/frame_selection.h"
 
 namespace rapid {
 

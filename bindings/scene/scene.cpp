@@ -15,16 +15,6 @@
 namespace rapid {
 namespace {
 
-// As --set takes it.
-std::string text_of(const SceneValue& value)
-{
-    if (const auto* number = std::get_if<double>(&value)) return fmt::format("{}", *number);
-    if (const auto* boolean = std::get_if<bool>(&value)) return *boolean ? "true" : "false";
-    if (const auto* text = std::get_if<std::string>(&value)) return *text;
-    const auto& [x, y, z] = std::get<std::array<double, 3>>(value);
-    return fmt::format("{},{},{}", x, y, z);
-}
-
 SceneNodeType described(const NodeType& type)
 {
     SceneNodeType result{type.name, type.doc, {}};
@@ -36,17 +26,6 @@ SceneNodeType described(const NodeType& type)
     return result;
 }
 
-std::optional<SceneError> fault_of(const SceneOptions& options)
-{
-    constexpr int most_threads = 4096;  // a typing error, not a machine
-    if (options.threads < 0 || options.threads > most_threads)
-        return wrong_call(fmt::format("threads = {}; it must be from 0 to {}", options.threads, most_threads));
-    if (!(options.script_seconds > 0))
-        return wrong_call(fmt::format("script_seconds = {}; it must be above 0", options.script_seconds));
-    if (options.script_memory == 0) return wrong_call("script_memory = 0; it must be bytes above 0");
-    return std::nullopt;
-}
-
 }  // namespace
 
 Scene::Scene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -54,7 +33,10 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
-Result<Scene> Scene::open(const std::string& file, SceneOptions options) { return open(file, std::move(options), SceneHooks()); }
+Result<Scene> Scene::open(const std::string& file, SceneOptions options)
+{
+    return open(file, std::move(options), SceneHooks());
+}
 
 Result<Scene> Scene::open_text(const std::string& name, const std::string& text, SceneOptions options)
 {
@@ -201,12 +183,7 @@ Result<Done> Scene::restore(const SceneSnapshot& snapshot)
     });
 }
 
-void Scene::cancel()
-{
-    impl_->cancellation.request();
-    const std::lock_guard lock(impl_->scripts_mutex);
-    if (impl_->scripts) impl_->scripts->interrupt(Cancellation::text);
-}
+void Scene::cancel() { impl_->cancel(); }
 
 Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)
 {

@@ -27,6 +27,34 @@ void call_hook(const std::function<void(const std::string& text)>& hook, const s
 
 }  // namespace
 
+std::string text_of(const SceneValue& value)
+{
+    if (const auto* number = std::get_if<double>(&value)) return fmt::format("{}", *number);
+    if (const auto* boolean = std::get_if<bool>(&value)) return *boolean ? "true" : "false";
+    if (const auto* text = std::get_if<std::string>(&value)) return *text;
+    const auto& [x, y, z] = std::get<std::array<double, 3>>(value);
+    return fmt::format("{},{},{}", x, y, z);
+}
+
+std::optional<SceneError> fault_of(const SceneOptions& options)
+{
+    constexpr int most_threads = 4096;  // a typing error, not a machine
+    if (options.threads < 0 || options.threads > most_threads)
+        return wrong_call(fmt::format("threads = {}; it must be from 0 to {}", options.threads, most_threads));
+    if (!(options.script_seconds > 0))
+        return wrong_call(fmt::format("script_seconds = {}; it must be above 0", options.script_seconds));
+    if (options.script_memory == 0) return wrong_call("script_memory = 0; it must be bytes above 0");
+    return std::nullopt;
+}
+
+SceneError Scene::Impl::error_of_call(SceneError::Kind kind)
+{
+    SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
+    if (error.message.find(Cancellation::text) != std::string::npos) error.kind = SceneError::Cancelled;
+    if (error.kind == SceneError::Cancelled || error.kind == SceneError::OutOfMemory) cancellation.forget();
+    return error;
+}
+
 SessionOptions Scene::Impl::session_options(const std::map<std::string, std::string>& set)
 {
     SessionOptions result;
@@ -35,6 +63,7 @@ SessionOptions Scene::Impl::session_options(const std::map<std::string, std::str
     result.script_memory = options.script_memory;
     result.text = text;
     for (const std::string& path : options.paths) result.paths.emplace_back(path);
+    result.may_write = may_write;
     result.interruptible = true;
     result.on_timeout = [this](const std::string& message) {
         is_late = true;
@@ -97,7 +126,7 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
 
 PlanOptions Scene::Impl::plan_options() const
 {
-    PlanOptions result;
+    PlanOptions result = plan_of_run;
     result.seed = options.seed;
     result.keep_all = options.keep_all;
     return result;
@@ -126,7 +155,7 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
     evaluator.reset();
     picture_scene.reset();
     plan = std::move(fresh);
-    evaluator = std::make_unique<Evaluator>(*plan);
+    evaluator = std::make_unique<Evaluator>(*plan, write);
     if (!options.estimate_errors) evaluator->leave_out_errors();
     if (hooks.tell_points) evaluator->tell_points();
     next = plan->first_frame();
@@ -159,6 +188,21 @@ SceneFrame Scene::Impl::advance()
     const auto& outputs = data->result.outputs;
     const std::string output = outputs.count("main") ? "main" : outputs.begin()->first;
     return SceneFrame(std::move(data), output);
+}
+
+void Scene::Impl::cancel()
+{
+    cancellation.request();
+    const std::lock_guard lock(scripts_mutex);
+    if (scripts) scripts->interrupt(Cancellation::text);
+}
+
+std::function<void(const std::string& message)> Scene::Impl::too_late() const
+{
+    if (!hooks.beyond_memory) return {};
+    return [this](const std::string& message) {
+        call_hook(hooks.beyond_memory, cancellation.error(message).at({file, 0}).what());
+    };
 }
 
 void Scene::Impl::refuse_unless_ready() const

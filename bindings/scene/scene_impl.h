@@ -27,6 +27,12 @@
 
 namespace rapid {
 
+// As --set takes it.
+std::string text_of(const SceneValue& value);
+
+// What no scene is opened with; nothing where there is no such thing.
+std::optional<SceneError> fault_of(const SceneOptions& options);
+
 // One scene. Its session is run again for other parameters; plan and evaluator for each start.
 struct [[gnu::visibility("hidden")]] Scene::Impl
 {
@@ -34,6 +40,10 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::optional<std::string> text;
     SceneOptions options;
     SceneHooks hooks;
+    // Of a run that writes files.
+    bool may_write = false;
+    PlanOptions plan_of_run;  // but seed and keep_all, which are those of the options
+    Evaluator::WriteHook write;
     std::map<std::string, std::string> settings;  // of parameters, by name
     std::shared_ptr<Offers> offers = std::make_shared<Offers>();
 
@@ -57,7 +67,6 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::mutex scripts_mutex;
     Session* scripts = nullptr;  // that an advance runs now
 
-
     // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors.
     template <class F>
     auto call(SceneError::Kind kind, const F& f)->Result<decltype(f())>
@@ -78,13 +87,12 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             arena ? arena->execute(run) : run();
             return std::move(*value);
         } catch (...) {
-            SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
-            if (error.message.find(Cancellation::text) != std::string::npos) error.kind = SceneError::Cancelled;
-            if (error.kind == SceneError::Cancelled || error.kind == SceneError::OutOfMemory) cancellation.forget();
-            return error;
+            return error_of_call(kind);
         }
     }
 
+    // What is being handled, inside of a catch block.
+    SceneError error_of_call(SceneError::Kind kind);
     SessionOptions session_options(const std::map<std::string, std::string>& set);
     PlanOptions plan_options() const;
     void tell(const std::vector<std::string>& texts) const;
@@ -99,6 +107,8 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     // Scripts that were stopped do not run again.
     void start_again();
     SceneFrame advance();
+    // From any thread.
+    void cancel();
     // Of points from the first frame on. fault: what ended it before the last one; null: nothing did.
     struct Traced {
         SceneTrace trace;
@@ -107,7 +117,21 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     };
     Traced trace(const TraceOptions& asked);
     SceneFrame points_behind(const std::string& node, std::int64_t frame);
+    // Computes frames of another plan of the session. Scripts that had to be stopped do not run again.
+    template <class F>
+    void beside(const F& compute)
+    {
+        try {
+            compute();
+        } catch (...) {
+            if (session->interrupted() != Interruption::None) evaluator.reset();
+            throw;
+        }
+        session->take_warnings();  // of frames, which the run tells
+    }
     void refuse_unless_ready() const;
+    // What SceneHooks::beyond_memory asks for, with the place of what is computed; empty where nobody does.
+    std::function<void(const std::string& message)> too_late() const;
 
     // For as long as it lives, cancel() stops scripts.
     struct Scripts {
@@ -129,16 +153,23 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         explicit Running(Impl& impl)
             : scripts(impl),
               scope(&impl.cancellation),
-              watch(impl.memory_at_first,
-                    [&impl](const std::string& message) {
-                        impl.session->interrupt(message);
-                        impl.cancellation.request(message);
-                    },
-                    {})
+              watch(
+                  impl.memory_at_first,
+                  [&impl](const std::string& message) {
+                      impl.session->interrupt(message);
+                      impl.cancellation.request(message);
+                  },
+                  impl.too_late())
         {
             impl.cancellation.check();
         }
     };
+};
+
+// What a scene is made of, for the other files of this folder.
+struct SceneInside {
+    static Scene::Impl& of(Scene& scene) { return *scene.impl_; }
+    using Impl = Scene::Impl;
 };
 
 }  // namespace rapid

@@ -95,13 +95,9 @@ SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t fram
         if (of.name == node) points = result;
     });
     run.leave_out_errors();
-    try {
+    beside([&] {
         while (run.next_frame() <= frame) run.advance();
-    } catch (...) {
-        if (session->interrupted() != Interruption::None) evaluator.reset();  // its scripts do not run again
-        throw;
-    }
-    session->take_warnings();  // of frames, which the run tells
+    });
     const PlannedSimulation& simulation = watched.simulations[found->simulation];
     auto data = std::make_shared<SceneFrame::Data>();
     data->scene = this;

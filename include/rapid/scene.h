@@ -311,6 +311,9 @@ struct SceneHooks {
     // Told of each file before it is read, and of each place where a module or a node was looked for. On any thread;
     // what it throws is dropped.
     std::function<void(const std::string& path)> reads;
+    // Told where memory was to end what is computed, and comes too late: the process has a sixteenth more than it may, or
+    // did not stop within a second. With the error's text; for a program that then rather ends. On a thread of Rapid's.
+    std::function<void(const std::string& message)> beyond_memory;
     // Refuses what no snapshot can hold, such as a function of the frame that counts in a local variable: for programs
     // that go on in another process.
     bool keep_state = false;
@@ -441,6 +444,7 @@ public:
     Result<std::string> picture(const SceneFrame& frame, PictureSize size = {});
 
 private:
+    friend struct SceneInside;  // of Rapid itself
     struct Impl;
     explicit Scene(std::unique_ptr<Impl> impl);
     static Result<Scene> open_any(const std::string& file, std::optional<std::string> text, SceneOptions options);

@@ -139,6 +139,12 @@ std::map<int, fs::path> FramePattern::existing(std::string_view output) const
 
 bool has_part(std::string_view pattern) { return pattern.find(part_variable) != std::string_view::npos; }
 
+std::string part_name(int number, int count)
+{
+    const std::string last = fmt::format("{}", count);
+    return fmt::format("{:0{}}of{}", number, last.size(), last);
+}
+
 std::string with_part(const std::string& pattern, std::string_view part)
 {
     if (has_part(pattern)) return with_value(pattern, part_variable, part);

@@ -41,6 +41,11 @@ private:
 std::string with_part(const std::string& pattern, std::string_view part);
 bool has_part(std::string_view pattern);
 
+constexpr int most_parts = 100000;
+
+// "03of16": the number as wide as the count, so that names are in order.
+std::string part_name(int number, int count);
+
 // The target of `-o FILE:ATTR,ATTR`.
 struct OutputTarget {
     std::string pattern;

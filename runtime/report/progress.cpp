@@ -43,17 +43,18 @@ Progress::Progress(std::FILE* out, ProgressStyle style, std::int64_t first, std:
 {
 }
 
-void Progress::frame(const FrameStatistics& frame, double now)
+void Progress::frame(std::int64_t number, std::uint64_t points, double now)
 {
     const double took = now - now_;
-    frame_seconds_ = frame.frame == first_ ? took : frame_seconds_ + newest_share * (took - frame_seconds_);
-    latest_ = frame;
+    frame_seconds_ = number == first_ ? took : frame_seconds_ + newest_share * (took - frame_seconds_);
+    latest_ = number;
+    points_ = points;
     now_ = now;
     if (style_ == ProgressStyle::Lines) {
-        put(out_, fmt::format("frame {}  {} points  {:.3f} s\n", frame.frame, with_separators(frame.points), took));
+        put(out_, fmt::format("frame {}  {} points  {:.3f} s\n", number, with_separators(points), took));
         std::fflush(out_);
     }
-    if (style_ == ProgressStyle::Bar && (now - drawn_at_ >= redraw_interval || frame.frame == last_)) draw();
+    if (style_ == ProgressStyle::Bar && (now - drawn_at_ >= redraw_interval || number == last_)) draw();
 }
 
 void Progress::line(const std::string& text)
@@ -74,11 +75,10 @@ void Progress::finish()
 
 void Progress::draw()
 {
-    const double rate = frame_seconds_ > 0 ? static_cast<double>(latest_.points) / frame_seconds_ : 0;
-    const double left = frame_seconds_ * static_cast<double>(last_ - latest_.frame);
+    const double rate = frame_seconds_ > 0 ? static_cast<double>(points_) / frame_seconds_ : 0;
+    const double left = frame_seconds_ * static_cast<double>(last_ - latest_);
     // The last column stays free: terminals wrap when it is filled.
-    const std::string bar =
-        progress_bar(latest_.frame, first_, last_, latest_.points, rate, left, terminal_width(out_) - 1);
+    const std::string bar = progress_bar(latest_, first_, last_, points_, rate, left, terminal_width(out_) - 1);
     put(out_, "\r" + bar + "\x1b[K");
     std::fflush(out_);
     drawn_ = true;

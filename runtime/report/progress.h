@@ -5,8 +5,6 @@
 #include <cstdio>
 #include <string>
 
-#include "runtime/report/statistics.h"
-
 namespace rapid {
 
 enum class ProgressStyle { None, Lines, Bar };
@@ -19,8 +17,8 @@ public:
     // The frames of the run, `last` included.
     Progress(std::FILE* out, ProgressStyle style, std::int64_t first, std::int64_t last);
 
-    // Reports a computed frame; now: time since the run began, s.
-    void frame(const FrameStatistics& frame, double now);
+    // Reports a computed frame and its points; now: time since the run began, s.
+    void frame(std::int64_t number, std::uint64_t points, double now);
 
     // Prints a line of text above the bar.
     void line(const std::string& text);
@@ -35,7 +33,8 @@ private:
     std::FILE* out_;
     ProgressStyle style_;
     std::int64_t first_, last_;
-    FrameStatistics latest_;
+    std::int64_t latest_ = 0;  // frame
+    std::uint64_t points_ = 0;
     double now_ = 0, drawn_at_ = -1;
     double frame_seconds_ = 0;  // exponential moving average
     bool drawn_ = false;

@@ -66,30 +66,24 @@ const std::map<std::string, std::set<std::string>> below = {
 // What files of the command include of the runtime besides the promised headers: small tools that know nothing of
 // points and scenes. All of runtime/files is of this kind.
 const std::set<std::string> small_tools = {
-    "runtime/cancellation.h",  "runtime/checked_json.h", "runtime/error.h",     "runtime/first_error.h",
-    "runtime/memory_budget.h", "runtime/memory_watch.h", "runtime/path_list.h", "runtime/printable.h",
-    "runtime/stopwatch.h",     "runtime/threads.h"};
+    "runtime/cancellation.h",       "runtime/checked_json.h",    "runtime/error.h",     "runtime/first_error.h",
+    "runtime/memory_budget.h",      "runtime/memory_watch.h",    "runtime/path_list.h", "runtime/printable.h",
+    "runtime/report/number_text.h", "runtime/report/progress.h", "runtime/stopwatch.h", "runtime/threads.h"};
 
 // Sources of the command that know more of Rapid than a program can: each is to be built on include/rapid alone, and no
 // other one comes to them.
 const std::set<std::string> commands_from_inside = {
-    "bindings/command/check.cpp",
-    "bindings/command/explain.cpp",
     "bindings/command/graph_options.cpp",
     "bindings/command/merge.cpp",
     "bindings/command/new.cpp",
-    "bindings/command/part_options.cpp",
     "bindings/command/point_store.cpp",
     "bindings/command/process_sandbox.cpp",
-    "bindings/command/run.cpp",
-    "bindings/command/run_report.cpp",
     "bindings/command/study.cpp",
     "bindings/command/study_run.cpp",
     "bindings/command/test.cpp",
     "bindings/command/test_report.cpp",
     "bindings/command/untrusted.cpp",
     "bindings/command/view.cpp",
-    "bindings/command/wedge.cpp",
     "bindings/command/wedge_report.cpp",
     "bindings/command/wedge_rows.cpp",
     "bindings/view/film.cpp",
@@ -181,7 +175,7 @@ TEST_CASE("what programs include is what is installed", "[layers]")
     REQUIRE(includes.size() > 10);
     for (const Include& include : includes) {
         CAPTURE(include.file, include.included);
-        CHECK((!include.ours || include.included == "offers.h"));
+        CHECK((!include.ours || fs::exists(fs::path(RAPID_SOURCE_DIR) / "include/rapid" / include.included)));
     }
 }
 
@@ -192,7 +186,7 @@ TEST_CASE("a command is a program like others, but for those that are listed", "
     for (const char* const folder : {"bindings/command", "bindings/view"})
         for (const Include& include : includes_below(folder))
             if (include.ours) includes[include.file].insert(include.included);
-    REQUIRE(includes.size() > 100);
+    REQUIRE(includes.size() > 50);
 
     // With the headers of the command that it includes, and what these include.
     const auto knows_inside = [&](const std::string& file) {

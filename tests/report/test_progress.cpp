@@ -36,14 +36,6 @@ private:
     std::FILE* file_;
 };
 
-FrameStatistics frame_of(std::int64_t number, std::uint64_t points)
-{
-    FrameStatistics frame;
-    frame.frame = number;
-    frame.points = points;
-    return frame;
-}
-
 // A bar of 40 columns, the widest there is.
 std::string bar_of(int done) { return fmt::format("[{:=<{}}{: <{}}]", "", done, "", 40 - done); }
 
@@ -59,8 +51,8 @@ TEST_CASE("a line a frame says its number, its points and its own time", "[repor
 {
     Memory memory;
     Progress progress(memory.file(), ProgressStyle::Lines, 1, 2);
-    progress.frame(frame_of(1, 0), 0.5);
-    progress.frame(frame_of(2, 1200), 0.75);
+    progress.frame(1, 0, 0.5);
+    progress.frame(2, 1200, 0.75);
     progress.finish();
     CHECK(memory.text() == "frame 1  0 points  0.500 s\nframe 2  1,200 points  0.250 s\n");
 }
@@ -69,7 +61,7 @@ TEST_CASE("a quiet run says nothing", "[report]")
 {
     Memory memory;
     Progress progress(memory.file(), ProgressStyle::None, 1, 2);
-    progress.frame(frame_of(1, 10), 0.5);
+    progress.frame(1, 10, 0.5);
     progress.line("writing a.0001.vdb");
     progress.finish();
     CHECK(memory.text().empty());
@@ -79,7 +71,7 @@ TEST_CASE("a bar is drawn at most twenty times a second, and for the last frame"
 {
     Memory memory;
     Progress progress(memory.file(), ProgressStyle::Bar, 1, 1000);
-    for (int f = 1; f <= 1000; ++f) progress.frame(frame_of(f, 10), 0.001 * f);
+    for (int f = 1; f <= 1000; ++f) progress.frame(f, 10, 0.001 * f);
     const std::string text = memory.text();
     CHECK(std::count(text.begin(), text.end(), '\r') <= 21);
     CHECK(text.find("frame 1000/1000") != std::string::npos);
@@ -89,7 +81,7 @@ TEST_CASE("a line of text takes the bar away, and the bar comes back below it", 
 {
     Memory memory;
     Progress progress(memory.file(), ProgressStyle::Bar, 1, 2);
-    progress.frame(frame_of(1, 10), 1);
+    progress.frame(1, 10, 1);
     const std::string bar = memory.text();
     progress.line("writing a.0001.vdb");
     CHECK(memory.text() == bar + "\r\x1b[K" + "writing a.0001.vdb\n" + bar);
@@ -123,6 +115,6 @@ TEST_CASE("time left is what the newest frames took, times the frames to come", 
 {
     Memory memory;
     Progress progress(memory.file(), ProgressStyle::Bar, 1, 11);
-    progress.frame(frame_of(1, 10), 2);
+    progress.frame(1, 10, 2);
     CHECK(memory.text().find("20.0 s left") != std::string::npos);
 }

@@ -238,14 +238,59 @@ TEST_CASE("a program is told of a script that is late, before it is stopped", "[
     options.script_seconds = 0.2;
     std::atomic<int> told = 0;
     std::string text;
-    const Result<Scene> scene = Scene::open(file, options, [&](const std::string& message) {
+    SceneHooks hooks;
+    hooks.late = [&](const std::string& message) {
         if (told++ == 0) text = message;
         throw 1;  // is dropped
-    });
+    };
+    const Result<Scene> scene = Scene::open(file, options, hooks);
     REQUIRE_FALSE(scene);
     CHECK(scene.error().kind == SceneError::TooLong);
     CHECK(told >= 1);
     CHECK_THAT(text, Contains("runs for more than 0.2 s"));
+}
+
+TEST_CASE("a program is told of the files that a scene reads, before they are read", "[reports]")
+{
+    const test::TemporaryFolder folder;
+    folder.write("speed.lua", "return 3");
+    const std::string file = folder.write("read.lua", R"(local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10, speed = require "speed" } :solve {})");
+    std::vector<std::string> read;
+    SceneHooks hooks;
+    hooks.reads = [&](const std::string& path) {
+        read.push_back(path);
+        throw 1;  // is dropped
+    };
+    good(Scene::open(file, {}, hooks));
+    CHECK(std::any_of(read.begin(), read.end(), [](const std::string& path) { return path.ends_with("speed.lua"); }));
+}
+
+TEST_CASE("points tell their errors, sub-steps and sleep where a program asks for it", "[reports]")
+{
+    const test::TemporaryFolder folder;
+    const std::string file = folder.write("told.lua", R"(local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 } :gravity {} :solve { substeps = 3 })");
+    SceneHooks hooks;
+    hooks.tell_points = true;
+    Scene scene = good(Scene::open(file, {}, hooks));
+    const SceneFrame frame = good(scene.advance_to(4));
+    REQUIRE(frame.size() > 100);
+    for (const char* const name : {"error", "substeps", "asleep"}) CHECK(frame.column(name));
+    CHECK_FALSE(good(good(Scene::open(file)).advance_to(4)).column("substeps"));
+}
+
+TEST_CASE("a scene that is to be kept refuses what no snapshot holds", "[reports]")
+{
+    const test::TemporaryFolder folder;
+    const std::string file = folder.write("counts.lua", R"(local rapid = require "rapid"
+local count = 0
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function() count = count + 1 return count end }
+  :solve {})");
+    SceneHooks hooks;
+    hooks.keep_state = true;
+    CHECK_FALSE(Scene::open(file, {}, hooks));
+    CHECK(Scene::open(file));
 }
 
 }  // namespace rapid

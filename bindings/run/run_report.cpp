@@ -1,31 +1,25 @@
-#include "bindings/command/run_report.h"
+#include "bindings/run/run_report.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
-#include "runtime/files/output_file.h"
 #include "runtime/report/memory.h"
 
 namespace rapid {
 
-RunReport::RunReport(Options options, FrameFiles& files) : options_(std::move(options)), files_(files)
+RunReport::RunReport(Options options, Listener listener, FrameFiles& files, RunCache* cache)
+    : listener_(std::move(listener)), files_(files), cache_(cache)
 {
-    run_.graph = options_.graph;
-    run_.threads = options_.threads;
-    if (!options_.stats_file.empty()) statistics_.emplace(options_.stats_file, run_);
-    if (!options_.profile_file.empty()) profile_.emplace(options_.profile_file);
+    run_.graph = std::move(options.graph);
+    run_.threads = options.threads;
+    if (!options.stats_file.empty()) statistics_.emplace(std::move(options.stats_file), run_);
+    if (!options.profile_file.empty()) profile_.emplace(std::move(options.profile_file));
 }
 
 double RunReport::now() const { return earlier_seconds_ + stopwatch_.seconds(); }
-
-void RunReport::begin(std::int64_t first, std::int64_t last)
-{
-    const std::lock_guard lock(mutex_);
-    progress_.emplace(stdout, options_.quiet ? ProgressStyle::None : progress_style(stdout), first, last);
-}
 
 void RunReport::frame(const FrameResult& result)
 {
@@ -37,7 +31,7 @@ void RunReport::frame(const FrameResult& result)
     if (cache_) cache_->computed(frame, result.figures.stiff);
     add_writing();
     keep_worst(run_.stiff, result.figures.stiff);
-    progress_->frame(frame, now());
+    listener_.frame(frame, now(), false);
 }
 
 void RunReport::known_frame(const FrameRecord& record, bool is_before)
@@ -47,23 +41,23 @@ void RunReport::known_frame(const FrameRecord& record, bool is_before)
     if (statistics_) statistics_->add(record.statistics);
     keep_worst(run_.stiff, record.stiff);
     for (const std::string& text : record.warnings) tell(text, record.statistics.frame);
-    if (!is_before) return;
-    earlier_seconds_ = std::max(earlier_seconds_, record.seconds);
-    earlier_peak_ = std::max(earlier_peak_, record.peak_bytes);
+    if (is_before) {
+        earlier_seconds_ = std::max(earlier_seconds_, record.seconds);
+        earlier_peak_ = std::max(earlier_peak_, record.peak_bytes);
+    }
+    listener_.frame(record.statistics, now(), true);
 }
 
 void RunReport::line(const std::string& text)
 {
     const std::lock_guard lock(mutex_);
-    progress_->line(text);
+    listener_.line(text);
 }
 
 void RunReport::warning(const std::string& text)
 {
     const std::lock_guard lock(mutex_);
-    if (!warned_.insert(text).second) return;
-    if (progress_) progress_->finish();
-    print_warning(text);
+    if (warned_.insert(text).second) listener_.warning(text);
 }
 
 void RunReport::warning(const std::string& text, std::int64_t frame)
@@ -76,53 +70,44 @@ void RunReport::warning(const std::string& text, std::int64_t frame)
 void RunReport::tell(const std::string& text, std::int64_t frame)
 {
     if (warned_.contains(text) || !frame_warnings_.add(text, frame)) return;
-    if (progress_) progress_->finish();
-    print_warning(fmt::format("frame {}: {}", frame, text));
+    listener_.warning(fmt::format("frame {}: {}", frame, text));
 }
 
-void RunReport::finish()
+void RunReport::tell_untold()
+{
+    for (const std::string& text : std::exchange(frame_warnings_, {}).untold()) listener_.warning(text);
+}
+
+std::string RunReport::finish()
 {
     const std::lock_guard lock(mutex_);
-    if (progress_) progress_->finish();
     tell_untold();
     write_statistics();
-    if (options_.quiet) return;
-    print(summary(run_, totals_));
+    return summary(run_, totals_);
 }
 
-int RunReport::fail(const Error& error) { return end_early(status_failed, error); }
-
-int RunReport::interrupted(int signal, const std::string& why) { return end_early(128 + signal, Error(why)); }
-
-int RunReport::end_early(int status, const Error& error)
+std::string RunReport::finish_early()
 {
     const std::lock_guard lock(mutex_);
-    if (progress_) progress_->finish();
     tell_untold();
-    print_error(error, options_.verbose);
-    try {
-        write_statistics();
-    } catch (const Error& second) {
-        print_error(second, options_.verbose);
-    }
-    return status;
+    return try_to_write();
 }
 
-void RunReport::abandon(int status, const std::string& why)
+std::optional<RunReport::Abandoned> RunReport::abandon()
 {
-    // The run's own thread holds the lock only briefly, unless its terminal is stopped; then do without it.
-    if (mutex_.try_lock_for(std::chrono::seconds(1))) {
-        if (progress_) progress_->finish();
-        tell_untold();
-        print_error(Error(why), false);
-        try {
-            write_statistics();
-        } catch (const Error& error) {
-            print_error(error, false);
-        }
+    // The run's own thread holds the lock only briefly, unless the program does not return from what it is told.
+    if (!mutex_.try_lock_for(std::chrono::seconds(1))) return std::nullopt;  // which stays locked otherwise
+    return Abandoned{frame_warnings_.untold(), try_to_write()};
+}
+
+std::string RunReport::try_to_write()
+{
+    try {
+        write_statistics();
+        return {};
+    } catch (const Error& error) {
+        return error.what();
     }
-    remove_unfinished_files();
-    _exit(status);
 }
 
 void RunReport::add_writing()
@@ -151,11 +136,6 @@ void RunReport::write_statistics()
     }
     if (statistics_) statistics_->finish(run_);
     if (failed) throw Error(*failed);
-}
-
-void RunReport::tell_untold()
-{
-    for (const std::string& line : frame_warnings_.untold()) print_warning(line);
 }
 
 }  // namespace rapid

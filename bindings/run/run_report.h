@@ -1,24 +1,24 @@
-// The output of `rapid run` while it runs and when it ends, however it ends.
+// What is told of a run while it goes on and when it ends, however it ends: its frames, its warnings, the files of its
+// statistics and its profile; and what a cache keeps of all that.
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
-#include "bindings/command/command.h"
 #include "bindings/run/frame_files.h"
 #include "bindings/run/profile_file.h"
 #include "bindings/run/run_cache.h"
 #include "bindings/run/statistics_file.h"
 #include "runtime/report/frame_warnings.h"
-#include "runtime/report/progress.h"
 #include "runtime/report/totals.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
 
-// Frames, progress and summary go to standard output, warnings and errors to standard error.
 class RunReport {
 public:
     struct Options {
@@ -26,15 +26,16 @@ public:
         int threads = 1;
         std::string stats_file;    // empty: none
         std::string profile_file;  // likewise
-        bool quiet = false, verbose = false;
     };
-    // The run's time begins here. files: those that the run writes.
-    RunReport(Options options, FrameFiles& files);
+    // Called one at a time; none may be empty.
+    struct Listener {
+        std::function<void(const FrameStatistics& frame, double seconds, bool is_known)> frame;
+        std::function<void(const std::string&text)> line, warning;
+    };
+    // The run's time begins here. files: those that the run writes; cache: hears of all frames, null where there is
+    // none.
+    RunReport(Options options, Listener listener, FrameFiles& files, RunCache* cache);
 
-    // Hears of all frames from now on.
-    void set_cache(RunCache* cache) { cache_ = cache; }
-
-    void begin(std::int64_t first, std::int64_t last);
     // A frame that an earlier run has computed; is_before: before all that this one computes.
     void known_frame(const FrameRecord& record, bool is_before);
     void frame(const FrameResult& result);
@@ -45,29 +46,31 @@ public:
     // they come, and the rest is counted for the end.
     void warning(const std::string& text, std::int64_t frame);
 
-    // The statistics file and the summary. Error: the file can't be written.
-    void finish();
-    // A signal that ends the run between two frames: says so, and writes the statistics and the profile of the frames
-    // so far. Returns the status of the process.
-    int interrupted(int signal, const std::string& why);
-    // An error that ends the run: reports it, and writes the statistics and the profile of the frames so far.
-    int fail(const Error& error);
-    // From another thread, at any moment: says why, writes the statistics, removes unfinished files, and ends the
-    // process.
-    [[noreturn]] void abandon(int status, const std::string& why);
+    // The run is complete: tells what was only counted, and writes statistics and profile. Returns the summary. Error:
+    // a file can't be written.
+    std::string finish();
+    // It ends before. Returns why a file could not be written; empty where they were.
+    std::string finish_early();
+    // From another thread, at any moment, before the process ends; afterwards nothing is told any more. Nothing where
+    // the run's own thread does not let go within a second.
+    struct Abandoned {
+        std::vector<std::string> warnings;
+        std::string failure;  // as finish_early()
+    };
+    std::optional<Abandoned> abandon();
 
 private:
     void add_writing();
     // Statistics and profile. Error: a file can't be written.
     void write_statistics();
-    void tell_untold();
+    std::string try_to_write();
     void tell(const std::string& text, std::int64_t frame);
-    int end_early(int status, const Error& error);
+    void tell_untold();
     double now() const;
 
-    const Options options_;
+    const Listener listener_;
     FrameFiles& files_;
-    RunCache* cache_ = nullptr;
+    RunCache* const cache_;
     const Stopwatch stopwatch_;
     double earlier_seconds_ = 0;  // of the runs that this one goes on behind
     std::uint64_t earlier_peak_ = 0;
@@ -77,7 +80,6 @@ private:
     RunTotals totals_;
     std::optional<StatisticsFile> statistics_;
     std::optional<ProfileFile> profile_;
-    std::optional<Progress> progress_;
     std::set<std::string> warned_;  // of no frame: as many as the scene makes
     FrameWarnings frame_warnings_;
 };

@@ -1,0 +1,91 @@
+#include "bindings/command/file_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "bindings/command/or_throw.h"
+#include "runtime/files/frame_pattern.h"
+
+namespace rapid {
+namespace {
+
+// "1,2.5,-3": numbers alone, between commas.
+std::vector<double> read_numbers(const std::string& text)
+{
+    std::vector<double> numbers;
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    while (true) {
+        double number = 0;
+        const auto parsed = std::from_chars(at, end, number);
+        if (parsed.ec != std::errc() || !std::isfinite(number)) return {};
+        numbers.push_back(number);
+        if (parsed.ptr == end) return numbers;
+        if (*parsed.ptr != ',') return {};
+        at = parsed.ptr + 1;
+    }
+}
+
+void read_camera(const std::string& text, PictureSettings& pictures)
+{
+    const std::vector<double> n = read_numbers(text);
+    const bool right = (n.size() == 6 || n.size() == 7) && (n.size() == 6 || (n[6] > 0 && n[6] < 180));
+    if (!right || std::equal(n.begin(), n.begin() + 3, n.begin() + 3))
+        throw Error(
+            fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
+                        "another that it looks at, and its vertical angle of view, in degrees",
+                        text));
+    pictures.position = {n[0], n[1], n[2]};
+    pictures.target = {n[3], n[4], n[5]};
+    if (n.size() == 7) pictures.fov = n[6];
+}
+
+PictureSize read_size(const std::string& text)
+{
+    constexpr int most = 16384;  // pixels an edge: a picture of 3 GiB
+    PictureSize size;
+    const char* const end = text.data() + text.size();
+    const auto width = std::from_chars(text.data(), end, size.width);
+    const bool has_x = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+    const auto height = has_x ? std::from_chars(width.ptr + 1, end, size.height) : width;
+    if (!has_x || height.ec != std::errc() || height.ptr != end || std::min(size.width, size.height) < 1 ||
+        std::max(size.width, size.height) > most)
+        throw Error(fmt::format("--size = \"{}\"; it must be WIDTHxHEIGHT, each from 1 to {}", text, most));
+    return size;
+}
+
+}  // namespace
+
+void FileOptions::declare(CLI::App& app)
+{
+    app.add_option_function<std::vector<std::string>>(
+           "-o,--output",
+           [this](const std::vector<std::string>& texts) {
+               for (const std::string& text : texts) parse_output_target(text);
+               files_.outputs = texts;
+           },
+           "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
+           ".usda .npz .obj .csv .png, films: .mp4 .webm .gif); "
+           "attributes behind a colon are written besides P, v and id, without them all are")
+        ->type_name("PATTERN[:ATTR,ATTR]")
+        ->allow_extra_args(false);
+    app.add_option_function<std::string>(
+           "--camera", [this](const std::string& text) { read_camera(text, files_.pictures); },
+           "for pictures: the camera's place, what it looks at, and its vertical angle of view in degrees")
+        ->type_name("PX,PY,PZ,TX,TY,TZ[,FOV]");
+    app.add_option_function<std::string>(
+           "--size", [this](const std::string& text) { files_.pictures.size = read_size(text); },
+           "for pictures [default 1280x720]")
+        ->type_name("WIDTHxHEIGHT");
+}
+
+bool FileOptions::makes_films() const
+{
+    return std::any_of(names().begin(), names().end(),
+                       [](const std::string& text) { return or_throw(output_format(text)).is_film; });
+}
+
+}  // namespace rapid

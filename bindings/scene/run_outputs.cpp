@@ -1,0 +1,237 @@
+// Files that are asked for, and what a scene's plan makes of them.
+#include "bindings/scene/run_outputs.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "bindings/run/races.h"
+#include "bindings/scene/scene_impl.h"
+#include "runtime/io/format.h"
+#include "runtime/report/explanation_text.h"
+#include "runtime/report/statistics.h"
+
+namespace rapid {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string dumped(const ordered_json& json)
+{
+    return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+// The plan of a scene whose points go to files.
+struct OutputPlan {
+    FrameFiles files;
+    Plan plan;
+
+    OutputPlan(const SceneInside::Impl& scene, const FileOutputs& outputs, const PlanOptions& options)
+        : files(frame_files(outputs)), plan(scene.session->graph(), options)
+    {
+        files.resolve(plan, true);
+    }
+};
+
+PlanOptions plan_options(const SceneInside::Impl& scene, const FileOutputs& outputs)
+{
+    PlanOptions options = frame_files(outputs).plan_options(scene.options.seed);
+    options.keep_all = scene.options.keep_all;
+    return options;
+}
+
+// Without files: as an output that names no attributes.
+PlanOptions explained_options(const SceneInside::Impl& scene, const FileOutputs& outputs)
+{
+    PlanOptions options = plan_options(scene, outputs);
+    if (outputs.outputs.empty()) options.all_made = true;
+    return options;
+}
+
+Explanation explained(const SceneInside::Impl& scene, const FileOutputs& outputs)
+{
+    return rapid::explain(OutputPlan(scene, outputs, explained_options(scene, outputs)).plan, outputs.outputs);
+}
+
+// By name: the points of a create, and what a node keeps.
+SceneReport report_of(const Snapshot& snapshot)
+{
+    ordered_json json = {{"frame", snapshot.frame}};
+    std::vector<KeptBytes> kept;
+    for (const auto& [name, state] : snapshot.simulations) {
+        json["simulations"][name] = state.size();
+        kept.push_back({name, state.size(), "points, ids and what is adopted"});
+    }
+    for (const auto& [name, state] : snapshot.nodes) {
+        json["nodes"][name] = state.size();
+        kept.push_back({name, state.size(), "of the node"});
+    }
+    return {to_text(fmt::format("\nSTATE after frame {}", snapshot.frame), kept), dumped(json)};
+}
+
+}  // namespace
+
+FrameSelection selection_of(const RunFrames& range) { return {range.first, range.last, range.step}; }
+
+FrameFiles frame_files(const FileOutputs& files)
+{
+    constexpr int most_pixels = 16384;
+    const PictureSettings& asked = files.pictures;
+    if (std::min(asked.size.width, asked.size.height) < 1 ||
+        std::max(asked.size.width, asked.size.height) > most_pixels)
+        refuse(fmt::format("a picture of {}x{}; each must be from 1 to {}", asked.size.width, asked.size.height,
+                           most_pixels));
+    if (asked.fov && !(*asked.fov > 0 && *asked.fov < 180))
+        refuse(fmt::format("fov = {}; it must be between 0 and 180 degrees", *asked.fov));
+    PictureOptions picture;
+    picture.width = asked.size.width;
+    picture.height = asked.size.height;
+    if (asked.position) picture.position = Vec3d(asked.position->data());
+    if (asked.target) picture.target = Vec3d(asked.target->data());
+    if (asked.fov) picture.fov = *asked.fov * M_PI / 180;
+    return FrameFiles(files.outputs, std::move(picture));
+}
+
+Result<OutputFormat> output_format(const std::string& output)
+{
+    try {
+        const Format& format = format_of(parse_output_target(output).pattern);
+        return OutputFormat{format.extension, format.film};
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<std::vector<std::string>> output_folders(const FileOutputs& files)
+{
+    try {
+        std::vector<std::string> folders;
+        for (const std::filesystem::path& folder : folders_of(files.outputs)) folders.push_back(folder.string());
+        return folders;
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files)
+{
+    SceneInside::Impl& impl = SceneInside::of(scene);
+    return impl.call(SceneError::WrongScene, [&] {
+        const Explanation explanation = explained(impl, files);
+        return SceneReport{to_text(explanation), to_json(explanation)};
+    });
+}
+
+Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, Scene& other)
+{
+    SceneInside::Impl& here = SceneInside::of(scene);
+    SceneInside::Impl& there = SceneInside::of(other);
+    if (&here == &there) return wrong_call("the scene is compared with itself; open the file again");
+    Result<Explanation> others = there.call(SceneError::WrongScene, [&] { return explained(there, files); });
+    if (!others) return others.error();
+    return here.call(SceneError::WrongScene, [&] {
+        const Explanation own = explained(here, files);
+        const Explanation more = surplus(own, *others), less = surplus(*others, own);
+        return SceneReport{
+            text_of_surplus(here.file, there.file, more) + '\n' + text_of_surplus(there.file, here.file, less) +
+                fmt::format("\nbytes a point at most: {} and {}\n", own.bytes_per_point(), others->bytes_per_point()),
+            dumped({{"graph", here.file},
+                    {"against", there.file},
+                    {"only_graph", ordered_json::parse(json_of_surplus(more))},
+                    {"only_against", ordered_json::parse(json_of_surplus(less))},
+                    {"bytes_per_point", {own.bytes_per_point(), others->bytes_per_point()}}})};
+    });
+}
+
+Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame)
+{
+    SceneInside::Impl& impl = SceneInside::of(scene);
+    return impl.call(SceneError::FailedFrame, [&] {
+        impl.start_again();
+        const SceneInside::Impl::Running running(impl);
+        const OutputPlan output(impl, files, explained_options(impl, files));
+        if (frame < output.plan.first_frame())
+            refuse(fmt::format("frame {} is before the scene's first, {}", frame, output.plan.first_frame()));
+        Evaluator evaluator(output.plan);
+        impl.beside([&] {
+            while (evaluator.next_frame() <= frame) evaluator.advance();
+        });
+        return report_of(evaluator.save());
+    });
+}
+
+Result<std::string> check_outputs(Scene& scene, const FileOutputs& files)
+{
+    SceneInside::Impl& impl = SceneInside::of(scene);
+    return impl.call(SceneError::WrongScene, [&] {
+        const OutputPlan output(impl, files, plan_options(impl, files));
+        std::string text;
+        for (const Session::Parameter& parameter : impl.session->parameters()) {
+            text += fmt::format("param {} = {}", parameter.name, describe(parameter.value));
+            if (describe(parameter.value) != describe(parameter.fallback))
+                text += fmt::format(" (default {})", describe(parameter.fallback));
+            text += parameter.doc.empty() ? "\n" : fmt::format("  {}\n", parameter.doc);
+        }
+        std::vector<std::string> outputs;
+        for (const auto& [name, place] : output.plan.outputs) outputs.push_back(name);
+        text += fmt::format("{}: OK, {} of {} nodes reached from {} {}\n", impl.file, output.plan.nodes.size(),
+                            impl.session->graph().nodes.size(), outputs.size() == 1 ? "output" : "outputs",
+                            fmt::join(outputs, ", "));
+        return text;
+    });
+}
+
+Result<std::string> advice_on(Scene& scene, const FileOutputs& files)
+{
+    SceneInside::Impl& impl = SceneInside::of(scene);
+    return impl.call(SceneError::FailedFrame, [&] {
+        impl.start_again();
+        const SceneInside::Impl::Running running(impl);
+        const OutputPlan output(impl, files, plan_options(impl, files));
+        std::string text;
+        impl.beside([&] {
+            try {
+                const FrameFigures found = Evaluator(output.plan).examine();
+                text = advice(found.stiff) + text_of(found.resolution);
+            } catch (const Error&) {
+                if (impl.cancellation.is_requested()) throw;
+            }
+        });
+        return text;
+    });
+}
+
+Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames)
+{
+    SceneInside::Impl& impl = SceneInside::of(scene);
+    return impl.call(SceneError::FailedFrame, [&] {
+        if (frames.step < 1) refuse(fmt::format("step = {}; it must be at least 1", frames.step));
+        impl.start_again();
+        const SceneInside::Impl::Running running(impl);
+        PlanOptions options = plan_options(impl, files);
+        options.keep_all = true;  // an attribute that no file needs may show the race
+        const OutputPlan output(impl, files, options);
+        if (frames.last < output.plan.first_frame())
+            refuse(fmt::format("frame {} is before the scene's first, {}", frames.last, output.plan.first_frame()));
+        Races races;
+        impl.beside([&] {
+            const auto load = [&](const KernelOrder& order) {
+                SessionOptions session = impl.session_options(impl.settings);
+                session.quiet = true;
+                session.kernel_order = order;
+                return std::make_unique<Session>(impl.file, std::move(session));
+            };
+            races = rapid::find_races(load, output.plan, options, selection_of(frames));
+        });
+        SceneRaces result;
+        result.compared = races.compared;
+        if (races.found) try {
+                throw Error(*races.found);
+            } catch (...) {
+                result.found = caught_error(SceneError::FailedFrame);
+            }
+        return result;
+    });
+}
+
+}  // namespace rapid

@@ -1,0 +1,14 @@
+// What the options of rapid/run.h mean for the files of a run.
+#pragma once
+
+#include "bindings/run/frame_files.h"
+#include "include/rapid/run.h"
+
+namespace rapid {
+
+// Throws a Refusal: a size or an angle that can't be. Error: an output that is none.
+FrameFiles frame_files(const FileOutputs& files);
+
+FrameSelection selection_of(const RunFrames& range);
+
+}  // namespace rapid

@@ -1,0 +1,391 @@
+// Runs that write files: a scene, the files of its frames, and what is kept of them.
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <filesystem>
+
+#include "bindings/run/event_file.h"
+#include "bindings/run/run_cache.h"
+#include "bindings/run/run_report.h"
+#include "bindings/run/written_names.h"
+#include "bindings/scene/run_outputs.h"
+#include "bindings/scene/scene_impl.h"
+#include "runtime/files/frame_pattern.h"
+#include "runtime/graph/coupling.h"
+
+namespace rapid {
+namespace {
+
+constexpr std::int64_t default_frames = 48;
+
+std::optional<Part> part_of(const RunOptions& options)
+{
+    if (!options.part) return std::nullopt;
+    return Part{options.part->number, options.part->count};
+}
+
+std::string name_of(const RunPart& part) { return part_name(part.number, part.count); }
+
+std::string name_in_part(const std::string& file, const std::optional<RunPart>& part)
+{
+    return part && !file.empty() ? with_part(file, name_of(*part)) : file;
+}
+
+std::filesystem::path folder_of(const std::filesystem::path& file)
+{
+    return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+void check(const RunOptions& options)
+{
+    if (const auto& part = options.part;
+        part && (part->count < 1 || part->count > most_parts || part->number < 1 || part->number > part->count))
+        refuse(fmt::format("part {} of {}; it must be from 1 to their number, which is at most {}", part->number,
+                           part->count, most_parts));
+    if (options.sample && !(*options.sample > 0 && *options.sample <= 1))
+        refuse(fmt::format("sample = {}; it must be above 0 and at most 1", *options.sample));
+    if (options.frames && (options.frames->step < 1 || options.frames->last < options.frames->first))
+        refuse(fmt::format("frames {}-{}x{}; they must go up, by a step of at least 1", options.frames->first,
+                           options.frames->last, options.frames->step));
+    if (options.cache.every < 0) refuse(fmt::format("every = {}; it must be at least 0", options.cache.every));
+    if (options.cache.again && options.cache.folder.empty())
+        refuse("again says what to do with a cache; give its folder");
+}
+
+template <class F>
+void call_if_set(const F& callback, const auto&... arguments)
+{
+    if (callback) callback(arguments...);
+}
+
+}  // namespace
+
+struct [[gnu::visibility("hidden")]] SceneRun::Impl
+{
+    const RunOptions options;
+    const RunListener listener;
+    SceneInside::Impl scene;
+    FrameFiles files;
+    EventFile events;
+    RunCache cache;
+    WrittenNames names;
+    std::shared_ptr<PartRecord> record;  // null where all points are simulated
+    std::optional<InputContents> read;   // of a part
+    RunReport report;
+    FrameSelection frames{};
+    bool is_ready = false, has_begun = false;
+    std::atomic<bool> computes = false;  // frames: what they read is not noted
+    std::atomic<bool> is_to_end = false;
+
+    Impl(std::string file, SceneOptions scene_options, SceneHooks hooks, RunOptions asked, RunListener told)
+        : options(std::move(asked)),
+          listener(std::move(told)),
+          files(frame_files(options.files)),
+          events(name_in_part(options.events, options.part)),
+          cache({options.cache.folder, options.cache.every, options.cache.again, options.cache.replace}),
+          report({file, scene_options.threads > 0 ? scene_options.threads : tbb::this_task_arena::max_concurrency(),
+                  name_in_part(options.statistics, options.part), name_in_part(options.profile, options.part)},
+                 {[this](const FrameStatistics& frame, double seconds, bool is_known) {
+                      call_if_set(listener.frame, RunFrame{frame.frame, frame.points, seconds, is_known});
+                  },
+                  [this](const std::string& text) { call_if_set(listener.line, text); },
+                  [this](const std::string& text) { call_if_set(listener.warning, text); }},
+                 files, cache.asked() ? &cache : nullptr)
+    {
+        if (cache.asked()) {
+            cache.set_graph(file);
+            hooks.keep_state = true;
+        }
+        if (options.part) begin_part(file);
+        scene.file = std::move(file);
+        scene.text = options.text;
+        scene.options = std::move(scene_options);
+        scene.hooks = std::move(hooks);
+        scene.may_write = true;
+        if (options.part) note_settings();
+        take_hooks();
+        scene.plan_of_run = files.plan_options(std::nullopt);
+        scene.plan_of_run.keep_steps = !options.events.empty();
+        scene.write = [this](const std::string& pattern, const PointSet& points, const Frame& frame, double fps) {
+            if (frames.contains(std::llround(frame.number))) files.write_node(pattern, points, frame, fps);
+        };
+        if (scene.options.threads > 0) scene.arena.emplace(scene.options.threads);
+    }
+
+    void begin_part(const std::string& file)
+    {
+        read.emplace(folder_of(file), InputContents::Code::Included);
+        record = std::make_shared<PartRecord>();
+        record->part = *part_of(options);
+        record->sample = options.sample;
+        files.take_part(record);
+    }
+
+    // By which parts know that they belong together.
+    void note_settings() const
+    {
+        for (const auto& [name, value] : scene.options.set) record->identity[name] = text_of(value);
+        if (scene.options.seed) record->identity["--seed"] = fmt::format("{}", *scene.options.seed);
+    }
+
+    void take_hooks()
+    {
+        scene.hooks.reads = [this, reads = std::move(scene.hooks.reads)](const std::string& path) {
+            const std::filesystem::path file(path);
+            if (!computes) names.reads(file);
+            if (read) read->add(file);
+            if (cache.asked()) cache.was_read(file);
+            if (reads) reads(path);
+        };
+        scene.options.log = [this, log = std::move(scene.options.log)](LogLevel level, const std::string& text) {
+            if (level == LogLevel::Warning)
+                report.warning(text);
+            else if (log)
+                log(level, text);
+        };
+    }
+
+    void prepare()
+    {
+        claim_own_files();
+        std::map<std::string, std::string> set;
+        for (const auto& [name, value] : scene.options.set) set[name] = text_of(value);
+        scene.take_offers();
+        scene.load(std::move(set));
+        const Plan& plan = *scene.plan;
+        if (const Subset subset(part_of(options), options.sample); !subset.is_all()) take_subset(plan, subset);
+        frames = range_of(plan);
+        if (record) {
+            record->frames = frames;
+            record->identify(read->take());
+        }
+        files.resolve(plan, !frames.single());
+        files.claim(names, frames);
+        if (!options.claims.empty()) files.claim(options.claims, options.statistics);
+        is_ready = true;
+    }
+
+    // Those that are not of frames. Error: one of them is the scene, or two are one.
+    void claim_own_files()
+    {
+        names.reads(scene.file);
+        const auto claim = [&](const std::string& file, const std::string& option) {
+            if (file.empty()) return;
+            try {
+                names.add(file, option);
+            } catch (const Error& error) {
+                throw Error(fmt::format("{} {}: {}", option, file, error.message()));
+            }
+        };
+        if (cache.asked())
+            for (const char* name : {"journal", "events", ".lock"}) claim(cache.folder() / name, "--cache");
+        claim(name_in_part(options.statistics, options.part), "--stats");
+        claim(name_in_part(options.profile, options.part), "--profile");
+        claim(events.path(), "--events");
+    }
+
+    FrameSelection range_of(const Plan& plan) const
+    {
+        const std::int64_t start = plan.first_frame();
+        if (!options.frames) return {start, start + default_frames - 1};
+        if (options.frames->first < start)
+            throw Error(fmt::format("-f: frame {} is before the scene's first, {}", options.frames->first, start));
+        return selection_of(*options.frames);
+    }
+
+    // What else changes what a run keeps.
+    Fingerprint fingerprint_options() const
+    {
+        const auto answer = [](bool is) { return is ? "yes" : "no"; };
+        Fingerprint all = {{"the estimate of errors", answer(scene.options.estimate_errors)},
+                           {"--events", answer(!options.events.empty())},
+                           {"--keep-all", answer(scene.options.keep_all)}};
+        if (options.part) all["--part"] = name_of(*options.part);
+        if (options.sample) all["--sample"] = fmt::format("{}", *options.sample);
+        return all;
+    }
+
+    // Error: found before the first frame.
+    RunOutcome run()
+    {
+        if (!is_ready) refuse("the run is not prepared; call prepare() first");
+        if (has_begun) refuse("the run has been computed; make another one");
+        has_begun = true;
+        events.begin();
+        if (cache.asked()) cache.begin(*scene.session, *scene.plan, frames, fingerprint_options(), files, events);
+        computes = true;
+        RunOutcome outcome;
+        outcome.last_frame = scene.plan->first_frame() - 1;
+        try {
+            const std::int64_t last = compute(outcome);
+            if (outcome.ending == RunOutcome::Ended) {
+                files.finish(false);
+                finish_cache(false);
+                add_unwritten(outcome, report.finish_early());
+                return outcome;
+            }
+            if (cache.first_due())  // what an earlier run has computed behind it
+                for (const FrameRecord* known : cache.records(last + 1, frames.last)) report.known_frame(*known, false);
+            files.finish();
+            finish_cache(true);
+            events.finish();
+            outcome.summary = report.finish();
+            outcome.last_frame = frames.last;
+        } catch (...) {
+            outcome.ending = RunOutcome::Failed;
+            outcome.error = scene.error_of_call(SceneError::FailedFrame);
+            finish_files(outcome.error->message);
+            add_unwritten(outcome, report.finish_early());
+        }
+        return outcome;
+    }
+
+    // Returns the last frame that is due.
+    std::int64_t compute(RunOutcome & outcome)
+    {
+        Evaluator& evaluator = *scene.evaluator;
+        // Until the last frame is computed: files that are written then are no reason to grow.
+        const SceneInside::Impl::Running running(scene);
+        std::int64_t last = frames.last;
+        if (cache.asked()) last = go_on(evaluator, *scene.plan);
+        outcome.last_frame = std::max(outcome.last_frame, evaluator.next_frame() - 1);
+        call_if_set(listener.begins, cache.keeps_snapshots());
+        while (evaluator.next_frame() <= last) {
+            const FrameResult result = evaluator.advance();
+            outcome.last_frame = result.frame;
+            for (const std::string& warning : scene.session->take_warnings()) report.warning(warning, result.frame);
+            for (const std::string& warning : result.warnings) report.warning(warning, result.frame);
+            if (frames.contains(result.frame)) files.write(result);
+            for (const std::string& name : files.take_first_names()) report.line("writing " + name);
+            for (const std::string& warning : files.take_warnings()) report.warning(warning, result.frame);
+            report.frame(result);
+            events.add(result);
+            const bool ends = is_to_end;
+            if (cache.asked()) cache.keep(evaluator, events, ends);
+            if (ends) {
+                outcome.ending = RunOutcome::Ended;
+                break;
+            }
+            for (const std::string& warning : cache.take_warnings()) report.warning(warning, result.frame);
+        }
+        return last;
+    }
+
+    // Tells what the cache has, and takes the evaluator there. Returns the last frame to compute.
+    std::int64_t go_on(Evaluator & evaluator, const Plan& plan)
+    {
+        cache.restore(evaluator, events);
+        for (const std::string& warning : cache.take_warnings()) report.warning(warning);
+        const std::int64_t first = plan.first_frame();
+        const std::int64_t known = cache.first_due() ? evaluator.next_frame() - 1 : frames.last;
+        for (const FrameRecord* one : cache.records(first, known)) report.known_frame(*one, true);
+        if (known >= first)
+            report.line(fmt::format("frames {}-{} are known from {}", first, known, cache.folder().string()));
+        return cache.first_due() ? cache.last_due() : first - 1;
+    }
+
+    void finish_cache(bool complete)
+    {
+        if (!cache.asked()) return;
+        cache.finish(complete);
+        for (const std::string& warning : cache.take_warnings()) report.warning(warning);
+    }
+
+    // Writes the frames before the one that failed, which are complete, or says why not.
+    void finish_files(const std::string& reason)
+    {
+        try {
+            files.finish(false);
+        } catch (const Error& error) {
+            if (error.message() != reason) report.warning(error.what());
+        } catch (const std::exception& error) {
+            if (error.what() != reason) report.warning(error.what());
+        }
+    }
+
+    static void add_unwritten(RunOutcome & outcome, const std::string& failure)
+    {
+        if (!failure.empty()) outcome.unwritten.push_back(failure);
+    }
+};
+
+SceneRun::SceneRun(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SceneRun::SceneRun(SceneRun&&) noexcept = default;
+SceneRun& SceneRun::operator=(SceneRun&&) noexcept = default;
+SceneRun::~SceneRun() = default;
+
+Result<SceneRun> SceneRun::make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
+                                RunListener listener)
+{
+    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
+    if (std::optional<SceneError> fault = fault_of(scene)) return std::move(*fault);
+    try {
+        check(options);
+        return SceneRun(std::make_unique<Impl>(std::move(file), std::move(scene), std::move(hooks), std::move(options),
+                                               std::move(listener)));
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<Done> SceneRun::prepare()
+{
+    return impl_->scene.call(SceneError::WrongScene, [&] {
+        if (impl_->is_ready) refuse("the run is prepared; call run()");
+        impl_->prepare();
+        return Done();
+    });
+}
+
+std::int64_t SceneRun::first_frame() const { return impl_->scene.plan->first_frame(); }
+RunFrames SceneRun::frames() const { return {impl_->frames.first, impl_->frames.last, impl_->frames.step}; }
+
+Result<std::vector<std::pair<std::string, std::string>>> SceneRun::merges(int parts)
+{
+    return impl_->scene.call(SceneError::WrongCall, [&] {
+        if (!impl_->is_ready) refuse("the run is not prepared; call prepare() first");
+        if (parts < 1 || parts > most_parts)
+            refuse(fmt::format("parts = {}; it must be from 1 to {}", parts, most_parts));
+        if (impl_->options.part) refuse("the run is a part itself");
+        take_subset(*impl_->scene.plan, Subset(Part{1, parts}, std::nullopt));
+        return impl_->files.merges();
+    });
+}
+
+Result<RunOutcome> SceneRun::run()
+{
+    return impl_->scene.call(SceneError::WrongScene, [&] { return impl_->run(); });
+}
+
+void SceneRun::end_after_frame() { impl_->is_to_end = true; }
+void SceneRun::cancel() { impl_->scene.cancel(); }
+
+std::optional<SceneRun::Abandoned> SceneRun::abandon()
+{
+    std::optional<RunReport::Abandoned> told = impl_->report.abandon();
+    if (!told) return std::nullopt;
+    Abandoned result{std::move(told->warnings), {}};
+    if (!told->failure.empty()) result.unwritten.push_back(std::move(told->failure));
+    return result;
+}
+
+Result<std::vector<std::string>> output_folders(const RunOptions& options)
+{
+    FileOutputs files = options.files;
+    for (std::string& output : files.outputs) output = name_in_part(output, options.part);
+    Result<std::vector<std::string>> folders = output_folders(files);
+    if (!folders) return folders;
+    try {
+        for (const std::string& file : {options.statistics, options.profile, options.events})
+            if (!file.empty()) folders->push_back(folder_of(file).string());
+        if (!options.cache.folder.empty()) folders->push_back(options.cache.folder);
+        for (const std::string& folder : *folders) std::filesystem::create_directories(folder);
+        if (!options.claims.empty()) folders->push_back(options.claims);
+        return folders;
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+}  // namespace rapid

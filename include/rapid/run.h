@@ -1,0 +1,195 @@
+// Runs that write files, as `rapid run` does: frames in any format, pictures and films, statistics, a cache from which
+// a run goes on, parts of the points for several machines. And what a scene's plan makes of such files: explain and
+// check.
+//
+//   rapid::RunOptions options;
+//   options.files.outputs = {"first.####.vdb", "first.####.png"};
+//   auto run = rapid::SceneRun::make("first.lua", {}, {}, options, {});
+//   if (!run) return fail(run.error().text());
+//   if (auto ready = run->prepare(); !ready) return fail(ready.error().text());
+//   auto outcome = run->run();
+//   if (!outcome || outcome->error) return fail(outcome ? outcome->error->text() : outcome.error().text());
+//
+// Messages name what is wrong by the options of the command: "-o" is FileOutputs::outputs, "-f" RunOptions::frames.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "scene.h"
+
+namespace rapid {
+
+// Frames from the first one to the last, each step-th.
+struct RunFrames {
+    std::int64_t first = 1, last = 48, step = 1;
+};
+
+// How pictures are drawn. What is not given is fitted to the points and shapes.
+struct PictureSettings {
+    PictureSize size{1280, 720};
+    std::optional<std::array<double, 3>> position, target;  // of the camera, and what it looks at; m
+    std::optional<double> fov;                              // vertical angle of view, degrees
+};
+
+// The files of a run's frames.
+struct FileOutputs {
+    // PATTERN or PATTERN:ATTRIBUTE,ATTRIBUTE: #### is the frame's number, {output} the name of an output of the scene,
+    // the extension chooses the format (docs/cli.md).
+    std::vector<std::string> outputs;
+    PictureSettings pictures;
+};
+
+// What a text of FileOutputs::outputs asks for.
+struct OutputFormat {
+    std::string extension;  // ".vdb"
+    bool is_film = false;   // one file of all frames, which ffmpeg writes
+};
+// Error: an extension that no format has, with the known ones; no pattern; no attributes behind a colon.
+Result<OutputFormat> output_format(const std::string& output);
+
+// Snapshots and a journal of frames in a folder, from which a run goes on where an earlier one ended.
+struct RunCacheOptions {
+    std::string folder;       // empty: there is none
+    std::int64_t every = 10;  // a snapshot after each n-th frame, and after the last; 0: none
+    bool again = false;       // computes and writes all frames, whatever the folder holds
+    bool replace = false;     // the cache of another run is replaced, and no error
+};
+
+// One of `count` subsets of the points, chosen by ids, which are put together by merging their files.
+struct RunPart {
+    int number = 1, count = 1;  // from 1 to count
+};
+
+struct RunOptions {
+    std::optional<std::string> text;  // of the scene, whose file is then a name for messages
+    std::optional<RunFrames> frames;  // that are written; all before them are computed. Nothing: 48 from the first
+    FileOutputs files;
+    // Files besides; empty: none.
+    std::string statistics;  // JSON, as of --stats
+    std::string profile;     // a trace in Chrome's format
+    std::string events;      // births, contacts and deaths as points
+    RunCacheOptions cache;
+    // Some of the points: file names get the part's, _part03of16 before the frame's number, or in place of {part}.
+    std::optional<RunPart> part;
+    std::optional<double> sample;  // the fraction of the points, above 0 and at most 1
+    // A folder in which runs that go on at once note the files of their nodes, so that two do not write one; empty:
+    // none.
+    std::string claims;
+};
+
+// The folders that a run writes to, that of its first output first; they are made where they are missing. Error: one
+// can't be made.
+Result<std::vector<std::string>> output_folders(const FileOutputs& files);
+Result<std::vector<std::string>> output_folders(const RunOptions& options);
+
+// A frame that is done.
+struct RunFrame {
+    std::int64_t number = 0;
+    std::uint64_t points = 0;  // of all outputs
+    double seconds = 0;        // since the run began, those of the runs that it goes on behind included
+    bool is_known = false;     // of a cache: it was not computed again
+};
+
+// Told while a run goes on, by the thread of the call, one at a time. They do not throw.
+struct RunListener {
+    std::function<void(const RunFrame& frame)> frame;
+    std::function<void(const std::string& text)> line;     // which files are written, what a cache has
+    std::function<void(const std::string& text)> warning;  // each once; of a frame with its number
+    // Frames are computed from now on. keeps_snapshots: what is computed until end_after_frame() will not be lost.
+    std::function<void(bool keeps_snapshots)> begins;
+};
+
+// How a run ended.
+struct RunOutcome {
+    enum Ending {
+        Complete,
+        Ended,   // by end_after_frame()
+        Failed,  // in a frame, or because a file could not be written
+    };
+    Ending ending = Complete;
+    std::int64_t last_frame = 0;         // that was computed or known
+    std::optional<SceneError> error;     // of Failed
+    std::vector<std::string> unwritten;  // statistics or a profile that could not be written, and why
+    std::string summary;                 // of Complete: points, seconds, errors, as `rapid run` prints it
+};
+
+// One run. Like a Scene it is used by one thread at a time, but for cancel(), end_after_frame() and abandon().
+class SceneRun {
+public:
+    // Its time begins here; nothing is opened or written yet. hooks.keep_state is chosen by the run. Error: WrongCall,
+    // an option that can't be.
+    static Result<SceneRun> make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
+                                 RunListener listener);
+
+    SceneRun(SceneRun&&) noexcept;
+    SceneRun& operator=(SceneRun&&) noexcept;
+    ~SceneRun();  // not while a call of another thread is running
+
+    // Opens and plans the scene, and finds what is wrong with the names of files. Errors: as Scene::open(); an output
+    // that the scene does not have, an attribute that nothing makes, two writers of one file, frames before the
+    // scene's first, a subset of points that are coupled.
+    Result<Done> prepare();
+
+    // The rest behind prepare().
+    std::int64_t first_frame() const;  // of the scene
+    RunFrames frames() const;          // that are written
+
+    // For a run in `parts` parts: of each output the pattern of the whole, and that of the parts, with {part}. Error:
+    // points that are coupled; pictures and films, which can't be put together; a name with {part}.
+    Result<std::vector<std::pair<std::string, std::string>>> merges(int parts);
+
+    // Computes and writes the frames; once. Error: found before the first frame: a folder of a cache that another run
+    // has or that is of another run, a file of events that can't be written. What happens later is in the outcome.
+    Result<RunOutcome> run();
+
+    // Ends the run behind the frame that is being computed, with a snapshot where it has a cache. From any thread.
+    void end_after_frame();
+    // Ends it at once, as Scene::cancel(). From any thread.
+    void cancel();
+
+    // For a program that is about to end, from any thread at any moment: writes statistics and profile of the frames so
+    // far. The run stands still afterwards. Nothing where its thread does not let go within a second.
+    struct Abandoned {
+        std::vector<std::string> warnings;   // that were only counted until now
+        std::vector<std::string> unwritten;  // as RunOutcome
+    };
+    std::optional<Abandoned> abandon();
+
+private:
+    struct Impl;
+    explicit SceneRun(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+// What a plan makes of files. Of a scene that is open; its frames stay as they are where nothing else is said.
+
+// As Scene::explain(), for these files: what they ask for is kept. Error: of an output, as SceneRun::prepare().
+Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files);
+// What one of two scenes keeps and the other does not, as `rapid explain --against` prints it.
+Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, Scene& other);
+// Bytes that the points of each create, and each node, keep after a frame, as a snapshot holds them: computes the
+// frames up to this one beside the scene. Error: a frame before the first one.
+Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame);
+
+// What can be found without running a frame: a line for each parameter, and how many nodes are reached from which
+// outputs. Error: of an output, as SceneRun::prepare().
+Result<std::string> check_outputs(Scene& scene, const FileOutputs& files);
+// A line for each stiff node, and for each shape that is too coarse for its points: tries out the first frame with a
+// few points, whose errors are left to the run.
+Result<std::string> advice_on(Scene& scene, const FileOutputs& files);
+
+// Whether frames have the same bits in other orders of the points and in two states of Lua.
+struct SceneRaces {
+    std::optional<SceneError> found;  // the first difference, with its node
+    bool compared = false;            // whether there was a point in these frames
+};
+// The scene is at its start afterwards. In an arena of one thread. Error: FailedFrame, of a frame that fails.
+Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames);
+
+}  // namespace rapid

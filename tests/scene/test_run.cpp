@@ -1,0 +1,468 @@
+// Runs of a program that write files: what `rapid run` writes, and what a program is told; runs that are ended, that
+// go on, of parts; wrong options.
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "include/rapid/run.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+using Catch::Contains, Catch::StartsWith;
+using test::good;
+
+const std::string cloud = R"(
+local rapid = require "rapid"
+local rate = rapid.param("rate", 2000, "particles born per second")
+return rapid.create { fps = 24, seed = 3 }
+  :emit { source = rapid.mesh.sphere { radius = 1, center = {0, 2, 0} }, rate = rate, birth = "random",
+          life = {0.1, 0.6}, speed = 1, spread = 30, attributes = { heat = 1 } }
+  :points("cool", function(p) p.heat = p.heat - p.dt end)
+  :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.4 } :solve { substeps = 2 }
+)";
+
+std::string content(const fs::path& file)
+{
+    std::ifstream stream(file, std::ios::binary);
+    std::ostringstream text;
+    text << stream.rdbuf();
+    return text.str();
+}
+
+RunOptions options(const test::TemporaryFolder& folder, RunFrames frames = {1, 8})
+{
+    RunOptions result;
+    result.text = cloud;
+    result.frames = frames;
+    result.files.outputs = {folder / "cloud.####.csv"};
+    return result;
+}
+
+// What a run has told.
+struct Told {
+    std::vector<RunFrame> frames;
+    std::vector<std::string> lines, warnings;
+    std::function<void(const RunFrame&)> on_frame;
+
+    RunListener listener()
+    {
+        RunListener result;
+        result.frame = [this](const RunFrame& frame) {
+            frames.push_back(frame);
+            if (on_frame) on_frame(frame);
+        };
+        result.line = [this](const std::string& text) { lines.push_back(text); };
+        result.warning = [this](const std::string& text) { warnings.push_back(text); };
+        return result;
+    }
+};
+
+SceneRun made(RunOptions asked, RunListener listener = {}, SceneOptions scene = {})
+{
+    return good(SceneRun::make("cloud.lua", std::move(scene), {}, std::move(asked), std::move(listener)));
+}
+
+RunOutcome outcome_of(SceneRun& run)
+{
+    good(run.prepare());
+    return good(run.run());
+}
+
+RunOutcome complete(RunOptions asked, RunListener listener = {}, SceneOptions scene = {})
+{
+    SceneRun run = made(std::move(asked), std::move(listener), std::move(scene));
+    RunOutcome outcome = outcome_of(run);
+    if (outcome.error) FAIL(outcome.error->text());
+    REQUIRE(outcome.ending == RunOutcome::Complete);
+    return outcome;
+}
+
+void check_wrong(const RunOptions& asked, const std::string& message)
+{
+    const Result<SceneRun> run = SceneRun::make("cloud.lua", {}, {}, asked, {});
+    REQUIRE_FALSE(run);
+    CHECK(run.error().kind == SceneError::WrongCall);
+    CHECK_THAT(run.error().message, Contains(message));
+}
+
+void check_unprepared(const RunOptions& asked, const std::string& message,
+                      SceneError::Kind kind = SceneError::WrongScene)
+{
+    SceneRun run = made(asked);
+    const Result<Done> prepared = run.prepare();
+    REQUIRE_FALSE(prepared);
+    CHECK(prepared.error().kind == kind);
+    CHECK_THAT(prepared.error().text(), Contains(message));
+}
+
+}  // namespace
+
+TEST_CASE("a run writes the points of the frames that a scene computes", "[run]")
+{
+    const test::TemporaryFolder folder;
+    RunOptions asked = options(folder, {3, 7, 2});
+    asked.statistics = folder / "statistics.json";
+    asked.events = folder / "events.csv";
+    asked.profile = folder / "profile.json";
+    Told told;
+    SceneRun run = made(asked, told.listener());
+    good(run.prepare());
+    CHECK(run.first_frame() == 1);
+    CHECK(run.frames().last == 7);
+    CHECK_FALSE(fs::exists(asked.statistics));
+    const RunOutcome outcome = good(run.run());
+    CHECK(outcome.ending == RunOutcome::Complete);
+    CHECK(outcome.last_frame == 7);
+    CHECK_THAT(outcome.summary, StartsWith("points "));
+    CHECK(told.warnings.empty());
+    REQUIRE(told.lines.size() == 1);
+    CHECK_THAT(told.lines.front(), Contains("cloud.0003.csv"));
+
+    Scene scene = test::opened(cloud);
+    REQUIRE(told.frames.size() == 7);
+    for (std::int64_t number = 1; number <= 7; ++number) {
+        const SceneFrame frame = good(scene.advance_to(number));
+        const RunFrame& one = told.frames[static_cast<std::size_t>(number - 1)];
+        CHECK(one.number == number);
+        CHECK(one.points == frame.size());
+        CHECK_FALSE(one.is_known);
+        const fs::path file = folder / ("cloud.000" + std::to_string(number) + ".csv");
+        REQUIRE(fs::exists(file) == (number == 3 || number == 5 || number == 7));
+        if (!fs::exists(file)) continue;
+        good(frame.write(folder / "expected.csv"));
+        CHECK(content(file) == content(folder / "expected.csv"));
+    }
+    const auto statistics = nlohmann::json::parse(content(asked.statistics));
+    CHECK(statistics.at("frames").size() == 7);
+    CHECK(statistics.at("graph") == "cloud.lua");
+    CHECK_FALSE(nlohmann::json::parse(content(asked.profile)).empty());
+    CHECK(good(SceneFrame::read(asked.events)).size() > 100);
+}
+
+TEST_CASE("a run that was ended goes on in another one to the same files", "[run]")
+{
+    const test::TemporaryFolder whole, parts;
+    complete(options(whole));
+
+    RunOptions asked = options(parts);
+    asked.cache = {parts / "cache", 3};
+    {
+        Told told;
+        SceneRun run = made(asked, told.listener());
+        told.on_frame = [&](const RunFrame& frame) {
+            if (frame.number == 5) run.end_after_frame();
+        };
+        const RunOutcome outcome = outcome_of(run);
+        CHECK(outcome.ending == RunOutcome::Ended);
+        CHECK(outcome.last_frame == 5);
+        CHECK_FALSE(outcome.error);
+        CHECK_FALSE(fs::exists(parts / "cloud.0006.csv"));
+    }
+    Told told;
+    bool keeps = false;
+    RunListener listener = told.listener();
+    listener.begins = [&](bool keeps_snapshots) { keeps = keeps_snapshots; };
+    complete(asked, listener);
+    CHECK(keeps);
+    REQUIRE(told.frames.size() == 8);
+    for (const RunFrame& frame : told.frames) CHECK(frame.is_known == (frame.number <= 5));
+    for (int number = 1; number <= 8; ++number) {
+        const std::string file = "cloud.000" + std::to_string(number) + ".csv";
+        CHECK(content(whole / file) == content(parts / file));
+    }
+
+    // A run of other values does not take the folder, unless it is to.
+    SceneOptions other;
+    other.set = {{"rate", 1000.0}};
+    {
+        SceneRun refused = made(asked, {}, other);
+        good(refused.prepare());
+        const Result<RunOutcome> outcome = refused.run();
+        REQUIRE_FALSE(outcome);
+        CHECK_THAT(outcome.error().message, Contains("rate was 2000, is 1000"));
+    }
+    asked.cache.replace = true;
+    complete(asked, {}, other);
+}
+
+TEST_CASE("without a cache a run ends behind its frame all the same", "[run]")
+{
+    const test::TemporaryFolder folder;
+    SceneRun run = made(options(folder));
+    run.end_after_frame();
+    const RunOutcome outcome = outcome_of(run);
+    CHECK(outcome.ending == RunOutcome::Ended);
+    CHECK(outcome.last_frame == 1);
+    CHECK(fs::exists(folder / "cloud.0001.csv"));
+    CHECK_FALSE(fs::exists(folder / "cloud.0002.csv"));
+}
+
+TEST_CASE("the parts of a run have the points of the whole", "[run]")
+{
+    const test::TemporaryFolder folder;
+    complete(options(folder));
+    const SceneFrame whole = good(SceneFrame::read(folder / "cloud.0008.csv"));
+    std::size_t points = 0;
+    for (int number = 1; number <= 3; ++number) {
+        RunOptions asked = options(folder);
+        asked.part = {number, 3};
+        complete(asked);
+        points += good(SceneFrame::read(folder / ("cloud_part" + std::to_string(number) + "of3.0008.csv"))).size();
+    }
+    REQUIRE(whole.size() > 100);
+    CHECK(points == whole.size());
+
+    RunOptions sampled = options(folder);
+    sampled.sample = 0.5;
+    sampled.files.outputs = {folder / "half.####.csv"};
+    complete(sampled);
+    const auto half = static_cast<double>(good(SceneFrame::read(folder / "half.0008.csv")).size());
+    CHECK(half == Approx(0.5 * static_cast<double>(whole.size())).epsilon(0.2));
+
+    SceneRun run = made(options(folder));
+    CHECK_THAT(run.merges(3).error().message, Contains("call prepare() first"));
+    good(run.prepare());
+    const auto merges = good(run.merges(3));
+    REQUIRE(merges.size() == 1);
+    CHECK(merges.front().first == (folder / "cloud.####.csv"));
+    CHECK(merges.front().second == (folder / "cloud_part{part}.####.csv"));
+    CHECK_THAT(run.merges(0).error().message, Contains("parts = 0; it must be from 1"));
+}
+
+TEST_CASE("a frame that fails ends a run, and those before it are written", "[run]")
+{
+    const test::TemporaryFolder folder;
+    RunOptions asked = options(folder);
+    asked.text = R"(local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
+  :points("late", function(p) if p.age > 0.15 then error("too old") end end) :solve {})";
+    asked.statistics = folder / "statistics.json";
+    SceneRun run = made(asked);
+    const RunOutcome outcome = outcome_of(run);
+    CHECK(outcome.ending == RunOutcome::Failed);
+    REQUIRE(outcome.error);
+    CHECK(outcome.error->kind == SceneError::FailedFrame);
+    CHECK(outcome.error->node == "late");
+    CHECK(outcome.error->line == 3);
+    CHECK(outcome.unwritten.empty());
+    REQUIRE(outcome.last_frame >= 2);
+    for (std::int64_t number = 1; number <= outcome.last_frame; ++number)
+        CHECK(fs::exists(folder / ("cloud.000" + std::to_string(number) + ".csv")));
+    CHECK(nlohmann::json::parse(content(asked.statistics)).at("frames").size() ==
+          static_cast<std::size_t>(outcome.last_frame));
+
+    const Result<RunOutcome> again = run.run();
+    REQUIRE_FALSE(again);
+    CHECK_THAT(again.error().message, Contains("the run has been computed"));
+}
+
+TEST_CASE("a run is cancelled from another thread", "[run]")
+{
+    const test::TemporaryFolder folder;
+    RunOptions asked = options(folder, {1, 100000});
+    asked.files.outputs.clear();
+    std::atomic<std::int64_t> frame = 0;
+    RunListener listener;
+    listener.frame = [&](const RunFrame& one) { frame = one.number; };
+    SceneRun run = made(asked, listener);
+    std::thread other([&] {
+        while (frame < 3) std::this_thread::yield();
+        run.cancel();
+    });
+    const RunOutcome outcome = outcome_of(run);
+    other.join();
+    CHECK(outcome.ending == RunOutcome::Failed);
+    REQUIRE(outcome.error);
+    CHECK(outcome.error->kind == SceneError::Cancelled);
+    CHECK(outcome.last_frame >= 3);
+}
+
+TEST_CASE("a run is abandoned between two frames, or not at all", "[run]")
+{
+    const test::TemporaryFolder folder;
+    RunOptions asked = options(folder);
+    asked.statistics = folder / "statistics.json";
+    Told told;
+    SceneRun run = made(asked, told.listener());
+    bool is_abandoned = true;
+    told.on_frame = [&](const RunFrame& frame) {  // while the program has been called
+        if (frame.number == 3) std::thread([&] { is_abandoned = run.abandon().has_value(); }).join();
+        if (frame.number == 4) run.end_after_frame();
+    };
+    CHECK(outcome_of(run).last_frame == 4);
+    CHECK_FALSE(is_abandoned);
+
+    asked.statistics = folder / "abandoned.json";
+    SceneRun prepared = made(asked);
+    good(prepared.prepare());
+    const std::optional<SceneRun::Abandoned> abandoned = prepared.abandon();
+    REQUIRE(abandoned);
+    CHECK(abandoned->unwritten.empty());
+    CHECK(nlohmann::json::parse(content(asked.statistics)).at("frames").empty());
+}
+
+TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
+{
+    const test::TemporaryFolder folder;
+    const RunOptions right = options(folder);
+    CHECK_FALSE(SceneRun::make("", {}, {}, right, {}));
+    const auto wrong = [&](const auto& change, const std::string& message) {
+        RunOptions asked = right;
+        change(asked);
+        check_wrong(asked, message);
+    };
+    wrong([](RunOptions& o) { o.frames = RunFrames{1, 4, 0}; }, "frames 1-4x0");
+    wrong([](RunOptions& o) { o.frames = RunFrames{4, 1}; }, "frames 4-1x1");
+    wrong([](RunOptions& o) { o.part = {3, 2}; }, "part 3 of 2");
+    wrong([](RunOptions& o) { o.part = {1, 0}; }, "part 1 of 0");
+    wrong([](RunOptions& o) { o.sample = 0; }, "sample = 0");
+    wrong([](RunOptions& o) { o.sample = NAN; }, "sample = nan");
+    wrong([](RunOptions& o) { o.cache.every = -1; }, "every = -1");
+    wrong([](RunOptions& o) { o.cache.again = true; }, "again says what to do with a cache");
+    wrong([](RunOptions& o) { o.files.pictures.size = {0, 10}; }, "a picture of 0x10");
+    wrong([](RunOptions& o) { o.files.pictures.size.width = 1 << 20; }, "a picture of 1048576x720");
+    wrong([](RunOptions& o) { o.files.pictures.fov = 180; }, "fov = 180");
+    SceneOptions scene;
+    scene.threads = -1;
+    CHECK_FALSE(SceneRun::make("cloud.lua", scene, {}, right, {}));
+    CHECK(fs::is_empty(folder.path()));
+}
+
+TEST_CASE("what is wrong with a scene and its files is found before the first frame", "[run]")
+{
+    const test::TemporaryFolder folder;
+    const RunOptions right = options(folder);
+    const auto wrong = [&](const auto& change, const std::string& message) {
+        RunOptions asked = right;
+        change(asked);
+        check_unprepared(asked, message);
+    };
+    wrong([](RunOptions& o) { o.text = "local rapid = require 'rapid'\nreturn rapid.creat {}"; }, "cloud.lua:2: ");
+    wrong([](RunOptions& o) { o.text = std::nullopt; }, "cloud.lua");
+    wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.csv"}; }, "several frames go to one file");
+    wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.####.xyz"}; }, "xyz");
+    wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.####.csv:heet"}; }, "heet");
+    wrong([&](RunOptions& o) { o.files.outputs.push_back(o.files.outputs.front()); }, "written twice");
+    wrong([&](RunOptions& o) { o.statistics = o.profile = folder / "one.json"; }, "one.json");
+    wrong([](RunOptions& o) { o.frames = RunFrames{0, 4}; }, "before the scene's first");
+    wrong(
+        [](RunOptions& o) {
+            o.text = R"(local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :contact { radius = 0.1 } :solve {})";
+            o.part = {1, 2};
+        },
+        "contact");
+    CHECK(fs::is_empty(folder.path()));
+
+    SceneRun run = made(right);
+    CHECK_THAT(run.run().error().message, Contains("call prepare() first"));
+    good(run.prepare());
+    CHECK_THAT(run.prepare().error().message, Contains("the run is prepared"));
+}
+
+TEST_CASE("runs at once do not write one file of a node", "[run]")
+{
+    const test::TemporaryFolder folder;
+    fs::create_directory(folder / "claims");
+    RunOptions asked = options(folder);
+    asked.text = R"(local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :solve {}
+  :write { file = ")" +
+                 (folder / "node.####.csv").string() + R"(" })";
+    asked.files.outputs.clear();
+    asked.claims = folder / "claims";
+    asked.statistics = folder / "a.json";
+    complete(asked);
+    asked.statistics = folder / "b.json";
+    check_unprepared(asked, "node.####.csv");
+}
+
+TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
+{
+    const test::TemporaryFolder folder;
+    CHECK(good(output_format("a.####.vdb:heat")).extension == ".vdb");
+    CHECK_FALSE(good(output_format("a.####.vdb")).is_film);
+    CHECK(good(output_format("a.mp4")).is_film);
+    CHECK_FALSE(output_format("a.####.xyz"));
+
+    RunOptions asked = options(folder);
+    asked.files.outputs = {folder / "points/{output}/a.####.csv", folder / "b.####.csv"};
+    asked.statistics = folder / "told/s.json";
+    asked.cache.folder = folder / "cache";
+    const std::vector<std::string> folders = good(output_folders(asked));
+    CHECK(folders == std::vector<std::string>{folder / "points", folder.path(), folder / "told", folder / "cache"});
+    for (const std::string& one : folders) CHECK(fs::is_directory(one));
+    asked.files.outputs = {"/proc/none/a.####.csv"};
+    CHECK_FALSE(output_folders(asked));
+}
+
+TEST_CASE("what a plan keeps for files is explained", "[run]")
+{
+    Scene scene = test::opened(cloud);
+    FileOutputs files;
+    const SceneReport all = good(explain_outputs(scene, files));
+    CHECK(all.text == good(scene.explain()).text);
+    files.outputs = {"a.####.csv:v"};
+    const SceneReport some = good(explain_outputs(scene, files));
+    CHECK(some.text != all.text);
+    CHECK_FALSE(nlohmann::json::parse(some.json).empty());
+    files.outputs = {"a.####.csv:heet"};
+    CHECK_THAT(explain_outputs(scene, files).error().message, Contains("did you mean"));
+
+    files.outputs.clear();
+    Scene other = test::opened(cloud + ":drag { linear = 1 }", {}, "other.lua");
+    const SceneReport more = good(explain_difference(scene, files, other));
+    CHECK_THAT(more.text, Contains("cloud.lua") && Contains("other.lua") && Contains("drag"));
+    CHECK(nlohmann::json::parse(more.json).at("against") == "other.lua");
+    CHECK_FALSE(explain_difference(scene, files, scene));
+
+    const auto state = nlohmann::json::parse(good(explain_state(scene, files, 4)).json);
+    CHECK(state.at("frame") == 4);
+    CHECK(state.at("simulations").at("create1").get<std::size_t>() > 0);
+    CHECK_THAT(explain_state(scene, files, 0).error().message, Contains("before the scene's first"));
+    CHECK(good(scene.advance()).number() == 1);
+}
+
+TEST_CASE("a scene is checked without a frame, and for kernels that remember", "[run]")
+{
+    SceneOptions options;
+    options.threads = 1;
+    Scene scene = test::opened(cloud, options);
+    CHECK_THAT(
+        good(check_outputs(scene, {})),
+        StartsWith("param rate = 2000  particles born per second\ncloud.lua: OK, ") && Contains("from output main"));
+    CHECK(good(advice_on(scene, {})).empty());
+    const SceneRaces none = good(find_races(scene, {}, {2, 4}));
+    CHECK_FALSE(none.found);
+    CHECK(none.compared);
+    CHECK_FALSE(good(find_races(scene, {}, {1, 1})).compared);
+    CHECK_FALSE(find_races(scene, {}, {0, 0}));
+    CHECK_FALSE(find_races(scene, {}, {1, 4, 0}));
+
+    Scene stiff = test::opened(R"(local rapid = require "rapid"
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, velocity = {0, 1, 0} } :drag { linear = 5000 } :solve {})");
+    CHECK_THAT(good(advice_on(stiff, {})), Contains("drag1"));
+
+    // A table in a table of the kernel's own is not followed, and large ones are not compared.
+    Scene remembers = test::opened(R"(local rapid = require "rapid"
+local box = { n = 0 }
+ballast = {}
+for i = 1, 20000 do ballast[i] = i end
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, attributes = { heat = 0 } }
+  :points("count", function(p) local held = { box } local kept = held[1] kept.n = kept.n + 1 p.heat = kept.n end) :solve {})",
+                                   options);
+    const SceneRaces races = good(find_races(remembers, {}, {2, 4}));
+    REQUIRE(races.found);
+    CHECK(races.found->node == "count");
+    CHECK_THAT(races.found->message, Contains("a kernel must not remember other points"));
+}
+
+}  // namespace rapid

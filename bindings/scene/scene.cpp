@@ -26,6 +26,18 @@ SceneNodeType described(const NodeType& type)
     return result;
 }
 
+void add_types(std::map<std::string, SceneNodeType>& by_name, const Registry& registry)
+{
+    for (const NodeType* type : registry.types()) by_name[type->name] = described(*type);
+}
+
+std::vector<SceneNodeType> in_order(std::map<std::string, SceneNodeType> by_name)
+{
+    std::vector<SceneNodeType> types;
+    for (auto& [name, type] : by_name) types.push_back(std::move(type));
+    return types;
+}
+
 }  // namespace
 
 Scene::Scene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -89,14 +101,22 @@ std::int64_t Scene::next_frame() const { return impl_->next; }
 Result<std::vector<SceneNodeType>> Scene::node_types()
 {
     return impl_->call(SceneError::WrongScene, [&] {
-        const Registry shipped = Session::all_node_types();
         std::map<std::string, SceneNodeType> by_name;
-        for (const NodeType* type : shipped.types()) by_name[type->name] = described(*type);
-        for (const NodeType* type : impl_->session->registry().types()) by_name[type->name] = described(*type);
-        std::vector<SceneNodeType> types;
-        for (auto& [name, type] : by_name) types.push_back(std::move(type));
-        return types;
+        add_types(by_name, Session::all_node_types());
+        add_types(by_name, impl_->session->registry());
+        return in_order(std::move(by_name));
     });
+}
+
+Result<std::vector<SceneNodeType>> Scene::all_node_types()
+{
+    try {
+        std::map<std::string, SceneNodeType> by_name;
+        add_types(by_name, Session::all_node_types());
+        return in_order(std::move(by_name));
+    } catch (...) {
+        return caught_error(SceneError::WrongScene);
+    }
 }
 
 Result<Done> Scene::set(const std::string& name, SceneValue value) { return set({{name, std::move(value)}}); }

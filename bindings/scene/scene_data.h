@@ -8,6 +8,7 @@
 
 #include "include/rapid/scene.h"
 #include "runtime/graph/evaluate.h"
+#include "runtime/graph/value.h"
 
 namespace rapid {
 
@@ -28,5 +29,7 @@ struct SceneSnapshot::Data {
 };
 
 SceneValue value_of(const DetailValue& detail);
+// Of a parameter: a boolean, a number, a text or three numbers.
+SceneValue value_in_header(const Value& value);
 
 }  // namespace rapid

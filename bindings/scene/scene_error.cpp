@@ -4,6 +4,7 @@
 
 #include <new>
 
+#include "runtime/cancellation.h"
 #include "runtime/of_thread.h"
 
 namespace rapid {
@@ -64,6 +65,13 @@ SceneError busy()
     error.message =
         "the scene is in another call: of another thread, or the one that has called back; wait for its end";
     return error;
+}
+
+void end_as_cancelled()
+{
+    SceneError error = wrong_call(Cancellation::text);
+    error.kind = SceneError::Cancelled;
+    throw Refusal{std::move(error)};
 }
 
 SceneError caught_error(SceneError::Kind kind)

@@ -1,6 +1,7 @@
 // Exceptions as values.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -17,9 +18,20 @@ struct Refusal {
     SceneError error;
 };
 [[noreturn]] inline void refuse(std::string message) { throw Refusal{wrong_call(std::move(message))}; }
+// Where the program's callback has said so.
+[[noreturn]] void end_as_cancelled();
 
 // What is being handled, inside of a catch block. kind: of an Error.
 SceneError caught_error(SceneError::Kind kind);
+
+// On a thread that may have no caller: what it throws is dropped.
+inline void call_hook(const std::function<void(const std::string& text)>& hook, const std::string& text)
+{
+    if (hook) try {
+            hook(text);
+        } catch (...) {
+        }
+}
 
 // Runs a callback of the program: what it throws becomes an Error that names it.
 template <class F, class... Arguments>

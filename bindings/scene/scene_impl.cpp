@@ -6,7 +6,6 @@
 #include "runtime/files/content_hash.h"
 
 namespace rapid {
-namespace {
 
 SceneValue value_in_header(const Value& value)
 {
@@ -15,17 +14,6 @@ SceneValue value_in_header(const Value& value)
     if (const auto* vector = value.get<Vec3d>()) return std::array<double, 3>{(*vector)[0], (*vector)[1], (*vector)[2]};
     return *value.get<std::string>();
 }
-
-// On a thread that may have no caller.
-void call_hook(const std::function<void(const std::string& text)>& hook, const std::string& text)
-{
-    if (hook) try {
-            hook(text);
-        } catch (...) {
-        }
-}
-
-}  // namespace
 
 std::string text_of(const SceneValue& value)
 {

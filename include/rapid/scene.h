@@ -385,6 +385,9 @@ public:
     // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on
     // RAPID_PATH.
     static Result<NodeDocuments> documents();
+    // The types that every scene of the process may use: native ones, those of plugins, and Rapid's own in Lua; in
+    // order of name.
+    static Result<std::vector<SceneNodeType>> all_node_types();
 
     // In the order in which the scene declares them.
     const std::vector<SceneParameter>& parameters() const;

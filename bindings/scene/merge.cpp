@@ -1,0 +1,32 @@
+// Parts of runs as one.
+#include "include/rapid/merge.h"
+
+#include "bindings/run/run_parts.h"
+#include "bindings/scene/scene_error.h"
+
+namespace rapid {
+
+Result<MergedFiles> merge_files(const std::vector<std::string>& patterns, const std::string& output,
+                                const std::function<bool(std::int64_t frame, std::uint64_t points)>& progress)
+{
+    SceneError::Kind kind = SceneError::WrongCall;
+    try {
+        if (patterns.empty()) refuse("no parts are named; give the patterns of their files");
+        const RunParts parts(patterns);
+        parts.check_output(output);
+        kind = SceneError::FailedFrame;
+        MergedFiles merged;
+        merged.parts = parts.count();
+        for (const int frame : parts.frames()) {
+            const std::uint64_t points = parts.write_frame(frame, output);
+            merged.points += points;
+            ++merged.frames;
+            if (progress && !call_program("progress", progress, frame, points)) end_as_cancelled();
+        }
+        return merged;
+    } catch (...) {
+        return caught_error(kind);
+    }
+}
+
+}  // namespace rapid

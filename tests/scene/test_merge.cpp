@@ -1,0 +1,130 @@
+// Parts of a run as one: the points of all in the order of their ids, and parts that are no whole.
+#include <filesystem>
+#include <vector>
+
+#include "include/rapid/merge.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Catch::Contains;
+using test::good;
+
+constexpr int points = 100;
+
+// To which of two parts an id belongs (docs/scale.md): the upper half of SplitMix64's values are the second's.
+int part_of(std::uint64_t id)
+{
+    std::uint64_t bits = id + 0x9e3779b97f4a7c15u;
+    bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
+    bits = (bits ^ bits >> 27) * 0x94d049bb133111ebu;
+    return (bits ^ bits >> 31) >> 63 ? 2 : 1;
+}
+
+// Two parts of a run of three frames, of points at x = id, y = frame.
+struct Parts {
+    test::TemporaryFolder folder;
+
+    Parts()
+    {
+        for (int part = 1; part <= 2; ++part) {
+            folder.write("x_part" + std::to_string(part) + "of2.csv.json",
+                         R"({"rapid_part": 1, "part": )" + std::to_string(part) +
+                             R"(, "parts": 2, "sample": null, "frames": {"first": 1, "last": 3, "step": 1},
+                                 "fps": 24, "start": 1, "identity": {"rate": "100"}})");
+            for (int frame = 1; frame <= 3; ++frame) write_frame(part, part, frame);
+        }
+    }
+    void write_frame(int part, int of, int frame) const
+    {
+        std::string rows = "id,Px,Py,Pz,vx,vy,vz\n";
+        for (int id = 0; id < points; ++id)
+            if (part_of(id) == of)
+                rows += std::to_string(id) + ',' + std::to_string(id) + ',' + std::to_string(frame) + ",0,0,0,0\n";
+        folder.write("x_part" + std::to_string(part) + "of2.000" + std::to_string(frame) + ".csv", rows);
+    }
+    std::string all() const { return folder / "x_part{part}.####.csv"; }
+};
+
+}  // namespace
+
+TEST_CASE("merged parts are the points of all, in the order of their ids", "[merge]")
+{
+    const Parts parts;
+    const std::string whole = parts.folder / "deep/whole.####.bgeo";
+    std::vector<std::int64_t> told;
+    const MergedFiles merged = good(merge_files({parts.all()}, whole, [&](std::int64_t frame, std::uint64_t count) {
+        CHECK(count == points);
+        told.push_back(frame);
+        return true;
+    }));
+    CHECK(merged.parts == 2);
+    CHECK(merged.frames == 3);
+    CHECK(merged.points == 3 * points);
+    CHECK(told == std::vector<std::int64_t>{1, 2, 3});
+
+    const SceneFrame frame = good(SceneFrame::read(parts.folder / "deep/whole.0002.bgeo"));
+    const SceneColumn id = good(frame.column("id")), P = good(frame.column("P"));
+    REQUIRE(id.count == points);
+    for (std::size_t i = 0; i < points; ++i) {
+        REQUIRE(*id.at<std::int64_t>(i) == static_cast<std::int64_t>(i));
+        REQUIRE(P.at<float>(i)[0] == static_cast<float>(i));
+        REQUIRE(P.at<float>(i)[1] == 2);
+    }
+}
+
+TEST_CASE("a merge ends where the program says so, behind a whole frame", "[merge]")
+{
+    const Parts parts;
+    const std::string whole = parts.folder / "whole.####.csv";
+    const Result<MergedFiles> merged =
+        merge_files({parts.all()}, whole, [](std::int64_t frame, std::uint64_t) { return frame < 2; });
+    REQUIRE_FALSE(merged);
+    CHECK(merged.error().kind == SceneError::Cancelled);
+    CHECK(good(SceneFrame::read(parts.folder / "whole.0002.csv")).size() == points);
+    CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0003.csv"));
+
+    const Result<MergedFiles> thrown = merge_files(
+        {parts.all()}, whole, [](std::int64_t, std::uint64_t) -> bool { throw std::runtime_error("no more"); });
+    REQUIRE_FALSE(thrown);
+    CHECK_THAT(thrown.error().message, Contains("the program's progress threw: no more"));
+}
+
+TEST_CASE("parts that are no whole are refused before anything is written", "[merge]")
+{
+    const Parts parts;
+    const std::string whole = parts.folder / "whole.####.csv";
+    const auto fault = [&](const std::vector<std::string>& of, const std::string& output) {
+        const Result<MergedFiles> merged = merge_files(of, output);
+        REQUIRE_FALSE(merged);
+        CHECK(merged.error().kind == SceneError::WrongCall);
+        return merged.error().text();
+    };
+    CHECK_THAT(fault({}, whole), Contains("no parts are named"));
+    CHECK_THAT(fault({parts.folder / "x_part1of2.####.csv"}, whole), Contains("missing is part 2of2"));
+    CHECK_THAT(fault({parts.folder / "y_part{part}.####.csv"}, whole),
+               Contains("no complete part of this name is there"));
+    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.####.png"), Contains("holds no points"));
+    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.csv"), Contains("several frames go to one file"));
+    CHECK_THAT(fault({parts.all()}, parts.folder / "x_part1of2.####.csv"), Contains("would replace"));
+    std::filesystem::remove(parts.folder / "x_part2of2.0003.csv");
+    CHECK_THAT(fault({parts.all()}, whole), Contains("a frame is missing: 3"));
+    CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0001.csv"));
+}
+
+TEST_CASE("a point of another part ends a merge in its frame", "[merge]")
+{
+    const Parts parts;
+    parts.write_frame(2, 1, 2);
+    const Result<MergedFiles> merged = merge_files({parts.all()}, parts.folder / "whole.####.csv");
+    REQUIRE_FALSE(merged);
+    CHECK(merged.error().kind == SceneError::FailedFrame);
+    CHECK_THAT(merged.error().text(), Contains("is not of part 2 of 2, but of part 1"));
+    CHECK(std::filesystem::exists(parts.folder / "whole.0001.csv"));
+    CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0002.csv"));
+}
+
+}  // namespace rapid

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "bindings/command/command.h"
-#include "bindings/host/modules.h"
-#include "bindings/host/session.h"
+#include "bindings/command/or_throw.h"
+#include "include/rapid/installation.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {
@@ -19,9 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // A file of lua/new, with the scene's name for NAME.
-std::string fill_in(const char* file, const std::string& name)
+std::string fill_in(const fs::path& lua, const char* file, const std::string& name)
 {
-    const fs::path path = lua_folder() / "new" / file;
+    const fs::path path = lua / "new" / file;
     std::ifstream stream(path, std::ios::binary);
     if (!stream) throw Error("can't be read: Rapid's own Lua files are missing").at({path.string(), 0});
     std::stringstream text;
@@ -65,11 +65,12 @@ public:
             if (std::error_code none; fs::exists(fs::symlink_status(file, none)))
                 throw Error("is there already and is left as it is; take another name").at({file, 0});
 
-        make(scene, fill_in("scene.lua", name_));
-        make(test, fill_in("test.lua", name_));
-        make(".luacheckrc", fill_in("luacheckrc", name_));
+        const fs::path lua = or_throw(Installation::find()).lua;
+        make(scene, fill_in(lua, "scene.lua", name_));
+        make(test, fill_in(lua, "test.lua", name_));
+        make(".luacheckrc", fill_in(lua, "luacheckrc", name_));
         const nlohmann::ordered_json editor = {{"runtime.version", "LuaJIT"},
-                                               {"workspace.library", {(lua_folder() / "rapid.d.lua").string()}}};
+                                               {"workspace.library", {(lua / "rapid.d.lua").string()}}};
         make(".luarc.json", editor.dump(2) + '\n');
         print(fmt::format("now: rapid run {} -f 1-96 -o {}.####.png\n     rapid test {}\n", scene, name_, test));
         return status_done;
@@ -86,7 +87,8 @@ private:
                 fmt::format("rapid new: \"{}\" is no name of a scene; it must be made of letters, digits, _ and "
                             "-, and begin with a letter",
                             name_));
-        if (Session::all_node_types().find(name_))
+        const std::vector<SceneNodeType> types = or_throw(Scene::all_node_types());
+        if (std::any_of(types.begin(), types.end(), [&](const SceneNodeType& type) { return type.name == name_; }))
             throw Error(
                 fmt::format("rapid new: \"{0}\" is the name of a node, and {0}.lua would hide it from scenes "
                             "beside it; take another name",

@@ -17,11 +17,10 @@
 #include <string_view>
 #include <vector>
 
-#include "bindings/host/modules.h"
+#include "bindings/command/or_throw.h"
+#include "include/rapid/installation.h"
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"
-#include "runtime/library_folder.h"
-#include "runtime/points/point_set.h"
 
 namespace rapid {
 namespace {
@@ -80,8 +79,9 @@ void allow(int ruleset, const std::filesystem::path& path, std::uint64_t rights)
 
 std::vector<std::filesystem::path> own_files()
 {
-    std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), lua_folder(),
-                                                library_folder()};
+    const Installation installation = or_throw(Installation::find());
+    std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), installation.lua,
+                                                installation.library};
     // Of the process no more than the memory that it has: its environment and its addresses are for nobody.
     for (const char* path :
          {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null", "/proc/cpuinfo",

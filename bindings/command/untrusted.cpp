@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "runtime/deferred.h"
+#include "bindings/command/or_throw.h"
+#include "include/rapid/installation.h"
 #include "runtime/path_list.h"
 
 namespace rapid {
@@ -43,7 +44,7 @@ void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, con
         all.readable.insert(all.readable.end(), allowed_.begin(), allowed_.end());
         enter_sandbox(all);
     }
-    load_deferred();  // the limits of memory forbid it
+    or_throw(Installation::load_all());  // the limits of memory forbid it
     complete_sandbox(processes, connections);
 }
 

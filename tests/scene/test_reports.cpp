@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 
+#include "include/rapid/installation.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -40,6 +42,28 @@ TEST_CASE("what scenes are made of is documented without a scene", "[reports]")
     CHECK_THAT(gravity->page.json,
                StartsWith(R"({"name":"gravity","doc":)") && Contains(R"("default":[0.0,-9.81,0.0])"));
     CHECK_THAT(documents.annotations, StartsWith("---@meta") && Contains("function Node:gravity(params) end"));
+}
+
+TEST_CASE("the types that every scene may use are listed without one", "[reports]")
+{
+    const std::vector<SceneNodeType> types = good(Scene::all_node_types());
+    const auto has = [&](const char* name) {
+        return std::any_of(types.begin(), types.end(), [&](const SceneNodeType& type) { return type.name == name; });
+    };
+    CHECK(has("gravity"));  // native
+    CHECK(has("lift"));     // in Lua
+    CHECK_FALSE(has("lfit"));
+    CHECK(std::is_sorted(types.begin(), types.end(), [](const auto& a, const auto& b) { return a.name < b.name; }));
+}
+
+TEST_CASE("Rapid's own files are where it says, and all of the library is loaded on request", "[reports]")
+{
+    const Installation installation = good(Installation::find());
+    CHECK(std::filesystem::exists(std::filesystem::path(installation.lua) / "rapid.d.lua"));
+    CHECK(std::filesystem::exists(std::filesystem::path(installation.lua) / "new/scene.lua"));
+    CHECK(std::filesystem::is_directory(installation.library));
+    good(Installation::load_all());
+    good(Installation::load_all());
 }
 
 TEST_CASE("a plan tells what it keeps and leaves out", "[reports]")

@@ -1,0 +1,30 @@
+// Where Rapid's own files are.
+#include "include/rapid/installation.h"
+
+#include "bindings/host/modules.h"
+#include "bindings/scene/scene_error.h"
+#include "runtime/deferred.h"
+#include "runtime/library_folder.h"
+
+namespace rapid {
+
+Result<Installation> Installation::find()
+{
+    try {
+        return Installation{lua_folder().string(), library_folder().string()};
+    } catch (...) {
+        return caught_error(SceneError::WrongScene);
+    }
+}
+
+Result<Done> Installation::load_all()
+{
+    try {
+        load_deferred();
+        return Done();
+    } catch (...) {
+        return caught_error(SceneError::WrongScene);
+    }
+}
+
+}  // namespace rapid

@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "runtime/files/whole_file.h"
+#include "bindings/command/or_throw.h"
+#include "include/rapid/picture_sheet.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/frame_pattern.h"
-#include "runtime/picture/contact_sheet.h"
-#include "runtime/picture/png_file.h"
+#include "runtime/files/whole_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/number_text.h"
 
@@ -145,26 +145,22 @@ void WedgeReport::write_json() const
 // Of the last pictures of the first -o that is one. Returns whether there is any.
 bool WedgeReport::write_sheet() const
 {
-    std::vector<SheetTile> tiles;
+    std::vector<SheetPicture> pictures;
     bool drawn = false;
     for (std::size_t k = 0; k < rows_.size(); ++k) {
         const Result& result = results_[k];
-        SheetTile& tile = tiles.emplace_back();
-        tile.label = {rows_[k].label()};
-        for (const std::string& output : rows_[k].outputs) {
-            if (const fs::path file = last_picture(output, result.last_frame); !file.empty()) {
-                tile.picture = read_png(file);
-                drawn = true;
-                break;
-            }
-        }
-        tile.label.push_back(result.failure.empty() ? fmt::format("{} points, {}", with_separators(result.points),
-                                                                  duration_text(result.seconds))
-                                                    : "failed");
+        SheetPicture& picture = pictures.emplace_back();
+        for (const std::string& output : rows_[k].outputs)
+            if (picture.file.empty()) picture.file = last_picture(output, result.last_frame);
+        drawn |= !picture.file.empty();
+        picture.label = {rows_[k].label(), result.failure.empty()
+                                               ? fmt::format("{} points, {}", with_separators(result.points),
+                                                             duration_text(result.seconds))
+                                               : "failed"};
     }
     // Of combinations those that differ by the last setting alone belong together.
     const std::size_t of_last = varied_.back().values.size(), series = of_last < rows_.size() ? of_last : 1;
-    if (drawn) write_whole(folder_ / "wedge.png", encode_png(contact_sheet(tiles, series)));
+    if (drawn) write_whole(folder_ / "wedge.png", or_throw(picture_sheet(pictures, series)));
     return drawn;
 }
 

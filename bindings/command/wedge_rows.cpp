@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "runtime/graph/registry.h"
+#include "runtime/error.h"
 
 namespace rapid {
 namespace {

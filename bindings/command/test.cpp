@@ -14,6 +14,7 @@
 
 #include "bindings/command/child.h"
 #include "bindings/command/command.h"
+#include "bindings/command/or_throw.h"
 #include "bindings/command/test_report.h"
 #include "bindings/command/untrusted.h"
 
@@ -53,17 +54,17 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
 }
 
 // The child: runs the tests of one file and reports each.
-int run_child(const std::string& file, const TestOptions& options)
+int run_child(const std::string& file, const SceneTestOptions& options)
 {
     const auto send = [](const json& event) {
         const std::string line = event.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
         if (write(report_descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
             _exit(status_failed);
     };
-    run_test_file(file, options, [&](const TestEvent& event) {
+    or_throw(run_scene_tests(file, options, [&](const SceneTestEvent& event) {
         std::fflush(stdout);
         send({{"kind", event.kind}, {"name", event.name}, {"message", event.message}});
-    });
+    }));
     send({{"end", true}});
     return status_done;
 }
@@ -117,7 +118,7 @@ public:
     }
 
 private:
-    TestOptions options(const CommonOptions& common) const
+    SceneTestOptions options(const CommonOptions& common) const
     {
         return {filter_, already_run_, common.threads, [](const std::string& message) {
                     print_error(Error(message), false);
@@ -134,8 +135,8 @@ private:
             if (ending.orderly) return;
             // Its message, if any, is on standard error already.
             if (ending.running.empty())
-                return add({TestEvent::Broken, file.string(), "", "the tests ended with " + ending.how});
-            add({TestEvent::Failed, file.string(), ending.running,
+                return add({SceneTestEvent::Broken, file.string(), "", "the tests ended with " + ending.how});
+            add({SceneTestEvent::Failed, file.string(), ending.running,
                  fmt::format("{}: the test ended the process with {}", file.string(), ending.how)});
             already_run += ending.started;
         }
@@ -200,11 +201,11 @@ private:
             if (event.is_discarded()) break;  // cut off with the process
             ending.orderly = event.contains("end");
             if (ending.orderly) break;
-            const auto kind = event.at("kind").get<TestEvent::Kind>();
+            const auto kind = event.at("kind").get<SceneTestEvent::Kind>();
             const std::string name = event.at("name");
             const auto now = std::chrono::steady_clock::now();
             ending.running = "";
-            if (kind == TestEvent::Started) {
+            if (kind == SceneTestEvent::Started) {
                 ending.running = name;
                 ++ending.started;
             } else {

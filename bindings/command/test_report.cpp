@@ -26,11 +26,11 @@ public:
     void add(const TestResult& result) override
     {
         const std::string& name = result.name.empty() ? result.file : result.name;
-        if (result.kind == TestEvent::Failed || result.kind == TestEvent::Broken)
-            print(fmt::format("{} {}\n{}", result.kind == TestEvent::Failed ? "FAILED" : "BROKEN", name,
+        if (result.kind == SceneTestEvent::Failed || result.kind == SceneTestEvent::Broken)
+            print(fmt::format("{} {}\n{}", result.kind == SceneTestEvent::Failed ? "FAILED" : "BROKEN", name,
                               prefixed("  ", result.message)));
         else if (verbose_)
-            print(fmt::format("{} {}\n", result.kind == TestEvent::Passed ? "passed" : "skipped", name));
+            print(fmt::format("{} {}\n", result.kind == SceneTestEvent::Passed ? "passed" : "skipped", name));
     }
 
     void end(const TestCounts& counts) override
@@ -54,9 +54,9 @@ public:
             if (c == '#' || c == '\\') name += '\\';
             name += c == '\n' ? ' ' : c;
         }
-        const bool ok = result.kind == TestEvent::Passed || result.kind == TestEvent::Skipped;
+        const bool ok = result.kind == SceneTestEvent::Passed || result.kind == SceneTestEvent::Skipped;
         print(fmt::format("{} {} - {}{}\n{}", ok ? "ok" : "not ok", ++number_, name,
-                          result.kind == TestEvent::Skipped ? " # SKIP" : "",
+                          result.kind == SceneTestEvent::Skipped ? " # SKIP" : "",
                           ok ? "" : prefixed("# ", result.message)));
     }
 
@@ -104,16 +104,16 @@ public:
         suite.seconds += result.seconds;
         suite.cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3f}\"", xml(result.file),
                                    xml(result.name), result.seconds);
-        if (result.kind == TestEvent::Passed) {
+        if (result.kind == SceneTestEvent::Passed) {
             suite.cases += "/>\n";
             return;
         }
         const std::string first_line = result.message.substr(0, result.message.find('\n'));
-        if (result.kind == TestEvent::Skipped)
+        if (result.kind == SceneTestEvent::Skipped)
             suite.cases += ">\n      <skipped/>\n";
         else
             suite.cases += fmt::format(">\n      <{0} message=\"{1}\">{2}</{0}>\n",
-                                       result.kind == TestEvent::Failed ? "failure" : "error", xml(first_line),
+                                       result.kind == SceneTestEvent::Failed ? "failure" : "error", xml(first_line),
                                        xml(result.message));
         suite.cases += "    </testcase>\n";
     }
@@ -150,12 +150,12 @@ private:
 
 }  // namespace
 
-void TestCounts::add(TestEvent::Kind kind)
+void TestCounts::add(SceneTestEvent::Kind kind)
 {
-    passed += kind == TestEvent::Passed;
-    failed += kind == TestEvent::Failed;
-    skipped += kind == TestEvent::Skipped;
-    broken += kind == TestEvent::Broken;
+    passed += kind == SceneTestEvent::Passed;
+    failed += kind == SceneTestEvent::Failed;
+    skipped += kind == SceneTestEvent::Skipped;
+    broken += kind == SceneTestEvent::Broken;
 }
 
 std::unique_ptr<TestReport> TestReport::make(const std::string& format, bool verbose)

@@ -4,12 +4,12 @@
 #include <memory>
 #include <string>
 
-#include "bindings/host/testing/run_tests.h"
+#include "include/rapid/test.h"
 
 namespace rapid {
 
 struct TestResult {
-    TestEvent::Kind kind;  // not Started
+    SceneTestEvent::Kind kind;  // not Started
     std::string file;
     std::string name;     // of the test; empty for a file that is Broken
     std::string message;  // of Failed and Broken
@@ -19,7 +19,7 @@ struct TestResult {
 struct TestCounts {
     int passed = 0, failed = 0, skipped = 0, broken = 0;
 
-    void add(TestEvent::Kind kind);
+    void add(SceneTestEvent::Kind kind);
 };
 
 class TestReport {

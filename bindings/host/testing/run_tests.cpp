@@ -67,6 +67,7 @@ SceneRun read_run(lua_State* L)
     run.threads = static_cast<int>(number_field(L, 2, "threads").value_or(host.options.threads));
     if (const auto seconds = number_field(L, 2, "script_timeout")) run.session.script_timeout = *seconds;
     run.session.on_timeout = host.options.on_timeout;
+    run.session.interruptible = true;
     run.session.may_write = false;
     run.check_declarations = flag_field(L, 2, "check_declarations");
     run.watch_lanes = flag_field(L, 2, "watch_lanes");

@@ -24,7 +24,7 @@ struct TestOptions {
     std::string filter;   // a Lua pattern that a test's name must match; empty: all
     int already_run = 0;  // tests at the beginning of the file to skip
     int threads = 0;      // of scenes that do not set it; 0: all
-    // Called from the watchdog's thread when a scene's script overruns; must not return.
+    // Called from the watchdog's thread when a scene's script overruns, before it is stopped.
     std::function<void(const std::string& message)> on_timeout;
 };
 

@@ -15,13 +15,13 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/graph_options.h"
 #include "bindings/command/machine.h"
+#include "bindings/command/or_throw.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/command/study_run.h"
 #include "bindings/command/swept_setting.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/files/whole_file.h"
-#include "bindings/host/graph_parameter.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"
 
@@ -40,10 +40,10 @@ int read_repeat(const std::string& text)
 }
 
 // One line on standard error: redrawn on a terminal, one a row elsewhere.
-class StudyProgress {
+class RowProgress {
 public:
-    StudyProgress(ProgressStyle style, std::size_t rows) : style_(style), rows_(rows) {}
-    ~StudyProgress() { erase(); }
+    RowProgress(ProgressStyle style, std::size_t rows) : style_(style), rows_(rows) {}
+    ~RowProgress() { erase(); }
 
     void now(const std::string& what)
     {
@@ -119,7 +119,7 @@ public:
                fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]",
                            default_frames))
             ->type_name("FRAMES");
-        const Study defaults;
+        const SceneStudy defaults;
         app.add_option(
                "--error", error_,
                fmt::format("of a graph: rms, max or p95; or residual, of its constraints [default {}]", defaults.error))
@@ -152,42 +152,41 @@ public:
 
     int run(const CommonOptions& common) override
     {
-        const StudySource source{graph_.file(), !sweep_.empty(), graph_.session(), graph_.seed(), common.threads};
-        const Study study = describe(source);
+        const StudyChild child{{graph_.file(), !sweep_.empty(), graph_.scene_options(), {}}, common.threads};
+        const SceneStudy study = describe(child);
         open_folder();
 
-        StudyResult result{
-            study, {}, describe_machine(common.threads > 0 ? common.threads : tbb::info::default_concurrency())};
+        std::vector<StudyRun> rows;
         {
-            const std::vector<Knobs> rows = study.rows();
-            StudyProgress progress(quiet_ ? ProgressStyle::None : progress_style(stderr), rows.size());
-            for (const Knobs& knobs : rows) {
-                StudyRow row = measure(source, study, knobs, progress);
+            const std::vector<StudyKnobs> all = or_throw(study.rows());
+            RowProgress progress(quiet_ ? ProgressStyle::None : progress_style(stderr), all.size());
+            for (const StudyKnobs& knobs : all) {
+                StudyRun row = measure(child, study, knobs, progress);
                 progress.row(study.label(knobs), row.failed.empty() ? fmt::format("error {:.3g}, {:.3f} ms", row.error,
                                                                                   1e3 * row.median_seconds())
                                                                     : "failed: " + row.failed);
-                result.rows.push_back(std::move(row));
+                rows.push_back(std::move(row));
             }
         }
-        const std::string text =
-            to_json(result).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
-        write_whole(fs::path(folder_) / "study.json", text);
-        write_whole(fs::path(folder_) / "study.svg", to_svg(result));
-        print(json_ ? text : to_text(result));
-        return status_of(result);
+        const StudyReport report = or_throw(study.report(
+            rows, describe_machine(common.threads > 0 ? common.threads : tbb::info::default_concurrency())));
+        write_whole(fs::path(folder_) / "study.json", report.json + '\n');
+        write_whole(fs::path(folder_) / "study.svg", report.svg);
+        print(json_ ? report.json + '\n' : report.text);
+        return status_;
     }
 
 private:
     // The study of a graph that the options describe.
-    Study asked() const
+    SceneStudy asked() const
     {
-        Study study;
+        SceneStudy study;
         study.file = graph_.file();
         study.name = fs::path(graph_.file()).filename().string();
         for (const std::string& text : sweep_) {
             const auto [knob, values] = read_swept_setting("--sweep", text, "NODE.PARAM");
             if (study.sweep.count(knob)) throw Error(fmt::format("--sweep: {} is swept twice", knob));
-            for (const std::string& value : values) study.sweep[knob].push_back(read_argument(value));
+            for (const std::string& value : values) study.sweep[knob].push_back(knob_value(value));
         }
         if (error_) study.error = *error_;
         if (!study.compares() && !reference_.empty())
@@ -197,12 +196,12 @@ private:
         if (study.compares()) study.reference.emplace();
         for (const std::string& text : reference_) {
             if (study.sweep.size() == 1 && text.find('=') == std::string::npos) {
-                (*study.reference)[study.sweep.begin()->first] = read_argument(text);
+                (*study.reference)[study.sweep.begin()->first] = knob_value(text);
                 continue;
             }
             const auto [knob, values] = read_swept_setting("--reference", text, "NODE.PARAM");
             if (values.size() != 1) throw Error(fmt::format("--reference \"{}\"; it must be one value", text));
-            (*study.reference)[knob] = read_argument(values.front());
+            (*study.reference)[knob] = knob_value(values.front());
         }
         study.lines = lines_;
         study.last_frame_only = error_frames_ == "last";
@@ -214,25 +213,25 @@ private:
         } else {
             study.last = study.first + default_frames - 1;
         }
-        study.complete();
+        or_throw(study.complete());
         return study;
     }
 
     // Error: the file, the graph or the options are wrong; found before any scene is run.
-    Study describe(const StudySource& source) const
+    SceneStudy describe(const StudyChild& child) const
     {
-        if (!source.is_graph)
+        if (!child.source.is_scene)
             for (const auto& [given, option] : {std::pair{!reference_.empty(), "--reference"},
                                                 {!lines_.empty(), "--lines"},
                                                 {frames_.has_value(), "-f"},
                                                 {error_.has_value(), "--error"},
                                                 {error_frames_.has_value(), "--error-frames"}})
                 if (given) throw Error(fmt::format("{} goes with --sweep; a study file says it itself", option));
-        const Study study = source.is_graph ? asked() : Study();
+        const SceneStudy study = child.source.is_scene ? asked() : SceneStudy();
         const Outcome outcome =
-            outcome_of([&](const TellParent& tell) { describe_study(source, study, !frames_.has_value(), tell); });
+            outcome_of([&](const TellParent& tell) { describe_study(child, study, !frames_.has_value(), tell); });
         if (!outcome.failed.empty()) throw Error(outcome.failed);
-        Study described = read_study(outcome.event);
+        SceneStudy described = read_study(outcome.event);
         if (repeat_) described.repeat_runs = *repeat_;
         return described;
     }
@@ -247,58 +246,51 @@ private:
             throw Error(fmt::format("can't be written: {}", std::strerror(errno))).at({folder_, 0});
     }
 
-    StudyRow measure(const StudySource& source, const Study& study, const Knobs& knobs, StudyProgress& progress)
+    StudyRun measure(const StudyChild& child, const SceneStudy& study, const StudyKnobs& knobs, RowProgress& progress)
     {
-        StudyRow row;
-        row.knobs = knobs;
         const auto fail = [&](const Outcome& outcome, const char* whose) {
+            status_ = std::max<int>(status_, outcome.refused ? status_refused : status_failed);
+            StudyRun row;
+            row.knobs = knobs;
             row.failed = whose + outcome.failed;
-            row.refused = outcome.refused;
             return row;
         };
-        const Reference& reference = reference_of(source, study, knobs, progress);
+        const Reference& reference = reference_of(child, study, knobs, progress);
         if (!reference.outcome.failed.empty()) return fail(reference.outcome, "the reference: ");
         const std::string label = study.label(knobs);
         progress.now(label);
         const Outcome outcome = outcome_of(
-            [&](const TellParent& tell) { run_row(source, study, knobs, reference.store, tell); },
+            [&](const TellParent& tell) {
+                run_row(child, study, knobs, reference.frames ? &*reference.frames : nullptr, tell);
+            },
             [&](std::int64_t run) { progress.now(fmt::format("{}  run {}/{}", label, run, study.repeat_runs + 1)); });
         if (!outcome.failed.empty()) return fail(outcome, "");
-        read_row(outcome.event, row);
-        return row;
+        return read_row(outcome.event, knobs);
     }
 
     struct Reference {
-        std::string label;  // of its knobs; empty for a closed form, which needs no run
-        PointStore store;
+        std::string label;                     // of its knobs
+        std::optional<StudyReference> frames;  // nothing for a closed form, which needs no run
         Outcome outcome;
     };
 
     // Rows of one line share a reference, which is kept until another one is needed.
-    const Reference& reference_of(const StudySource& source, const Study& study, const Knobs& knobs,
-                                  StudyProgress& progress)
+    const Reference& reference_of(const StudyChild& child, const SceneStudy& study, const StudyKnobs& knobs,
+                                  RowProgress& progress)
     {
-        const Knobs wanted = study.reference ? study.reference_of(knobs) : Knobs();
+        const StudyKnobs wanted = study.reference ? study.reference_of(knobs) : StudyKnobs();
         const std::string label = study.label(wanted);
         if (kept_ && kept_->label == label) return *kept_;
-        kept_ = std::make_unique<Reference>();
-        kept_->label = label;
+        kept_.emplace().label = label;
         if (!study.reference) return *kept_;
         progress.now("reference: " + label);
+        kept_->frames = or_throw(StudyReference::make());
         kept_->outcome =
-            outcome_of([&](const TellParent& tell) { run_reference(source, study, wanted, kept_->store, tell); });
+            outcome_of([&](const TellParent& tell) { run_reference(child, study, wanted, *kept_->frames, tell); });
         return *kept_;
     }
 
-    static int status_of(const StudyResult& result)
-    {
-        int status = status_done;
-        for (const StudyRow& row : result.rows)
-            if (!row.failed.empty()) status = std::max<int>(status, row.refused ? status_refused : status_failed);
-        return status;
-    }
-
-    GraphOptions graph_;
+    SceneArguments graph_;
     UntrustedOptions untrusted_;
     std::vector<std::string> sweep_, reference_, lines_;
     std::optional<FrameSelection> frames_;
@@ -306,7 +298,8 @@ private:
     std::optional<int> repeat_;
     std::string folder_ = ".";
     bool json_ = false, quiet_ = false;
-    std::unique_ptr<Reference> kept_;
+    std::optional<Reference> kept_;
+    int status_ = status_done;
 };
 RAPID_COMMAND(StudyCommand);
 

@@ -16,7 +16,7 @@
 
 namespace rapid {
 
-using Knobs = std::map<std::string, Value>;  // numbers, booleans and texts
+using Knobs = std::map<std::string, Value>;  // numbers, booleans, texts and vectors
 
 struct Study {
     std::string file, name;
@@ -53,7 +53,6 @@ struct StudyRow {
     std::uint64_t compared = 0;   // points, summed over frames
     std::uint64_t missing = 0;    // points only in the run or only in the reference
     std::string failed;           // the reason; empty where it ran
-    bool refused = false;         // it failed before its first frame
 
     double median_seconds() const;
     bool at_rounding() const;

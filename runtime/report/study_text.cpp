@@ -17,6 +17,7 @@ ordered_json json_of(const Value& value)
 {
     if (const bool* boolean = value.get<bool>()) return *boolean;
     if (const std::string* text = value.get<std::string>()) return *text;
+    if (const Vec3d* vector = value.get<Vec3d>()) return {vector->x(), vector->y(), vector->z()};
     const double number = *value.get<double>();
     constexpr double exact = 9007199254740992;  // 2^53
     if (number == std::floor(number) && std::abs(number) < exact) return static_cast<std::int64_t>(number);

@@ -74,18 +74,7 @@ const std::set<std::string> small_tools = {
 // other one comes to them.
 const std::set<std::string> commands_from_inside = {
     "bindings/command/graph_options.cpp",
-    "bindings/command/merge.cpp",
-    "bindings/command/new.cpp",
-    "bindings/command/point_store.cpp",
-    "bindings/command/process_sandbox.cpp",
-    "bindings/command/study.cpp",
-    "bindings/command/study_run.cpp",
-    "bindings/command/test.cpp",
-    "bindings/command/test_report.cpp",
-    "bindings/command/untrusted.cpp",
     "bindings/command/view.cpp",
-    "bindings/command/wedge_report.cpp",
-    "bindings/command/wedge_rows.cpp",
     "bindings/view/film.cpp",
     "bindings/view/frame_cache.cpp",
     "bindings/view/frame_message.cpp",

@@ -1,4 +1,4 @@
-#include "bindings/command/point_store.h"
+#include "bindings/run/point_store.h"
 
 #include <fmt/format.h>
 #include <sys/mman.h>
@@ -31,6 +31,12 @@ PointStore::PointStore() : descriptor_(memfd_create("rapid study", MFD_CLOEXEC))
 }
 
 PointStore::~PointStore() { close(descriptor_); }
+
+void PointStore::clear()
+{
+    if (ftruncate(descriptor_, 0) != 0 || lseek(descriptor_, 0, SEEK_SET) != 0)
+        throw file_error("the frames of the reference can't be replaced", errno);
+}
 
 void PointStore::keep(std::int64_t frame, const PointSet& points)
 {

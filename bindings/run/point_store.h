@@ -16,6 +16,8 @@ public:
     PointStore(const PointStore&) = delete;
     PointStore& operator=(const PointStore&) = delete;
 
+    // Of the frames so far there is none.
+    void clear();
     // Columns without groups; frames in the order in which they will be read.
     void keep(std::int64_t frame, const PointSet& points);
     // Reads the frame at `place`, 0 at first, and advances it. Error: it is another frame.

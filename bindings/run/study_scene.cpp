@@ -1,0 +1,180 @@
+#include "bindings/run/study_scene.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "runtime/graph/evaluate.h"
+#include "runtime/io/compare.h"
+#include "runtime/io/id_order.h"
+#include "runtime/stopwatch.h"
+
+namespace rapid {
+namespace {
+
+// The output that is compared: main, or the only one.
+std::string compared_output(const Plan& plan)
+{
+    if (plan.outputs.size() > 1 && !plan.outputs.count("main"))
+        throw Error("the scene has several outputs and none is called main; call the one to compare main");
+    return plan.outputs.count("main") ? "main" : plan.outputs.begin()->first;
+}
+
+bool is_compared(const Study& study, std::int64_t frame)
+{
+    return study.last_frame_only ? frame == study.last : frame > study.first && frame <= study.last;
+}
+
+// The rounding error of a position after n frames, m, as the state is rounded to single precision once a frame: each
+// frame adds up to half an ulp of P, and of v times the remaining time, in both directions, so that n such errors grow
+// as sqrt(n).
+double rounding_of(const PointSet& points, std::int64_t frames, double time)
+{
+    const auto ulp_of_largest = [&](const Column<Vec3f>& column) {
+        float largest = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) largest = std::max(largest, column[i].cwiseAbs().maxCoeff());
+        return largest > 0 && std::isfinite(largest) ? std::ldexp(1.0, std::ilogb(largest) - 23) : 0;
+    };
+    return std::sqrt(static_cast<double>(frames)) * (ulp_of_largest(points.P()) + time * ulp_of_largest(points.v())) /
+           2;
+}
+
+// The error of a run, accumulated frame by frame.
+class Measure {
+public:
+    Measure(const Study& study, const Session& session) : study_(study), session_(session) {}
+
+    // The largest residual of the frame's constraints.
+    void add(const FrameFigures& figures, const PointSet& points)
+    {
+        residual_ = std::max(residual_, figures.constraint_residual_max);
+        constrained_ |= figures.constraint_rows > 0;
+        row_.compared += points.size();
+    }
+
+    void add(const PointSet& points, const PointSet& reference, std::int64_t frames, double time)
+    {
+        const IdMatch match = match_by_id(points, reference);
+        row_.missing += match.only_a.size() + match.only_b.size();
+        row_.compared += match.a.size();
+        if (match.a.empty()) return;  // reordered() takes an empty list for all points
+        if (study_.error == "own") {
+            own_ = std::max(own_, session_.study_error(reordered(points, match.a), reordered(reference, match.b)));
+            return;
+        }
+        row_.rounding = std::max(row_.rounding, rounding_of(points, frames, time));
+        for (std::size_t i = 0; i < match.a.size(); ++i)
+            distances_.push_back(
+                (points.P()[match.a[i]].cast<double>() - reference.P()[match.b[i]].cast<double>()).norm());
+    }
+
+    // Error: the run has no error that is a number.
+    StudyRow row() const
+    {
+        if (!study_.compares() && !constrained_)
+            throw Error("no constraint acts in the frames that are looked at, so that none has a residual");
+        if (study_.compares() && row_.compared == 0)
+            throw Error(
+                fmt::format("no point is both in the run and in its reference ({} are in one of them)", row_.missing));
+        StudyRow row = row_;
+        row.error = norm();
+        if (!std::isfinite(row.error)) throw Error(fmt::format("the error is {}, no finite number", row.error));
+        return row;
+    }
+
+private:
+    double norm() const
+    {
+        if (!study_.compares()) return residual_;
+        if (study_.error == "own") return own_;
+        if (study_.error == "p95") return p95_of(distances_);
+        double squares = 0, largest = 0;
+        for (const double distance : distances_) {
+            squares += distance * distance;
+            largest = distance <= largest ? largest : distance;  // NaN stays
+        }
+        return study_.error == "max" ? largest : std::sqrt(squares / static_cast<double>(distances_.size()));
+    }
+
+    const Study& study_;
+    const Session& session_;
+    StudyRow row_;
+    double own_ = -std::numeric_limits<double>::infinity();
+    double residual_ = 0;
+    bool constrained_ = false;  // some frame had constraints
+    std::vector<double> distances_;
+};
+
+// Computes all frames, and gives those that are compared to `keep`. Returns the time, s.
+double run_frames(const Plan& plan, const Study& study,
+                  const std::function<void(const FrameResult& result, const PointSet& points)>& keep)
+{
+    const std::string output = compared_output(plan);
+    const Stopwatch stopwatch;
+    Evaluator evaluator(plan);
+    evaluator.leave_out_errors();
+    while (evaluator.next_frame() <= study.last) {
+        const FrameResult result = evaluator.advance();
+        if (keep && is_compared(study, result.frame)) keep(result, result.outputs.at(output));
+    }
+    return stopwatch.seconds();
+}
+
+}  // namespace
+
+StudyScene::StudyScene(const Study& study, const Session& session, Graph graph, std::optional<std::uint64_t> seed)
+    : study_(study), session_(session), graph_(std::move(graph)), seed_(seed)
+{
+}
+
+Plan StudyScene::plan() const
+{
+    Plan plan(graph_, {seed_, {}});
+    if (study_.first < plan.first_frame())
+        throw Error(fmt::format("frames: {} is before the scene's first frame, {}", study_.first, plan.first_frame()));
+    return plan;
+}
+
+void StudyScene::keep_frames(PointStore& store, const Progress& progress) const
+{
+    const Plan plan = this->plan();
+    progress(0);
+    run_frames(plan, study_,
+               [&](const FrameResult& result, const PointSet& points) { store.keep(result.frame, points); });
+    progress(1);
+}
+
+StudyRow StudyScene::measure(const Knobs& knobs, const PointStore* reference, const Progress& progress) const
+{
+    Measure measure(study_, session_);
+    std::vector<double> seconds;
+    // The first run warms caches, compiled kernels and the allocator, and measures the error: each run of a scene gives
+    // the same bits. Each run has a plan of its own, so that it does not reuse the shapes of another.
+    for (int run = 0; run <= study_.repeat_runs; ++run) {
+        const Plan plan = this->plan();
+        if (run == 0) progress(0);
+        if (run > 0) {
+            seconds.push_back(run_frames(plan, study_, {}));
+        } else {
+            std::uint64_t place = 0;
+            const std::string output = compared_output(plan);
+            run_frames(plan, study_, [&](const FrameResult& result, const PointSet& points) {
+                if (!study_.compares()) return measure.add(result.figures, points);
+                const double time = result.time.at(output), fps = result.fps.at(output);
+                const Frame frame{static_cast<double>(result.frame), time, 1 / fps};
+                const PointSet compared =
+                    study_.reference ? reference->read(result.frame, place) : session_.study_reference(frame, knobs);
+                measure.add(points, compared, result.frame - plan.first_frame(), time);
+            });
+        }
+        progress(run + 1);
+    }
+    StudyRow row = measure.row();
+    row.knobs = knobs;
+    row.seconds = std::move(seconds);
+    return row;
+}
+
+}  // namespace rapid

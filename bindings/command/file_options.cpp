@@ -38,9 +38,9 @@ void read_camera(const std::string& text, PictureSettings& pictures)
             fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
                         "another that it looks at, and its vertical angle of view, in degrees",
                         text));
-    pictures.position = {n[0], n[1], n[2]};
-    pictures.target = {n[3], n[4], n[5]};
-    if (n.size() == 7) pictures.fov = n[6];
+    pictures.camera.position = {n[0], n[1], n[2]};
+    pictures.camera.target = {n[3], n[4], n[5]};
+    if (n.size() == 7) pictures.camera.fov = n[6];
 }
 
 PictureSize read_size(const std::string& text)

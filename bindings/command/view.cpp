@@ -12,13 +12,14 @@
 #include "bindings/command/cache_files.h"
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/graph_options.h"
+#include "bindings/command/or_throw.h"
+#include "bindings/command/scene_arguments.h"
 #include "bindings/command/signals.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/host/modules.h"
 #include "bindings/view/requests.h"
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
+#include "include/rapid/installation.h"
 #include "runtime/files/output_file.h"
 #include "runtime/files/program_path.h"
 #include "runtime/memory_budget.h"
@@ -32,7 +33,7 @@ constexpr int watch_interval = 100;  // ms between two looks at the files that a
 // In an installation beside the Lua modules, in a checkout among the sources.
 std::filesystem::path page_folder()
 {
-    const std::filesystem::path root = lua_folder().parent_path();
+    const std::filesystem::path root = std::filesystem::path(or_throw(Installation::find()).lua).parent_path();
     std::error_code none;
     return std::filesystem::exists(root / "view/index.html", none) ? root / "view" : root / "bindings/view/page";
 }
@@ -95,15 +96,14 @@ public:
         const Threads threads(common.threads);
         // The run takes memory, too.
         ViewOptions options{graph_.file(),
-                            graph_.session(),
-                            graph_.seed(),
+                            graph_.scene_options(),
                             {},
                             {},
                             threads.count(),
                             static_cast<std::size_t>(memory_budget() / 2),
                             cache_,
                             untrusted_.asked()};
-        options.session.quiet = true;
+        options.scene.log = nullptr;  // the page has the warnings
         if (frames_) options.frames = {frames_->first, frames_->last};
         if (std::filesystem::path(graph_.file()).extension() != ".lua")
             options.files = find_cache(graph_.file()).frames;
@@ -141,7 +141,7 @@ private:
 
     static constexpr int inherited_socket = 3;  // of the process that restarts in the sandbox
 
-    GraphOptions graph_;
+    SceneArguments graph_;
     UntrustedOptions untrusted_;
     std::optional<FrameSelection> frames_;
     std::string cache_;

@@ -81,15 +81,7 @@ FrameFiles frame_files(const FileOutputs& files)
         std::max(asked.size.width, asked.size.height) > most_pixels)
         refuse(fmt::format("a picture of {}x{}; each must be from 1 to {}", asked.size.width, asked.size.height,
                            most_pixels));
-    if (asked.fov && !(*asked.fov > 0 && *asked.fov < 180))
-        refuse(fmt::format("fov = {}; it must be between 0 and 180 degrees", *asked.fov));
-    PictureOptions picture;
-    picture.width = asked.size.width;
-    picture.height = asked.size.height;
-    if (asked.position) picture.position = Vec3d(asked.position->data());
-    if (asked.target) picture.target = Vec3d(asked.target->data());
-    if (asked.fov) picture.fov = *asked.fov * M_PI / 180;
-    return FrameFiles(files.outputs, std::move(picture));
+    return FrameFiles(files.outputs, *picture_options(asked.camera, asked.size));
 }
 
 Result<OutputFormat> output_format(const std::string& output)

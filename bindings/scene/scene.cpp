@@ -9,8 +9,6 @@
 
 #include "bindings/scene/host_object.h"
 #include "bindings/scene/scene_impl.h"
-#include "runtime/picture/frame_picture.h"
-#include "runtime/picture/png_file.h"
 
 namespace rapid {
 namespace {
@@ -77,6 +75,7 @@ Result<Scene> Scene::open_with(const std::string& file, std::optional<std::strin
         impl->text = std::move(text);
         impl->options = std::move(options);
         impl->hooks = std::move(hooks);
+        impl->keeps_inputs = impl->hooks.keep_state;
         if (impl->options.threads > 0) impl->arena.emplace(impl->options.threads);
         std::map<std::string, std::string> set;
         for (const auto& [name, value] : impl->options.set) set[name] = text_of(value);
@@ -94,6 +93,8 @@ Result<Scene> Scene::open_with(const std::string& file, std::optional<std::strin
 
 const std::vector<SceneParameter>& Scene::parameters() const { return impl_->parameters; }
 const std::vector<SceneNode>& Scene::nodes() const { return impl_->nodes; }
+const std::vector<SceneOutput>& Scene::outputs() const { return impl_->outputs; }
+double Scene::fps() const { return impl_->plan->simulations.front().fps; }
 const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
 std::int64_t Scene::first_frame() const { return impl_->plan->first_frame(); }
 std::int64_t Scene::next_frame() const { return impl_->next; }
@@ -136,6 +137,7 @@ Result<Done> Scene::offer(const std::string& name, const HostObject& object)
 {
     return impl_->call(SceneError::WrongCall, [&] {
         impl_->offers->objects[name] = make_object(name, object, impl_->options.guard_callbacks);
+        impl_->behind_frame.reset();  // its functions may take it
         return Done();
     });
 }
@@ -188,8 +190,7 @@ Result<SceneSnapshot> Scene::save()
 Result<Done> Scene::restore(const SceneSnapshot& snapshot)
 {
     return impl_->call(SceneError::WrongCall, [&] {
-        if (snapshot.data_->nodes != impl_->hash_of_nodes())
-            refuse("the snapshot is of another graph; restore it in a scene with the same nodes");
+        impl_->refuse_unless_of_this_graph(snapshot);
         impl_->start_again();
         try {
             impl_->evaluator->load(snapshot.data_->snapshot);
@@ -204,24 +205,5 @@ Result<Done> Scene::restore(const SceneSnapshot& snapshot)
 }
 
 void Scene::cancel() { impl_->cancel(); }
-
-Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)
-{
-    return impl_->call(SceneError::WrongCall, [&] {
-        const SceneFrame::Data& data = *frame.data_;
-        if (data.scene != impl_.get()) refuse("the frame is of another scene");
-        if (!impl_->picture_scene) impl_->picture_scene = std::make_unique<SceneOfPlan>(*impl_->plan);
-        PictureOptions options;
-        options.width = size.width;
-        options.height = size.height;
-        FrameInfo info;
-        info.number = static_cast<int>(frame.number());
-        info.time = frame.time();
-        info.fps = frame.fps();
-        info.picture = std::make_shared<PictureOptions>(options);
-        info.scene = impl_->picture_scene->at(frame.number());
-        return encode_png(picture_of(data.result.outputs.at(frame.output_), info));
-    });
-}
 
 }  // namespace rapid

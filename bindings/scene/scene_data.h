@@ -3,12 +3,16 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "include/rapid/scene.h"
+#include "include/rapid/shapes.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/value.h"
+#include "runtime/picture/scene.h"
 
 namespace rapid {
 
@@ -17,19 +21,35 @@ struct SceneFrame::Data {
     std::vector<std::string> warnings;
     const void* scene = nullptr;  // whose plan it is of; not followed
 
+    // That a frame has chosen at first: "main", or the first one where there is none.
+    std::string first_output() const;
+
     // Columns that are uniform, written out. On first request, from any thread.
     mutable std::mutex mutex;
     mutable std::map<std::string, AnyColumn> expanded;  // by OUTPUT/NAME
 };
 
+class StateFile;
+
 struct SceneSnapshot::Data {
+    // Error: what SceneSnapshot::read() refuses.
+    static SceneSnapshot read_from(const StateFile& file);
+
     Snapshot snapshot;
     std::string file;   // of the scene
     std::string nodes;  // a hash of those of the graph, by type and name
 };
 
+struct SceneShapes::Data {
+    std::shared_ptr<const PictureScene> scene;
+    std::vector<std::string> warnings;
+};
+
 SceneValue value_of(const DetailValue& detail);
 // Of a parameter: a boolean, a number, a text or three numbers.
 SceneValue value_in_header(const Value& value);
+
+// As the renderer takes it, which refuses sizes. Refusal: an angle of view that no camera has.
+std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camera, PictureSize size);
 
 }  // namespace rapid

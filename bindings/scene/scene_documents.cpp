@@ -1,4 +1,6 @@
-// Types of nodes, without a scene.
+// What is Rapid's, without a scene: types of nodes, the memory that it keeps.
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "bindings/host/annotations.h"
@@ -7,6 +9,7 @@
 #include "bindings/scene/scene_error.h"
 #include "include/rapid/scene.h"
 #include "runtime/graph/plugin.h"
+#include "runtime/points/spare_pages.h"
 
 namespace rapid {
 namespace {
@@ -25,6 +28,18 @@ Result<Done> loaded(const std::string& from, void (*load)(const std::string&))
 
 Result<Done> Scene::load_plugin(const std::string& file) { return loaded(file, rapid::load_plugin); }
 Result<Done> Scene::load_plugins(const std::string& path) { return loaded(path, rapid::load_plugins); }
+
+Result<Done> Scene::keep_spare_columns(std::size_t columns)
+{
+    try {
+        constexpr std::size_t most = 4096;  // each release goes over them
+        if (columns > most) refuse(fmt::format("{} columns are to be kept; it must be at most {}", columns, most));
+        SparePages::all().keep(columns);
+        return Done();
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
 
 Result<NodeDocuments> Scene::documents()
 {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include "include/rapid/scene.h"
 #include "runtime/error.h"
@@ -25,10 +26,11 @@ struct Refusal {
 SceneError caught_error(SceneError::Kind kind);
 
 // On a thread that may have no caller: what it throws is dropped.
-inline void call_hook(const std::function<void(const std::string& text)>& hook, const std::string& text)
+template <class T>
+void call_hook(const std::function<void(const T& told)>& hook, const std::type_identity_t<T>& told)
 {
     if (hook) try {
-            hook(text);
+            hook(told);
         } catch (...) {
         }
 }

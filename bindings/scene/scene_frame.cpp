@@ -5,12 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
-#include "bindings/scene/scene_error.h"
 #include "runtime/files/left_out.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
+#include "runtime/points/id_index.h"
 #include "runtime/report/frame_profile.h"
 #include "runtime/report/statistics.h"
 
@@ -43,6 +44,25 @@ SceneColumn view_of(std::string_view name, const Column<T>& column)
     return view;
 }
 
+constexpr char what_a_frame_is[] = "frame of a scene";
+
+// What a file of a frame holds.
+struct KeptFrame {
+    std::int64_t number = 0;
+    std::map<std::string, double> fps, time;
+    std::map<std::string, PointSet> outputs;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(number, fps, time, outputs);
+        if constexpr (Archive::is_loading::value) {
+            StateReader::expect(!outputs.empty());
+            for (const auto& [name, points] : outputs) StateReader::expect(fps.contains(name) && time.contains(name));
+        }
+    }
+};
+
 SceneError no_such(const char* what, std::string_view name, const std::vector<std::string>& names)
 {
     return wrong_call(fmt::format("the frame has no {} \"{}\"{}", what, name, did_you_mean(name, names)));
@@ -57,6 +77,11 @@ std::vector<std::string> keys_of(const Map& map)
 }
 
 }  // namespace
+
+std::string SceneFrame::Data::first_output() const
+{
+    return result.outputs.contains("main") ? "main" : result.outputs.begin()->first;
+}
 
 SceneFrame::SceneFrame(std::shared_ptr<const Data> data, std::string output)
     : data_(std::move(data)), output_(std::move(output))
@@ -114,6 +139,26 @@ Result<SceneColumn> SceneFrame::expanded(std::string_view name) const
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }
+}
+
+Result<std::vector<std::uint32_t>> SceneFrame::places(const std::vector<std::int64_t>& ids) const
+{
+    static_assert(no_place == IdIndex::none);
+    try {
+        const IdIndex index(data_->result.outputs.at(output_).id());
+        std::vector<std::uint32_t> places(ids.size());
+        std::transform(ids.begin(), ids.end(), places.begin(), [&](std::int64_t id) { return index[id]; });
+        return places;
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+std::size_t SceneFrame::bytes() const
+{
+    std::size_t bytes = 0;
+    for (const auto& [name, points] : data_->result.outputs) bytes += points.bytes();
+    return bytes;
 }
 
 Result<std::string_view> SceneFrame::text_of(std::uint32_t token)
@@ -180,6 +225,21 @@ std::string SceneFrame::statistics_json() const
 
 std::string SceneFrame::profile_json() const { return rapid::profile_json(data_->result); }
 
+Result<SceneFrame> SceneFrame::without_statistics() const
+{
+    try {
+        auto data = std::make_shared<Data>();
+        data->result.frame = data_->result.frame;
+        data->result.outputs = data_->result.outputs;  // columns are shared
+        data->result.fps = data_->result.fps;
+        data->result.time = data_->result.time;
+        data->scene = data_->scene;
+        return SceneFrame(std::move(data), output_);
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
 Result<Done> SceneFrame::write(const std::string& path) const
 {
     try {
@@ -207,6 +267,29 @@ Result<SceneFrame> SceneFrame::read(const std::string& path)
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }
+}
+
+Result<Done> SceneFrame::save(const std::string& path, const std::string& key) const
+{
+    return of_file(path, [&] {
+        const FrameResult& result = data_->result;
+        write_kept(path, what_a_frame_is, key, KeptFrame{result.frame, result.fps, result.time, result.outputs});
+        return Done();
+    });
+}
+
+Result<SceneFrame> SceneFrame::load(const std::string& path, const std::string& key)
+{
+    return of_file(path, [&] {
+        auto kept = read_kept<KeptFrame>(path, what_a_frame_is, key);
+        auto data = std::make_shared<Data>();
+        data->result.frame = kept.number;
+        data->result.outputs = std::move(kept.outputs);
+        data->result.fps = std::move(kept.fps);
+        data->result.time = std::move(kept.time);
+        const std::string output = data->first_output();
+        return SceneFrame(std::move(data), output);
+    });
 }
 
 Result<SceneReport> SceneFrame::describe() const

@@ -15,6 +15,19 @@ SceneValue value_in_header(const Value& value)
     return *value.get<std::string>();
 }
 
+namespace {
+
+std::vector<SceneParameter> parameters_of(const Session& session)
+{
+    std::vector<SceneParameter> parameters;
+    for (const Session::Parameter& parameter : session.parameters())
+        parameters.push_back(
+            {parameter.name, parameter.doc, value_in_header(parameter.value), value_in_header(parameter.fallback)});
+    return parameters;
+}
+
+}  // namespace
+
 std::string text_of(const SceneValue& value)
 {
     if (const auto* number = std::get_if<double>(&value)) return fmt::format("{}", *number);
@@ -43,7 +56,8 @@ SceneError Scene::Impl::error_of_call(SceneError::Kind kind)
     return error;
 }
 
-SessionOptions Scene::Impl::session_options(const std::map<std::string, std::string>& set)
+SessionOptions Scene::Impl::session_options(const std::map<std::string, std::string>& set,
+                                            std::shared_ptr<InputContents> read)
 {
     SessionOptions result;
     result.set = set;
@@ -57,8 +71,11 @@ SessionOptions Scene::Impl::session_options(const std::map<std::string, std::str
         is_late = true;
         call_hook(hooks.late, message);
     };
-    if (hooks.reads)
-        result.on_read = [this](const std::filesystem::path& path) { call_hook(hooks.reads, path.string()); };
+    if (hooks.reads || read)
+        result.on_read = [this, read = std::move(read)](const std::filesystem::path& path) {
+            if (read) read->add(path);
+            call_hook(hooks.reads, path.string());
+        };
     result.keeps_state = hooks.keep_state;
     result.offers = offers;
     result.quiet = !options.log;
@@ -96,7 +113,19 @@ void Scene::Impl::take_offers()
 
 void Scene::Impl::load(std::map<std::string, std::string> set)
 {
-    auto fresh = std::make_unique<Session>(file, session_options(set));
+    std::shared_ptr<InputContents> read;
+    if (keeps_inputs)
+        read = std::make_shared<InputContents>(std::filesystem::path(file).parent_path(), InputContents::Code::LeftOut);
+    SessionOptions session_with = session_options(set, read);
+    session_with.interruption = std::make_shared<Interruption>();
+    Cancellation opening;
+    const Cancellation::Scope scope(hooks.stop.stop_possible() ? &opening : Cancellation::current());
+    const std::stop_callback stop(hooks.stop, [&opening, scripts = session_with.interruption] {
+        opening.request();
+        scripts->request(Cancellation::text, Interruption::Asked);
+    });
+    auto fresh = std::make_unique<Session>(file, std::move(session_with));
+    if (hooks.parameters) call_hook(hooks.parameters, parameters_of(*fresh));
     std::vector<std::string> told = fresh->take_warnings();
     tell(told);  // the plan may fail for what they warn of
     auto fresh_plan = std::make_unique<Plan>(fresh->graph(), plan_options());
@@ -108,7 +137,11 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
     session = std::move(fresh);
     settings = std::move(set);
     warnings = std::move(told);
-    describe_scene();
+    inputs = std::move(read);
+    opened = inputs ? inputs->take() : Fingerprint();
+    behind.clear();
+    behind_frame.reset();
+    describe_scene(*fresh_plan);
     start(std::move(fresh_plan));
 }
 
@@ -120,15 +153,19 @@ PlanOptions Scene::Impl::plan_options() const
     return result;
 }
 
-void Scene::Impl::describe_scene()
+void Scene::Impl::describe_scene(const Plan& planned)
 {
-    parameters.clear();
-    for (const Session::Parameter& parameter : session->parameters())
-        parameters.push_back(
-            {parameter.name, parameter.doc, value_in_header(parameter.value), value_in_header(parameter.fallback)});
+    parameters = parameters_of(*session);
     nodes.clear();
     for (const NodePtr& node : session->graph().nodes)
         nodes.push_back({node->name, node->type->name, node->location.file, node->location.line});
+    outputs.clear();
+    for (const auto& [name, node] : planned.outputs) {
+        SceneOutput& output = outputs.emplace_back();
+        output.name = name;
+        for (const std::size_t simulation : planned.nodes[node].carries)
+            output.creates.push_back(planned.simulations[simulation].create->name);
+    }
 }
 
 std::string Scene::Impl::hash_of_nodes() const
@@ -173,8 +210,7 @@ SceneFrame Scene::Impl::advance()
     next = evaluator->next_frame();
     has_advanced = true;
     tell(data->warnings);
-    const auto& outputs = data->result.outputs;
-    const std::string output = outputs.count("main") ? "main" : outputs.begin()->first;
+    const std::string output = data->first_output();
     return SceneFrame(std::move(data), output);
 }
 
@@ -196,6 +232,12 @@ std::function<void(const std::string& message)> Scene::Impl::too_late() const
 void Scene::Impl::refuse_unless_ready() const
 {
     if (!evaluator) refuse("the scene's last frame failed; call restart(), restore() or set() first");
+}
+
+void Scene::Impl::refuse_unless_of_this_graph(const SceneSnapshot& snapshot) const
+{
+    if (snapshot.data_->nodes != hash_of_nodes())
+        refuse("the snapshot is of another graph; restore it in a scene with the same nodes");
 }
 
 }  // namespace rapid

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "bindings/host/offers.h"
 #include "bindings/host/picture_scene.h"
 #include "bindings/host/session.h"
+#include "bindings/run/fingerprint.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_error.h"
 #include "include/rapid/scene.h"
@@ -40,6 +42,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::optional<std::string> text;
     SceneOptions options;
     SceneHooks hooks;
+    bool keeps_inputs = false;  // what it reads, for its fingerprint
     // Of a run that writes files.
     bool may_write = false;
     PlanOptions plan_of_run;  // but seed and keep_all, which are those of the options
@@ -50,10 +53,15 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::unique_ptr<Session> session;
     std::vector<SceneParameter> parameters;
     std::vector<SceneNode> nodes;
+    std::vector<SceneOutput> outputs;
     std::vector<std::string> warnings;
     std::unique_ptr<Plan> plan;
     std::unique_ptr<Evaluator> evaluator;  // null behind an error
     std::unique_ptr<SceneOfPlan> picture_scene;
+    std::map<std::string, SceneFrame> behind;   // the points behind the nodes in the frame that was asked for last
+    std::optional<std::int64_t> behind_frame;   // which one that is
+    std::shared_ptr<InputContents> inputs;      // of the files that are read; null where none are kept
+    std::map<std::string, std::string> opened;  // the contents of those of opening
     std::int64_t next = 1;
     bool has_advanced = false;
 
@@ -93,13 +101,15 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
 
     // What is being handled, inside of a catch block.
     SceneError error_of_call(SceneError::Kind kind);
-    SessionOptions session_options(const std::map<std::string, std::string>& set);
+    // read: keeps the contents of what the session reads; may be null.
+    SessionOptions session_options(const std::map<std::string, std::string>& set,
+                                   std::shared_ptr<InputContents> read = nullptr);
     PlanOptions plan_options() const;
     void tell(const std::vector<std::string>& texts) const;
     void take_offers();
     // Runs the file with these settings. The scene is as it was where that fails.
     void load(std::map<std::string, std::string> set);
-    void describe_scene();
+    void describe_scene(const Plan& planned);
     // By which snapshots know their graph.
     std::string hash_of_nodes() const;
     // A new run of the graph: operators keep state, and belong to a plan.
@@ -129,7 +139,16 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         }
         session->take_warnings();  // of frames, which the run tells
     }
+    // Computes the frames up to this one beside the scene. from: may be null; results: told of each node's.
+    void compute_beside(const Plan& apart, std::int64_t frame, const Snapshot* from, Evaluator::ResultHook results);
+    // The points behind a node of a plan as a frame.
+    SceneFrame frame_behind(const Plan& apart, const PlannedNode& planned, std::int64_t frame, PointSet points) const;
+    const std::map<std::string, SceneFrame>& points_behind_all(std::int64_t frame, const SceneSnapshot* from);
+    PointOrigin origin(const SceneFrame& frame, std::int64_t id, const SceneSnapshot* from);
+    SceneShapes shapes_at(std::int64_t frame);
     void refuse_unless_ready() const;
+    void refuse_unless_of_this_graph(const SceneSnapshot& snapshot) const;
+    void refuse_unless_kept() const;  // keep_state
     // What SceneHooks::beyond_memory asks for, with the place of what is computed; empty where nobody does.
     std::function<void(const std::string& message)> too_late() const;
 
@@ -149,6 +168,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         Scripts scripts;
         Cancellation::Scope scope;
         MemoryWatch watch;
+        std::stop_callback<std::function<void()>> stop;
         // Error: it was cancelled before.
         explicit Running(Impl& impl)
             : scripts(impl),
@@ -159,7 +179,8 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
                       impl.session->interrupt(message);
                       impl.cancellation.request(message);
                   },
-                  impl.too_late())
+                  impl.too_late()),
+              stop(impl.hooks.stop, [&impl] { impl.cancel(); })
         {
             impl.cancellation.check();
         }

@@ -1,8 +1,9 @@
-// What is told of a scene: its plan, its graph as a picture, the points behind a node, and the lives of single points.
+// What is told of a scene: its plan, its graph as a picture, and the lives of single points.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 #include "bindings/scene/scene_impl.h"
 #include "runtime/report/biography.h"
@@ -34,6 +35,20 @@ Result<std::string> Scene::graph(GraphForm form)
                 return to_json(picture, lay_out(dot, "json"));
         }
         refuse(fmt::format("the form is {}; it must be one of GraphForm", static_cast<int>(form)));
+    });
+}
+
+Result<std::string> Scene::graph_json(GraphLayout* kept)
+{
+    return impl_->call(SceneError::WrongCall, [&] {
+        const GraphPicture picture = picture_of(*impl_->plan);
+        if (!kept) return to_json(picture, "");
+        std::string dot = to_dot(picture, Tips::LeftOut);
+        if (kept->graph != dot) {
+            std::string places = lay_out(dot, "json");
+            *kept = {std::move(dot), std::move(places)};
+        }
+        return to_json(picture, kept->places);
     });
 }
 
@@ -72,48 +87,6 @@ Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
         });
     result.trace.lives = {to_text(lives), to_json(lives)};
     return result;
-}
-
-SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t frame)
-{
-    const Running running(*this);
-    const Plan watched(session->graph(), plan_options());
-    const auto& nodes_of_plan = watched.nodes;
-    const auto found = std::find_if(nodes_of_plan.begin(), nodes_of_plan.end(),
-                                    [&](const PlannedNode& planned) { return planned.node->name == node; });
-    if (found == nodes_of_plan.end()) {
-        std::vector<std::string> names;
-        for (const SceneNode& one : nodes) names.push_back(one.name);
-        const bool is_left_out = std::find(names.begin(), names.end(), node) != names.end();
-        refuse(is_left_out ? fmt::format("node \"{}\" is left out: no output comes from it", node)
-                           : fmt::format("the scene has no node \"{}\"{}", node, did_you_mean(node, names)));
-    }
-    if (frame < watched.first_frame())
-        refuse(fmt::format("frame {} is before the scene's first, {}", frame, watched.first_frame()));
-    PointSet points;  // of a node whose result never changes, those of its only evaluation
-    Evaluator run(watched, {}, [&](const Node& of, std::int64_t, const PointSet& result) {
-        if (of.name == node) points = result;
-    });
-    run.leave_out_errors();
-    beside([&] {
-        while (run.next_frame() <= frame) run.advance();
-    });
-    const PlannedSimulation& simulation = watched.simulations[found->simulation];
-    auto data = std::make_shared<SceneFrame::Data>();
-    data->scene = this;
-    data->result.frame = frame;
-    data->result.outputs.emplace(node, std::move(points));
-    data->result.fps.emplace(node, simulation.fps);
-    data->result.time.emplace(node, static_cast<double>(frame - simulation.start) / simulation.fps);
-    return SceneFrame(std::move(data), node);
-}
-
-Result<SceneFrame> Scene::points_behind(const std::string& node, std::int64_t frame)
-{
-    return impl_->call(SceneError::FailedFrame, [&] {
-        impl_->start_again();
-        return impl_->points_behind(node, frame);
-    });
 }
 
 Result<SceneTrace> Scene::trace(const TraceOptions& options)

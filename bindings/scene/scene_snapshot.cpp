@@ -4,11 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
-#include "bindings/scene/scene_error.h"
-#include "runtime/graph/abi.h"
-#include "runtime/io/state_file.h"
-#include "runtime/points/state_archive.h"
 #include "runtime/report/number_text.h"
 
 namespace rapid {
@@ -49,34 +46,20 @@ std::string told_as_text(const std::string& path, const CheckedJson& told)
     return text;
 }
 
-// What f gives of a file. Error: with the file.
-template <class F>
-auto of_file(const std::string& path, const F& f) -> Result<decltype(f())>
-{
-    try {
-        try {
-            return f();
-        } catch (Error& error) {
-            throw error.at({path, 0});
-        } catch (const nlohmann::json::exception&) {
-            throw Error("its header is not that of a snapshot").at({path, 0});
-        }
-    } catch (...) {
-        return caught_error(SceneError::WrongCall);
-    }
-}
-
 }  // namespace
 
 SceneSnapshot::SceneSnapshot(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
 std::int64_t SceneSnapshot::frame() const { return data_->snapshot.frame; }
 std::size_t SceneSnapshot::size() const { return data_->snapshot.size(); }
 
-Result<Done> SceneSnapshot::write(const std::string& path) const
+Result<Done> SceneSnapshot::write(const std::string& path) const { return write(path, ""); }
+
+Result<Done> SceneSnapshot::write(const std::string& path, const std::string& key) const
 {
     return of_file(path, [&] {
         const Snapshot& snapshot = data_->snapshot;
         CheckedJson header = {{"what", what_it_is}, {"graph", data_->file}, {"frame", snapshot.frame}};
+        if (!key.empty()) header["key"] = key;
         for (const auto& [name, state] : snapshot.simulations) header["simulations"][name] = state.size();
         for (const auto& [name, state] : snapshot.nodes) header["nodes"][name] = state.size();
         header["fingerprint"] = {{"Rapid", RAPID_ABI}, {"nodes", data_->nodes}};
@@ -87,21 +70,30 @@ Result<Done> SceneSnapshot::write(const std::string& path) const
     });
 }
 
+SceneSnapshot SceneSnapshot::Data::read_from(const StateFile& file)
+{
+    if (file.header().at("what") != what_it_is)
+        throw Error("it is of a run of the command, which goes on from it by itself: rapid run --cache");
+    const CheckedJson& fingerprint = file.header().at("fingerprint");
+    require_this_build(fingerprint.at("Rapid").get<std::string>());
+    auto data = std::make_shared<Data>();
+    data->file = file.header().at("graph").get<std::string>();
+    data->nodes = fingerprint.at("nodes").get<std::string>();
+    rapid::restore(data->snapshot, file.state());
+    return SceneSnapshot(std::move(data));
+}
+
 Result<SceneSnapshot> SceneSnapshot::read(const std::string& path)
+{
+    return of_file(path, [&] { return Data::read_from(StateFile(path)); });
+}
+
+Result<SceneSnapshot> SceneSnapshot::read(const std::string& path, const std::string& key)
 {
     return of_file(path, [&] {
         const StateFile file(path);
-        if (file.header().at("what") != what_it_is)
-            throw Error("it is of a run of the command, which goes on from it by itself: rapid run --cache");
-        const CheckedJson& fingerprint = file.header().at("fingerprint");
-        if (fingerprint.at("Rapid") != RAPID_ABI)
-            throw Error(fmt::format("it is of Rapid {}, and this is {}; write it anew",
-                                    fingerprint.at("Rapid").get<std::string>(), RAPID_ABI));
-        auto data = std::make_shared<Data>();
-        data->file = file.header().at("graph").get<std::string>();
-        data->nodes = fingerprint.at("nodes").get<std::string>();
-        rapid::restore(data->snapshot, file.state());
-        return SceneSnapshot(std::move(data));
+        require_key(file.header(), key);
+        return Data::read_from(file);
     });
 }
 

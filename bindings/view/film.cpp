@@ -3,20 +3,12 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
-#include <filesystem>
 #include <fstream>
 #include <utility>
 
-#include "runtime/files/temporary_folder.h"
-#include "runtime/io/film.h"
-#include "runtime/io/frame_writer.h"
+#include "bindings/command/or_throw.h"
 
 namespace rapid {
-namespace {
-
-namespace fs = std::filesystem;
-
-}  // namespace
 
 ViewFilm::ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of)
     : wish_(std::move(wish)), frame_of_(std::move(frame_of))
@@ -25,11 +17,9 @@ ViewFilm::ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of
         throw Error(fmt::format("a film can't be a \"{}\"; it must be .mp4, .webm or .gif", wish_.extension));
     if (wish_.last < wish_.first)
         throw Error(fmt::format("a film of the frames {} to {} has none", wish_.first, wish_.last));
-    const PictureOptions& picture = *wish_.picture;
-    if (needs_even_edges(wish_.extension) && (picture.width % 2 != 0 || picture.height % 2 != 0))
-        throw Error(fmt::format("a {} film of {} x {} can't be made; both edges must be even", wish_.extension,
-                                picture.width, picture.height));
-    require_ffmpeg();
+    folder_.emplace("film");
+    file_ = folder_->path() / ("film" + wish_.extension);
+    drawn_ = or_throw(SceneFilm::begin(file_, wish_.film));
     progress_.of = wish_.last - wish_.first + 1;
     thread_ = std::thread([this] { run(); });
 }
@@ -62,6 +52,8 @@ void ViewFilm::run()
         } catch (const std::exception& caught) {
             error = caught.what();
         }
+        drawn_.reset();
+        folder_.reset();
     });
     const std::lock_guard lock(mutex_);
     film_ = std::move(film);
@@ -71,33 +63,21 @@ void ViewFilm::run()
 
 std::string ViewFilm::draw()
 {
-    const TemporaryFolder folder("film");  // until the film has been read
-    const fs::path file = folder.path() / ("film" + wish_.extension);
-    {
-        FrameWriter writer({{file.string(), {}}}, 1);
-        std::uint64_t run = 0;
-        for (std::int64_t number = wish_.first; number <= wish_.last; ++number) {
-            cancellation_.check();
-            const ViewFramePtr frame = frame_of_(number);
-            if (!frame) throw Error(fmt::format("frame {} is not computed", number));
-            if (number == wish_.first) run = frame->run;
-            if (frame->run != run) throw Error("the scene has begun again; make the film when it is computed");
-            const auto points = frame->outputs.find(wish_.output);
-            if (points == frame->outputs.end()) throw Error("the scene has no such output");
-            FrameInfo info;
-            info.number = static_cast<int>(number);
-            info.time = static_cast<double>(number - wish_.first) / wish_.fps;
-            info.fps = wish_.fps;
-            info.picture = wish_.picture;
-            info.scene = frame->scene;
-            writer.submit(points->second, std::move(info));
-            const std::size_t written = writer.take_written().size();
-            const std::lock_guard lock(mutex_);
-            progress_.done += static_cast<std::int64_t>(written);
-        }
-        writer.finish();
+    std::uint64_t run = 0;
+    for (std::int64_t number = wish_.first; number <= wish_.last; ++number) {
+        cancellation_.check();
+        const ViewFramePtr frame = frame_of_(number);
+        if (!frame) throw Error(fmt::format("frame {} is not computed", number));
+        if (number == wish_.first) run = frame->run;
+        if (frame->run != run) throw Error("the scene has begun again; make the film when it is computed");
+        const Result<SceneFrame> points = frame->points.output(wish_.output);
+        if (!points) throw Error("the scene has no such output");
+        or_throw(drawn_->add(*points, frame->shapes));
+        const std::lock_guard lock(mutex_);
+        progress_.done = drawn_->done();
     }
-    std::ifstream in(file, std::ios::binary);
+    or_throw(drawn_->finish());
+    std::ifstream in(file_, std::ios::binary);
     std::string film(std::istreambuf_iterator<char>(in), {});
     if (!in || film.empty()) throw Error("the film can't be read");
     const std::lock_guard lock(mutex_);

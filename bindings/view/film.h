@@ -3,14 +3,15 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "bindings/view/frame_store.h"
+#include "include/rapid/film.h"
 #include "runtime/cancellation.h"
-#include "runtime/picture/scene.h"
+#include "runtime/files/temporary_folder.h"
 
 namespace rapid {
 
@@ -19,9 +20,8 @@ public:
     struct Wish {
         std::string extension;  // .mp4, .webm or .gif
         std::int64_t first = 1, last = 1;
-        double fps = 24;
         std::string output;  // of the graph
-        std::shared_ptr<const PictureOptions> picture;
+        FilmOptions film;
         int threads = 1;
     };
     // frame_of: from any thread; null where there is no such frame, which is an error. Error: no ffmpeg; a format or
@@ -45,6 +45,9 @@ private:
 
     const Wish wish_;
     const std::function<ViewFramePtr(std::int64_t)> frame_of_;
+    std::optional<TemporaryFolder> folder_;  // until the film has been read
+    std::string file_;
+    std::optional<SceneFilm> drawn_;
     Cancellation cancellation_;
     mutable std::mutex mutex_;
     Progress progress_;

@@ -12,10 +12,9 @@
 #include <sstream>
 #include <utility>
 
+#include "bindings/command/or_throw.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/input_file.h"
-#include "runtime/io/state_file.h"
-#include "runtime/points/state_archive.h"
 
 namespace rapid {
 namespace {
@@ -26,91 +25,15 @@ using Json = CheckedJson;
 constexpr std::size_t most_runs = 8;
 constexpr const char *frame_file = "frame", *shapes_file = "shapes", *snapshot_file = "snapshot";
 
-// What a frame's file holds.
-struct KeptFrame {
-    std::map<std::string, PointSet> outputs;
-
-    template <class Archive>
-    void serialize(Archive& keep)
-    {
-        keep(outputs);
-        if constexpr (Archive::is_loading::value) StateReader::expect(!outputs.empty());
-    }
-};
-
-// A PictureScene, and back.
-struct KeptScene {
-    struct Body {
-        std::vector<Vec3f> positions;
-        std::vector<Mesh::Triangle> triangles;
-        std::int32_t role = 0;
-
-        template <class Archive>
-        void serialize(Archive& keep)
-        {
-            keep(positions, triangles, role);
-        }
-    };
-    std::vector<Body> bodies;
-    PictureScene rest;  // without bodies
-
-    KeptScene() = default;
-    explicit KeptScene(const PictureScene& scene) : rest(scene)
-    {
-        rest.bodies.clear();
-        for (const PictureScene::Body& body : scene.bodies)
-            bodies.push_back({body.mesh->positions, body.mesh->triangles, body.role});
-    }
-
-    std::shared_ptr<const PictureScene> scene() &&
-    {
-        for (Body& body : bodies) {
-            auto mesh = std::make_shared<Mesh>();
-            mesh->positions = std::move(body.positions);
-            mesh->triangles = std::move(body.triangles);
-            const auto corners = static_cast<std::int32_t>(mesh->positions.size());
-            for (const Mesh::Triangle& triangle : mesh->triangles)
-                if (triangle.minCoeff() < 0 || triangle.maxCoeff() >= corners) StateReader::fail();
-            rest.bodies.push_back({mesh, body.role == PictureScene::Body::Emitter ? PictureScene::Body::Emitter
-                                                                                  : PictureScene::Body::Collider});
-        }
-        return std::make_shared<PictureScene>(std::move(rest));
-    }
-
-    template <class Archive>
-    void serialize(Archive& keep)
-    {
-        keep(bodies);
-        auto planes = static_cast<std::uint32_t>(rest.planes.size());
-        auto styles = static_cast<std::uint32_t>(rest.styles.size());
-        keep(planes, styles);
-        if constexpr (Archive::is_loading::value) {
-            keep_room(keep, planes, rest.planes);
-            keep_room(keep, styles, rest.styles);
-        }
-        for (PictureScene::Plane& plane : rest.planes) keep(plane.normal, plane.offset);
-        for (PointStyle& style : rest.styles) keep(style.group, style.additive, style.shutter);
-        keep(rest.camera.position, rest.camera.target, rest.camera.fov, rest.camera.group);
-    }
-
-private:
-    template <class Archive, class T>
-    static void keep_room(const Archive& from, std::uint32_t count, std::vector<T>& list)
-    {
-        from.require(count);
-        list.resize(count);
-    }
-};
-
 }  // namespace
 
-CachedRun::CachedRun(fs::path folder, const Fingerprint& fingerprint, const InputContents& contents)
-    : folder_(std::move(folder)), hash_(hash_of(fingerprint))
+CachedRun::CachedRun(fs::path folder, std::string hash, Scene& scene)
+    : folder_(std::move(folder)), hash_(std::move(hash))
 {
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
-    read_index(contents);
+    read_index(scene);
     const fs::path index = folder_ / "index";
     // A link would have something appended elsewhere.
     index_ =
@@ -129,7 +52,7 @@ fs::path CachedRun::file(const char* what, std::int64_t number) const
 }
 
 // A line that a killed process has left unfinished, and frames whose files are not there, are passed over.
-void CachedRun::read_index(const InputContents& contents)
+void CachedRun::read_index(Scene& scene)
 {
     std::error_code none;
     const fs::path path = folder_ / "index";
@@ -151,10 +74,8 @@ void CachedRun::read_index(const InputContents& contents)
                         entry.at("shapes").get<std::int64_t>()};
             const bool is_whole = fs::exists(file(frame_file, number), none) &&
                                   (known.shapes == 0 || fs::exists(file(shapes_file, known.shapes), none));
-            const auto read = entry.at("read").get<Fingerprint>();
-            const bool is_same = std::all_of(read.begin(), read.end(), [&](const auto& one) {
-                return InputContents::is_content(one.first) && contents.content_of(one.first) == one.second;
-            });
+            const bool is_same =
+                or_throw(scene.are_unchanged(entry.at("read").get<std::map<std::string, std::string>>()));
             if (is_whole && is_same && Json::accept(known.statistics)) known_[number] = std::move(known);
         } catch (const nlohmann::json::exception&) {
             continue;
@@ -162,24 +83,24 @@ void CachedRun::read_index(const InputContents& contents)
     }
 }
 
-std::int64_t CachedRun::number_of(const std::shared_ptr<const PictureScene>& scene)
+std::int64_t CachedRun::number_of(const SceneShapes& shapes)
 {
-    if (!scene) return 0;
-    if (scene == written_) return written_number_;
-    written_ = scene;
+    if (shapes == SceneShapes()) return 0;
+    if (shapes == written_) return written_number_;
+    written_ = shapes;
     written_number_ = ++last_shapes_;
-    writer_.submit(file(shapes_file, written_number_), {{"what", "shapes of a view"}}, state_of(KeptScene(*scene)));
+    writer_.submit(file(shapes_file, written_number_), [shapes](const std::string& path) { return shapes.save(path); });
     return written_number_;
 }
 
-void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warnings, const Fingerprint& read)
+void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warnings,
+                    const std::map<std::string, std::string>& read)
 {
     const std::lock_guard lock(mutex_);
     if (there_.contains(frame.number)) return;
-    const std::int64_t shapes = number_of(frame.scene);
+    const std::int64_t shapes = number_of(frame.shapes);
     writer_.submit(file(frame_file, frame.number),
-                   {{"what", "frame of a view"}, {"fingerprint", hash_}, {"frame", frame.number}},
-                   state_of(KeptFrame{frame.outputs}));
+                   [points = frame.points, key = hash_](const std::string& path) { return points.save(path, key); });
     there_[frame.number] = shapes;
     const Json entry = {{"frame", frame.number},
                         {"shapes", shapes},
@@ -191,27 +112,20 @@ void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warn
     [[maybe_unused]] const ssize_t written = ::write(index_.number(), line.data(), line.size());
 }
 
-void CachedRun::keep(const Snapshot& snapshot)
+void CachedRun::keep(const SceneSnapshot& snapshot)
 {
-    writer_.submit(file(snapshot_file, snapshot.frame),
-                   {{"what", "snapshot of a view"}, {"fingerprint", hash_}, {"frame", snapshot.frame}},
-                   state_of(snapshot));
+    writer_.submit(file(snapshot_file, snapshot.frame()),
+                   [snapshot, key = hash_](const std::string& path) { return snapshot.write(path, key); });
 }
 
-std::optional<Snapshot> CachedRun::snapshot_before(std::int64_t frame) const
+std::optional<SceneSnapshot> CachedRun::snapshot_before(std::int64_t frame) const
 {
     for (std::int64_t number = frame - 1; number >= 0 && !known_.empty() && number >= known_.begin()->first; --number) {
         std::error_code none;
         if (!fs::exists(file(snapshot_file, number), none)) continue;
-        try {
-            const StateFile kept(file(snapshot_file, number));
-            if (kept.header().at("fingerprint") != hash_) continue;
-            Snapshot snapshot;
-            restore(snapshot, kept.state());
-            return snapshot;
-        } catch (const std::exception&) {  // a damaged one: an earlier one will do
-            continue;
-        }
+        Result<SceneSnapshot> snapshot = SceneSnapshot::read(file(snapshot_file, number), hash_);
+        if (snapshot) return std::move(*snapshot);
+        // A damaged one: an earlier one will do.
     }
     return std::nullopt;
 }
@@ -223,13 +137,11 @@ bool CachedRun::has(std::int64_t number) const
     return there_.contains(number) && fs::exists(file(frame_file, number), none);
 }
 
-std::shared_ptr<const PictureScene> CachedRun::shapes(std::int64_t number)
+SceneShapes CachedRun::shapes(std::int64_t number)
 {
-    if (number == 0) return nullptr;
-    if (loaded_ && loaded_number_ == number) return loaded_;
-    KeptScene kept;
-    restore(kept, StateFile(file(shapes_file, number)).state());
-    loaded_ = std::move(kept).scene();
+    if (number == 0) return {};
+    if (loaded_number_ == number) return loaded_;
+    loaded_ = or_throw(SceneShapes::load(file(shapes_file, number)));
     loaded_number_ = number;
     return loaded_;
 }
@@ -239,16 +151,8 @@ ViewFramePtr CachedRun::load(std::int64_t number, std::uint64_t run)
     const std::lock_guard lock(mutex_);
     const auto there = there_.find(number);
     if (there == there_.end()) return nullptr;
-    const StateFile kept(file(frame_file, number));
-    if (kept.header().at("fingerprint") != hash_) throw Error("it is of another run").at({file(frame_file, number), 0});
-    KeptFrame frame;
-    restore(frame, kept.state());
-    auto result = std::make_shared<ViewFrame>();
-    result->number = number;
-    result->run = run;
-    result->outputs = std::move(frame.outputs);
-    result->scene = shapes(there->second);
-    return result;
+    SceneFrame points = or_throw(SceneFrame::load(file(frame_file, number), hash_));
+    return std::make_shared<ViewFrame>(ViewFrame{number, run, std::move(points), "", shapes(there->second)});
 }
 
 FrameCache::FrameCache(const fs::path& folder) : folder_(folder / "view")
@@ -264,9 +168,10 @@ FrameCache::FrameCache(const fs::path& folder) : folder_(folder / "view")
             fmt::format("--cache {}: another view has it; wait for its end, or give another folder", folder.string()));
 }
 
-std::shared_ptr<CachedRun> FrameCache::open(const Fingerprint& fingerprint, const InputContents& contents)
+std::shared_ptr<CachedRun> FrameCache::open(Scene& scene)
 {
-    auto run = std::make_shared<CachedRun>(folder_ / hash_of(fingerprint), fingerprint, contents);
+    const std::string hash = or_throw(scene.fingerprint()).hash;
+    auto run = std::make_shared<CachedRun>(folder_ / hash, hash, scene);
     remove_old();
     return run;
 }

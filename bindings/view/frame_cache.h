@@ -15,19 +15,18 @@
 #include <string>
 #include <vector>
 
-#include "bindings/run/fingerprint.h"
-#include "bindings/run/snapshot_writer.h"
+#include "bindings/view/file_writer.h"
 #include "bindings/view/frame_store.h"
 #include "runtime/files/file_error.h"
-#include "runtime/graph/snapshot.h"
 
 namespace rapid {
 
 // The frames of one run.
 class CachedRun : public FrameSource {
 public:
-    // What is there of it. Error: the folder can't be made or read.
-    CachedRun(std::filesystem::path folder, const Fingerprint& fingerprint, const InputContents& contents);
+    // What is there of it, of which the scene reads the same files still. hash: of its fingerprint. Error: the folder
+    // can't be made or read.
+    CachedRun(std::filesystem::path folder, std::string hash, Scene& scene);
 
     struct Known {
         std::string statistics;
@@ -37,14 +36,15 @@ public:
     // The frames that were there at the beginning.
     const std::map<std::int64_t, Known>& known() const { return known_; }
 
-    // Writes a frame, unless it is known; waits while two others are being written. read: the contents of files that
-    // were read for it.
-    void put(const ViewFrame& frame, const std::vector<std::string>& warnings, const Fingerprint& read);
-    void keep(const Snapshot& snapshot);
+    // Writes a frame, unless it is known; waits while two others are being written. read: the files that were read for
+    // it (Scene::take_inputs).
+    void put(const ViewFrame& frame, const std::vector<std::string>& warnings,
+             const std::map<std::string, std::string>& read);
+    void keep(const SceneSnapshot& snapshot);
     // Waits until all is written.
     void finish() { writer_.finish(); }
     // The latest one before a frame that is whole.
-    std::optional<Snapshot> snapshot_before(std::int64_t frame) const;
+    std::optional<SceneSnapshot> snapshot_before(std::int64_t frame) const;
 
     bool has(std::int64_t number) const override;
     ViewFramePtr load(std::int64_t number, std::uint64_t run) override;
@@ -54,9 +54,9 @@ public:
 
 private:
     std::filesystem::path file(const char* what, std::int64_t number) const;
-    void read_index(const InputContents& contents);
-    std::int64_t number_of(const std::shared_ptr<const PictureScene>& scene);
-    std::shared_ptr<const PictureScene> shapes(std::int64_t number);
+    void read_index(Scene& scene);
+    std::int64_t number_of(const SceneShapes& shapes);
+    SceneShapes shapes(std::int64_t number);
 
     const std::filesystem::path folder_;
     const std::string hash_;
@@ -65,9 +65,9 @@ private:
     mutable std::mutex mutex_;                    // of what follows
     std::map<std::int64_t, std::int64_t> there_;  // frames with the numbers of their shapes
     std::int64_t last_shapes_ = 0;
-    std::shared_ptr<const PictureScene> written_, loaded_;  // the last ones
+    SceneShapes written_, loaded_;  // the last ones
     std::int64_t written_number_ = 0, loaded_number_ = 0;
-    SnapshotWriter writer_;
+    FileWriter writer_;
 };
 
 class FrameCache {
@@ -75,7 +75,7 @@ public:
     // Error: the folder can't be made, or another process has it.
     explicit FrameCache(const std::filesystem::path& folder);
 
-    std::shared_ptr<CachedRun> open(const Fingerprint& fingerprint, const InputContents& contents);
+    std::shared_ptr<CachedRun> open(Scene& scene);
 
 private:
     void remove_old() const;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,10 +11,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <unordered_map>
 
+#include "bindings/command/or_throw.h"
 #include "runtime/error.h"
-#include "runtime/graph/evaluation.h"
-#include "runtime/io/text_table.h"
 
 namespace rapid {
 namespace {
@@ -110,34 +111,34 @@ std::array<std::pair<float, float>, turns> ranges_of(std::span<const float> valu
     return ranges;
 }
 
-// The points that are shown, where these are not all with what is shown of them.
-PointSet shown_of(const PointSet& points, const ShownPoints& shown, const FrameWish& wish)
+SceneColumn column_of(const SceneFrame& points, const std::string& name)
 {
-    if (!shown.places) return points;
-    PointSet needed = points;  // shares the columns
-    for (const std::string& name : points.column_names())
-        if (name != "P" && name != "v" && name != "id" && name != "Cd" && name != "pscale" && name != wish.colour)
-            needed.remove(name);
-    for (const std::string& name : points.group_names())
-        if (group_prefix + name != wish.colour) needed.remove_group(name);
-    return needed.select(*shown.places);
+    const Result<SceneColumn> column = points.column(name);
+    if (!column) throw Error(fmt::format("the points have no attribute \"{}\" here", name));
+    return *column;
 }
 
-void add_positions(Message& message, const PointSet& points)
+SceneColumn group_of(const SceneFrame& points, const std::string& name)
 {
-    const Strided<Vec3f> P = points.P().read();
-    const std::size_t count = points.size();
-    const auto* values = reinterpret_cast<const float*>(P.data);
-    const auto ranges = ranges_of<3>({values, 3 * (P.stride == 0 ? std::min<std::size_t>(count, 1) : count)});
-    const Vec3f low(ranges[0].first, ranges[1].first, ranges[2].first);
-    const Vec3f high(ranges[0].second, ranges[1].second, ranges[2].second);
-    message.header()["box"] = {{low.x(), low.y(), low.z()}, {high.x(), high.y(), high.z()}};
+    const Result<SceneColumn> group = points.group(name);
+    if (!group) throw Error(fmt::format("the points have no group \"{}\" here", name));
+    return *group;
+}
+
+void add_positions(Message& message, const SceneFrame& points, const Places* places)
+{
+    const PointValues<float> P(column_of(points, "P"), places);
+    const std::size_t count = P.size();
+    const float* const values = P[0];
+    const auto ranges = ranges_of<3>({values, 3 * (P.is_one() ? std::min<std::size_t>(count, 1) : count)});
+    const std::array<float, 3> low = {ranges[0].first, ranges[1].first, ranges[2].first};
+    const std::array<float, 3> high = {ranges[0].second, ranges[1].second, ranges[2].second};
+    message.header()["box"] = {low, high};
     message.add<std::uint16_t>("P", "u16", 3 * count, [=](std::span<std::uint16_t> to) {
         std::array<float, period> from{}, factor{};
         for (std::size_t j = 0; j < period; ++j) {
-            const auto axis = static_cast<Eigen::Index>(j % 3);
-            from[j] = low[axis];
-            factor[j] = WordScale(low[axis], high[axis]).factor;
+            from[j] = low[j % 3];
+            factor[j] = WordScale(low[j % 3], high[j % 3]).factor;
         }
         const auto quantise = [&](const float* source, std::size_t begin, std::size_t n) {
             for (std::size_t j = 0; j < n; ++j) {
@@ -146,7 +147,7 @@ void add_positions(Message& message, const PointSet& points)
                 to[begin + j] = static_cast<std::uint16_t>(static_cast<std::int32_t>(bounded));
             }
         };
-        if (P.stride == 0) {
+        if (P.is_one()) {
             for (std::size_t k = 0; k < count; ++k) quantise(values, 3 * k, 3);
             return;
         }
@@ -156,16 +157,17 @@ void add_positions(Message& message, const PointSet& points)
     });
 }
 
-void add_velocities(Message& message, const PointSet& points)
+void add_velocities(Message& message, const SceneFrame& points, const Places* places)
 {
-    const Strided<Vec3f> v = points.v().read();
+    const PointValues<float> v(column_of(points, "v"), places);
     float most = 0;
-    for (std::size_t k = 0; k < points.size(); ++k) most = std::max(most, v[k].cwiseAbs().maxCoeff());
+    for (std::size_t k = 0; k < v.size(); ++k)
+        most = std::max(most, Eigen::Map<const Eigen::Vector3f>(v[k]).cwiseAbs().maxCoeff());
     message.header()["fastest"] = most;
     const float scale = most > 0 ? 32767 / most : 0;
-    message.add<std::int16_t>("v", "i16", 3 * points.size(), [=, count = points.size()](std::span<std::int16_t> to) {
-        for (std::size_t k = 0; k < count; ++k)
-            for (int axis = 0; axis < 3; ++axis)
+    message.add<std::int16_t>("v", "i16", 3 * v.size(), [=](std::span<std::int16_t> to) {
+        for (std::size_t k = 0; k < v.size(); ++k)
+            for (std::size_t axis = 0; axis < 3; ++axis)
                 to[3 * k + axis] = static_cast<std::int16_t>(std::lround(v[k][axis] * scale));
     });
 }
@@ -191,14 +193,15 @@ void add_values(Message& message, const char* name, std::vector<float> values, b
     });
 }
 
-void add_colours(Message& message, const PointSet& points, const FrameWish& wish)
+void add_colours(Message& message, const SceneFrame& points, const FrameWish& wish, const Places* places)
 {
-    const auto* Cd = points.find<Vec3f>("Cd");
+    const std::optional<SceneColumn> Cd = find_column(points, "Cd", ColumnType::Vec3);
     if (Cd && (wish.colour.empty() || wish.colour == "Cd")) {
         message.header()["colour"] = "Cd";
-        message.add<std::uint8_t>("colour", "u8", 3 * points.size(), [from = Cd->read()](std::span<std::uint8_t> to) {
-            const auto* values = reinterpret_cast<const float*>(from.data);
-            const std::size_t same = from.stride == 0 ? 3 : to.size();  // values that are not repeated
+        const PointValues<float> from(*Cd, places);
+        message.add<std::uint8_t>("colour", "u8", 3 * from.size(), [from](std::span<std::uint8_t> to) {
+            const float* const values = from[0];
+            const std::size_t same = from.is_one() ? 3 : to.size();  // values that are not repeated
             // Over single numbers, without branches: the loop is vectorised.
             for (std::size_t j = 0; j < std::min(same, to.size()); ++j) {
                 const float bounded = values[j] > 0 ? std::min(values[j], 1.0f) : 0;  // not a number: 0
@@ -210,106 +213,114 @@ void add_colours(Message& message, const PointSet& points, const FrameWish& wish
     }
     const std::string name = wish.colour.empty() ? "speed" : wish.colour;
     message.header()["colour"] = name;
-    add_values(message, "value", numbers_of(points, name), name.starts_with(group_prefix) || name == "asleep");
+    add_values(message, "value", numbers_of(points, name, places), name.starts_with(group_mark) || name == "asleep");
+}
+
+// The place of each point's text among those of these points, in the order of the alphabet.
+std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
+{
+    std::unordered_map<std::uint32_t, float> ranks;
+    for (std::size_t k = 0; k < tokens.size(); ++k) ranks.try_emplace(*tokens[k]);
+    std::vector<std::pair<std::string_view, float*>> texts;
+    for (auto& [token, rank] : ranks) texts.emplace_back(or_throw(SceneFrame::text_of(token)), &rank);
+    std::sort(texts.begin(), texts.end());
+    for (std::size_t r = 0; r < texts.size(); ++r) *texts[r].second = static_cast<float>(r);
+    std::vector<float> result(tokens.size());
+    for (std::size_t k = 0; k < result.size(); ++k) result[k] = ranks.at(*tokens[k]);
+    return result;
+}
+
+// f of the components of each point.
+template <class T, class F>
+std::vector<float> numbers_of_each(const SceneColumn& column, const Places* places, const F& f)
+{
+    std::vector<float> numbers(places ? places->size() : column.count);
+    for (std::size_t k = 0; k < numbers.size(); ++k)
+        numbers[k] = static_cast<float>(f(column.at<T>(places ? (*places)[k] : k)));
+    return numbers;
+}
+
+float length_of_vector(const float* vector) { return Eigen::Map<const Eigen::Vector3f>(vector).norm(); }
+
+template <class T>
+T only_component(const T* components)
+{
+    return *components;
 }
 
 }  // namespace
 
-// The place of each text among those of the points, in the order of the alphabet.
-std::vector<float> ranks_of(const Column<Token>& column)
+std::vector<float> numbers_of(const SceneFrame& points, const std::string& name, const Places* places)
 {
-    const TextTable table = text_table(column);
-    std::vector<std::size_t> order(table.texts.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(),
-              [&](std::size_t a, std::size_t b) { return table.texts[a].text() < table.texts[b].text(); });
-    std::vector<float> rank(order.size());
-    for (std::size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<float>(k);
-    std::vector<float> ranks(column.size());
-    for (std::size_t i = 0; i < ranks.size(); ++i) ranks[i] = rank[static_cast<std::size_t>(table.places[i])];
-    return ranks;
+    if (name.starts_with(group_mark))
+        return numbers_of_each<std::uint8_t>(group_of(points, name.substr(group_mark.size())), places,
+                                             only_component<std::uint8_t>);
+    const bool is_speed = name == "speed" && !points.column("speed");
+    const SceneColumn column = column_of(points, is_speed ? "v" : name);
+    switch (column.type) {
+        case ColumnType::Vec3:
+            return numbers_of_each<float>(column, places, length_of_vector);
+        case ColumnType::Quat:
+            return numbers_of_each<float>(column, places, [](const float* q) { return q[3]; });
+        case ColumnType::Float:
+            return numbers_of_each<float>(column, places, only_component<float>);
+        case ColumnType::Int32:
+            return numbers_of_each<std::int32_t>(column, places, only_component<std::int32_t>);
+        case ColumnType::Int64:
+            return numbers_of_each<std::int64_t>(column, places, only_component<std::int64_t>);
+        case ColumnType::UInt8:
+            return numbers_of_each<std::uint8_t>(column, places, only_component<std::uint8_t>);
+        case ColumnType::String:
+            return ranks_of(PointValues<std::uint32_t>(column, places));
+    }
+    return {};
 }
 
-std::vector<float> numbers_of(const PointSet& points, const std::string& name)
-{
-    std::vector<float> numbers(points.size());
-    if (name == "speed" && !points.has("speed")) {
-        const Strided<Vec3f> v = points.v().read();
-        for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = v[i].norm();
-        return numbers;
-    }
-    if (name.starts_with(group_prefix)) {
-        const Column<std::uint8_t>* members = points.find_group(name.substr(group_prefix.size()));
-        if (!members)
-            throw Error(fmt::format("the points have no group \"{}\" here", name.substr(group_prefix.size())));
-        for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = (*members)[i];
-        return numbers;
-    }
-    const AnyColumn* column = points.find(name);
-    if (!column) throw Error(fmt::format("the points have no attribute \"{}\" here", name));
-    if (const auto* texts = std::get_if<Column<Token>>(column)) return ranks_of(*texts);
-    std::visit(
-        [&](const auto& values) {
-            const auto from = values.read();
-            using T = std::decay_t<decltype(values[0])>;
-            for (std::size_t i = 0; i < numbers.size(); ++i) {
-                if constexpr (std::is_same_v<T, Vec3f>)
-                    numbers[i] = from[i].norm();
-                else if constexpr (std::is_same_v<T, Quatf>)
-                    numbers[i] = from[i].w();
-                else if constexpr (std::is_arithmetic_v<T>)
-                    numbers[i] = static_cast<float>(from[i]);
-            }
-        },
-        *column);
-    return numbers;
-}
-
-ShownPoints shown_points(const PointSet& points, const FrameWish& wish)
+ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish)
 {
     ShownPoints shown;
     shown.count = points.size();
     if (wish.group.empty() && points.size() <= wish.most) return shown;
-    const Column<std::uint8_t>* members = nullptr;
-    if (!wish.group.empty()) {
-        members = points.find_group(wish.group);
-        if (!members) throw Error(fmt::format("the points have no group \"{}\" here", wish.group));
-    }
-    std::vector<std::uint32_t> places;
+    std::optional<SceneColumn> members;
+    if (!wish.group.empty()) members = group_of(points, wish.group);
+    Places places;
     for (std::uint32_t i = 0; i < points.size(); ++i)
-        if (!members || (*members)[i]) places.push_back(i);
+        if (!members || *members->at<std::uint8_t>(i)) places.push_back(i);
     // By id, so that the same points are shown in every frame.
-    const Strided<std::int64_t> id = points.id().read();
+    const SceneColumn id = column_of(points, "id");
     while (places.size() > wish.most) {
         if (shown.every > UINT64_MAX / 2) {  // files of others may have many points of one id
             places.resize(wish.most);
             break;
         }
         shown.every *= 2;
-        std::erase_if(places, [&](std::uint32_t i) { return static_cast<std::uint64_t>(id[i]) % shown.every != 0; });
+        std::erase_if(places, [&](std::uint32_t i) {
+            return static_cast<std::uint64_t>(*id.at<std::int64_t>(i)) % shown.every != 0;
+        });
     }
     shown.count = places.size();
     shown.places = std::move(places);
     return shown;
 }
 
-std::string frame_message(std::uint32_t request, const PointSet& points, const FrameWish& wish, const std::string& head)
+std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish,
+                          const std::string& head)
 {
     Message message(ordered_json::parse(head));
     const ShownPoints shown = shown_points(points, wish);
-    const PointSet some = shown_of(points, shown, wish);
+    const Places* const places = shown.all_or_some();
     message.header()["total"] = points.size();
     message.header()["shown"] = shown.count;
     message.header()["every"] = shown.every;
-    add_positions(message, some);
-    add_colours(message, some, wish);
-    if (const auto* pscale = some.find<float>("pscale")) {
-        if (pscale->is_uniform())
-            message.header()["radius"] = points.empty() ? 0.0f : (*pscale)[0];
+    add_positions(message, points, places);
+    add_colours(message, points, wish, places);
+    if (const auto pscale = find_column(points, "pscale", ColumnType::Float)) {
+        if (pscale->stride == 0)
+            message.header()["radius"] = points.size() == 0 ? 0.0f : *pscale->at<float>(0);
         else
-            add_values(message, "radius", numbers_of(some, "pscale"));
+            add_values(message, "radius", numbers_of(points, "pscale", places));
     }
-    if (wish.velocities) add_velocities(message, some);
+    if (wish.velocities) add_velocities(message, points, places);
     return message.finish(request);
 }
 
@@ -321,26 +332,23 @@ std::string trails_message(std::uint32_t request, const std::vector<float>& ends
     return message.finish(request);
 }
 
-std::string shapes_message(std::uint32_t request, const PictureScene& scene, const std::set<std::uint64_t>& known,
+std::string shapes_message(std::uint32_t request, const SceneShapes& shapes, const std::set<std::uint64_t>& known,
                            const std::vector<std::uint64_t>& numbers)
 {
     Message message(ordered_json::object());
     ordered_json bodies = ordered_json::array(), planes = ordered_json::array();
-    for (const PictureScene::Plane& plane : scene.planes)
-        planes.push_back(
-            {{"normal", {plane.normal.x(), plane.normal.y(), plane.normal.z()}}, {"offset", plane.offset}});
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-        const PictureScene::Body& body = scene.bodies[b];
-        bodies.push_back(
-            {{"mesh", numbers[b]}, {"role", body.role == PictureScene::Body::Collider ? "collider" : "emitter"}});
+    for (const ShapePlane& plane : shapes.planes())
+        planes.push_back({{"normal", plane.normal}, {"offset", plane.offset}});
+    const std::vector<ShapeMesh> meshes = shapes.meshes();
+    for (std::size_t b = 0; b < meshes.size(); ++b) {
+        const ShapeMesh& mesh = meshes[b];
+        bodies.push_back({{"mesh", numbers[b]}, {"role", mesh.role == ShapeRole::Collider ? "collider" : "emitter"}});
         if (known.contains(numbers[b])) continue;
-        const Mesh& mesh = *body.mesh;
         const std::string name = std::to_string(numbers[b]);
-        message.add<float>("P" + name, "f32", 3 * mesh.positions.size(), [&](std::span<float> to) {
-            std::memcpy(to.data(), mesh.positions.data(), to.size_bytes());
-        });
-        message.add<std::uint32_t>("T" + name, "u32", 3 * mesh.triangles.size(), [&](std::span<std::uint32_t> to) {
-            std::memcpy(to.data(), mesh.triangles.data(), to.size_bytes());
+        message.add<float>("P" + name, "f32", 3 * mesh.corner_count,
+                           [&mesh](std::span<float> to) { std::copy_n(mesh.positions, to.size(), to.begin()); });
+        message.add<std::uint32_t>("T" + name, "u32", 3 * mesh.triangle_count, [&mesh](std::span<std::uint32_t> to) {
+            std::copy_n(mesh.triangles, to.size(), to.begin());
         });
     }
     message.header()["bodies"] = std::move(bodies);

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/picture/scene.h"
-#include "runtime/points/point_set.h"
+#include "bindings/view/points.h"
+#include "include/rapid/shapes.h"
 
 namespace rapid {
 
@@ -24,26 +24,28 @@ struct FrameWish {
 
 // The places of the points that are shown; nothing where these are all. Error: no such group.
 struct ShownPoints {
-    std::optional<std::vector<std::uint32_t>> places;
+    std::optional<Places> places;
     std::size_t count = 0;
     std::uint64_t every = 1;  // of the ids
 
     std::size_t operator[](std::size_t k) const { return places ? (*places)[k] : k; }
+    const Places* all_or_some() const { return places ? &*places : nullptr; }
 };
-ShownPoints shown_points(const PointSet& points, const FrameWish& wish);
+ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish);
 
 // head: members of the header, as JSON in braces. Error: no such attribute or group.
-std::string frame_message(std::uint32_t request, const PointSet& points, const FrameWish& wish,
+std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish,
                           const std::string& head);
 
-// The shapes of a frame: planes, and meshes, without those that the page has.
-std::string shapes_message(std::uint32_t request, const PictureScene& scene, const std::set<std::uint64_t>& known,
+// The shapes of a frame: planes, and meshes by their numbers, without those that the page has.
+std::string shapes_message(std::uint32_t request, const SceneShapes& shapes, const std::set<std::uint64_t>& known,
                            const std::vector<std::uint64_t>& numbers);
 
 // Ends of line segments, x y z and how old they are, from 0 to 1; every: as of ShownPoints.
 std::string trails_message(std::uint32_t request, const std::vector<float>& ends, std::uint64_t every);
 
-// A value of each point: an attribute as a number (the length of a vector), "speed", or membership of "group:NAME".
-std::vector<float> numbers_of(const PointSet& points, const std::string& name);
+// A value of each point at `places`, null: of all: an attribute as a number (the length of a vector), "speed", or
+// membership of "group:NAME". Error: no such attribute or group.
+std::vector<float> numbers_of(const SceneFrame& points, const std::string& name, const Places* places = nullptr);
 
 }  // namespace rapid

@@ -7,12 +7,9 @@ namespace rapid {
 
 std::size_t bytes_of(const ViewFrame& frame)
 {
-    std::size_t bytes = sizeof(ViewFrame) + frame.statistics.size();
-    for (const auto& [name, points] : frame.outputs) bytes += points.bytes();
-    if (frame.scene)
-        for (const PictureScene::Body& body : frame.scene->bodies)
-            bytes += body.mesh->positions.size() * sizeof(Vec3f) / 4 +
-                     body.mesh->triangles.size() * sizeof(Mesh::Triangle) / 4;
+    std::size_t bytes = sizeof(ViewFrame) + frame.statistics.size() + frame.points.bytes();
+    for (const ShapeMesh& mesh : frame.shapes.meshes())
+        bytes += (mesh.corner_count * sizeof(float) + mesh.triangle_count * sizeof(std::int32_t)) * 3 / 4;
     return bytes;
 }
 

@@ -12,17 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "runtime/picture/scene.h"
-#include "runtime/points/point_set.h"
+#include "include/rapid/scene.h"
+#include "include/rapid/shapes.h"
 
 namespace rapid {
 
 struct ViewFrame {
-    std::int64_t number = 0;
-    std::uint64_t run = 0;                    // of which it is
-    std::map<std::string, PointSet> outputs;  // by name
-    std::string statistics;                   // JSON, as in a statistics file
-    std::shared_ptr<const PictureScene> scene;
+    std::int64_t number;
+    std::uint64_t run;       // of which it is
+    SceneFrame points;       // of all outputs
+    std::string statistics;  // JSON, as in a statistics file
+    SceneShapes shapes = {};
     std::size_t bytes = 0;
 };
 using ViewFramePtr = std::shared_ptr<const ViewFrame>;

@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
-#include "runtime/graph/evaluation.h"
-#include "runtime/picture/frame_picture.h"
-#include "runtime/picture/png_file.h"
-#include "runtime/points/id_index.h"
+#include "bindings/command/or_throw.h"
 
 namespace rapid {
 namespace {
@@ -23,13 +22,9 @@ constexpr std::size_t most_segments = 480'000;  // of trails
 constexpr std::size_t most_waiting = 1000;      // requests; a page has one
 constexpr int most_depth = 8;                   // of lists in a request: a copy of deeper ones would fill the stack
 
-Json json_of(const Value& value)
+Json json_of(const SceneValue& value)
 {
-    if (const bool* flag = value.get<bool>()) return *flag;
-    if (const double* number = value.get<double>()) return *number;
-    if (const std::string* text = value.get<std::string>()) return *text;
-    if (const Vec3d* v = value.get<Vec3d>()) return {v->x(), v->y(), v->z()};
-    return nullptr;
+    return std::visit([](const auto& known) { return Json(known); }, value);
 }
 
 Json json_of(const Error& error)
@@ -65,50 +60,65 @@ Json number(double value)
     return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
 }
 
-Json value_at(const AnyColumn& column, std::size_t i)
+Json value_at(const SceneColumn& column, std::size_t i)
 {
-    return std::visit(
-        [&](const auto& values) -> Json {
-            const auto& value = values[i];
-            using T = std::decay_t<decltype(value)>;
-            if constexpr (std::is_same_v<T, Vec3f>)
-                return {number(value.x()), number(value.y()), number(value.z())};
-            else if constexpr (std::is_same_v<T, Quatf>)
-                return {number(value.x()), number(value.y()), number(value.z()), number(value.w())};
-            else if constexpr (std::is_same_v<T, float>)
-                return number(value);
-            else if constexpr (std::is_same_v<T, Token>)
-                return std::string(value.text());
-            else
-                return value;
-        },
-        column);
+    switch (column.type) {
+        case ColumnType::Float:
+            return number(*column.at<float>(i));
+        case ColumnType::Vec3:
+        case ColumnType::Quat: {
+            Json components = Json::array();
+            for (std::size_t k = 0; k < column.components; ++k) components.push_back(number(column.at<float>(i)[k]));
+            return components;
+        }
+        case ColumnType::Int32:
+            return *column.at<std::int32_t>(i);
+        case ColumnType::Int64:
+            return *column.at<std::int64_t>(i);
+        case ColumnType::UInt8:
+            return *column.at<std::uint8_t>(i);
+        case ColumnType::String:
+            return std::string(or_throw(SceneFrame::text_of(*column.at<std::uint32_t>(i))));
+    }
+    return nullptr;
 }
 
-Json row_of(const PointSet& points, std::size_t i)
+Json row_of(const SceneFrame& points, std::size_t i)
 {
     Json row = Json::object();
-    for (const auto& [name, column] : points.columns())
-        if (name != "dt") row[name] = value_at(column, i);
+    for (const std::string& name : points.columns())
+        if (name != "dt") row[name] = value_at(*points.column(name), i);
     Json groups = Json::array();
-    for (const auto& [name, members] : points.groups())
-        if (members[i]) groups.push_back(name);
+    for (const std::string& name : points.groups())
+        if (*points.group(name)->at<std::uint8_t>(i)) groups.push_back(name);
     return {{"values", row}, {"groups", groups}};
 }
 
-// width and height, pixels; camera: position, target, vertical angle in degrees.
-std::shared_ptr<const PictureOptions> picture_options(const Json& json)
+std::uint32_t place_of(const SceneFrame& points, std::int64_t id) { return or_throw(points.places({id})).front(); }
+
+Eigen::Map<const Eigen::Vector3f> vector_at(const SceneColumn& column, std::size_t i)
 {
-    auto options = std::make_shared<PictureOptions>();
-    options->width = std::clamp(json.value("width", 1280), 16, 16384);
-    options->height = std::clamp(json.value("height", 720), 16, 16384);
+    return Eigen::Map<const Eigen::Vector3f>(column.at<float>(i));
+}
+
+// width and height, pixels.
+PictureSize size_of(const Json& json)
+{
+    return {std::clamp(json.value("width", 1280), 16, 16384), std::clamp(json.value("height", 720), 16, 16384)};
+}
+
+// camera: position, target, vertical angle in degrees.
+PictureCamera camera_of(const Json& json)
+{
     const auto camera = json.value("camera", std::vector<double>());
-    if (camera.size() == 7) {
-        options->position = Vec3d(camera[0], camera[1], camera[2]);
-        options->target = Vec3d(camera[3], camera[4], camera[5]);
-        options->fov = camera[6] * 3.14159265358979323846 / 180;
-    }
-    return options;
+    if (camera.size() != 7) return {};
+    return {std::array{camera[0], camera[1], camera[2]}, std::array{camera[3], camera[4], camera[5]}, camera[6]};
+}
+
+// The output that a request names; the first one where it names none.
+Result<SceneFrame> chosen_output(const ViewFrame& frame, const Json& json)
+{
+    return frame.points.output(json.value("output", frame.points.outputs().front()));
 }
 
 FrameWish wish_of(const Json& json)
@@ -217,7 +227,7 @@ void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
         simulation_.is_sequence() ? FrameStore::Stretches{} : simulation_.store().stretches(status.run);
     Json parameters = Json::array(), warnings = Json::array();
     const std::map<std::string, std::string> values = simulation_.values();
-    for (const Session::Parameter& parameter : status.parameters)
+    for (const SceneParameter& parameter : status.parameters)
         parameters.push_back({{"name", parameter.name},
                               {"doc", parameter.doc},
                               {"value", json_of(parameter.value)},
@@ -256,7 +266,7 @@ void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoint
 {
     const std::int64_t number = json.at("frame").get<std::int64_t>();
     const std::string node = json.value("after", "");
-    const auto guarded = [ask, use](const PointSet& points) {
+    const auto guarded = [ask, use](const SceneFrame& points) {
         try {
             use(points);
         } catch (const std::exception& error) {
@@ -265,13 +275,11 @@ void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoint
     };
     if (!node.empty()) {
         simulation_.inspect(number,
-                            [this, ask, node, guarded](const std::shared_ptr<const ViewSimulation::Results>& all,
-                                                       const std::string& error) {
+                            [this, ask, node, guarded](const ViewSimulation::Results& all, const std::string& error) {
                                 post_([=] {
-                                    if (!all) return ask.fail(error);
-                                    const auto points = all->find(node);
-                                    if (points == all->end())
-                                        return ask.fail("the node is not evaluated in this frame");
+                                    if (!error.empty()) return ask.fail(error);
+                                    const auto points = all.find(node);
+                                    if (points == all.end()) return ask.fail("the node is not evaluated in this frame");
                                     guarded(points->second);
                                 });
                             });
@@ -279,9 +287,9 @@ void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoint
     }
     const ViewFramePtr frame = simulation_.frame(number);
     if (!frame) return ask.fail("the frame is not computed");
-    const auto output = frame->outputs.find(json.value("output", frame->outputs.begin()->first));
-    if (output == frame->outputs.end()) return ask.fail("the scene has no such output");
-    guarded(output->second);
+    const Result<SceneFrame> points = chosen_output(*frame, json);
+    if (!points) return ask.fail("the scene has no such output");
+    guarded(*points);
 }
 
 void ViewRequests::tell_frame(const Json& json, const Ask& ask)
@@ -290,17 +298,17 @@ void ViewRequests::tell_frame(const Json& json, const Ask& ask)
     const std::string after = json.value("after", "");
     const ViewFramePtr frame = after.empty() ? simulation_.frame(number) : nullptr;
     const Json head = {{"frame", number}, {"run", frame ? frame->run : simulation_.status().run}, {"after", after}};
-    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
         ask.answer(frame_message(ask.re, points, wish, head.dump()), true);
     });
 }
 
-std::uint64_t ViewRequests::number_of(const MeshPtr& mesh)
+std::uint64_t ViewRequests::number_of(const ShapeMesh& mesh)
 {
-    const auto known = meshes_.find(mesh.get());
-    if (known != meshes_.end() && !known->second.second.expired()) return known->second.first;
-    std::erase_if(meshes_, [](const auto& entry) { return entry.second.second.expired(); });
-    meshes_[mesh.get()] = {next_mesh_, mesh};
+    const auto known = meshes_.find(mesh.owner);
+    if (known != meshes_.end()) return known->second;
+    std::erase_if(meshes_, [](const auto& entry) { return entry.first.expired(); });
+    meshes_[mesh.owner] = next_mesh_;
     return next_mesh_++;
 }
 
@@ -308,21 +316,18 @@ void ViewRequests::tell_shapes(const Json& json, const Ask& ask)
 {
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
     if (!frame) return ask.fail("the frame is not computed");
-    const PictureScene none;
-    const PictureScene& scene = frame->scene ? *frame->scene : none;
     std::vector<std::uint64_t> numbers;
-    for (const PictureScene::Body& body : scene.bodies) numbers.push_back(number_of(body.mesh));
+    for (const ShapeMesh& mesh : frame->shapes.meshes()) numbers.push_back(number_of(mesh));
     const auto known = json.value("known", std::vector<std::uint64_t>());
-    ask.answer(shapes_message(ask.re, scene, {known.begin(), known.end()}, numbers), true);
+    ask.answer(shapes_message(ask.re, frame->shapes, {known.begin(), known.end()}, numbers), true);
 }
 
 void ViewRequests::tell_point(const Json& json, const Ask& ask)
 {
-    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
         std::size_t i = points.size();
         if (json.contains("id")) {
-            const std::uint32_t place = IdIndex(points.id())[json["id"].get<std::int64_t>()];
-            if (place != IdIndex::none) i = place;
+            i = place_of(points, json["id"].get<std::int64_t>());
         } else {
             const ShownPoints shown = shown_points(points, wish);
             const auto k = json.at("row").get<std::size_t>();
@@ -339,16 +344,16 @@ void ViewRequests::tell_path(const Json& json, const Ask& ask) const
     const auto id = json.at("id").get<std::int64_t>();
     Json path = Json::array();
     for (const ViewFramePtr& frame : simulation_.store().of_run(simulation_.status().run)) {
-        const auto output = frame->outputs.find(json.value("output", frame->outputs.begin()->first));
-        if (output == frame->outputs.end()) continue;
-        const std::uint32_t i = IdIndex(output->second.id())[id];
-        if (i == IdIndex::none) continue;
-        const PointSet& points = output->second;
-        const Vec3f P = points.P()[i];
-        const auto* error = points.find<float>("error");
-        const auto* substeps = points.find<std::int32_t>("substeps");
-        path.push_back({frame->number, number(P.x()), number(P.y()), number(P.z()), number(points.v()[i].norm()),
-                        error ? number((*error)[i]) : Json(), substeps ? Json((*substeps)[i]) : Json()});
+        const Result<SceneFrame> points = chosen_output(*frame, json);
+        if (!points) continue;
+        const std::uint32_t i = place_of(*points, id);
+        if (i == SceneFrame::no_place) continue;
+        const auto P = vector_at(*points->column("P"), i);
+        const auto error = find_column(*points, "error", ColumnType::Float);
+        const auto substeps = find_column(*points, "substeps", ColumnType::Int32);
+        path.push_back({frame->number, number(P.x()), number(P.y()), number(P.z()),
+                        number(vector_at(*points->column("v"), i).norm()), error ? value_at(*error, i) : Json(),
+                        substeps ? value_at(*substeps, i) : Json()});
     }
     ask.tell({{"path", path}});
 }
@@ -360,27 +365,32 @@ void ViewRequests::tell_trails(const Json& json, const Ask& ask)
     const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", 12), 1, 1000);
     FrameWish wish = wish_of(json);
     wish.most = std::min<std::size_t>(20000, most_segments / static_cast<std::size_t>(last - first));
-    with_points(json, ask, [=, this](const PointSet& now) {
+    with_points(json, ask, [=, this](const SceneFrame& now) {
         const ShownPoints shown = shown_points(now, wish);
-        std::vector<Vec3f> there(shown.count);
+        const SceneColumn P_now = *now.column("P"), id = *now.column("id");
+        std::vector<Eigen::Vector3f> there(shown.count);
+        std::vector<std::int64_t> ids(shown.count);
+        for (std::size_t k = 0; k < shown.count; ++k) {
+            there[k] = vector_at(P_now, shown[k]);
+            ids[k] = *id.at<std::int64_t>(shown[k]);
+        }
         std::vector<std::uint8_t> was(shown.count, 1);
-        for (std::size_t k = 0; k < shown.count; ++k) there[k] = now.P()[shown[k]];
         std::vector<float> segments;
         for (std::int64_t number = last - 1; number >= first; --number) {
             const ViewFramePtr frame = simulation_.store().find(number);
             if (!frame) break;
-            const auto output = frame->outputs.find(json.value("output", frame->outputs.begin()->first));
-            if (output == frame->outputs.end()) break;
-            const IdIndex index(output->second.id());
-            const Strided<Vec3f> P = output->second.P().read();
+            const Result<SceneFrame> points = chosen_output(*frame, json);
+            if (!points) break;
+            const std::vector<std::uint32_t> places = or_throw(points->places(ids));
+            const SceneColumn P = *points->column("P");
+            const auto age = static_cast<float>(last - number) / static_cast<float>(last - first);
             for (std::size_t k = 0; k < shown.count; ++k) {
-                const std::uint32_t i = was[k] ? index[now.id()[shown[k]]] : IdIndex::none;
-                was[k] = i != IdIndex::none;
+                was[k] = was[k] && places[k] != SceneFrame::no_place;
                 if (!was[k]) continue;
-                const auto age = static_cast<float>(last - number) / static_cast<float>(last - first);
-                for (const auto& [end, at] : {std::pair(there[k], age), std::pair(Vec3f(P[i]), age)})
-                    segments.insert(segments.end(), {end.x(), end.y(), end.z(), at});
-                there[k] = P[i];
+                const Eigen::Vector3f before = vector_at(P, places[k]);
+                for (const Eigen::Vector3f& end : {there[k], before})
+                    segments.insert(segments.end(), {end.x(), end.y(), end.z(), age});
+                there[k] = before;
             }
         }
         ask.answer(trails_message(ask.re, segments, shown.every), true);
@@ -392,7 +402,7 @@ void ViewRequests::tell_trace(const Json& json, const Ask& ask)
     const auto last = json.at("last").get<std::int64_t>();
     const std::string output = json.value("output", "main");
     simulation_.origin(json.at("frame").get<std::int64_t>(), output, json.at("id").get<std::int64_t>(),
-                       [this, ask, last](const ViewSimulation::Origin& point, const std::string& unknown) {
+                       [this, ask, last](const PointOrigin& point, const std::string& unknown) {
                            post_([=, this] {
                                if (!unknown.empty()) return ask.fail(unknown);
                                simulation_.trace(point, last,
@@ -408,7 +418,7 @@ void ViewRequests::tell_trace(const Json& json, const Ask& ask)
 
 void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
 {
-    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
         FrameWish all = wish;
         all.most = points.size();
         const ShownPoints shown = shown_points(points, all);
@@ -417,9 +427,10 @@ void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
         const std::string sort = json.value("sort", "id");
         const bool down = json.value("descending", false);
         if (sort == "id") {
-            const Strided<std::int64_t> id = points.id().read();
+            const SceneColumn column = *points.column("id");
+            const auto id = [&](std::uint32_t i) { return *column.at<std::int64_t>(i); };
             std::stable_sort(order.begin(), order.end(),
-                             [&](auto a, auto b) { return down ? id[a] > id[b] : id[a] < id[b]; });
+                             [&](auto a, auto b) { return down ? id(a) > id(b) : id(a) < id(b); });
         } else {
             const std::vector<float> values = numbers_of(points, sort);
             std::stable_sort(order.begin(), order.end(),
@@ -428,14 +439,11 @@ void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
         const std::size_t from = std::min(json.value("from", std::size_t{0}), order.size());
         const std::size_t to = std::min(order.size(), from + std::min(json.value("count", most_rows), most_rows));
         Json names = Json::array(), rows = Json::array();
-        for (const auto& [name, column] : points.columns())
+        for (const std::string& name : points.columns())
             if (name != "dt") names.push_back(name);
         for (std::size_t k = from; k < to; ++k) rows.push_back(row_of(points, order[k]));
-        ask.tell({{"total", order.size()},
-                  {"from", from},
-                  {"names", names},
-                  {"groups", points.group_names()},
-                  {"rows", rows}});
+        ask.tell(
+            {{"total", order.size()}, {"from", from}, {"names", names}, {"groups", points.groups()}, {"rows", rows}});
     });
 }
 
@@ -443,7 +451,7 @@ void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
 // matrix: from the world to the screen's -1 ... 1, by columns.
 void ViewRequests::tell_region(const Json& json, const Ask& ask)
 {
-    with_points(json, ask, [=, wish = wish_of(json)](const PointSet& points) {
+    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
         const auto matrix = json.at("matrix").get<std::vector<double>>();
         const auto rectangle = json.at("rectangle").get<std::vector<double>>();  // least x, y, largest x, y
         if (matrix.size() != 16 || rectangle.size() != 4) return ask.fail("a matrix has 16 numbers, a rectangle 4");
@@ -451,19 +459,18 @@ void ViewRequests::tell_region(const Json& json, const Ask& ask)
         FrameWish all = wish;
         all.most = points.size();
         const ShownPoints shown = shown_points(points, all);
-        const Strided<Vec3f> P = points.P().read();
-        std::vector<std::uint32_t> places;
+        const SceneColumn P = *points.column("P");
+        Places places;
         for (std::size_t k = 0; k < shown.count; ++k) {
-            const Eigen::Vector4d at = project * P[shown[k]].cast<double>().homogeneous();
+            const Eigen::Vector4d at = project * vector_at(P, shown[k]).cast<double>().homogeneous();
             if (at.w() <= 0) continue;
             const double x = at.x() / at.w(), y = at.y() / at.w();
             if (x >= rectangle[0] && x <= rectangle[2] && y >= rectangle[1] && y <= rectangle[3])
                 places.push_back(static_cast<std::uint32_t>(shown[k]));
         }
-        const PointSet chosen = points.select(places);
         Json ranges = Json::object(), groups = Json::object();
         const auto add = [&](const std::string& name) {
-            const std::vector<float> values = numbers_of(chosen, name);
+            const std::vector<float> values = numbers_of(points, name, &places);
             float low = std::numeric_limits<float>::infinity(), high = -low;
             double sum = 0;
             for (const float value : values) low = std::min(low, value), high = std::max(high, value), sum += value;
@@ -471,14 +478,14 @@ void ViewRequests::tell_region(const Json& json, const Ask& ask)
                 ranges[name] = {number(low), number(sum / static_cast<double>(values.size())), number(high)};
         };
         add("speed");
-        for (const std::string& name : chosen.column_names())
+        for (const std::string& name : points.columns())
             if (name != "dt" && name != "speed") add(name);
-        for (const auto& [name, members] : chosen.groups()) {
-            std::size_t count = 0;
-            for (std::size_t i = 0; i < chosen.size(); ++i) count += members[i];
-            groups[name] = count;
+        for (const std::string& name : points.groups()) {
+            const SceneColumn members = *points.group(name);
+            groups[name] = std::count_if(places.begin(), places.end(),
+                                         [&](std::uint32_t i) { return *members.at<std::uint8_t>(i) != 0; });
         }
-        ask.tell({{"count", chosen.size()}, {"ranges", ranges}, {"groups", groups}});
+        ask.tell({{"count", places.size()}, {"ranges", ranges}, {"groups", groups}});
     });
 }
 
@@ -508,11 +515,8 @@ void ViewRequests::tell_picture(const Json& json, const Ask& ask)
 {
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
     if (!frame) return ask.fail("the frame is not computed");
-    with_points(json, ask, [=](const PointSet& points) {
-        FrameInfo info;
-        info.picture = picture_options(json);
-        info.scene = frame->scene;
-        ask.send(encode_png(picture_of(points, info)));
+    with_points(json, ask, [=](const SceneFrame& points) {
+        ask.send(or_throw(points.picture(frame->shapes, camera_of(json), size_of(json))));
     });
 }
 
@@ -526,11 +530,8 @@ void ViewRequests::begin_film(const Json& json, const Ask& ask)
     wish.extension = json.value("extension", "");
     wish.first = json.at("first").get<std::int64_t>();
     wish.last = json.at("last").get<std::int64_t>();
-    wish.fps = json.value("fps", status.fps);
-    if (!(wish.fps >= 1 && wish.fps <= 1000))
-        throw Error(fmt::format("{} frames a second; a film has from 1 to 1000", wish.fps));
     wish.output = json.value("output", "main");
-    wish.picture = picture_options(json);
+    wish.film = {json.value("fps", status.fps), size_of(json), camera_of(json)};
     wish.threads = simulation_.options().threads;
     film_.reset();  // one that has not ended is given up
     film_ =

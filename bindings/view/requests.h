@@ -37,8 +37,8 @@ private:
         void send(const std::string& data) const;  // a file
         void fail(const std::string& why) const;
     };
-    // A set of points that requests name: of an output of a frame, or after a node.
-    using WithPoints = std::function<void(const PointSet& points)>;
+    // Points that requests name: of an output of a frame, or after a node.
+    using WithPoints = std::function<void(const SceneFrame& points)>;
     void with_points(const Json& json, const Ask& ask, const WithPoints& use);
 
     // graph: the number of the picture of the graph that the page has; of another one it is told.
@@ -59,7 +59,7 @@ private:
     void send_film(const Ask& ask);
     void set_parameters(const Json& json, const Ask& ask);
 
-    std::uint64_t number_of(const MeshPtr& mesh);
+    std::uint64_t number_of(const ShapeMesh& mesh);
 
     ViewSimulation& simulation_;
     const std::string title_;
@@ -70,7 +70,7 @@ private:
         Ask ask;
     };
     std::vector<Waiting> waiting_;
-    std::map<const Mesh*, std::pair<std::uint64_t, std::weak_ptr<const Mesh>>> meshes_;
+    std::map<std::weak_ptr<const void>, std::uint64_t, std::owner_less<>> meshes_;  // by owner
     std::uint64_t next_mesh_ = 1;
     std::unique_ptr<ViewFilm> film_;  // one at a time
 };

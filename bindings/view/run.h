@@ -1,4 +1,4 @@
-// One run of a viewer's scene: a session of its own, on a thread of its own, that publishes frames until it is done or
+// One run of a viewer's scene: a Scene of its own, on a thread of its own, that publishes frames until it is done or
 // abandoned, and answers questions about them between two frames.
 #pragma once
 
@@ -12,14 +12,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "bindings/run/fingerprint.h"
 #include "bindings/view/simulation.h"
-#include "runtime/graph/plan.h"
-#include "runtime/graph/snapshot.h"
 
 namespace rapid {
 
@@ -38,16 +36,15 @@ public:
     using Task = std::function<void(Run&)>;
     void ask(Task task);
 
-    // Null: there is no plan, for an error.
-    const Plan* plan() const { return plan_.get(); }
+    // Where there is none, for an error, nothing else is asked for.
+    bool has_scene() const { return scene_.has_value(); }
 
-    std::shared_ptr<const Results> inspect(std::int64_t frame);
-    Arguments arguments(std::int64_t frame) const;
-    Origin origin(std::int64_t frame, const std::string& output, std::int64_t id);
+    Results inspect(std::int64_t frame);
+    Arguments arguments(std::int64_t frame);
+    PointOrigin origin(std::int64_t frame, const std::string& output, std::int64_t id);
 
 private:
-    PlanOptions plan_options() const;
-    bool stopped() const { return stop_.cancellation.is_requested(); }
+    bool stopped() const { return stop_.stop_requested(); }
 
     // Calls `change` with the status, unless this run has been abandoned.
     template <class F>
@@ -58,7 +55,9 @@ private:
     // The frames that the cache has.
     void take_known(ViewStatus& status);
     bool is_known(std::int64_t frame) const { return cached_ && cached_->known().contains(frame); }
-    std::optional<Snapshot> cached_snapshot_before(std::int64_t frame) const;
+    // The latest one that there is.
+    std::optional<SceneSnapshot> cached_snapshot_before(std::int64_t frame) const;
+    std::optional<SceneSnapshot> snapshot_before(std::int64_t frame) const;
     static void warn(ViewStatus& status, std::int64_t frame, const std::string& text);
 
     // Of files that could not be written.
@@ -69,28 +68,24 @@ private:
     bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, bool is_whole);
 
     // They share columns with each other and the frames, but not all of them: of many every second is dropped.
-    void keep_snapshot(Snapshot snapshot);
+    void keep_snapshot(const SceneSnapshot& snapshot);
     void draw_graph();
-    void note_file(const std::filesystem::path& file);
 
     // Empty: there is none, or the run is to end.
     Task next_task(bool wait);
 
     ViewSimulation& view_;
     const std::uint64_t number_;
-    std::unique_ptr<Session> session_;
-    std::unique_ptr<Plan> plan_;
-    std::unique_ptr<InputContents> contents_;  // of the files that it reads; null without a cache
-    std::shared_ptr<CachedRun> cached_;        // null without a cache
+    std::optional<Scene> scene_;
+    std::shared_ptr<CachedRun> cached_;  // null without a cache
     std::int64_t first_ = 1, last_ = 1;
-    std::map<std::int64_t, Snapshot> snapshots_;
-    std::shared_ptr<const Results> inspected_;
-    std::int64_t inspected_frame_ = 0;
+    std::map<std::int64_t, SceneSnapshot> snapshots_;
+    std::optional<std::int64_t> inspected_;  // the frame of which the scene keeps the points behind nodes
 
     std::mutex mutex_;
     std::condition_variable wake_;
     std::deque<Task> tasks_;
-    Stop stop_;
+    std::stop_source stop_;
     std::atomic<bool> ended_{false};
     std::thread thread_;  // the last member: it starts when the others are initialised
 };

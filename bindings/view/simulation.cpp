@@ -6,12 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "bindings/command/or_throw.h"
+#include "bindings/view/points.h"
 #include "bindings/view/run.h"
-#include "runtime/graph/evaluate.h"
-#include "runtime/io/format.h"
-#include "runtime/points/spare_pages.h"
-#include "runtime/report/biography.h"
-#include "runtime/report/graphviz.h"
 
 namespace rapid {
 namespace {
@@ -28,6 +25,23 @@ fs::file_time_type changed_at(const fs::path& file)
     return none ? fs::file_time_type::min() : time;  // one that may come
 }
 
+int bytes_of_value(const SceneColumn& column)
+{
+    switch (column.type) {
+        case ColumnType::Float:
+        case ColumnType::Int32:
+        case ColumnType::String:
+        case ColumnType::Vec3:
+        case ColumnType::Quat:
+            return static_cast<int>(4 * column.components);
+        case ColumnType::Int64:
+            return 8;
+        case ColumnType::UInt8:
+            return 1;
+    }
+    return 0;
+}
+
 }  // namespace
 
 Error error_of(const std::exception& error)
@@ -40,7 +54,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
     : options_(std::move(options)), changed_(std::move(changed)), store_(options_.memory)
 {
     status_.version = 1;
-    SparePages::all().keep(most_spare);
+    or_throw(Scene::keep_spare_columns(most_spare));
     if (!options_.cache.empty()) cache_ = std::make_unique<FrameCache>(options_.cache);
     if (!is_sequence()) {
         begin();
@@ -54,7 +68,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
 
 ViewSimulation::~ViewSimulation()
 {
-    if (tracer_stop_) tracer_stop_->request();
+    tracer_stop_.request_stop();
     if (tracer_.joinable()) tracer_.join();
     if (run_) run_->abandon();
     run_.reset();
@@ -78,12 +92,6 @@ void ViewSimulation::begin()
     collect_ended();
     run_ = std::make_unique<Run>(*this, number);
     changed_();
-}
-
-void ViewSimulation::Stop::request()
-{
-    cancellation.request();
-    scripts->request(Cancellation::text, Interruption::Asked);
 }
 
 // Those that are at their end; of too many, waits for the first.
@@ -134,16 +142,23 @@ void ViewSimulation::note_file(std::uint64_t run, const fs::path& file)
     if (status_.run == run) read_.try_emplace(fs::absolute(file), changed_at(file));
 }
 
-std::string ViewSimulation::laid_out(const std::string& dot)
+SceneOptions ViewSimulation::scene_options() const
 {
-    {
-        const std::lock_guard lock(mutex_);
-        if (layout_.dot == dot) return layout_.json;
-    }
-    std::string json = lay_out(dot, "json");
+    SceneOptions options = options_.scene;
+    for (const auto& [name, value] : values()) options.set.emplace_back(name, value);  // of two the later one counts
+    return options;
+}
+
+GraphLayout ViewSimulation::layout() const
+{
     const std::lock_guard lock(mutex_);
-    layout_ = {dot, json};
-    return json;
+    return layout_;
+}
+
+void ViewSimulation::keep(GraphLayout layout)
+{
+    const std::lock_guard lock(mutex_);
+    layout_ = std::move(layout);
 }
 
 ViewStatus ViewSimulation::status() const
@@ -162,98 +177,77 @@ ViewFramePtr ViewSimulation::read_file(std::int64_t number)
 {
     const auto file = options_.files.find(static_cast<int>(number));
     if (file == options_.files.end()) return nullptr;
-    auto frame = std::make_shared<ViewFrame>();
-    frame->number = number;
-    frame->run = ++file_uses_;  // older ones make room
-    frame->outputs["main"] = read_points(file->second);
-    frame->statistics = fmt::format("{{\"frame\": {}, \"points\": {}}}", number, frame->outputs["main"].size());
+    const SceneFrame points = or_throw(SceneFrame::read(file->second));
+    auto frame = std::make_shared<ViewFrame>(ViewFrame{number, ++file_uses_, points, ""});  // older ones make room
+    frame->statistics = fmt::format("{{\"frame\": {}, \"points\": {}}}", number, points.size());
     frame->bytes = bytes_of(*frame);
     store_.put(frame);
     {
         const std::lock_guard lock(mutex_);
-        for (const auto& [name, column] : frame->outputs["main"].columns())
-            status_.names[name] = static_cast<int>(std::visit([](const auto& c) { return sizeof(c[0]); }, column));
-        for (const auto& [name, members] : frame->outputs["main"].groups()) status_.names[group_prefix + name] = 1;
+        for (const std::string& name : points.columns()) status_.names[name] = bytes_of_value(*points.column(name));
+        for (const std::string& name : points.groups()) status_.names[group_mark + name] = 1;
         ++status_.version;
     }
     changed_();
     return frame;
 }
 
-void ViewSimulation::inspect(std::int64_t frame,
-                             std::function<void(std::shared_ptr<const Results>, std::string error)> told)
+template <class T>
+void ViewSimulation::ask_run(std::function<T(Run&)> answer, std::function<void(T, std::string error)> told)
 {
-    if (!run_) return told(nullptr, "a sequence of files has no nodes");
-    run_->ask([frame, told = std::move(told)](Run& run) {
-        if (!run.plan()) return told(nullptr, "the scene has an error");
+    run_->ask([answer = std::move(answer), told = std::move(told)](Run& run) {
+        if (!run.has_scene()) return told({}, "the scene has an error");
         try {
-            told(run.inspect(frame), "");
+            told(answer(run), "");
         } catch (const std::exception& error) {
-            told(nullptr, error_of(error).what());
+            told({}, error_of(error).what());
         }
     });
+}
+
+void ViewSimulation::inspect(std::int64_t frame, std::function<void(Results, std::string error)> told)
+{
+    if (!run_) return told({}, "a sequence of files has no nodes");
+    ask_run<Results>([=](Run& run) { return run.inspect(frame); }, std::move(told));
 }
 
 void ViewSimulation::arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> told)
 {
     if (!run_) return told({}, "a sequence of files has no nodes");
-    run_->ask([frame, told = std::move(told)](Run& run) {
-        if (!run.plan()) return told({}, "the scene has an error");
-        try {
-            told(run.arguments(frame), "");
-        } catch (const std::exception& error) {
-            told({}, error_of(error).what());
-        }
-    });
+    ask_run<Arguments>([=](Run& run) { return run.arguments(frame); }, std::move(told));
 }
 
 void ViewSimulation::origin(std::int64_t frame, std::string output, std::int64_t id,
-                            std::function<void(Origin, std::string error)> told)
+                            std::function<void(PointOrigin, std::string error)> told)
 {
     if (!run_) return told({}, "a sequence of files has no biographies");
-    run_->ask([=, output = std::move(output), told = std::move(told)](Run& run) {
-        if (!run.plan()) return told({}, "the scene has an error");
-        try {
-            told(run.origin(frame, output, id), "");
-        } catch (const std::exception& error) {
-            told({}, error_of(error).what());
-        }
-    });
+    ask_run<PointOrigin>([=](Run& run) { return run.origin(frame, output, id); }, std::move(told));
 }
 
-void ViewSimulation::trace(const Origin& point, std::int64_t last,
+void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
                            std::function<void(std::string json, std::string error)> told)
 {
     if (is_sequence()) return told("", "a sequence of files has no biographies");
-    if (tracer_stop_) tracer_stop_->request();
+    tracer_stop_.request_stop();
     if (tracer_.joinable()) tracer_.join();
-    tracer_stop_ = std::make_shared<Stop>();
-    SessionOptions session = options_.session;
-    for (const auto& [name, value] : values()) session.set[name] = value;
-    session.interruptible = true;
-    session.interruption = tracer_stop_->scripts;
-    tracer_ = std::thread([=, this, stop = tracer_stop_, told = std::move(told)] {
-        tbb::task_arena arena(options_.threads);
-        arena.execute([&] {
-            const Cancellation::Scope scope(&stop->cancellation);
-            try {
-                const Session scene(options_.graph, session);
-                PlanOptions options;
-                options.seed = options_.seed;
-                options.keep_steps = true;
-                const Plan plan(scene.graph(), options);
-                Biographer biographer(plan, {point.id}, point.create);
-                Evaluator evaluator(plan, {}, biographer.results());
-                evaluator.leave_out_errors();
-                biographer.watch(evaluator);
-                while (evaluator.next_frame() <= last) biographer.add(evaluator.advance());
-                told(to_json(biographer.lives()), "");
-            } catch (const std::exception& error) {
-                const bool is_stopped = stop->cancellation.is_requested();
-                told("", is_stopped ? "another point was asked for" : error_of(error).what());
-            }
+    tracer_stop_ = std::stop_source();
+    tracer_ =
+        std::thread([=, this, options = scene_options(), stop = tracer_stop_.get_token(), told = std::move(told)] {
+            tbb::task_arena arena(options_.threads);
+            arena.execute([&] {
+                try {
+                    SceneHooks hooks;
+                    hooks.stop = stop;
+                    Scene scene = or_throw(Scene::open(options_.graph, options, hooks));
+                    const SceneTrace trace =
+                        or_throw(scene.trace({{point.id}, point.create, scene.first_frame(), last, 1}));
+                    if (trace.fault) throw_error(*trace.fault);
+                    told(trace.lives.json, "");
+                } catch (const std::exception& error) {
+                    told("", stop.stop_requested() ? "another point was asked for" : error_of(error).what());
+                }
+            });
         });
-    });
 }
 
 }  // namespace rapid

@@ -1,9 +1,8 @@
-// What a viewer shows: a scene that is run again whenever something changes, or the files of a sequence. The only place
-// where the viewer meets sessions and evaluators.
+// What a viewer shows: a scene that is run again whenever something changes, or the files of a sequence.
 //
-// Each run has a thread and a session of its own. A change abandons it: its scripts, and the sub-steps of Solve, end
-// within the frame (Interruption, Cancellation), while the next run has begun already. At most two are ending at a
-// time; then the next one waits.
+// Each run has a thread and a Scene of its own. A change abandons it: its scripts, and the sub-steps of Solve, end
+// within the frame (SceneHooks::stop), while the next run has begun already. At most two are ending at a time; then the
+// next one waits.
 #pragma once
 
 #include <atomic>
@@ -15,23 +14,21 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "bindings/host/session.h"
 #include "bindings/view/frame_cache.h"
 #include "bindings/view/frame_store.h"
-#include "runtime/cancellation.h"
+#include "include/rapid/scene.h"
 #include "runtime/error.h"
 
 namespace rapid {
 
 struct ViewOptions {
     std::string graph;
-    SessionOptions session;
-    std::optional<std::uint64_t> seed;
+    SceneOptions scene;
     std::optional<std::pair<std::int64_t, std::int64_t>> frames;
     std::map<int, std::filesystem::path> files;  // a sequence: there is no graph
     int threads = 1;
@@ -52,7 +49,7 @@ struct ViewStatus {
     std::optional<Error> error;
     std::vector<std::pair<std::int64_t, std::string>> warnings;  // with their first frames; 0: of none
     std::uint64_t more_warnings = 0;                             // that are not kept
-    std::vector<Session::Parameter> parameters;
+    std::vector<SceneParameter> parameters;
     std::vector<std::string> outputs;
     std::shared_ptr<const std::string> graph;  // the picture as JSON; null where there is none
     std::uint64_t graph_number = 0;            // grows with every other picture
@@ -84,31 +81,31 @@ public:
 
     // Calls `told` from the run's thread with the points as they are after each node in a frame, by name, or with an
     // error. The run goes on afterwards.
-    using Results = std::map<std::string, PointSet>;
-    void inspect(std::int64_t frame, std::function<void(std::shared_ptr<const Results>, std::string error)> told);
+    using Results = std::map<std::string, SceneFrame>;
+    void inspect(std::int64_t frame, std::function<void(Results, std::string error)> told);
     // Likewise the arguments of the nodes in a frame, as texts by node and name.
     using Arguments = std::map<std::string, std::map<std::string, std::string>>;
     void arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> told);
     // Likewise the create and the id under which it bore a point of an output in a frame: where chains are merged, ids
     // are others.
-    struct Origin {
-        std::string create;
-        std::int64_t id;
-    };
     void origin(std::int64_t frame, std::string output, std::int64_t id,
-                std::function<void(Origin, std::string error)> told);
-    // Likewise the life of a point up to a frame, as JSON, from a thread and a session of their own.
-    void trace(const Origin& point, std::int64_t last, std::function<void(std::string json, std::string error)> told);
+                std::function<void(PointOrigin, std::string error)> told);
+    // Likewise the life of a point up to a frame, as JSON, from a thread and a scene of their own.
+    void trace(const PointOrigin& point, std::int64_t last,
+               std::function<void(std::string json, std::string error)> told);
 
 private:
     class Run;
     void begin();
     void collect_ended();
     void note_file(std::uint64_t run, const std::filesystem::path& file);
-    // What Graphviz makes of a graph, as JSON; the last one is kept: most changes leave the graph as it is. Error: of
-    // dot.
-    std::string laid_out(const std::string& dot);
+    // The scene that a run or a trace opens, with the values of parameters.
+    SceneOptions scene_options() const;
+    GraphLayout layout() const;
+    void keep(GraphLayout layout);
     ViewFramePtr read_file(std::int64_t number);
+    template <class T>
+    void ask_run(std::function<T(Run&)> answer, std::function<void(T, std::string error)> told);
 
     const ViewOptions options_;
     const std::function<void()> changed_;
@@ -118,20 +115,12 @@ private:
     ViewStatus status_;
     std::map<std::filesystem::path, std::filesystem::file_time_type> read_;  // files, and when they were changed
     std::map<std::string, std::string> values_;
-    struct Layout {
-        std::string dot, json;
-    };
-    Layout layout_;
+    GraphLayout layout_;  // of the last run: most changes leave the graph as it is
     std::unique_ptr<Run> run_;
     std::deque<std::unique_ptr<Run>> ending_;
     std::atomic<std::uint64_t> file_uses_ = 0;  // of a sequence: counts the files that were read
+    std::stop_source tracer_stop_;
     std::thread tracer_;
-    struct Stop {
-        Cancellation cancellation;
-        std::shared_ptr<Interruption> scripts = std::make_shared<Interruption>();
-        void request();
-    };
-    std::shared_ptr<Stop> tracer_stop_;
 };
 
 }  // namespace rapid

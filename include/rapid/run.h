@@ -33,8 +33,7 @@ struct RunFrames {
 // How pictures are drawn. What is not given is fitted to the points and shapes.
 struct PictureSettings {
     PictureSize size{1280, 720};
-    std::optional<std::array<double, 3>> position, target;  // of the camera, and what it looks at; m
-    std::optional<double> fov;                              // vertical angle of view, degrees
+    PictureCamera camera;
 };
 
 // The files of a run's frames.

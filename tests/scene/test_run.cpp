@@ -329,7 +329,7 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     wrong([](RunOptions& o) { o.cache.again = true; }, "again says what to do with a cache");
     wrong([](RunOptions& o) { o.files.pictures.size = {0, 10}; }, "a picture of 0x10");
     wrong([](RunOptions& o) { o.files.pictures.size.width = 1 << 20; }, "a picture of 1048576x720");
-    wrong([](RunOptions& o) { o.files.pictures.fov = 180; }, "fov = 180");
+    wrong([](RunOptions& o) { o.files.pictures.camera.fov = 180; }, "fov = 180");
     SceneOptions scene;
     scene.threads = -1;
     CHECK_FALSE(SceneRun::make("cloud.lua", scene, {}, right, {}));

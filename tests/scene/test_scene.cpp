@@ -6,8 +6,11 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <stdexcept>
+#include <stop_token>
 #include <thread>
 
+#include "include/rapid/shapes.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
 #include "tests/test.h"
@@ -338,6 +341,66 @@ TEST_CASE("another thread cancels an advance", "[scene]")
     CHECK(scene.advance().error().kind == SceneError::Cancelled);
     good(scene.restart());
     good(scene.advance());
+}
+
+TEST_CASE("a stop that is asked for ends opening, and all that a scene does later", "[scene]")
+{
+    const test::TemporaryFolder folder;
+    const auto after = [](std::stop_source& stop, int milliseconds) {
+        return std::jthread([&stop, milliseconds] {
+            std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+            stop.request_stop();
+        });
+    };
+    const auto hooks_of = [](const std::stop_source& stop) {
+        SceneHooks hooks;
+        hooks.stop = stop.get_token();
+        return hooks;
+    };
+    {
+        std::stop_source stop;
+        const std::jthread other = after(stop, 50);
+        const auto scene = Scene::open(folder.write("body.lua", endless("body")), {}, hooks_of(stop));
+        REQUIRE_FALSE(scene);
+        CHECK(scene.error().kind == SceneError::Cancelled);
+    }
+    const auto file = folder.write("kernel.lua", endless("kernel"));
+    {
+        std::stop_source stop;
+        Scene scene = good(Scene::open(file, {}, hooks_of(stop)));
+        const SceneFrame first = good(scene.advance());
+        const std::jthread other = after(stop, 50);
+        CHECK(scene.advance().error().kind == SceneError::Cancelled);
+        CHECK(scene.restart().error().kind == SceneError::Cancelled);
+        CHECK(scene.points_behind_all(1).error().kind == SceneError::Cancelled);
+        CHECK(scene.shapes(1).error().kind == SceneError::Cancelled);
+        CHECK(scene.arguments(1).error().kind == SceneError::Cancelled);
+        CHECK(first.size() > 0);
+    }
+    std::stop_source stop;
+    stop.request_stop();
+    CHECK(Scene::open(file, {}, hooks_of(stop)).error().kind == SceneError::Cancelled);
+    CHECK(good(Scene::open(file, {}, hooks_of(std::stop_source()))).next_frame() == 1);
+}
+
+TEST_CASE("parameters are told where the plan of a scene fails, too", "[scene]")
+{
+    const test::TemporaryFolder folder;
+    std::vector<std::string> told;
+    SceneHooks hooks;
+    hooks.parameters = [&](const std::vector<SceneParameter>& parameters) {
+        for (const SceneParameter& parameter : parameters) told.push_back(parameter.name);
+        throw std::runtime_error("dropped");
+    };
+    const auto file = folder.write("scene.lua",
+                                   "local rapid = require 'rapid'\nlocal s = rapid.param('steps', 0, 'sub-steps')\n"
+                                   "return rapid.create {} :solve { substeps = s }");
+    CHECK_FALSE(Scene::open(file, {}, hooks));
+    CHECK(told == std::vector<std::string>{"steps"});
+    SceneOptions right;
+    right.set = {{"steps", 2.0}};
+    CHECK(good(Scene::open(file, right, hooks)).next_frame() == 1);
+    CHECK(told.size() == 2);
 }
 
 // A frame that takes minutes, without a script: the test ends because it is cancelled.

@@ -1,0 +1,69 @@
+// Files of what this build of Rapid has made, for itself: to the bit, and known by a key.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "bindings/scene/scene_error.h"
+#include "runtime/graph/abi.h"
+#include "runtime/io/state_file.h"
+#include "runtime/points/state_archive.h"
+
+namespace rapid {
+
+// What f gives of a file. Error: with the file.
+template <class F>
+auto of_file(const std::string& path, const F& f) -> Result<decltype(f())>
+{
+    try {
+        try {
+            return f();
+        } catch (Error& error) {
+            throw error.at({path, 0});
+        } catch (const nlohmann::json::exception&) {
+            throw Error("its header is not one that Rapid writes").at({path, 0});
+        }
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+// Error: the file is of another build.
+inline void require_this_build(const std::string& build)
+{
+    if (build != RAPID_ABI)
+        throw Error(fmt::format("it is of Rapid {}, and this is {}; write it anew", build, RAPID_ABI));
+}
+
+// Error: the file is of another key.
+inline void require_key(const CheckedJson& header, const std::string& key)
+{
+    if (header.value("key", "") != key) throw Error("it is of another run");
+}
+
+template <class T>
+void write_kept(const std::string& path, const char* what, const std::string& key, const T& value)
+{
+    OutputFile file(path);
+    write_state(file, {{"what", what}, {"key", key}, {"build", RAPID_ABI}}, state_of(value));
+    file.finish();
+}
+
+template <class T>
+T read_kept(const std::string& path, const char* what, const std::string& key)
+{
+    const StateFile file(path);
+    const CheckedJson& header = file.header();
+    if (header.at("what") != what)
+        throw Error(fmt::format("it is a {}, and no {}", header.at("what").get<std::string>(), what));
+    require_this_build(header.at("build").get<std::string>());
+    require_key(header, key);
+    T value;
+    restore(value, file.state());
+    return value;
+}
+
+}  // namespace rapid

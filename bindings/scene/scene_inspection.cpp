@@ -1,0 +1,169 @@
+// What is in a scene and in a frame of it: attributes, arguments, the points behind nodes, and where points come from.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "bindings/scene/scene_impl.h"
+#include "runtime/points/id_index.h"
+
+namespace rapid {
+
+Result<std::vector<SceneAttribute>> Scene::attributes()
+{
+    return impl_->call(SceneError::WrongCall, [&] {
+        std::vector<SceneAttribute> all;
+        for (const PlannedSimulation& simulation : impl_->plan->simulations) {
+            const std::string& create = simulation.create->name;
+            std::set<std::string> told;  // Evaluator::tell_points
+            if (impl_->hooks.tell_points && simulation.solve) told = {"asleep", "error", "substeps"};
+            for (const PlannedAttribute& attribute : simulation.attributes)
+                if (!told.contains(attribute.name))
+                    all.push_back({attribute.name, create, attribute.kept, attribute.bytes_per_point()});
+            for (const std::string& name : told) all.push_back({name, create, true, sizeof(float)});
+        }
+        return all;
+    });
+}
+
+Result<std::map<std::string, std::map<std::string, std::string>>> Scene::arguments(std::int64_t frame)
+{
+    return impl_->call(SceneError::FailedFrame, [&] {
+        const Impl::Running running(*impl_);
+        std::map<std::string, std::map<std::string, std::string>> all;
+        for (const PlannedNode& planned : impl_->plan->nodes) {
+            const PlannedSimulation& simulation = impl_->plan->simulations[planned.simulation];
+            const Frame now =
+                FrameClock{simulation.fps, simulation.start, simulation.subframes}.at(static_cast<double>(frame));
+            for (const auto& [name, value] : planned.node->arguments) {
+                const FrameFunction* function = value.function();
+                all[planned.node->name][name] = describe(function ? function->call(now) : value);
+            }
+        }
+        return all;
+    });
+}
+
+void Scene::Impl::compute_beside(const Plan& apart, std::int64_t frame, const Snapshot* from,
+                                 Evaluator::ResultHook results)
+{
+    const Running running(*this);
+    if (frame < apart.first_frame())
+        refuse(fmt::format("frame {} is before the scene's first, {}", frame, apart.first_frame()));
+    Evaluator run(apart, {}, std::move(results));
+    if (hooks.tell_points) run.tell_points();
+    if (!hooks.tell_points || !options.estimate_errors) run.leave_out_errors();
+    beside([&] {
+        if (from) run.load(*from);
+        while (run.next_frame() <= frame) run.advance();
+    });
+}
+
+SceneFrame Scene::Impl::frame_behind(const Plan& apart, const PlannedNode& planned, std::int64_t frame,
+                                     PointSet points) const
+{
+    const std::string& node = planned.node->name;
+    const PlannedSimulation& simulation = apart.simulations[planned.simulation];
+    auto data = std::make_shared<SceneFrame::Data>();
+    data->scene = this;
+    data->result.frame = frame;
+    data->result.outputs.emplace(node, std::move(points));
+    data->result.fps.emplace(node, simulation.fps);
+    data->result.time.emplace(node, static_cast<double>(frame - simulation.start) / simulation.fps);
+    return SceneFrame(std::move(data), node);
+}
+
+SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t frame)
+{
+    const Plan watched(session->graph(), plan_options());
+    const auto& nodes_of_plan = watched.nodes;
+    const auto found = std::find_if(nodes_of_plan.begin(), nodes_of_plan.end(),
+                                    [&](const PlannedNode& planned) { return planned.node->name == node; });
+    if (found == nodes_of_plan.end()) {
+        std::vector<std::string> names;
+        for (const SceneNode& one : nodes) names.push_back(one.name);
+        const bool is_left_out = std::find(names.begin(), names.end(), node) != names.end();
+        refuse(is_left_out ? fmt::format("node \"{}\" is left out: no output comes from it", node)
+                           : fmt::format("the scene has no node \"{}\"{}", node, did_you_mean(node, names)));
+    }
+    PointSet points;  // of a node whose result never changes, those of its only evaluation
+    compute_beside(watched, frame, nullptr, [&](const Node& of, std::int64_t, const PointSet& result) {
+        if (of.name == node) points = result;
+    });
+    return frame_behind(watched, *found, frame, std::move(points));
+}
+
+const std::map<std::string, SceneFrame>& Scene::Impl::points_behind_all(std::int64_t frame, const SceneSnapshot* from)
+{
+    if (behind_frame == frame) return behind;
+    if (from) {
+        refuse_unless_of_this_graph(*from);
+        if (from->frame() >= frame)
+            refuse(fmt::format("the snapshot is behind frame {}; frame {} takes one from before it", from->frame(),
+                               frame));
+    }
+    const Plan watched(session->graph(), plan_options());
+    std::map<std::string, PointSet> results;
+    compute_beside(watched, frame, from ? &from->data_->snapshot : nullptr,
+                   [&](const Node& node, std::int64_t at, const PointSet& points) {
+                       if (at == frame) results[node.name] = points;
+                   });
+    behind_frame.reset();
+    behind.clear();
+    for (const PlannedNode& planned : watched.nodes)
+        if (const auto found = results.find(planned.node->name); found != results.end())
+            behind.emplace(found->first, frame_behind(watched, planned, frame, std::move(found->second)));
+    behind_frame = frame;
+    return behind;
+}
+
+PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const SceneSnapshot* from)
+{
+    const auto output = plan->outputs.find(frame.output_);
+    if (output == plan->outputs.end())
+        refuse(fmt::format("the scene has no output \"{}\", which the frame has", frame.output_));
+    const PointSet& points = frame.data_->result.outputs.at(frame.output_);
+    const std::uint32_t place = IdIndex(points.id())[id];
+    if (place == IdIndex::none) refuse("the point is not in this frame");
+    const PlannedNode& planned = plan->nodes[output->second];
+    if (planned.carries.size() == 1) return {plan->simulations[planned.simulation].create->name, id};
+    // The chains' own points that are at the same place, to the bit, with the same velocity.
+    std::vector<PointOrigin> found;
+    const std::map<std::string, SceneFrame>& results = points_behind_all(frame.number(), from);
+    for (const std::size_t s : planned.carries) {
+        const PlannedSimulation& simulation = plan->simulations[s];
+        const auto end = results.find(simulation.solve ? simulation.solve->name : simulation.create->name);
+        if (end == results.end()) continue;
+        const PointSet& chain = end->second.data_->result.outputs.at(end->first);
+        const Strided<Vec3f> P = chain.P().read(), v = chain.v().read();
+        for (std::size_t i = 0; i < chain.size(); ++i)
+            if (P[i] == points.P()[place] && v[i] == points.v()[place])
+                found.push_back({simulation.create->name, chain.id()[i]});
+    }
+    if (found.size() == 1) return found.front();
+    refuse(found.empty() ? "the chain of the point is not known: nodes behind its Solve have moved it"
+                         : "several points are at this place with this velocity; choose another frame");
+}
+
+Result<SceneFrame> Scene::points_behind(const std::string& node, std::int64_t frame)
+{
+    return impl_->call(SceneError::FailedFrame, [&] {
+        impl_->start_again();
+        return impl_->points_behind(node, frame);
+    });
+}
+
+Result<std::map<std::string, SceneFrame>> Scene::points_behind_all(std::int64_t frame,
+                                                                   const std::optional<SceneSnapshot>& from)
+{
+    return impl_->call(SceneError::FailedFrame,
+                       [&] { return impl_->points_behind_all(frame, from ? &*from : nullptr); });
+}
+
+Result<PointOrigin> Scene::origin(const SceneFrame& frame, std::int64_t id, const std::optional<SceneSnapshot>& from)
+{
+    return impl_->call(SceneError::FailedFrame, [&] { return impl_->origin(frame, id, from ? &*from : nullptr); });
+}
+
+}  // namespace rapid

@@ -1,0 +1,196 @@
+// Shapes of a frame, and pictures of points among them.
+#include "include/rapid/shapes.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "bindings/scene/kept_file.h"
+#include "bindings/scene/scene_impl.h"
+#include "runtime/picture/frame_picture.h"
+#include "runtime/picture/png_file.h"
+
+namespace rapid {
+namespace {
+
+constexpr char what_shapes_are[] = "shapes of a frame";
+
+static_assert(sizeof(Vec3f) == 3 * sizeof(float) && sizeof(Mesh::Triangle) == 3 * sizeof(std::int32_t));
+
+// A PictureScene in a file.
+struct KeptScene {
+    struct Body {
+        std::vector<Vec3f> positions;
+        std::vector<Mesh::Triangle> triangles;
+        std::int32_t role = 0;
+
+        template <class Archive>
+        void serialize(Archive& keep)
+        {
+            keep(positions, triangles, role);
+        }
+    };
+    std::vector<Body> bodies;
+    PictureScene rest;  // without bodies
+
+    KeptScene() = default;
+    explicit KeptScene(const PictureScene& scene) : rest(scene)
+    {
+        rest.bodies.clear();
+        for (const PictureScene::Body& body : scene.bodies)
+            bodies.push_back({body.mesh->positions, body.mesh->triangles, body.role});
+    }
+
+    std::shared_ptr<const PictureScene> scene() &&
+    {
+        for (Body& body : bodies) {
+            auto mesh = std::make_shared<Mesh>();
+            mesh->positions = std::move(body.positions);
+            mesh->triangles = std::move(body.triangles);
+            const auto corners = static_cast<std::int32_t>(mesh->positions.size());
+            for (const Mesh::Triangle& triangle : mesh->triangles)
+                if (triangle.minCoeff() < 0 || triangle.maxCoeff() >= corners) StateReader::fail();
+            rest.bodies.push_back({mesh, body.role == PictureScene::Body::Emitter ? PictureScene::Body::Emitter
+                                                                                  : PictureScene::Body::Collider});
+        }
+        return std::make_shared<PictureScene>(std::move(rest));
+    }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(bodies);
+        auto planes = static_cast<std::uint32_t>(rest.planes.size());
+        auto styles = static_cast<std::uint32_t>(rest.styles.size());
+        keep(planes, styles);
+        if constexpr (Archive::is_loading::value) {
+            keep_room(keep, planes, rest.planes);
+            keep_room(keep, styles, rest.styles);
+        }
+        for (PictureScene::Plane& plane : rest.planes) keep(plane.normal, plane.offset);
+        for (PointStyle& style : rest.styles) keep(style.group, style.additive, style.shutter);
+        keep(rest.camera.position, rest.camera.target, rest.camera.fov, rest.camera.group);
+    }
+
+private:
+    template <class Archive, class T>
+    static void keep_room(const Archive& from, std::uint32_t count, std::vector<T>& list)
+    {
+        from.require(count);
+        list.resize(count);
+    }
+};
+
+}  // namespace
+
+SceneShapes::SceneShapes() = default;
+SceneShapes::SceneShapes(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+
+std::vector<ShapeMesh> SceneShapes::meshes() const
+{
+    std::vector<ShapeMesh> meshes;
+    if (!data_) return meshes;
+    for (const PictureScene::Body& body : data_->scene->bodies) {
+        ShapeMesh& mesh = meshes.emplace_back();
+        mesh.role = body.role == PictureScene::Body::Collider ? ShapeRole::Collider : ShapeRole::Emitter;
+        mesh.corner_count = body.mesh->positions.size();
+        mesh.positions = reinterpret_cast<const float*>(body.mesh->positions.data());
+        mesh.triangle_count = body.mesh->triangles.size();
+        mesh.triangles = reinterpret_cast<const std::int32_t*>(body.mesh->triangles.data());
+        mesh.owner = body.mesh;
+    }
+    return meshes;
+}
+
+std::vector<ShapePlane> SceneShapes::planes() const
+{
+    std::vector<ShapePlane> planes;
+    if (!data_) return planes;
+    for (const PictureScene::Plane& plane : data_->scene->planes)
+        planes.push_back({{plane.normal.x(), plane.normal.y(), plane.normal.z()}, plane.offset});
+    return planes;
+}
+
+std::vector<std::string> SceneShapes::warnings() const { return data_ ? data_->warnings : std::vector<std::string>(); }
+
+bool SceneShapes::operator==(const SceneShapes& other) const
+{
+    return (data_ ? data_->scene : nullptr) == (other.data_ ? other.data_->scene : nullptr);
+}
+
+Result<Done> SceneShapes::save(const std::string& path) const
+{
+    return of_file(path, [&] {
+        const PictureScene none;
+        write_kept(path, what_shapes_are, "", KeptScene(data_ ? *data_->scene : none));
+        return Done();
+    });
+}
+
+Result<SceneShapes> SceneShapes::load(const std::string& path)
+{
+    return of_file(path, [&] {
+        auto data = std::make_shared<Data>();
+        data->scene = read_kept<KeptScene>(path, what_shapes_are, "").scene();
+        return SceneShapes(std::move(data));
+    });
+}
+
+SceneShapes Scene::Impl::shapes_at(std::int64_t frame)
+{
+    const Running running(*this);
+    if (!picture_scene) picture_scene = std::make_unique<SceneOfPlan>(*plan);
+    auto data = std::make_shared<SceneShapes::Data>();
+    data->scene = picture_scene->at(frame);
+    data->warnings = session->take_warnings();
+    return SceneShapes(std::move(data));
+}
+
+Result<SceneShapes> Scene::shapes(std::int64_t frame)
+{
+    return impl_->call(SceneError::FailedFrame, [&] { return impl_->shapes_at(frame); });
+}
+
+std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camera, PictureSize size)
+{
+    if (camera.fov && !(*camera.fov > 0 && *camera.fov < 180))
+        refuse(fmt::format("fov = {}; it must be between 0 and 180 degrees", *camera.fov));
+    auto options = std::make_shared<PictureOptions>();
+    options->width = size.width;
+    options->height = size.height;
+    if (camera.position) options->position = Vec3d(camera.position->data());
+    if (camera.target) options->target = Vec3d(camera.target->data());
+    if (camera.fov) options->fov = *camera.fov * M_PI / 180;
+    return options;
+}
+
+Result<std::string> SceneFrame::picture(const SceneShapes& shapes, const PictureCamera& camera, PictureSize size) const
+{
+    try {
+        FrameInfo info;
+        info.picture = picture_options(camera, size);
+        info.scene = shapes.data_ ? shapes.data_->scene : nullptr;
+        return encode_png(picture_of(data_->result.outputs.at(output_), info));
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
+}
+
+Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)
+{
+    return impl_->call(SceneError::WrongCall, [&] {
+        const SceneFrame::Data& data = *frame.data_;
+        if (data.scene != impl_.get()) refuse("the frame is of another scene");
+        if (!impl_->picture_scene) impl_->picture_scene = std::make_unique<SceneOfPlan>(*impl_->plan);
+        FrameInfo info;
+        info.number = static_cast<int>(frame.number());
+        info.time = frame.time();
+        info.fps = frame.fps();
+        info.picture = picture_options({}, size);
+        info.scene = impl_->picture_scene->at(frame.number());
+        return encode_png(picture_of(data.result.outputs.at(frame.output_), info));
+    });
+}
+
+}  // namespace rapid

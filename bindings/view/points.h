@@ -1,0 +1,62 @@
+// Columns of a frame as requests read them: of all points, or of those at some places.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "include/rapid/scene.h"
+
+namespace rapid {
+
+// How the page names a group among the attributes.
+inline const std::string group_mark = "group:";
+
+// Null: all points.
+using Places = std::vector<std::uint32_t>;
+
+// The values of a column, packed: a view of the frame's where that has them so. T: of a component.
+template <class T>
+class PointValues {
+public:
+    PointValues(const SceneColumn& column, const Places* places)
+        : size_(places ? places->size() : column.count),
+          components_(column.components),
+          step_(column.stride == 0 ? 0 : components_),
+          data_(static_cast<const T*>(column.data))
+    {
+        if (is_one() || (!places && column.stride == components_ * sizeof(T))) return;
+        own_ = std::make_shared<std::vector<T>>();
+        own_->reserve(size_ * components_);
+        for (std::size_t k = 0; k < size_; ++k) {
+            const T* value = column.at<T>(places ? (*places)[k] : k);
+            own_->insert(own_->end(), value, value + components_);
+        }
+        data_ = own_->data();
+    }
+
+    std::size_t size() const { return size_; }
+    // Whether all points share one value, which then is there once.
+    bool is_one() const { return step_ == 0; }
+    // The components of point k.
+    const T* operator[](std::size_t k) const { return data_ + k * step_; }
+
+private:
+    std::size_t size_, components_, step_;
+    std::shared_ptr<std::vector<T>> own_;
+    const T* data_;
+};
+
+// A column of this type. Nothing: there is none.
+inline std::optional<SceneColumn> find_column(const SceneFrame& points, std::string_view name, ColumnType type)
+{
+    const Result<SceneColumn> column = points.column(name);
+    if (!column || column->type != type) return std::nullopt;
+    return *column;
+}
+
+}  // namespace rapid

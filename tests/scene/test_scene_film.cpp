@@ -1,0 +1,62 @@
+// Films of frames.
+#include <cmath>
+
+#include "include/rapid/film.h"
+#include "include/rapid/scene.h"
+#include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+using Catch::Contains, Catch::StartsWith;
+using test::good;
+
+}  // namespace
+
+TEST_CASE("a film that can't be is refused before its first picture", "[film]")
+{
+    const test::TemporaryFolder folder;
+    const auto fault = [&](const std::string& name, const FilmOptions& options = {}) {
+        const auto film = SceneFilm::begin(folder / name, options);
+        REQUIRE_FALSE(film);
+        CHECK(film.error().kind == SceneError::WrongCall);
+        return film.error().message;
+    };
+    CHECK(fault("film.avi") == "a film can't be a \".avi\"; it must be .mp4, .webm or .gif");
+    CHECK_THAT(fault("film.####.gif"), Contains("is a pattern of several"));
+    CHECK_THAT(fault("film_{output}.gif"), Contains("is a pattern of several"));
+    CHECK(fault("film.gif", {0, {64, 48}, {}}) == "0 frames a second; a film has from 1 to 1000");
+    CHECK(fault("film.gif", {std::nan(""), {64, 48}, {}}) == "nan frames a second; a film has from 1 to 1000");
+    CHECK_THAT(fault("film.gif", {24, {0, 48}, {}}), Contains("each side must be from 1 to 16384 pixels"));
+    CHECK(fault("film.mp4", {24, {63, 48}, {}}) == "a .mp4 film of 63 x 48 can't be made; both edges must be even");
+}
+
+TEST_CASE("a film has its name when it is finished, and is not there where it is not", "[film]")
+{
+    const test::TemporaryFolder folder;
+    Scene scene = test::opened(
+        "local rapid = require 'rapid'\nreturn rapid.create { points = rapid.points.grid {} } :gravity {} :solve {}");
+    {
+        SceneFilm film = good(SceneFilm::begin(folder / "film.gif", {24, {32, 24}, {}}));
+        CHECK(film.finish().error().message == "the film has no pictures; add() some first");
+        for (int k = 1; k <= 3; ++k) {
+            const SceneFrame frame = good(scene.advance());
+            good(film.add(frame, good(scene.shapes(frame.number()))));
+        }
+        CHECK(film.done() <= 3);
+        good(film.finish());
+        CHECK(film.done() == 3);
+        CHECK_THAT(film.add(good(scene.advance()), {}).error().message, Contains("the film is finished"));
+        CHECK_THAT(film.finish().error().message, Contains("the film is finished"));
+    }
+    CHECK_THAT(test::file_text(folder / "film.gif"), StartsWith("GIF89a"));
+    {
+        SceneFilm film = good(SceneFilm::begin(folder / "given_up.gif", {24, {32, 24}, {}}));
+        good(film.add(good(scene.advance()), {}));
+    }
+    CHECK(test::file_names(folder.path()) == std::vector<std::string>{"film.gif"});
+}
+
+}  // namespace rapid

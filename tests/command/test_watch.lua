@@ -17,7 +17,9 @@ local function watch(steps, options)
   folder:write("scene.lua", scene)
   folder:write("height.lua", "return 1")
   folder:write("mine.lua", node)
+  -- The log is there before it is looked at: of a missing one there is no number.
   local script = [[
+: >log
 await() {  # TEXT TIMES: in the log, within 20 s
   for _ in $(seq 400); do
     [ "$(grep -c -- "$1" log)" -lt "$2" ] || return 0
@@ -32,7 +34,7 @@ await() {  # TEXT TIMES: in the log, within 20 s
   end
   script = script .. ("kill -%s $(cat pid)\n) &\n"):format(options.signal or "INT") ..
     "timeout 60 sh -c 'echo $$ >pid; exec \"$0\" run scene.lua --watch -f 1-2 -o all.#.csv' " ..
-    "\"$RAPID\" >log 2>&1\necho status $? >>log\nwait\n"
+    "\"$RAPID\" >>log 2>&1\necho status $? >>log\nwait\n"
   command.shell(script, { cwd = folder.path })
   return folder:read "log", folder
 end

@@ -5,7 +5,6 @@
 #include "bindings/command/command.h"
 #include "bindings/command/file_options.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/memory_limit.h"
 #include "bindings/command/or_throw.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
@@ -44,11 +43,11 @@ public:
             throw Error("-f chooses the frames of --races; without it no frame is run: give both, or leave it out");
         Threads threads(races_ ? 1 : common.threads);
         return threads.run([&] {
-            const MemoryLimit limit(graph_.file(), end_at_limit(common));
-            Scene scene = graph_.open(common);
+            Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
             const std::string text = or_throw(check_outputs(scene, files_.files()));
             if (!races_) {
-                print(text + or_throw(advice_on(scene, files_.files())));
+                print(text);
+                print(or_throw(advice_on(scene, files_.files())));
                 return status_done;
             }
             const std::int64_t first = scene.first_frame();

@@ -6,7 +6,6 @@
 #include "bindings/command/command.h"
 #include "bindings/command/file_options.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/memory_limit.h"
 #include "bindings/command/or_throw.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
@@ -47,15 +46,14 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            const MemoryLimit limit(graph_.file(), end_at_limit(common));
-            Scene scene = graph_.open(common);
+            Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
+            const SceneReport kept = or_throw(explain_outputs(scene, files_.files()));
             if (!against_.empty()) {
                 Scene other = graph_.open_other(against_, common);
                 const SceneReport more = or_throw(explain_difference(scene, files_.files(), other));
                 print(json_ ? indented(ordered_json::parse(more.json)) : more.text);
                 return status_done;
             }
-            const SceneReport kept = or_throw(explain_outputs(scene, files_.files()));
             std::optional<SceneReport> state;
             if (state_after_) {
                 if (*state_after_ < scene.first_frame())

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "bindings/command/command.h"
-#include "bindings/command/memory_limit.h"
 #include "bindings/command/or_throw.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
@@ -44,7 +43,6 @@ public:
                 "-o {}: dot, a program of its own, lays it out, which --untrusted forbids; write .dot", file_));
         Threads threads(common.threads);
         return threads.run([&] {
-            const MemoryLimit limit(graph_.file(), end_at_limit(common));
             Scene scene = graph_.open(common);
             const GraphForm form = extension == ".svg"    ? GraphForm::Svg
                                    : extension == ".json" ? GraphForm::Json

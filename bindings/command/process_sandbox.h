@@ -4,8 +4,7 @@
 // through it meets the limits of the system, which the process can't lift again:
 //
 //   Landlock    it reads `readable` and what is below, Rapid's own files, RAPID_PATH and the system's libraries,
-//   creates
-//               and changes files below `writable`, and nothing else
+//               creates and changes files below `writable`, and nothing else
 //   seccomp     it makes the system calls that Rapid needs (system_call_filter.h): it opens no socket, starts no
 //               process, reaches no other process, and changes no mode, owner, time or attribute of a file
 //   environment it has that of the loader, the C library and Rapid

@@ -1,7 +1,10 @@
 // rapid run: computes the frames in order and writes them.
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <csignal>
+#include <optional>
 
 #include "bindings/command/command.h"
 #include "bindings/command/farm_options.h"
@@ -96,35 +99,35 @@ public:
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
         Threads threads(common.threads);
         RunTerminal terminal(quiet_, common.verbose);
-        SceneRun* run = nullptr;  // null until it is made
-        const auto abandon = [&](int status, const std::string& why) { terminal.abandon(*run, status, why); };
-        std::optional<GracefulEnd> end;
-        SceneRun made = threads.run([&] {
-            return make([&](const std::string& message) { abandon(status_failed, message); },
-                        terminal.listener([&](bool keeps_snapshots) {
-                            if (keeps_snapshots) end->allow();
-                        }));
-        });
-        run = &made;
-        end.emplace(grace_, [&](int signal) {
+        std::optional<SceneRun> run;  // until the others have ended
+        std::atomic<SceneRun*> made = nullptr;
+        const auto abandon = [&](int status, const std::string& why) {
+            if (SceneRun* const it = made) terminal.abandon(*it, status, why);
+            _exit(status);
+        };
+        GracefulEnd end(grace_, [&](int signal) {
             abandon(128 + signal, "interrupted; the frame took longer than the --grace, and is dropped");
         });
         const SignalThread signals([&](int signal) {
-            if (end->ask(signal))
+            if (end.ask(signal))
                 run->end_after_frame();
             else
                 abandon(128 + signal, "interrupted");
         });
         return threads.run([&] {
+            const auto fail = [&](const std::string& message) { abandon(status_failed, message); };
+            run.emplace(make(fail, terminal.listener([&](bool keeps_snapshots) {
+                if (keeps_snapshots) end.allow();
+            })));
+            made = &*run;
             {
-                const MemoryLimit limit(graph_.file(),
-                                        [&](const std::string& message) { abandon(status_failed, message); });
+                const MemoryLimit limit(graph_.file(), fail);
                 or_throw(run->prepare());
             }
             if (farm_.asked()) return submit(*run);
             terminal.begin(run->first_frame(), run->frames().last);
             const RunOutcome outcome = or_throw(run->run());
-            return terminal.end(outcome, end->signal());
+            return terminal.end(outcome, end.signal());
         });
     }
 

@@ -4,16 +4,17 @@
 
 #include <utility>
 
+#include "bindings/command/memory_limit.h"
 #include "bindings/command/or_throw.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
 
-Scene opened(const std::string& file, SceneOptions options, const CommonOptions& common)
+// The limit of memory is that of opening: frames are watched by the scene, which knows the node.
+Scene opened(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
-    SceneHooks hooks;
-    hooks.late = end_at_limit(common);
+    const MemoryLimit limit(file, hooks.late);
     return or_throw(Scene::open(file, std::move(options), std::move(hooks)));
 }
 
@@ -66,13 +67,21 @@ SceneOptions SceneArguments::scene_options() const
     return options;
 }
 
-Scene SceneArguments::open(const CommonOptions& common) const { return opened(file_, scene_options(), common); }
+Scene SceneArguments::open(const CommonOptions& common, AtLimit frame) const
+{
+    SceneHooks hooks;
+    hooks.late = end_at_limit(common);
+    if (frame == AtLimit::EndsProcess) hooks.beyond_memory = hooks.late;
+    return opened(file_, scene_options(), std::move(hooks));
+}
 
 Scene SceneArguments::open_other(const std::string& file, const CommonOptions& common) const
 {
     SceneOptions options = scene_options();
     options.set.clear();
-    return opened(file, std::move(options), common);
+    SceneHooks hooks;
+    hooks.late = end_at_limit(common);
+    return opened(file, std::move(options), std::move(hooks));
 }
 
 }  // namespace rapid

@@ -24,9 +24,11 @@ public:
 
     // With the settings; what scripts print is printed, and so are warnings.
     SceneOptions scene_options() const;
+    // What becomes of a frame that does not end at the limit of memory when it is asked to.
+    enum class AtLimit { GoesOn, EndsProcess };
     // Opens the scene of a command that writes none of its files. A script that runs into its timeout ends the process,
     // now or in a later frame. Error: the file or a --set is wrong.
-    Scene open(const CommonOptions& common) const;
+    Scene open(const CommonOptions& common, AtLimit frame = AtLimit::GoesOn) const;
     // Another one, with the same limits; --set is for the first one only.
     Scene open_other(const std::string& file, const CommonOptions& common) const;
 

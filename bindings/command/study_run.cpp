@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command/command.h"
-#include "bindings/command/memory_limit.h"
 #include "bindings/command/or_throw.h"
 #include "runtime/threads.h"
 
@@ -63,15 +62,12 @@ void guarded(const StudyChild& child, const TellParent& tell,
 {
     StudySource source = child.source;
     source.options.log = [](LogLevel, const std::string& text) { print(text + '\n'); };
-    source.hooks.late = end_at_limit(tell);
+    source.hooks.late = source.hooks.beyond_memory = end_at_limit(tell);
     Threads threads(child.threads);
     bool started = false;
     std::string failed;
     try {
-        threads.run([&] {
-            const MemoryLimit limit(source.file, end_at_limit(tell));
-            work(source, started);
-        });
+        threads.run([&] { work(source, started); });
         return;
     } catch (const std::bad_alloc&) {
         failed = "out of memory";

@@ -5,7 +5,6 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
-#include "bindings/command/memory_limit.h"
 #include "bindings/command/or_throw.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
@@ -50,7 +49,7 @@ public:
     {
         Threads threads(common.threads);
         return threads.run([&] {
-            Scene scene = open(common);
+            Scene scene = graph_.open(common);
             const std::int64_t start = scene.first_frame();
             const FrameSelection frames = frames_.value_or(FrameSelection{start, start + default_frames - 1});
             if (frames.last < start)
@@ -65,13 +64,6 @@ public:
     }
 
 private:
-    // The limit of memory: frames are watched by the scene, which knows the node.
-    Scene open(const CommonOptions& common) const
-    {
-        const MemoryLimit limit(graph_.file(), end_at_limit(common));
-        return graph_.open(common);
-    }
-
     SceneArguments graph_;
     std::vector<std::int64_t> ids_;
     std::string create_;

@@ -122,13 +122,6 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
     return options;
 }
 
-std::vector<std::string> FrameFiles::names() const
-{
-    std::vector<std::string> names;
-    for (const Target& target : targets_) names.push_back(target.text);
-    return names;
-}
-
 // Each pattern of pictures keeps what it has drawn of the scene.
 void FrameFiles::require_picture_memory(std::size_t patterns) const
 {

@@ -42,9 +42,6 @@ public:
     // picture, which can't be put together; a name with {part}.
     std::vector<std::pair<std::string, std::string>> merges() const;
 
-    // The -o as the user gave them.
-    std::vector<std::string> names() const;
-
     // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames,
     // or for no output of the graph; two that write the same files.
     void resolve(const Plan& plan, bool several_frames);

@@ -25,20 +25,20 @@ struct Difference {
     std::string what, here, there;  // "heat of point id 3", "1", "2"
 };
 
-std::string text_of(float value) { return fmt::format("{:.9g}", value); }
-std::string text_of(double value) { return fmt::format("{:.17g}", value); }
-std::string text_of(std::int32_t value) { return fmt::format("{}", value); }
-std::string text_of(std::int64_t value) { return fmt::format("{}", value); }
-std::string text_of(const Vec3f& v) { return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z()); }
-std::string text_of(const Vec3d& v) { return fmt::format("vec3({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z()); }
-std::string text_of(const Quatf& q)
+std::string shown(float value) { return fmt::format("{:.9g}", value); }
+std::string shown(double value) { return fmt::format("{:.17g}", value); }
+std::string shown(std::int32_t value) { return fmt::format("{}", value); }
+std::string shown(std::int64_t value) { return fmt::format("{}", value); }
+std::string shown(const Vec3f& v) { return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z()); }
+std::string shown(const Vec3d& v) { return fmt::format("vec3({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z()); }
+std::string shown(const Quatf& q)
 {
     return fmt::format("quat({:.9g}, {:.9g}, {:.9g}, {:.9g})", q.x(), q.y(), q.z(), q.w());
 }
-std::string text_of(Token text) { return fmt::format("\"{}\"", text.text()); }
-std::string text_of(const DetailValue& value)
+std::string shown(Token text) { return fmt::format("\"{}\"", text.text()); }
+std::string shown(const DetailValue& value)
 {
-    return std::visit([](const auto& v) { return text_of(v); }, value);
+    return std::visit([](const auto& v) { return shown(v); }, value);
 }
 
 template <class T>
@@ -62,8 +62,8 @@ std::optional<Difference> compare_columns(const PointSet& a, const PointSet& b)
                 const auto& there = std::get<Column<T>>(*other);
                 const std::optional<std::size_t> i = first_unequal(here, there);
                 if (!i) return std::nullopt;
-                return Difference{nullptr, fmt::format("{} of point id {}", name, a.id()[*i]), text_of(here[*i]),
-                                  text_of(there[*i])};
+                return Difference{nullptr, fmt::format("{} of point id {}", name, a.id()[*i]), shown(here[*i]),
+                                  shown(there[*i])};
             },
             column);
         if (found) return found;
@@ -88,9 +88,9 @@ std::optional<Difference> compare_details(const PointSet& a, const PointSet& b)
 {
     for (const auto& [name, value] : a.details) {
         const auto other = b.details.find(name);
-        const std::string there = other == b.details.end() ? "not there" : text_of(other->second);
-        if (text_of(value) != there)
-            return Difference{nullptr, fmt::format("the detail value {}", name), text_of(value), there};
+        const std::string there = other == b.details.end() ? "not there" : shown(other->second);
+        if (shown(value) != there)
+            return Difference{nullptr, fmt::format("the detail value {}", name), shown(value), there};
     }
     return std::nullopt;
 }
@@ -101,8 +101,7 @@ std::optional<Difference> compare(const PointSet& a, const PointSet& b)
     // Where ids differ, as points were killed or sorted, their values are of no interest.
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
         if (a.id()[i] != b.id()[i])
-            return Difference{nullptr, fmt::format("the id at place {}", i + 1), text_of(a.id()[i]),
-                              text_of(b.id()[i])};
+            return Difference{nullptr, fmt::format("the id at place {}", i + 1), shown(a.id()[i]), shown(b.id()[i])};
     if (a.size() != b.size())
         return Difference{nullptr, "the number of points", fmt::format("{}", a.size()), fmt::format("{}", b.size())};
     if (auto found = compare_columns(a, b)) return found;
@@ -177,7 +176,7 @@ std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan
 
 }  // namespace
 
-Races find_races(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const FrameSelection& frames)
+Races races_in(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const FrameSelection& frames)
 {
     const std::vector<NodePoints> expected = results_in_order(plan, frames);
     Races races;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <thread>
 #include <utility>
 
 #include "runtime/report/memory.h"
@@ -19,11 +20,22 @@ RunReport::RunReport(Options options, Listener listener, FrameFiles& files, RunC
     if (!options.profile_file.empty()) profile_.emplace(std::move(options.profile_file));
 }
 
+std::unique_lock<std::timed_mutex> RunReport::locked()
+{
+    std::unique_lock lock(mutex_);
+    while (is_abandoned_) {
+        lock.unlock();
+        std::this_thread::sleep_for(std::chrono::seconds(1));  // the process is about to end
+        lock.lock();
+    }
+    return lock;
+}
+
 double RunReport::now() const { return earlier_seconds_ + stopwatch_.seconds(); }
 
 void RunReport::frame(const FrameResult& result)
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     const FrameStatistics frame = statistics_of(result);
     totals_.add(frame);
     if (statistics_) statistics_->add(frame);
@@ -36,7 +48,7 @@ void RunReport::frame(const FrameResult& result)
 
 void RunReport::known_frame(const FrameRecord& record, bool is_before)
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     totals_.add(record.statistics);
     if (statistics_) statistics_->add(record.statistics);
     keep_worst(run_.stiff, record.stiff);
@@ -50,19 +62,19 @@ void RunReport::known_frame(const FrameRecord& record, bool is_before)
 
 void RunReport::line(const std::string& text)
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     listener_.line(text);
 }
 
 void RunReport::warning(const std::string& text)
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     if (warned_.insert(text).second) listener_.warning(text);
 }
 
 void RunReport::warning(const std::string& text, std::int64_t frame)
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     if (cache_) cache_->warned(text);
     tell(text, frame);
 }
@@ -80,7 +92,7 @@ void RunReport::tell_untold()
 
 std::string RunReport::finish()
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     tell_untold();
     write_statistics();
     return summary(run_, totals_);
@@ -88,7 +100,7 @@ std::string RunReport::finish()
 
 std::string RunReport::finish_early()
 {
-    const std::lock_guard lock(mutex_);
+    const auto lock = locked();
     tell_untold();
     return try_to_write();
 }
@@ -96,7 +108,9 @@ std::string RunReport::finish_early()
 std::optional<RunReport::Abandoned> RunReport::abandon()
 {
     // The run's own thread holds the lock only briefly, unless the program does not return from what it is told.
-    if (!mutex_.try_lock_for(std::chrono::seconds(1))) return std::nullopt;  // which stays locked otherwise
+    const std::unique_lock lock(mutex_, std::chrono::seconds(1));
+    if (!lock) return std::nullopt;
+    is_abandoned_ = true;
     return Abandoned{frame_warnings_.untold(), try_to_write()};
 }
 
@@ -105,7 +119,7 @@ std::string RunReport::try_to_write()
     try {
         write_statistics();
         return {};
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
         return error.what();
     }
 }

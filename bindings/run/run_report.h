@@ -30,7 +30,8 @@ public:
     // Called one at a time; none may be empty.
     struct Listener {
         std::function<void(const FrameStatistics& frame, double seconds, bool is_known)> frame;
-        std::function<void(const std::string&text)> line, warning;
+        std::function<void(const std::string& text)> line;
+        std::function<void(const std::string& text)> warning;
     };
     // The run's time begins here. files: those that the run writes; cache: hears of all frames, null where there is
     // none.
@@ -51,8 +52,8 @@ public:
     std::string finish();
     // It ends before. Returns why a file could not be written; empty where they were.
     std::string finish_early();
-    // From another thread, at any moment, before the process ends; afterwards nothing is told any more. Nothing where
-    // the run's own thread does not let go within a second.
+    // From another thread, at any moment, before the process ends: what is told afterwards does not return. Nothing
+    // where the run's own thread does not let go within a second.
     struct Abandoned {
         std::vector<std::string> warnings;
         std::string failure;  // as finish_early()
@@ -60,6 +61,8 @@ public:
     std::optional<Abandoned> abandon();
 
 private:
+    // For what the run's own thread tells. Does not return where the run has been abandoned.
+    std::unique_lock<std::timed_mutex> locked();
     void add_writing();
     // Statistics and profile. Error: a file can't be written.
     void write_statistics();
@@ -76,6 +79,7 @@ private:
     std::uint64_t earlier_peak_ = 0;
 
     std::timed_mutex mutex_;
+    bool is_abandoned_ = false;
     RunStatistics run_;
     RunTotals totals_;
     std::optional<StatisticsFile> statistics_;

@@ -140,6 +140,7 @@ Plan StudyScene::plan() const
 void StudyScene::keep_frames(PointStore& store, const Progress& progress) const
 {
     const Plan plan = this->plan();
+    store.clear();
     progress(0);
     run_frames(plan, study_,
                [&](const FrameResult& result, const PointSet& points) { store.keep(result.frame, points); });

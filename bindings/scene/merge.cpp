@@ -1,6 +1,8 @@
 // Parts of runs as one.
 #include "include/rapid/merge.h"
 
+#include <atomic>
+
 #include "bindings/run/run_parts.h"
 #include "bindings/scene/scene_error.h"
 
@@ -9,6 +11,11 @@ namespace rapid {
 Result<MergedFiles> merge_files(const std::vector<std::string>& patterns, const std::string& output,
                                 const std::function<bool(std::int64_t frame, std::uint64_t points)>& progress)
 {
+    static std::atomic<bool> is_running = false;  // its columns are those of the process
+    if (is_running.exchange(true)) return busy();
+    struct Ended {
+        ~Ended() { is_running = false; }
+    } const ended;
     SceneError::Kind kind = SceneError::WrongCall;
     try {
         if (patterns.empty()) refuse("no parts are named; give the patterns of their files");

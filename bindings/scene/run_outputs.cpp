@@ -2,7 +2,9 @@
 #include "bindings/scene/run_outputs.h"
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "bindings/run/races.h"
@@ -71,6 +73,15 @@ SceneReport report_of(const Snapshot& snapshot)
 
 }  // namespace
 
+void check_frames(const RunFrames& frames)
+{
+    constexpr std::int64_t least = std::numeric_limits<std::int32_t>::min();
+    constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
+    if (frames.step < 1 || frames.last < frames.first || frames.first < least || frames.last > most)
+        refuse(fmt::format("frames {}-{}x{}; they must go up, by a step of at least 1, and fit 32 bits", frames.first,
+                           frames.last, frames.step));
+}
+
 FrameSelection selection_of(const RunFrames& range) { return {range.first, range.last, range.step}; }
 
 FrameFiles frame_files(const FileOutputs& files)
@@ -119,19 +130,20 @@ Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, S
     SceneInside::Impl& here = SceneInside::of(scene);
     SceneInside::Impl& there = SceneInside::of(other);
     if (&here == &there) return wrong_call("the scene is compared with itself; open the file again");
-    Result<Explanation> others = there.call(SceneError::WrongScene, [&] { return explained(there, files); });
+    const Result<Explanation> own = here.call(SceneError::WrongScene, [&] { return explained(here, files); });
+    if (!own) return own.error();
+    const Result<Explanation> others = there.call(SceneError::WrongScene, [&] { return explained(there, files); });
     if (!others) return others.error();
-    return here.call(SceneError::WrongScene, [&] {
-        const Explanation own = explained(here, files);
-        const Explanation more = surplus(own, *others), less = surplus(*others, own);
+    return here.call(SceneError::Unexpected, [&] {
+        const Explanation more = surplus(*own, *others), less = surplus(*others, *own);
         return SceneReport{
             text_of_surplus(here.file, there.file, more) + '\n' + text_of_surplus(there.file, here.file, less) +
-                fmt::format("\nbytes a point at most: {} and {}\n", own.bytes_per_point(), others->bytes_per_point()),
+                fmt::format("\nbytes a point at most: {} and {}\n", own->bytes_per_point(), others->bytes_per_point()),
             dumped({{"graph", here.file},
                     {"against", there.file},
                     {"only_graph", ordered_json::parse(json_of_surplus(more))},
                     {"only_against", ordered_json::parse(json_of_surplus(less))},
-                    {"bytes_per_point", {own.bytes_per_point(), others->bytes_per_point()}}})};
+                    {"bytes_per_point", {own->bytes_per_point(), others->bytes_per_point()}}})};
     });
 }
 
@@ -139,7 +151,6 @@ Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::i
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {
-        impl.start_again();
         const SceneInside::Impl::Running running(impl);
         const OutputPlan output(impl, files, explained_options(impl, files));
         if (frame < output.plan.first_frame())
@@ -177,18 +188,20 @@ Result<std::string> advice_on(Scene& scene, const FileOutputs& files)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {
-        impl.start_again();
-        const SceneInside::Impl::Running running(impl);
-        const OutputPlan output(impl, files, plan_options(impl, files));
         std::string text;
-        impl.beside([&] {
-            try {
+        try {
+            const SceneInside::Impl::Running running(impl);
+            const OutputPlan output(impl, files, plan_options(impl, files));
+            impl.beside([&] {
                 const FrameFigures found = Evaluator(output.plan).examine();
                 text = advice(found.stiff) + text_of(found.resolution);
-            } catch (const Error&) {
-                if (impl.cancellation.is_requested()) throw;
-            }
-        });
+            });
+        } catch (const Error& error) {
+            if (error.message().find(Cancellation::text) != std::string::npos) throw;
+            impl.is_late = false;
+            if (!impl.evaluator) impl.start_again();  // without what a limit has stopped
+            impl.cancellation.forget();               // of a limit of memory
+        }
         return text;
     });
 }
@@ -197,23 +210,27 @@ Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames 
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {
-        if (frames.step < 1) refuse(fmt::format("step = {}; it must be at least 1", frames.step));
-        impl.start_again();
-        const SceneInside::Impl::Running running(impl);
+        check_frames(frames);
         PlanOptions options = plan_options(impl, files);
         options.keep_all = true;  // an attribute that no file needs may show the race
-        const OutputPlan output(impl, files, options);
-        if (frames.last < output.plan.first_frame())
-            refuse(fmt::format("frame {} is before the scene's first, {}", frames.last, output.plan.first_frame()));
         Races races;
-        impl.beside([&] {
+        tbb::task_arena(1).execute([&] {
+            // All sessions of the trials are stopped by one hand.
+            const auto scripts = std::make_shared<Interruption>();
+            const SceneInside::Impl::Apart apart(impl, scripts);
             const auto load = [&](const KernelOrder& order) {
                 SessionOptions session = impl.session_options(impl.settings);
                 session.quiet = true;
                 session.kernel_order = order;
+                session.interruption = scripts;
                 return std::make_unique<Session>(impl.file, std::move(session));
             };
-            races = rapid::find_races(load, output.plan, options, selection_of(frames));
+            const std::unique_ptr<Session> in_order = load({});
+            const Plan plan(in_order->graph(), options);
+            frame_files(files).resolve(plan, true);
+            if (frames.last < plan.first_frame())
+                refuse(fmt::format("frame {} is before the scene's first, {}", frames.last, plan.first_frame()));
+            races = races_in(load, plan, options, selection_of(frames));
         });
         SceneRaces result;
         result.compared = races.compared;

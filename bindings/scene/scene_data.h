@@ -16,10 +16,11 @@
 
 namespace rapid {
 
-struct SceneFrame::Data {
+struct [[gnu::visibility("hidden")]] SceneFrame::Data
+{
     FrameResult result;
     std::vector<std::string> warnings;
-    const void* scene = nullptr;  // whose plan it is of; not followed
+    std::uint64_t scene = 0;  // whose plan it is of, by its number; 0: of none
 
     // That a frame has chosen at first: "main", or the first one where there is none.
     std::string first_output() const;
@@ -31,7 +32,8 @@ struct SceneFrame::Data {
 
 class StateFile;
 
-struct SceneSnapshot::Data {
+struct [[gnu::visibility("hidden")]] SceneSnapshot::Data
+{
     // Error: what SceneSnapshot::read() refuses.
     static SceneSnapshot read_from(const StateFile& file);
 
@@ -40,7 +42,8 @@ struct SceneSnapshot::Data {
     std::string nodes;  // a hash of those of the graph, by type and name
 };
 
-struct SceneShapes::Data {
+struct [[gnu::visibility("hidden")]] SceneShapes::Data
+{
     std::shared_ptr<const PictureScene> scene;
     std::vector<std::string> warnings;
 };
@@ -49,7 +52,8 @@ SceneValue value_of(const DetailValue& detail);
 // Of a parameter: a boolean, a number, a text or three numbers.
 SceneValue value_in_header(const Value& value);
 
-// As the renderer takes it, which refuses sizes. Refusal: an angle of view that no camera has.
+// As the renderer takes it, which refuses sizes. Refusal: a camera that looks at its own place,
+// or nowhere; an angle of view that none has.
 std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camera, PictureSize size);
 
 }  // namespace rapid

@@ -11,6 +11,8 @@
 
 namespace rapid {
 
+constexpr int most_threads = 4096;  // of a scene: more are a typing error, not a machine
+
 SceneError wrong_call(std::string message);
 SceneError busy();  // of a call while the scene is in another one
 

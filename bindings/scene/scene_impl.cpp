@@ -39,7 +39,6 @@ std::string text_of(const SceneValue& value)
 
 std::optional<SceneError> fault_of(const SceneOptions& options)
 {
-    constexpr int most_threads = 4096;  // a typing error, not a machine
     if (options.threads < 0 || options.threads > most_threads)
         return wrong_call(fmt::format("threads = {}; it must be from 0 to {}", options.threads, most_threads));
     if (!(options.script_seconds > 0))
@@ -120,9 +119,12 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
     session_with.interruption = std::make_shared<Interruption>();
     Cancellation opening;
     const Cancellation::Scope scope(hooks.stop.stop_possible() ? &opening : Cancellation::current());
-    const std::stop_callback stop(hooks.stop, [&opening, scripts = session_with.interruption] {
-        opening.request();
-        scripts->request(Cancellation::text, Interruption::Asked);
+    const std::stop_callback stop(hooks.stop, [&opening, scripts = session_with.interruption]() noexcept {
+        try {
+            opening.request();
+            scripts->request(Cancellation::text, Interruption::Asked);
+        } catch (...) {  // for want of memory
+        }
     });
     auto fresh = std::make_unique<Session>(file, std::move(session_with));
     if (hooks.parameters) call_hook(hooks.parameters, parameters_of(*fresh));
@@ -181,6 +183,7 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
     picture_scene.reset();
     plan = std::move(fresh);
     evaluator = std::make_unique<Evaluator>(*plan, write);
+    ended_by = nullptr;
     if (!options.estimate_errors) evaluator->leave_out_errors();
     if (hooks.tell_points) evaluator->tell_points();
     next = plan->first_frame();
@@ -206,7 +209,7 @@ SceneFrame Scene::Impl::advance()
     }
     data->warnings = session->take_warnings();
     data->warnings.insert(data->warnings.end(), data->result.warnings.begin(), data->result.warnings.end());
-    data->scene = this;
+    data->scene = number;
     next = evaluator->next_frame();
     has_advanced = true;
     tell(data->warnings);
@@ -214,11 +217,40 @@ SceneFrame Scene::Impl::advance()
     return SceneFrame(std::move(data), output);
 }
 
-void Scene::Impl::cancel()
+std::uint64_t Scene::Impl::next_number()
 {
-    cancellation.request();
-    const std::lock_guard lock(scripts_mutex);
-    if (scripts) scripts->interrupt(Cancellation::text);
+    static std::atomic<std::uint64_t> last = 0;
+    return ++last;
+}
+
+void Scene::Impl::cancel() noexcept
+{
+    try {
+        cancellation.request();
+        const std::lock_guard lock(scripts_mutex);
+        if (scripts) scripts->interrupt(Cancellation::text);
+    } catch (...) {
+    }
+}
+
+Scene::Impl::Apart::Apart(Impl& impl, const std::shared_ptr<Interruption>& scripts)
+    : scope(&impl.cancellation), stop(impl.hooks.stop, [&impl, scripts] {
+          try {
+              impl.cancellation.request();
+              scripts->request(Cancellation::text, Interruption::Asked);
+          } catch (...) {  // for want of memory
+          }
+      })
+{
+    if (impl.hooks.watch_memory)
+        watch.emplace(
+            impl.memory_at_first,
+            [&impl, scripts](const std::string& message) {
+                impl.cancellation.request(message);
+                scripts->request(message, Interruption::Asked);
+            },
+            impl.too_late());
+    impl.cancellation.check();
 }
 
 std::function<void(const std::string& message)> Scene::Impl::too_late() const
@@ -231,6 +263,7 @@ std::function<void(const std::string& message)> Scene::Impl::too_late() const
 
 void Scene::Impl::refuse_unless_ready() const
 {
+    if (!evaluator && ended_by) std::rethrow_exception(ended_by);
     if (!evaluator) refuse("the scene's last frame failed; call restart(), restore() or set() first");
 }
 

@@ -38,6 +38,7 @@ std::optional<SceneError> fault_of(const SceneOptions& options);
 // One scene. Its session is run again for other parameters; plan and evaluator for each start.
 struct [[gnu::visibility("hidden")]] Scene::Impl
 {
+    const std::uint64_t number = next_number();  // of the scenes of the process
     std::string file;
     std::optional<std::string> text;
     SceneOptions options;
@@ -57,6 +58,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::vector<std::string> warnings;
     std::unique_ptr<Plan> plan;
     std::unique_ptr<Evaluator> evaluator;  // null behind an error
+    std::exception_ptr ended_by;           // of a frame beside the scene, which left it without an evaluator
     std::unique_ptr<SceneOfPlan> picture_scene;
     std::map<std::string, SceneFrame> behind;   // the points behind the nodes in the frame that was asked for last
     std::optional<std::int64_t> behind_frame;   // which one that is
@@ -87,6 +89,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         try {
             std::optional<decltype(f())> value;
             const auto run = [&] {
+                if (hooks.stop.stop_requested()) throw Error(Cancellation::text);
                 const MemoryBudget budget(options.memory);
                 if (session) session->use_from_this_thread();
                 // Of the loops of this scene no thread that waits takes up another scene.
@@ -117,8 +120,9 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     // Scripts that were stopped do not run again.
     void start_again();
     SceneFrame advance();
-    // From any thread.
-    void cancel();
+    static std::uint64_t next_number();
+    // From any thread. For want of memory scripts go on to the next chunk.
+    void cancel() noexcept;
     // Of points from the first frame on. fault: what ended it before the last one; null: nothing did.
     struct Traced {
         SceneTrace trace;
@@ -134,7 +138,10 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         try {
             compute();
         } catch (...) {
-            if (session->interrupted() != Interruption::None) evaluator.reset();
+            if (session->interrupted() != Interruption::None) {
+                evaluator.reset();
+                ended_by = std::current_exception();
+            }
             throw;
         }
         session->take_warnings();  // of frames, which the run tells
@@ -163,25 +170,32 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             impl.scripts = to;
         }
     };
+    // For as long as it lives, what ends a call also ends sessions with these scripts, which are not the scene's: of
+    // opening, and of trials.
+    struct Apart {
+        Cancellation::Scope scope;
+        std::optional<MemoryWatch> watch;
+        std::stop_callback<std::function<void()>> stop;
+        Apart(Impl& impl, const std::shared_ptr<Interruption>& scripts);
+    };
     // For as long as it lives, frames are computed, which end when it is cancelled or takes more memory than its limit.
     struct Running {
         Scripts scripts;
         Cancellation::Scope scope;
-        MemoryWatch watch;
+        std::optional<MemoryWatch> watch;
         std::stop_callback<std::function<void()>> stop;
         // Error: it was cancelled before.
         explicit Running(Impl& impl)
-            : scripts(impl),
-              scope(&impl.cancellation),
-              watch(
-                  impl.memory_at_first,
-                  [&impl](const std::string& message) {
-                      impl.session->interrupt(message);
-                      impl.cancellation.request(message);
-                  },
-                  impl.too_late()),
-              stop(impl.hooks.stop, [&impl] { impl.cancel(); })
+            : scripts(impl), scope(&impl.cancellation), stop(impl.hooks.stop, [&impl] { impl.cancel(); })
         {
+            if (impl.hooks.watch_memory)
+                watch.emplace(
+                    impl.memory_at_first,
+                    [&impl](const std::string& message) {
+                        impl.session->interrupt(message);
+                        impl.cancellation.request(message);
+                    },
+                    impl.too_late());
             impl.cancellation.check();
         }
     };

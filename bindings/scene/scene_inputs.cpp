@@ -16,6 +16,9 @@ Result<SceneFingerprint> Scene::fingerprint()
         impl_->refuse_unless_kept();
         SceneFingerprint result;
         result.parts = fingerprint_of(*impl_->session, *impl_->plan, impl_->file, impl_->opened);
+        if (impl_->hooks.tell_points)
+            result.parts["points tell"] =
+                impl_->options.estimate_errors ? "error, substeps, asleep" : "substeps, asleep";
         result.hash = hash_of(result.parts);
         return result;
     });

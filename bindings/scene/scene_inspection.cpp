@@ -17,7 +17,8 @@ Result<std::vector<SceneAttribute>> Scene::attributes()
         for (const PlannedSimulation& simulation : impl_->plan->simulations) {
             const std::string& create = simulation.create->name;
             std::set<std::string> told;  // Evaluator::tell_points
-            if (impl_->hooks.tell_points && simulation.solve) told = {"asleep", "error", "substeps"};
+            if (impl_->hooks.tell_points && simulation.solve) told = {"asleep", "substeps"};
+            if (!told.empty() && impl_->options.estimate_errors) told.insert("error");
             for (const PlannedAttribute& attribute : simulation.attributes)
                 if (!told.contains(attribute.name))
                     all.push_back({attribute.name, create, attribute.kept, attribute.bytes_per_point()});
@@ -66,7 +67,7 @@ SceneFrame Scene::Impl::frame_behind(const Plan& apart, const PlannedNode& plann
     const std::string& node = planned.node->name;
     const PlannedSimulation& simulation = apart.simulations[planned.simulation];
     auto data = std::make_shared<SceneFrame::Data>();
-    data->scene = this;
+    data->scene = number;
     data->result.frame = frame;
     data->result.outputs.emplace(node, std::move(points));
     data->result.fps.emplace(node, simulation.fps);
@@ -96,13 +97,13 @@ SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t fram
 
 const std::map<std::string, SceneFrame>& Scene::Impl::points_behind_all(std::int64_t frame, const SceneSnapshot* from)
 {
-    if (behind_frame == frame) return behind;
     if (from) {
         refuse_unless_of_this_graph(*from);
         if (from->frame() >= frame)
             refuse(fmt::format("the snapshot is behind frame {}; frame {} takes one from before it", from->frame(),
                                frame));
     }
+    if (behind_frame == frame) return behind;
     const Plan watched(session->graph(), plan_options());
     std::map<std::string, PointSet> results;
     compute_beside(watched, frame, from ? &from->data_->snapshot : nullptr,

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <mutex>
 
 #include "bindings/run/event_file.h"
 #include "bindings/run/run_cache.h"
@@ -11,6 +12,7 @@
 #include "bindings/run/written_names.h"
 #include "bindings/scene/run_outputs.h"
 #include "bindings/scene/scene_impl.h"
+#include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/graph/coupling.h"
 
@@ -37,7 +39,7 @@ std::filesystem::path folder_of(const std::filesystem::path& file)
     return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-void check(const RunOptions& options)
+void check_options(const SceneOptions& scene, const RunOptions& options)
 {
     if (const auto& part = options.part;
         part && (part->count < 1 || part->count > most_parts || part->number < 1 || part->number > part->count))
@@ -45,12 +47,17 @@ void check(const RunOptions& options)
                            part->count, most_parts));
     if (options.sample && !(*options.sample > 0 && *options.sample <= 1))
         refuse(fmt::format("sample = {}; it must be above 0 and at most 1", *options.sample));
-    if (options.frames && (options.frames->step < 1 || options.frames->last < options.frames->first))
-        refuse(fmt::format("frames {}-{}x{}; they must go up, by a step of at least 1", options.frames->first,
-                           options.frames->last, options.frames->step));
+    if (options.frames) check_frames(*options.frames);
     if (options.cache.every < 0) refuse(fmt::format("every = {}; it must be at least 0", options.cache.every));
     if (options.cache.again && options.cache.folder.empty())
         refuse("again says what to do with a cache; give its folder");
+    if (!options.claims.empty() && options.statistics.empty())
+        refuse("claims are known by the file of statistics; give one");
+    // Of which a fingerprint has nothing.
+    if (!options.cache.folder.empty() && (!scene.objects.empty() || !scene.nodes.empty()))
+        refuse(
+            "a cache does not know when what the program offers has changed; leave objects and nodes out, or the "
+            "cache");
 }
 
 template <class F>
@@ -70,11 +77,13 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     EventFile events;
     RunCache cache;
     WrittenNames names;
+    std::mutex names_mutex;              // scripts on all threads make objects of files
     std::shared_ptr<PartRecord> record;  // null where all points are simulated
     std::optional<InputContents> read;   // of a part
     RunReport report;
     FrameSelection frames{};
-    bool is_ready = false, has_begun = false;
+    std::int64_t first = 1;  // of the scene
+    bool has_opened = false, is_ready = false, has_begun = false;
     std::atomic<bool> computes = false;  // frames: what they read is not noted
     std::atomic<bool> is_to_end = false;
 
@@ -93,10 +102,9 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
                   [this](const std::string& text) { call_if_set(listener.warning, text); }},
                  files, cache.asked() ? &cache : nullptr)
     {
-        if (cache.asked()) {
-            cache.set_graph(file);
-            hooks.keep_state = true;
-        }
+        if (cache.asked()) cache.set_graph(file);
+        hooks.keep_state = cache.asked();
+        hooks.tell_points = false;
         if (options.part) begin_part(file);
         scene.file = std::move(file);
         scene.text = options.text;
@@ -127,13 +135,17 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     {
         for (const auto& [name, value] : scene.options.set) record->identity[name] = text_of(value);
         if (scene.options.seed) record->identity["--seed"] = fmt::format("{}", *scene.options.seed);
+        if (options.text) record->identity["the text of the scene"] = hash_text(content_hash(*options.text));
     }
 
     void take_hooks()
     {
         scene.hooks.reads = [this, reads = std::move(scene.hooks.reads)](const std::string& path) {
             const std::filesystem::path file(path);
-            if (!computes) names.reads(file);
+            if (!computes) {
+                const std::lock_guard lock(names_mutex);
+                names.reads(file);
+            }
             if (read) read->add(file);
             if (cache.asked()) cache.was_read(file);
             if (reads) reads(path);
@@ -148,12 +160,16 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
 
     void prepare()
     {
+        if (is_ready) refuse("the run is prepared; call run()");
+        if (has_opened) refuse("the run could not be prepared; make another one");
+        has_opened = true;
         claim_own_files();
         std::map<std::string, std::string> set;
         for (const auto& [name, value] : scene.options.set) set[name] = text_of(value);
         scene.take_offers();
         scene.load(std::move(set));
         const Plan& plan = *scene.plan;
+        first = plan.first_frame();
         if (const Subset subset(part_of(options), options.sample); !subset.is_all()) take_subset(plan, subset);
         frames = range_of(plan);
         if (record) {
@@ -216,7 +232,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         if (cache.asked()) cache.begin(*scene.session, *scene.plan, frames, fingerprint_options(), files, events);
         computes = true;
         RunOutcome outcome;
-        outcome.last_frame = scene.plan->first_frame() - 1;
+        outcome.last_frame = first - 1;
         try {
             const std::int64_t last = compute(outcome);
             if (outcome.ending == RunOutcome::Ended) {
@@ -235,7 +251,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         } catch (...) {
             outcome.ending = RunOutcome::Failed;
             outcome.error = scene.error_of_call(SceneError::FailedFrame);
-            finish_files(outcome.error->message);
+            finish_files(outcome.error->text());
             add_unwritten(outcome, report.finish_early());
         }
         return outcome;
@@ -248,7 +264,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         // Until the last frame is computed: files that are written then are no reason to grow.
         const SceneInside::Impl::Running running(scene);
         std::int64_t last = frames.last;
-        if (cache.asked()) last = go_on(evaluator, *scene.plan);
+        if (cache.asked()) last = go_on();
         outcome.last_frame = std::max(outcome.last_frame, evaluator.next_frame() - 1);
         call_if_set(listener.begins, cache.keeps_snapshots());
         while (evaluator.next_frame() <= last) {
@@ -273,11 +289,11 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     }
 
     // Tells what the cache has, and takes the evaluator there. Returns the last frame to compute.
-    std::int64_t go_on(Evaluator & evaluator, const Plan& plan)
+    std::int64_t go_on()
     {
+        Evaluator& evaluator = *scene.evaluator;
         cache.restore(evaluator, events);
         for (const std::string& warning : cache.take_warnings()) report.warning(warning);
-        const std::int64_t first = plan.first_frame();
         const std::int64_t known = cache.first_due() ? evaluator.next_frame() - 1 : frames.last;
         for (const FrameRecord* one : cache.records(first, known)) report.known_frame(*one, true);
         if (known >= first)
@@ -297,8 +313,6 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     {
         try {
             files.finish(false);
-        } catch (const Error& error) {
-            if (error.message() != reason) report.warning(error.what());
         } catch (const std::exception& error) {
             if (error.what() != reason) report.warning(error.what());
         }
@@ -321,7 +335,7 @@ Result<SceneRun> SceneRun::make(std::string file, SceneOptions scene, SceneHooks
     if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
     if (std::optional<SceneError> fault = fault_of(scene)) return std::move(*fault);
     try {
-        check(options);
+        check_options(scene, options);
         return SceneRun(std::make_unique<Impl>(std::move(file), std::move(scene), std::move(hooks), std::move(options),
                                                std::move(listener)));
     } catch (...) {
@@ -332,13 +346,12 @@ Result<SceneRun> SceneRun::make(std::string file, SceneOptions scene, SceneHooks
 Result<Done> SceneRun::prepare()
 {
     return impl_->scene.call(SceneError::WrongScene, [&] {
-        if (impl_->is_ready) refuse("the run is prepared; call run()");
         impl_->prepare();
         return Done();
     });
 }
 
-std::int64_t SceneRun::first_frame() const { return impl_->scene.plan->first_frame(); }
+std::int64_t SceneRun::first_frame() const { return impl_->first; }
 RunFrames SceneRun::frames() const { return {impl_->frames.first, impl_->frames.last, impl_->frames.step}; }
 
 Result<std::vector<std::pair<std::string, std::string>>> SceneRun::merges(int parts)
@@ -348,7 +361,7 @@ Result<std::vector<std::pair<std::string, std::string>>> SceneRun::merges(int pa
         if (parts < 1 || parts > most_parts)
             refuse(fmt::format("parts = {}; it must be from 1 to {}", parts, most_parts));
         if (impl_->options.part) refuse("the run is a part itself");
-        take_subset(*impl_->scene.plan, Subset(Part{1, parts}, std::nullopt));
+        if (parts > 1) refuse_coupled(*impl_->scene.plan);
         return impl_->files.merges();
     });
 }
@@ -363,11 +376,15 @@ void SceneRun::cancel() { impl_->scene.cancel(); }
 
 std::optional<SceneRun::Abandoned> SceneRun::abandon()
 {
-    std::optional<RunReport::Abandoned> told = impl_->report.abandon();
-    if (!told) return std::nullopt;
-    Abandoned result{std::move(told->warnings), {}};
-    if (!told->failure.empty()) result.unwritten.push_back(std::move(told->failure));
-    return result;
+    try {
+        std::optional<RunReport::Abandoned> told = impl_->report.abandon();
+        if (!told) return std::nullopt;
+        Abandoned result{std::move(told->warnings), {}};
+        if (!told->failure.empty()) result.unwritten.push_back(std::move(told->failure));
+        return result;
+    } catch (...) {  // for want of memory
+        return std::nullopt;
+    }
 }
 
 Result<std::vector<std::string>> output_folders(const RunOptions& options)
@@ -378,10 +395,10 @@ Result<std::vector<std::string>> output_folders(const RunOptions& options)
     if (!folders) return folders;
     try {
         for (const std::string& file : {options.statistics, options.profile, options.events})
-            if (!file.empty()) folders->push_back(folder_of(file).string());
-        if (!options.cache.folder.empty()) folders->push_back(options.cache.folder);
+            if (!file.empty()) folders->push_back(folder_of(name_in_part(file, options.part)).string());
+        for (const std::string& folder : {options.cache.folder, options.claims})
+            if (!folder.empty()) folders->push_back(folder);
         for (const std::string& folder : *folders) std::filesystem::create_directories(folder);
-        if (!options.claims.empty()) folders->push_back(options.claims);
         return folders;
     } catch (...) {
         return caught_error(SceneError::WrongCall);

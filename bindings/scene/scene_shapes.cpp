@@ -144,6 +144,7 @@ SceneShapes Scene::Impl::shapes_at(std::int64_t frame)
     auto data = std::make_shared<SceneShapes::Data>();
     data->scene = picture_scene->at(frame);
     data->warnings = session->take_warnings();
+    tell(data->warnings);
     return SceneShapes(std::move(data));
 }
 
@@ -156,6 +157,12 @@ std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camer
 {
     if (camera.fov && !(*camera.fov > 0 && *camera.fov < 180))
         refuse(fmt::format("fov = {}; it must be between 0 and 180 degrees", *camera.fov));
+    const auto is_finite = [](const auto& place) {
+        return !place || std::all_of(place->begin(), place->end(), [](double x) { return std::isfinite(x); });
+    };
+    if (!is_finite(camera.position) || !is_finite(camera.target))
+        refuse("the camera's position and target must be numbers that are finite");
+    if (camera.position && camera.position == camera.target) refuse("the camera looks at its own place");
     auto options = std::make_shared<PictureOptions>();
     options->width = size.width;
     options->height = size.height;
@@ -181,14 +188,13 @@ Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)
 {
     return impl_->call(SceneError::WrongCall, [&] {
         const SceneFrame::Data& data = *frame.data_;
-        if (data.scene != impl_.get()) refuse("the frame is of another scene");
-        if (!impl_->picture_scene) impl_->picture_scene = std::make_unique<SceneOfPlan>(*impl_->plan);
+        if (data.scene != impl_->number) refuse("the frame is of another scene");
         FrameInfo info;
         info.number = static_cast<int>(frame.number());
         info.time = frame.time();
         info.fps = frame.fps();
         info.picture = picture_options({}, size);
-        info.scene = impl_->picture_scene->at(frame.number());
+        info.scene = impl_->shapes_at(frame.number()).data_->scene;
         return encode_png(picture_of(data.result.outputs.at(frame.output_), info));
     });
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "bindings/host/graph_parameter.h"
@@ -83,6 +84,7 @@ auto with_scene(const StudySource& source, const Knobs& knobs, const bool& is_st
         impl.file = source.file;
         impl.options = source.options;
         impl.hooks = source.hooks;
+        impl.hooks.keep_state = impl.hooks.tell_points = false;
         if (impl.options.threads > 0) impl.arena.emplace(impl.options.threads);
         auto result = impl.call(SceneError::WrongScene, [&] {
             impl.take_offers();
@@ -90,7 +92,12 @@ auto with_scene(const StudySource& source, const Knobs& knobs, const bool& is_st
             for (const auto& [name, value] : impl.options.set) set[name] = text_of(value);
             SessionOptions options = impl.session_options(set);
             if (!source.is_scene) options.knobs = knobs;
-            impl.session = std::make_unique<Session>(impl.file, std::move(options));
+            const auto scripts = std::make_shared<Interruption>();
+            options.interruption = scripts;
+            {
+                const SceneInside::Impl::Apart apart(impl, scripts);
+                impl.session = std::make_unique<Session>(impl.file, std::move(options));
+            }
             const SceneInside::Impl::Running running(impl);
             const Graph& graph = impl.session->graph();
             return f(*impl.session, source.is_scene ? with_arguments(graph, knobs) : graph);
@@ -123,6 +130,32 @@ void check_reference(const SceneStudy& study, const StudySource& source, const S
         refuse("error = \"own\" is a function of a study file; of a scene it must be rms, max, p95 or residual");
 }
 
+void check_study(const SceneStudy& study)
+{
+    const std::string& error = study.error;
+    if (error != "rms" && error != "max" && error != "p95" && error != "residual" && error != "own")
+        refuse(fmt::format("error = \"{}\"; it must be rms, max, p95, residual or own", error));
+    if (study.last <= study.first)
+        refuse(fmt::format("frames {} to {}; the last must be behind the first", study.first, study.last));
+    if (study.repeat_runs < 1) refuse(fmt::format("repeat_runs = {}; it must be at least 1", study.repeat_runs));
+    for (const auto& [knob, values] : study.sweep)
+        if (values.empty()) refuse(fmt::format("sweep: {} has no values", knob));
+}
+
+// Whether each knob of the sweep makes rows.
+void check_lines(const SceneStudy& study)
+{
+    std::set<std::string> known;
+    for (const std::string& line : study.lines) {
+        if (!study.sweep.count(line)) refuse(fmt::format("lines: the sweep has no knob \"{}\"; call complete()", line));
+        if (!known.insert(line).second) refuse(fmt::format("lines: \"{}\" is there twice", line));
+    }
+    known.insert(study_inside(study).step());
+    for (const auto& [knob, values] : study.sweep)
+        if (!known.count(knob))
+            refuse(fmt::format("sweep: {} is neither among the lines nor the step; call complete()", knob));
+}
+
 void check_rows(const Study& study, const std::vector<StudyRun>& rows)
 {
     const std::vector<Knobs> expected = study.rows();
@@ -150,9 +183,7 @@ auto without_scene(const F& f) -> Result<decltype(f())>
 
 }  // namespace
 
-struct StudyReference::Data {
-    PointStore store;
-};
+struct [[gnu::visibility("hidden")]] StudyReference::Data { PointStore store; };
 
 StudyReference::StudyReference(std::shared_ptr<Data> data) : data_(std::move(data)) {}
 
@@ -180,12 +211,7 @@ Result<SceneStudy> SceneStudy::read(const StudySource& source)
 Result<Done> SceneStudy::complete()
 {
     return without_scene([&] {
-        if (error != "rms" && error != "max" && error != "p95" && error != "residual" && error != "own")
-            refuse(fmt::format("error = \"{}\"; it must be rms, max, p95, residual or own", error));
-        if (last <= first) refuse(fmt::format("frames {} to {}; the last must be behind the first", first, last));
-        if (repeat_runs < 1) refuse(fmt::format("repeat_runs = {}; it must be at least 1", repeat_runs));
-        for (const auto& [knob, values] : sweep)
-            if (values.empty()) refuse(fmt::format("sweep: {} has no values", knob));
+        check_study(*this);
         Study study = study_inside(*this);
         study.complete();
         lines = study.lines;
@@ -196,8 +222,8 @@ Result<Done> SceneStudy::complete()
 Result<std::vector<StudyKnobs>> SceneStudy::rows() const
 {
     return without_scene([&] {
-        for (const std::string& line : lines)
-            if (!sweep.count(line)) refuse(fmt::format("lines: the sweep has no knob \"{}\"; call complete()", line));
+        check_study(*this);
+        check_lines(*this);
         std::vector<StudyKnobs> rows;
         for (const Knobs& knobs : study_inside(*this).rows()) rows.push_back(knobs_in_header(knobs));
         return rows;
@@ -226,8 +252,8 @@ Result<Done> SceneStudy::compute_reference(const StudySource& source, const Stud
 {
     bool is_started = false;
     return with_scene(source, knobs_inside(knobs), is_started, [&](const Session& session, Graph graph) {
+        check_study(*this);
         const Study study = study_inside(*this);
-        into.data_->store.clear();
         StudyScene(study, session, std::move(graph), source.options.seed)
             .keep_frames(into.data_->store, progress_of(progress, is_started));
         return Done();
@@ -239,6 +265,7 @@ Result<StudyRun> SceneStudy::measure(const StudySource& source, const StudyKnobs
 {
     bool is_started = false;
     return with_scene(source, knobs_inside(knobs), is_started, [&](const Session& session, Graph graph) {
+        check_study(*this);
         check_reference(*this, source, from);
         const Study study = study_inside(*this);
         const StudyRow row =
@@ -252,6 +279,8 @@ Result<StudyReport> SceneStudy::report(const std::vector<StudyRun>& rows,
                                        const std::vector<std::pair<std::string, std::string>>& machine) const
 {
     return without_scene([&] {
+        check_study(*this);
+        check_lines(*this);
         StudyResult result{study_inside(*this), {}, machine};
         check_rows(result.study, rows);
         for (const StudyRun& row : rows)

@@ -13,7 +13,8 @@ namespace {
 TestOptions engine_options(const SceneTestOptions& options)
 {
     if (options.already_run < 0) refuse(fmt::format("already_run = {}; it must be at least 0", options.already_run));
-    if (options.threads < 0) refuse(fmt::format("threads = {}; it must be at least 0", options.threads));
+    if (options.threads < 0 || options.threads > most_threads)
+        refuse(fmt::format("threads = {}; it must be from 0 to {}", options.threads, most_threads));
     TestOptions result{options.filter, options.already_run, options.threads, {}};
     result.on_timeout = [late = options.late](const std::string& message) { call_hook(late, message); };
     return result;

@@ -51,10 +51,14 @@ void FileWriter::run()
         is_busy_ = true;
         changed_.notify_all();
         lock.unlock();
-        const Result<Done> written = job->write(job->path);
         std::string failure;
-        if (!written)
-            failure = fmt::format("{}: {}; the run goes on without this snapshot", job->path, written.error().message);
+        try {
+            const Result<Done> written = job->write(job->path);
+            if (!written)
+                failure = fmt::format("{}: {}; the run goes on without this file", job->path, written.error().message);
+        } catch (const std::exception& error) {
+            failure = error.what();
+        }
         job.reset();  // releases its columns before the next frame would copy them
         lock.lock();
         is_busy_ = false;

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <sstream>
 #include <utility>
@@ -151,7 +150,13 @@ ViewFramePtr CachedRun::load(std::int64_t number, std::uint64_t run)
     const std::lock_guard lock(mutex_);
     const auto there = there_.find(number);
     if (there == there_.end()) return nullptr;
-    SceneFrame points = or_throw(SceneFrame::load(file(frame_file, number), hash_));
+    Result<SceneFrame> loaded = SceneFrame::load(file(frame_file, number), hash_);
+    if (!loaded) {  // the next view computes it again
+        std::error_code none;
+        fs::remove(file(frame_file, number), none);
+        there_.erase(there);
+    }
+    SceneFrame points = or_throw(std::move(loaded));
     return std::make_shared<ViewFrame>(ViewFrame{number, run, std::move(points), "", shapes(there->second)});
 }
 

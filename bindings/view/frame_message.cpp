@@ -6,11 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <unordered_map>
 
 #include "bindings/command/or_throw.h"
@@ -280,11 +278,11 @@ ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish)
 {
     ShownPoints shown;
     shown.count = points.size();
-    if (wish.group.empty() && points.size() <= wish.most) return shown;
+    if (wish.group.empty() && shown.count <= wish.most) return shown;
     std::optional<SceneColumn> members;
     if (!wish.group.empty()) members = group_of(points, wish.group);
     Places places;
-    for (std::uint32_t i = 0; i < points.size(); ++i)
+    for (std::uint32_t i = 0; i < shown.count; ++i)
         if (!members || *members->at<std::uint8_t>(i)) places.push_back(i);
     // By id, so that the same points are shown in every frame.
     const SceneColumn id = column_of(points, "id");

@@ -16,10 +16,11 @@ namespace rapid {
 // How the page names a group among the attributes.
 inline const std::string group_mark = "group:";
 
-// Null: all points.
+// Of some points, in the columns.
 using Places = std::vector<std::uint32_t>;
 
-// The values of a column, packed: a view of the frame's where that has them so. T: of a component.
+// The values of a column, packed: a view of the frame's where that has them so. T: of a component. places: null for all
+// points.
 template <class T>
 class PointValues {
 public:
@@ -30,11 +31,16 @@ public:
           data_(static_cast<const T*>(column.data))
     {
         if (is_one() || (!places && column.stride == components_ * sizeof(T))) return;
-        own_ = std::make_shared<std::vector<T>>();
-        own_->reserve(size_ * components_);
-        for (std::size_t k = 0; k < size_; ++k) {
-            const T* value = column.at<T>(places ? (*places)[k] : k);
-            own_->insert(own_->end(), value, value + components_);
+        own_ = std::make_shared<std::vector<T>>(size_ * components_);
+        switch (components_) {
+            case 1:
+                gather<1>(column, places);
+                break;
+            case 3:
+                gather<3>(column, places);
+                break;
+            default:
+                gather<0>(column, places);
         }
         data_ = own_->data();
     }
@@ -46,6 +52,18 @@ public:
     const T* operator[](std::size_t k) const { return data_ + k * step_; }
 
 private:
+    // count: of the components; 0: as many as there are.
+    template <std::size_t count>
+    void gather(const SceneColumn& column, const Places* places)
+    {
+        const std::size_t n = count > 0 ? count : components_;
+        T* to = own_->data();
+        for (std::size_t k = 0; k < size_; ++k, to += n) {
+            const T* value = column.at<T>(places ? (*places)[k] : k);
+            for (std::size_t c = 0; c < n; ++c) to[c] = value[c];
+        }
+    }
+
     std::size_t size_, components_, step_;
     std::shared_ptr<std::vector<T>> own_;
     const T* data_;

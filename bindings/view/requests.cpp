@@ -533,9 +533,9 @@ void ViewRequests::begin_film(const Json& json, const Ask& ask)
     wish.output = json.value("output", "main");
     wish.film = {json.value("fps", status.fps), size_of(json), camera_of(json)};
     wish.threads = simulation_.options().threads;
-    film_.reset();  // one that has not ended is given up
-    film_ =
+    auto film =
         std::make_unique<ViewFilm>(std::move(wish), [this](std::int64_t number) { return simulation_.frame(number); });
+    film_ = std::move(film);  // one that has not ended is given up
     tell_film(ask);
 }
 

@@ -12,8 +12,6 @@
 namespace rapid {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr std::size_t most_warnings = 200;
 constexpr std::size_t most_laid_out = 150;  // nodes, by Graphviz
 constexpr double snapshot_seconds = 0.25;   // of computing: so much is computed again to inspect a frame
@@ -116,6 +114,7 @@ void ViewSimulation::Run::begin()
     };
     hooks.keep_state = view_.cache_ != nullptr;
     hooks.tell_points = true;
+    hooks.watch_memory = false;  // frames have a share of it, and give way
     view_.note_file(number_, view_.options_.graph);
     scene_ = or_throw(Scene::open(view_.options_.graph, view_.scene_options(), std::move(hooks)));
     const std::int64_t start = scene_->first_frame();
@@ -217,11 +216,12 @@ void ViewSimulation::Run::compute()
             cached_->keep(or_throw(scene_->save()));
             since_cached = Stopwatch();
         }
-        if (!publish(frame, warnings, number > first_)) return;
+        if (!publish(frame, warnings, 0, number > first_)) return;
         if (number == first_) {
             auto with_shapes = std::make_shared<ViewFrame>(*frame);
+            const std::size_t told = warnings.size();
             add_shapes(*with_shapes);
-            if (!publish(with_shapes, warnings, true)) return;
+            if (!publish(with_shapes, warnings, told, true)) return;
             draw_graph();
         }
     }
@@ -234,7 +234,8 @@ void ViewSimulation::Run::compute()
     });
 }
 
-bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, bool is_whole)
+bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, std::size_t told,
+                                  bool is_whole)
 {
     if (stopped()) return false;
     if (cached_ && is_whole) cached_->put(*frame, warnings, or_throw(scene_->take_inputs()));
@@ -245,7 +246,7 @@ bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<s
     }
     tell([&](ViewStatus& status) {
         warn_of_cache(status, frame->number);
-        for (const std::string& text : warnings) warn(status, frame->number, text);
+        for (std::size_t k = told; k < warnings.size(); ++k) warn(status, frame->number, warnings[k]);
         if (!kept) status.state = ViewState::Full;
     });
     return kept;

@@ -64,8 +64,8 @@ private:
     void warn_of_cache(ViewStatus& status, std::int64_t frame);
     void compute();
 
-    // is_whole: it has its shapes, and may go to the cache.
-    bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, bool is_whole);
+    // told: so many of the warnings were told before. is_whole: it has its shapes, and may go to the cache.
+    bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, std::size_t told, bool is_whole);
 
     // They share columns with each other and the frames, but not all of them: of many every second is dropped.
     void keep_snapshot(const SceneSnapshot& snapshot);

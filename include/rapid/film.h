@@ -38,7 +38,7 @@ public:
     // The next picture, which a thread of the film's own draws; waits while another one waits. Error: of this or of an
     // earlier picture, after which there will be no film; what ffmpeg says.
     Result<Done> add(const SceneFrame& frame, const SceneShapes& shapes);
-    // The pictures that are in the film by now.
+    // The pictures that were in the film at the last add(), or finish().
     std::int64_t done() const;
     // Waits until all are; the file then has its name, and nothing is added any more. Error: as add(); no picture was
     // added.

@@ -26,8 +26,9 @@ struct MergedFiles {
 //
 // Errors: WrongCall, before anything is written: a part or a frame that is missing or of another run, each of them; a
 // format that holds no points; an output that would replace a part. FailedFrame: a file that can't be read or written,
-// a point that belongs to another part; frames before it are written. From one thread of a process at a time; no scene
-// may run meanwhile, whose points would be held in those files, too.
+// a point that belongs to another part; frames before it are written. Busy: another thread merges. OutOfMemory and
+// Unexpected at any time. Meanwhile no scene may run and no frame be read or copied, whose points would lie in those
+// files, too. Messages say "-o" of the output, and --part of a run in parts, as the command does.
 Result<MergedFiles> merge_files(const std::vector<std::string>& parts, const std::string& output,
                                 const std::function<bool(std::int64_t frame, std::uint64_t points)>& progress = {});
 

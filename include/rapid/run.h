@@ -27,13 +27,13 @@ namespace rapid {
 
 // Frames from the first one to the last, each step-th.
 struct RunFrames {
-    std::int64_t first = 1, last = 48, step = 1;
+    std::int64_t first = 1, last = 48, step = 1;  // numbers of frames, and a distance of them
 };
 
 // How pictures are drawn. What is not given is fitted to the points and shapes.
 struct PictureSettings {
-    PictureSize size{1280, 720};
-    PictureCamera camera;
+    PictureSize size{1280, 720};  // of each
+    PictureCamera camera;         // of all
 };
 
 // The files of a run's frames.
@@ -52,7 +52,8 @@ struct OutputFormat {
 // Error: an extension that no format has, with the known ones; no pattern; no attributes behind a colon.
 Result<OutputFormat> output_format(const std::string& output);
 
-// Snapshots and a journal of frames in a folder, from which a run goes on where an earlier one ended.
+// Snapshots and a journal of frames in a folder, from which a run goes on where an earlier one ended. Of scenes that
+// take nothing of the program's own (SceneOptions::objects and nodes), as that may change unseen.
 struct RunCacheOptions {
     std::string folder;       // empty: there is none
     std::int64_t every = 10;  // a snapshot after each n-th frame, and after the last; 0: none
@@ -65,10 +66,11 @@ struct RunPart {
     int number = 1, count = 1;  // from 1 to count
 };
 
+// What a run writes, and how.
 struct RunOptions {
     std::optional<std::string> text;  // of the scene, whose file is then a name for messages
     std::optional<RunFrames> frames;  // that are written; all before them are computed. Nothing: 48 from the first
-    FileOutputs files;
+    FileOutputs files;                // of frames
     // Files besides; empty: none.
     std::string statistics;  // JSON, as of --stats
     std::string profile;     // a trace in Chrome's format
@@ -77,8 +79,8 @@ struct RunOptions {
     // Some of the points: file names get the part's, _part03of16 before the frame's number, or in place of {part}.
     std::optional<RunPart> part;
     std::optional<double> sample;  // the fraction of the points, above 0 and at most 1
-    // A folder in which runs that go on at once note the files of their nodes, so that two do not write one; empty:
-    // none.
+    // A folder in which runs of different statistics note the files of their nodes, so that two of them, as of a wedge,
+    // do not write one; empty: none.
     std::string claims;
 };
 
@@ -89,15 +91,15 @@ Result<std::vector<std::string>> output_folders(const RunOptions& options);
 
 // A frame that is done.
 struct RunFrame {
-    std::int64_t number = 0;
+    std::int64_t number = 0;   // of the frame
     std::uint64_t points = 0;  // of all outputs
     double seconds = 0;        // since the run began, those of the runs that it goes on behind included
     bool is_known = false;     // of a cache: it was not computed again
 };
 
-// Told while a run goes on, by the thread of the call, one at a time. They do not throw.
+// Told by prepare() and run(), on the thread of the call, one at a time. They do not throw.
 struct RunListener {
-    std::function<void(const RunFrame& frame)> frame;
+    std::function<void(const RunFrame& frame)> frame;      // that is done
     std::function<void(const std::string& text)> line;     // which files are written, what a cache has
     std::function<void(const std::string& text)> warning;  // each once; of a frame with its number
     // Frames are computed from now on. keeps_snapshots: what is computed until end_after_frame() will not be lost.
@@ -106,12 +108,13 @@ struct RunListener {
 
 // How a run ended.
 struct RunOutcome {
+    // By what it ended.
     enum Ending {
         Complete,
-        Ended,   // by end_after_frame()
-        Failed,  // in a frame, or because a file could not be written
+        Ended,   // by end_after_frame(): there are no films, no file of events, and a part is not complete
+        Failed,  // in a frame, because a file could not be written, or by cancel()
     };
-    Ending ending = Complete;
+    Ending ending = Complete;            // of this run
     std::int64_t last_frame = 0;         // that was computed or known
     std::optional<SceneError> error;     // of Failed
     std::vector<std::string> unwritten;  // statistics or a profile that could not be written, and why
@@ -121,17 +124,18 @@ struct RunOutcome {
 // One run. Like a Scene it is used by one thread at a time, but for cancel(), end_after_frame() and abandon().
 class SceneRun {
 public:
-    // Its time begins here; nothing is opened or written yet. hooks.keep_state is chosen by the run. Error: WrongCall,
-    // an option that can't be.
+    // Its time begins here. Nothing is opened yet, and nothing written, but the folders of statistics and profile are
+    // made. keep_state and tell_points of the hooks are chosen by the run. Error: WrongCall, an option that can't be.
     static Result<SceneRun> make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
                                  RunListener listener);
 
+    // What is moved from may only be assigned to, or end.
     SceneRun(SceneRun&&) noexcept;
     SceneRun& operator=(SceneRun&&) noexcept;
     ~SceneRun();  // not while a call of another thread is running
 
-    // Opens and plans the scene, and finds what is wrong with the names of files. Errors: as Scene::open(); an output
-    // that the scene does not have, an attribute that nothing makes, two writers of one file, frames before the
+    // Opens and plans the scene, and finds what is wrong with the names of files; once. Errors: as Scene::open(); an
+    // output that the scene does not have, an attribute that nothing makes, two writers of one file, frames before the
     // scene's first, a subset of points that are coupled.
     Result<Done> prepare();
 
@@ -152,12 +156,14 @@ public:
     // Ends it at once, as Scene::cancel(). From any thread.
     void cancel();
 
-    // For a program that is about to end, from any thread at any moment: writes statistics and profile of the frames so
-    // far. The run stands still afterwards. Nothing where its thread does not let go within a second.
+    // What abandon() has to tell.
     struct Abandoned {
         std::vector<std::string> warnings;   // that were only counted until now
         std::vector<std::string> unwritten;  // as RunOutcome
     };
+    // For a program that is about to end, from any thread at any moment, but not from a listener: writes statistics and
+    // profile of the frames so far. A call of the run does not return afterwards. Nothing where the run's thread does
+    // not let go within a second, as when a listener does not return.
     std::optional<Abandoned> abandon();
 
 private:
@@ -166,7 +172,8 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-// What a plan makes of files. Of a scene that is open; its frames stay as they are where nothing else is said.
+// What a plan makes of files, of a scene that is open, which stays where it is; where a script had to be stopped it is
+// at its start afterwards, or is to be restarted.
 
 // As Scene::explain(), for these files: what they ask for is kept. Error: of an output, as SceneRun::prepare().
 Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files);
@@ -188,7 +195,7 @@ struct SceneRaces {
     std::optional<SceneError> found;  // the first difference, with its node
     bool compared = false;            // whether there was a point in these frames
 };
-// The scene is at its start afterwards. In an arena of one thread. Error: FailedFrame, of a frame that fails.
+// On one thread. Error: FailedFrame, of a frame that fails.
 Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames);
 
 }  // namespace rapid

@@ -348,9 +348,13 @@ struct SceneHooks {
     // Told of each file before it is read, and of each place where a module or a node was looked for. On any thread;
     // what it throws is dropped.
     std::function<void(const std::string& path)> reads;
-    // Told where memory was to end what is computed, and comes too late: the process has a sixteenth more than it may, or
-    // did not stop within a second. With the error's text; for a program that then rather ends. On a thread of Rapid's.
+    // Told where memory was to end what is computed, and comes too late: the process has a sixteenth more than it may,
+    // or did not stop within a second. With the error's text; for a program that then rather ends. On a thread of
+    // Rapid's.
     std::function<void(const std::string& message)> beyond_memory;
+    // Whether a frame ends with an error where the process takes more memory than its limit: not for a program that
+    // keeps frames, as long as it has room for them.
+    bool watch_memory = true;
     // Told of the parameters as soon as the scene's file has run, before its plan is made, which may fail: for a
     // program that lets its user change them then, too. On the thread of the call; what it throws is dropped.
     std::function<void(const std::vector<SceneParameter>& parameters)> parameters;
@@ -387,7 +391,8 @@ struct PointOrigin {
 // What the frames of a scene follow from: scenes of equal fingerprints come to the same bits.
 struct SceneFingerprint {
     // By name: the build of Rapid, plugins, parameters, seeds, nodes with their arguments and inputs, the code of all
-    // functions, the contents of the files that opening has read.
+    // functions, the contents of the files that opening has read, what points tell (SceneHooks::tell_points). Of what
+    // the program offers the names alone.
     std::map<std::string, std::string> parts;
     std::string hash;  // of them, without the lines in which functions stand
 };

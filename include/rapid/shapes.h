@@ -54,8 +54,8 @@ public:
     // What was warned of when they were made, such as a mesh with holes.
     std::vector<std::string> warnings() const;
 
-    // To a file for load() of the same build of Rapid. Error of save(): the system's; of load(): also a file that is of
-    // something else, damaged or of another build.
+    // All but warnings() to a file for load() of the same build of Rapid. Error of save(): the system's; of load():
+    // also a file that is of something else, damaged or of another build.
     Result<Done> save(const std::string& path) const;
     static Result<SceneShapes> load(const std::string& path);
 

@@ -10,9 +10,17 @@
 //   if (auto done = study.complete(); !done) return fail(done.error().text());
 //   auto reference = rapid::StudyReference::make();
 //   if (!reference) return fail(reference.error().text());
-//   study.compute_reference(source, *study.reference, *reference);
-//   for (const rapid::StudyKnobs& knobs : *study.rows()) rows.push_back(*study.measure(source, knobs, &*reference));
-//   std::cout << study.report(rows)->text;
+//   auto rows = study.rows();
+//   if (!rows) return fail(rows.error().text());
+//   auto computed = study.compute_reference(source, study.reference_of(rows->front()), *reference);
+//   if (!computed) return fail(computed.error().text());
+//   std::vector<rapid::StudyRun> runs;
+//   for (const rapid::StudyKnobs& knobs : *rows) {
+//       auto run = study.measure(source, knobs, &*reference);
+//       if (!run) return fail(run.error().text());
+//       runs.push_back(*run);
+//   }
+//   if (auto report = study.report(runs)) std::cout << report->text;
 //
 // Runs take place in this process, one after the other. A program that is to outlive a setting which crashes forks a
 // process for each; what is said to start no threads may be called before that.
@@ -49,8 +57,8 @@ struct StudySource {
 };
 
 // The frames of the run that others are compared with, in memory without a name that is gone with its last copy.
-// Copying one copies a pointer. Processes that are forked share it: one may compute it, and others measure by it. It is
-// written by one thread at a time, and read by any number.
+// Copying one copies a pointer; what is moved from may only be assigned to, or end. Processes that are forked share it:
+// one may compute it, and others measure by it. It is written by one thread at a time, and read by any number.
 class StudyReference {
 public:
     // Starts no threads. Error: the system's.

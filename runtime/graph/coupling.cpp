@@ -86,20 +86,23 @@ std::vector<PointCoupling> couplings_of(const Plan& plan)
     return found;
 }
 
-void take_subset(const Plan& plan, const Subset& subset)
+void refuse_coupled(const Plan& plan)
 {
     const std::vector<PointCoupling> found = couplings_of(plan);
-    if (found.empty()) {
-        for (const PlannedNode& planned : plan.nodes)
-            if (const CouplingRule* rule = rule_of(planned.node->type->name); rule && rule->take)
-                rule->take(planned, subset);
-        return;
-    }
+    if (found.empty()) return;
     const auto& [node, what] = found.front();
     throw Error(
         fmt::format("{}: points of this scene can't be simulated in parts, nor a sample of them; run all", what))
         .in_node(node->name)
         .at(node->location);
+}
+
+void take_subset(const Plan& plan, const Subset& subset)
+{
+    refuse_coupled(plan);
+    for (const PlannedNode& planned : plan.nodes)
+        if (const CouplingRule* rule = rule_of(planned.node->type->name); rule && rule->take)
+            rule->take(planned, subset);
 }
 
 std::optional<float> value_of_all(const Plan& plan, std::size_t simulation, const std::string& attribute)

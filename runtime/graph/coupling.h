@@ -29,8 +29,10 @@ struct PointCoupling {
 
 // Of the nodes that are reached, in the order of the plan.
 std::vector<PointCoupling> couplings_of(const Plan& plan);
-// From now on the nodes that bring points bring those of the subset alone; before the plan is evaluated. Error: points
-// are coupled; of the first node that does it, with its place.
+// Error: points are coupled; of the first node that does it, with its place.
+void refuse_coupled(const Plan& plan);
+// From now on the nodes that bring points bring those of the subset alone; before the plan is evaluated. Error: as
+// refuse_coupled().
 void take_subset(const Plan& plan, const Subset& subset);
 
 // The value of a float attribute that all points of a simulation have from their birth to their end; nothing where they

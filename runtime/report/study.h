@@ -1,7 +1,7 @@
 // A study: one scene at many settings of its knobs, each run compared with a reference and timed.
 //
 // The definition of a study, the results of its runs, and what follows from them: the observed order of accuracy of
-// each line, and the Pareto-optimal rows. The command runs the scenes.
+// each line, and the Pareto-optimal rows.
 #pragma once
 
 #include <cstdint>

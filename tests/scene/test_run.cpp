@@ -101,6 +101,9 @@ void check_unprepared(const RunOptions& asked, const std::string& message,
     REQUIRE_FALSE(prepared);
     CHECK(prepared.error().kind == kind);
     CHECK_THAT(prepared.error().text(), Contains(message));
+    CHECK_THAT(run.prepare().error().message, Contains("make another one"));
+    CHECK_FALSE(run.run());
+    CHECK(run.first_frame() == 1);
 }
 
 }  // namespace
@@ -235,6 +238,8 @@ TEST_CASE("the parts of a run have the points of the whole", "[run]")
     CHECK(merges.front().first == (folder / "cloud.####.csv"));
     CHECK(merges.front().second == (folder / "cloud_part{part}.####.csv"));
     CHECK_THAT(run.merges(0).error().message, Contains("parts = 0; it must be from 1"));
+    good(run.run());  // of all points still
+    CHECK(good(SceneFrame::read(folder / "cloud.0008.csv")).size() == whole.size());
 }
 
 TEST_CASE("a frame that fails ends a run, and those before it are written", "[run]")
@@ -327,12 +332,26 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     wrong([](RunOptions& o) { o.sample = NAN; }, "sample = nan");
     wrong([](RunOptions& o) { o.cache.every = -1; }, "every = -1");
     wrong([](RunOptions& o) { o.cache.again = true; }, "again says what to do with a cache");
+    wrong([](RunOptions& o) { o.claims = "claims"; }, "claims are known by the file of statistics");
+    wrong([](RunOptions& o) { o.files.pictures.camera.position = {1, NAN, 0}; }, "must be numbers that are finite");
+    wrong(
+        [](RunOptions& o) {
+            o.files.pictures.camera.position = o.files.pictures.camera.target = {1, 2, 3};
+        },
+        "the camera looks at its own place");
     wrong([](RunOptions& o) { o.files.pictures.size = {0, 10}; }, "a picture of 0x10");
     wrong([](RunOptions& o) { o.files.pictures.size.width = 1 << 20; }, "a picture of 1048576x720");
     wrong([](RunOptions& o) { o.files.pictures.camera.fov = 180; }, "fov = 180");
     SceneOptions scene;
     scene.threads = -1;
     CHECK_FALSE(SceneRun::make("cloud.lua", scene, {}, right, {}));
+    scene.threads = 0;
+    scene.nodes.emplace_back();
+    RunOptions cached = right;
+    cached.cache.folder = folder / "cache";
+    const Result<SceneRun> offering = SceneRun::make("cloud.lua", scene, {}, cached, {});
+    REQUIRE_FALSE(offering);
+    CHECK_THAT(offering.error().message, Contains("a cache does not know when what the program offers has changed"));
     CHECK(fs::is_empty(folder.path()));
 }
 
@@ -368,6 +387,21 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :conta
     CHECK_THAT(run.prepare().error().message, Contains("the run is prepared"));
 }
 
+TEST_CASE("advice that takes too long is none, and leaves a scene that runs", "[run]")
+{
+    SceneOptions options;
+    options.script_seconds = 0.2;
+    Scene scene = test::opened(R"(local rapid = require "rapid"
+local n = rapid.param("n", 1e12)
+return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
+  :points("long", function(p) for i = 1, n do p.v = p.v * 0.5 end end) :drag { linear = 5000 } :solve {})",
+                               options);
+    CHECK(good(advice_on(scene, {})).empty());
+    good(scene.set("n", 1.0));
+    CHECK_THAT(good(advice_on(scene, {})), Contains("drag1"));
+    CHECK(good(scene.advance()).number() == 1);
+}
+
 TEST_CASE("runs at once do not write one file of a node", "[run]")
 {
     const test::TemporaryFolder folder;
@@ -400,6 +434,14 @@ TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
     const std::vector<std::string> folders = good(output_folders(asked));
     CHECK(folders == std::vector<std::string>{folder / "points", folder.path(), folder / "told", folder / "cache"});
     for (const std::string& one : folders) CHECK(fs::is_directory(one));
+    asked.part = {2, 4};
+    asked.files.outputs = {folder / "{part}/a.####.csv"};
+    asked.statistics = folder / "told{part}/s.json";
+    asked.claims = folder / "claims";
+    CHECK(good(output_folders(asked)) ==
+          std::vector<std::string>{folder / "2of4", folder / "told2of4", folder / "cache", folder / "claims"});
+    CHECK(fs::is_directory(folder / "told2of4"));
+    CHECK_FALSE(fs::exists(folder / "told{part}"));
     asked.files.outputs = {"/proc/none/a.####.csv"};
     CHECK_FALSE(output_folders(asked));
 }
@@ -424,18 +466,18 @@ TEST_CASE("what a plan keeps for files is explained", "[run]")
     CHECK(nlohmann::json::parse(more.json).at("against") == "other.lua");
     CHECK_FALSE(explain_difference(scene, files, scene));
 
+    good(scene.advance());
     const auto state = nlohmann::json::parse(good(explain_state(scene, files, 4)).json);
     CHECK(state.at("frame") == 4);
     CHECK(state.at("simulations").at("create1").get<std::size_t>() > 0);
     CHECK_THAT(explain_state(scene, files, 0).error().message, Contains("before the scene's first"));
-    CHECK(good(scene.advance()).number() == 1);
+    CHECK(good(scene.advance()).number() == 2);
 }
 
 TEST_CASE("a scene is checked without a frame, and for kernels that remember", "[run]")
 {
-    SceneOptions options;
-    options.threads = 1;
-    Scene scene = test::opened(cloud, options);
+    Scene scene = test::opened(cloud);
+    good(scene.advance());
     CHECK_THAT(
         good(check_outputs(scene, {})),
         StartsWith("param rate = 2000  particles born per second\ncloud.lua: OK, ") && Contains("from output main"));
@@ -446,6 +488,7 @@ TEST_CASE("a scene is checked without a frame, and for kernels that remember", "
     CHECK_FALSE(good(find_races(scene, {}, {1, 1})).compared);
     CHECK_FALSE(find_races(scene, {}, {0, 0}));
     CHECK_FALSE(find_races(scene, {}, {1, 4, 0}));
+    CHECK(good(scene.advance()).number() == 2);
 
     Scene stiff = test::opened(R"(local rapid = require "rapid"
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, velocity = {0, 1, 0} } :drag { linear = 5000 } :solve {})");
@@ -457,8 +500,7 @@ local box = { n = 0 }
 ballast = {}
 for i = 1, 20000 do ballast[i] = i end
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, attributes = { heat = 0 } }
-  :points("count", function(p) local held = { box } local kept = held[1] kept.n = kept.n + 1 p.heat = kept.n end) :solve {})",
-                                   options);
+  :points("count", function(p) local held = { box } local kept = held[1] kept.n = kept.n + 1 p.heat = kept.n end) :solve {})");
     const SceneRaces races = good(find_races(remembers, {}, {2, 4}));
     REQUIRE(races.found);
     CHECK(races.found->node == "count");

@@ -225,6 +225,29 @@ TEST_CASE("what is no study is refused", "[study]")
     CHECK(kind(swept().first_frame(wrong)) == SceneError::WrongCall);
 }
 
+TEST_CASE("a knob may be a vector", "[study]")
+{
+    const Source scene(
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :gravity { name = 'down' } :solve {}\n",
+        true);
+    SceneStudy study;
+    study.sweep["down.g"] = {knob_value("{0, -8, 0}"), knob_value("{0, -6, 0}")};
+    study.reference = {{"down.g", knob_value("{0, -8, 0}")}};
+    study.last = 13;
+    study.error = "max";
+    study.repeat_runs = 1;
+    good(study.complete());
+    const StudyReference reference = good(StudyReference::make());
+    good(study.compute_reference(scene.source, *study.reference, reference));
+    std::vector<StudyRun> runs;
+    for (const StudyKnobs& knobs : good(study.rows()))
+        runs.push_back(good(study.measure(scene.source, knobs, &reference)));
+    CHECK(runs[0].error == 0);
+    CHECK(runs[1].error == Approx(2 * 0.5 * 0.5 / 2));  // Δg t²/2
+    CHECK_THAT(good(study.report(runs)).text, Contains("{0, -6, 0}"));
+}
+
 TEST_CASE("the value of a knob is read as from a command line", "[study]")
 {
     CHECK(knob_value("true") == SceneValue(true));

@@ -85,8 +85,8 @@ def hostile_names_are_text(bench):
     heads = browser.run("return [...document.querySelectorAll('#sheet th')].map((t) => t.textContent)")
     assert set(names) <= set(heads), heads
     choose(browser, "colour", names[7])
-    browser.wait("!document.getElementById('legend').hidden")
-    assert names[7] in browser.run("return document.getElementById('legend').textContent")
+    # The legend of the speed is there before.
+    wait_for(lambda: names[7] in browser.run("return document.getElementById('legend').textContent"))
     browser.run("rapidView.choosePoint(3)")
     browser.wait("document.querySelectorAll('#attributes tr').length > 70")
     assert browser.run("return document.querySelectorAll('#view img, #bar img, #side img, #dock img, b:not(#error b)').length") == 0

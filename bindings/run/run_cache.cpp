@@ -171,7 +171,7 @@ void RunCache::begin(const Session& session, const Plan& plan, const FrameSelect
         failures_.push_back(shown_error((folder_ / "journal").string(), error) + "; the run goes on, and what it " +
                             "computes is not kept");
     }
-    if (every_ > 0) writer_ = std::make_unique<SnapshotWriter>();
+    if (every_ > 0) writer_ = std::make_unique<FileWriter>("snapshot");
 }
 
 void RunCache::find_due(const Plan& plan, FrameFiles& files)
@@ -363,7 +363,12 @@ void RunCache::keep(const Evaluator& evaluator, EventFile& events, bool in_any_c
     Fingerprint all = fingerprint_;
     all.insert(contents_.begin(), contents_.end());
     header["fingerprint"] = all;
-    writer_->submit(snapshot_file(frame), std::move(header), state_of(kept));
+    // The state shares its columns with the run.
+    writer_->submit(snapshot_file(frame), [header = std::move(header), state = state_of(kept)](const fs::path& path) {
+        OutputFile file(path);
+        write_state(file, header, state);
+        file.finish();
+    });
     last_kept_ = frame;
 }
 

@@ -12,7 +12,7 @@
 #include "bindings/run/event_file.h"
 #include "bindings/run/frame_files.h"
 #include "bindings/run/run_journal.h"
-#include "bindings/run/snapshot_writer.h"
+#include "runtime/files/file_writer.h"
 #include "runtime/files/frame_selection.h"
 #include "runtime/graph/evaluate.h"
 
@@ -100,7 +100,7 @@ private:
     std::map<std::int64_t, FrameRecord> open_;  // frames whose files are to come
     std::map<std::string, WrittenFile> films_;  // by path, that are being written
     std::vector<std::string> warnings_, failures_;
-    std::unique_ptr<SnapshotWriter> writer_;
+    std::unique_ptr<FileWriter> writer_;  // of snapshots
 };
 
 }  // namespace rapid

@@ -24,6 +24,12 @@ using Json = CheckedJson;
 constexpr std::size_t most_runs = 8;
 constexpr const char *frame_file = "frame", *shapes_file = "shapes", *snapshot_file = "snapshot";
 
+// For the writer, which knows the file.
+void check_written(const Result<Done>& written)
+{
+    if (!written) throw Error(written.error().message);
+}
+
 }  // namespace
 
 CachedRun::CachedRun(fs::path folder, std::string hash, Scene& scene)
@@ -88,7 +94,8 @@ std::int64_t CachedRun::number_of(const SceneShapes& shapes)
     if (shapes == written_) return written_number_;
     written_ = shapes;
     written_number_ = ++last_shapes_;
-    writer_.submit(file(shapes_file, written_number_), [shapes](const std::string& path) { return shapes.save(path); });
+    writer_.submit(file(shapes_file, written_number_),
+                   [shapes](const fs::path& path) { check_written(shapes.save(path)); });
     return written_number_;
 }
 
@@ -98,8 +105,9 @@ void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warn
     const std::lock_guard lock(mutex_);
     if (there_.contains(frame.number)) return;
     const std::int64_t shapes = number_of(frame.shapes);
-    writer_.submit(file(frame_file, frame.number),
-                   [points = frame.points, key = hash_](const std::string& path) { return points.save(path, key); });
+    writer_.submit(file(frame_file, frame.number), [points = frame.points, key = hash_](const fs::path& path) {
+        check_written(points.save(path, key));
+    });
     there_[frame.number] = shapes;
     const Json entry = {{"frame", frame.number},
                         {"shapes", shapes},
@@ -114,7 +122,7 @@ void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warn
 void CachedRun::keep(const SceneSnapshot& snapshot)
 {
     writer_.submit(file(snapshot_file, snapshot.frame()),
-                   [snapshot, key = hash_](const std::string& path) { return snapshot.write(path, key); });
+                   [snapshot, key = hash_](const fs::path& path) { check_written(snapshot.write(path, key)); });
 }
 
 std::optional<SceneSnapshot> CachedRun::snapshot_before(std::int64_t frame) const

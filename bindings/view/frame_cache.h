@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "bindings/view/file_writer.h"
 #include "bindings/view/frame_store.h"
 #include "runtime/files/file_error.h"
+#include "runtime/files/file_writer.h"
 
 namespace rapid {
 
@@ -67,7 +67,7 @@ private:
     std::int64_t last_shapes_ = 0;
     SceneShapes written_, loaded_;  // the last ones
     std::int64_t written_number_ = 0, loaded_number_ = 0;
-    FileWriter writer_;
+    FileWriter writer_{"file"};
 };
 
 class FrameCache {

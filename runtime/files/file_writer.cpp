@@ -1,12 +1,13 @@
-#include "bindings/view/file_writer.h"
+#include "runtime/files/file_writer.h"
 
 #include <fmt/format.h>
 
+#include <exception>
 #include <utility>
 
 namespace rapid {
 
-FileWriter::FileWriter()
+FileWriter::FileWriter(std::string what) : what_(std::move(what))
 {
     thread_ = std::thread([this] { run(); });
 }
@@ -21,11 +22,11 @@ FileWriter::~FileWriter()
     thread_.join();
 }
 
-void FileWriter::submit(const std::filesystem::path& file, Write write)
+void FileWriter::submit(std::filesystem::path path, Write write)
 {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return !waiting_; });
-    waiting_ = Job{file.string(), std::move(write)};
+    waiting_ = Job{std::move(path), std::move(write)};
     changed_.notify_all();
 }
 
@@ -53,11 +54,9 @@ void FileWriter::run()
         lock.unlock();
         std::string failure;
         try {
-            const Result<Done> written = job->write(job->path);
-            if (!written)
-                failure = fmt::format("{}: {}; the run goes on without this file", job->path, written.error().message);
+            job->write(job->path);
         } catch (const std::exception& error) {
-            failure = error.what();
+            failure = fmt::format("{}: {}; the run goes on without this {}", job->path.string(), error.what(), what_);
         }
         job.reset();  // releases its columns before the next frame would copy them
         lock.lock();

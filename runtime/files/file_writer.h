@@ -10,19 +10,19 @@
 #include <thread>
 #include <vector>
 
-#include "include/rapid/scene.h"
-
 namespace rapid {
 
 class FileWriter {
 public:
-    FileWriter();
+    // what: that a run does without where it can't be written, "snapshot".
+    explicit FileWriter(std::string what);
     // Completes what was submitted.
     ~FileWriter();
 
-    using Write = std::function<Result<Done>(const std::string& path)>;
-    // Waits while another one waits.
-    void submit(const std::filesystem::path& file, Write write);
+    // Throws why the file can't be written.
+    using Write = std::function<void(const std::filesystem::path& path)>;
+    // Waits while another one waits. What `write` holds is released when it is done.
+    void submit(std::filesystem::path path, Write write);
     // Waits until all are written.
     void finish();
     // Why files could not be written, since the last call.
@@ -30,11 +30,12 @@ public:
 
 private:
     struct Job {
-        std::string path;
+        std::filesystem::path path;
         Write write;
     };
     void run();
 
+    const std::string what_;
     std::mutex mutex_;
     std::condition_variable changed_;
     std::optional<Job> waiting_;

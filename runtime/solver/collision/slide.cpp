@@ -72,7 +72,14 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
         slide.duration = stop;
         slide.stops = true;
     }
-    if (!straight) {
+    if (const double t = slide.duration; !straight && !slide.stops && holds * t > speed) {
+        // Friction that can turn the point about within the piece has the direction of the velocity at its end: by any
+        // other one a slow point would go to and fro across the pull.
+        const Vec3d pulled = vt + t * at;
+        const double size = pulled.norm();
+        slide.stops = size <= t * holds;
+        slide.a = slide.stops ? Vec3d(-vt / t) : Vec3d(at - holds / size * pulled);
+    } else if (!straight) {
         const Vec3d middle = vt + 0.5 * slide.duration * slide.a;
         if (const double size = middle.norm(); size > 0) slide.a = at - holds / size * middle;
     }

@@ -37,6 +37,28 @@ TEST_CASE("sliding friction stops a point after v/(μ g)", "[slide]")
     CHECK_THAT(slide.a, close_to(Vec3d(0, 0, 0.25 * g), 1e-12));
 }
 
+// So slow that friction turns within the shortest piece. The velocity at the end of a piece is by the mean of the
+// accelerations at both ends, as along curved surfaces.
+TEST_CASE("a slow point goes where it is pulled, and not to and fro across the pull", "[slide]")
+{
+    const double excess = GENERATE(0.02, 0.1), turn = GENERATE(0.5, 1.5, 2.5);  // m/s² over friction; rad
+    CAPTURE(excess, turn);
+    const Support on = support({0, 1, 0}, 0.3);
+    const Vec3d pull(0.3 * g + excess, -g, 0);
+    const double time = 1.0 / 48, speed = 4e-5;
+    Vec3d v = speed * Vec3d(std::cos(turn), 0, std::sin(turn));
+    int pieces = 0;
+    for (double left = time; left > 0 && pieces < 1000; ++pieces) {
+        const Slide slide = slide_on(on, v, pull, left, min_turning_piece * time);
+        const double s = slide.duration;
+        const Vec3d v1 = v + s * slide.a;
+        v = slide.stops ? Vec3d(Vec3d::Zero()) : Vec3d(v + 0.5 * s * (slide.a + slide_on(on, v1, pull, 0, 0).a));
+        left -= s;
+    }
+    CHECK(pieces < 64);
+    CHECK_THAT(v, close_to(Vec3d(excess * time, 0, 0), 2 * speed));
+}
+
 TEST_CASE("a surface does not bear a point that is pulled off it, or that it falls away from", "[slide]")
 {
     CHECK(slide_on(support({0, 1, 0}, 0), {1, 0, 0}, {0, g, 0}, 1, 0).kind == Slide::Leaves);

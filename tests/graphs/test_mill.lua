@@ -21,6 +21,11 @@ describe("mill", function()
     assert.truthy(inside < 0.0125, inside)
   end)
 
+  it("lets no grain meet the edge of a paddle again and again, up to the limit of contacts", function()
+    local many = rapid.run("graphs/mill.lua", { frames = {1, 20}, set = { rate = 20000 } })
+    for _, warning in ipairs(many.warnings) do assert.is_nil(warning:find("limit of contacts", 1, true), warning) end
+  end)
+
   it("throws some of it up", function()
     local highest = -1e9
     for i = 1, #result[40] do highest = math.max(highest, result[40][i].v.y) end

@@ -131,8 +131,10 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
                           ac,
                           obstacle.viscosity[block_.indices[i]],
                           obstacle.adhesion_to_sliding(block_.indices[i])};
-    if (g < -support.adhesion && vn >= -tangential * relative.norm())
-        part(point, arrival, contact, vn);
+    // Of a surface that moves a velocity has the rounding of both.
+    const double still = tangential * relative.norm() + 0x1p-50 * contact.vc.norm();
+    if (g < -support.adhesion && vn >= -still)
+        part(point, arrival, contact, o);
     else if (vn >= 0 || u * u <= rising2 || 2 * u <= g * (1 - epsilon) * point.left)
         rest(point, support, contact_response(v, contact.vc, n, 0, friction));
     else
@@ -148,17 +150,23 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
 }
 
 // The point touches the surface, and is pulled off it.
-void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, double vn)
+void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o)
 {
     const std::size_t i = point.i;
     if (contact.flat) {
         // An approach by rounding alone would be met again and again at the same moment. What the point rests on
         // besides still bears it.
-        block_.v[i] -= std::min(vn, 0.0) * contact.n;
+        block_.v[i] -= std::min((arrival.v - contact.vc).dot(contact.n), 0.0) * contact.n;
         return;
     }
-    // It touches as far as a field can tell: the next moments belong to the path.
-    const double s = std::min(point.left, min_piece * block_.dt[i]);
+    // It touches as far as a field can tell: the next moments belong to the path. They are long enough for a point that
+    // grazes an edge to pass it in some steps, and too short for one that a facet bears after all to sink into it.
+    const Obstacle& obstacle = block_.obstacles[o];
+    const double speed = (arrival.v - contact.vc).norm(), a = arrival.a.norm();
+    const double passes = obstacle.feature > 0 ? time_to_travel(obstacle.feature / 64, speed, a) : 0;
+    const double tolerance = obstacle.contact_tolerance(arrival.P, block_.radius(obstacle, i));
+    const double sinks = a > 0 ? std::sqrt(tolerance / a) : passes;
+    const double s = std::min(point.left, std::max(min_piece * block_.dt[i], std::min(passes, sinks)));
     block_.P[i] += s * (arrival.v + 0.5 * s * arrival.a);
     block_.v[i] += s * arrival.a;
     point.left -= s;

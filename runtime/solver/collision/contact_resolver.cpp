@@ -134,7 +134,7 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
     // Of a surface that moves a velocity has the rounding of both.
     const double still = tangential * relative.norm() + 0x1p-50 * contact.vc.norm();
     if (g < -support.adhesion && vn >= -still)
-        part(point, arrival, contact, o);
+        part(point, arrival, contact, o, (a - ac).norm());
     else if (vn >= 0 || u * u <= rising2 || 2 * u <= g * (1 - epsilon) * point.left)
         rest(point, support, contact_response(v, contact.vc, n, 0, friction));
     else
@@ -149,8 +149,8 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
     if (hits) audit_.add(i, o, {P, n, contact.vc, -vn, v, block_.v[i] - v, when});
 }
 
-// The point touches the surface, and is pulled off it.
-void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o)
+// The point touches the surface, and is pulled off it. pull: m/s², in the surface's frame.
+void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o, double pull)
 {
     const std::size_t i = point.i;
     if (contact.flat) {
@@ -162,10 +162,10 @@ void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const 
     // It touches as far as a field can tell: the next moments belong to the path. They are long enough for a point that
     // grazes an edge to pass it in some steps, and too short for one that a facet bears after all to sink into it.
     const Obstacle& obstacle = block_.obstacles[o];
-    const double speed = (arrival.v - contact.vc).norm(), a = arrival.a.norm();
-    const double passes = obstacle.feature > 0 ? time_to_travel(obstacle.feature / 64, speed, a) : 0;
+    const double speed = (arrival.v - contact.vc).norm();
+    const double passes = obstacle.feature > 0 ? time_to_travel(obstacle.feature / 64, speed, pull) : 0;
     const double tolerance = obstacle.contact_tolerance(arrival.P, block_.radius(obstacle, i));
-    const double sinks = a > 0 ? std::sqrt(tolerance / a) : passes;
+    const double sinks = pull > 0 ? std::sqrt(tolerance / pull) : passes;
     const double s = std::min(point.left, std::max(min_piece * block_.dt[i], std::min(passes, sinks)));
     block_.P[i] += s * (arrival.v + 0.5 * s * arrival.a);
     block_.v[i] += s * arrival.a;

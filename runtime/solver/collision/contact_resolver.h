@@ -31,7 +31,7 @@ private:
     Arrival arrival_on_chord(CollidingPoint& point, double time) const;
     void capture(CollidingPoint& point, const Contact& contact, int obstacle);
     void respond(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int obstacle);
-    void part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int obstacle);
+    void part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int obstacle, double pull);
     void bounce(CollidingPoint& point, const Support& support, double bounce);
     void rest(CollidingPoint& point, const Support& support, const Vec3d& v);
     bool is_same_surface(const CollidingPoint& point, const Support& support, const Vec3d& along) const;

@@ -24,6 +24,12 @@ double shortest_piece(const Obstacle& obstacle, const Path& path, double dt)
     return time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm());
 }
 
+// Of a point that the surface bears, in the surface's frame.
+Vec3d tangential_acceleration(const Slide& slide, const Vec3d& pull, const Vec3d& n)
+{
+    return slide.kind == Slide::Moves ? slide.a : Vec3d(pull - pull.dot(n) * n);
+}
+
 }  // namespace
 
 void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> going)
@@ -38,7 +44,9 @@ void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const s
             if (follow_arc(points[query_.point[j]], j)) query_.move(j, kept++);
         query_.truncate(kept);
         project(points, obstacle);
+        if (!obstacle.moves) query_.find_gradients_at_times(*obstacle.shape);
         for (std::size_t j = 0; j < kept; ++j) end_piece(points[query_.point[j]], j);
+        if (obstacle.moves) follow_surface(points, obstacle);
     }
 }
 
@@ -133,19 +141,19 @@ void CurvedMotion::meet_kink(CollidingPoint& point, const Vec3d& n)
     point.kind = CollidingPoint::Waits;
 }
 
-// Onto the surface: two steps of Newton's method. Leaves the gradients there.
+// Onto the surface: two steps of Newton's method. Leaves the gradients at the last but one place.
 void CurvedMotion::project(std::span<const CollidingPoint> points, const Obstacle& obstacle)
 {
     for (int step = 0; step < 2; ++step) {
         query_.find_gradients_at_times(*obstacle.shape);
-        for (std::size_t j = 0; j < query_.size(); ++j) {
-            const double slope2 = query_.gradient[j].squaredNorm();
-            if (!(slope2 > 0)) continue;
-            const double radius = block_.radius(obstacle, points[query_.point[j]].i);
-            query_.P[j] -= (query_.phi[j] - radius) / slope2 * query_.gradient[j];
-        }
+        for (std::size_t j = 0; j < query_.size(); ++j) step_to_surface(points[query_.point[j]].i, j, obstacle);
     }
-    query_.find_gradients_at_times(*obstacle.shape);
+}
+
+void CurvedMotion::step_to_surface(std::size_t i, std::size_t j, const Obstacle& obstacle)
+{
+    const double slope2 = query_.gradient[j].squaredNorm();
+    if (slope2 > 0) query_.P[j] -= (query_.phi[j] - block_.radius(obstacle, i)) / slope2 * query_.gradient[j];
 }
 
 void CurvedMotion::end_piece(CollidingPoint& point, std::size_t j) const
@@ -164,9 +172,56 @@ void CurvedMotion::end_piece(CollidingPoint& point, std::size_t j) const
     end.v += on.vc + s * on.ac;
     end.P += s * (on.vc + 0.5 * s * on.ac);
     point.piece = std::min(2 * s, block_.dt[point.i]);
-    // Other shapes are looked for along the chord.
-    if (s > 0) path.v = (end.P - path.P) / s;
+    draw_chord(point);
+}
+
+// Other shapes are looked for along the chord.
+void CurvedMotion::draw_chord(CollidingPoint& point) const
+{
+    Path& path = point.path;
+    if (path.duration > 0) path.v = (point.end.P - path.P) / path.duration;
     path.a.setZero();
+}
+
+// At the ends of the pieces, which were found in the frame of the surface at their beginnings, it has turned, and gone
+// another way than its velocity and acceleration say.
+void CurvedMotion::follow_surface(std::span<CollidingPoint> points, const Obstacle& obstacle)
+{
+    for (std::size_t j = 0; j < query_.size(); ++j) {
+        const CollidingPoint& point = points[query_.point[j]];
+        query_.P[j] = point.end.P;
+        query_.time[j] += point.path.duration;
+    }
+    query_.find_gradients_at_times(*obstacle.shape);
+    for (std::size_t j = 0; j < query_.size(); ++j) {
+        CollidingPoint& point = points[query_.point[j]];
+        const double slope = query_.gradient[j].norm();
+        if (point.kind != CollidingPoint::Curved || !(slope > 0)) continue;
+        step_to_surface(point.i, j, obstacle);
+        point.end.P = query_.P[j];
+        point.end.n = query_.gradient[j] / slope;
+        draw_chord(point);
+        const Support& on = point.on[0];
+        if (!point.stops && !on.ac.isZero(0) && !(on.viscosity > 0)) find_end_velocity_on_moving(point);
+    }
+}
+
+// Of a surface that turns or speeds up, in the world's frame: by the mean of the accelerations at both ends.
+void CurvedMotion::find_end_velocity_on_moving(CollidingPoint& point) const
+{
+    CollidingPoint::PieceEnd& end = point.end;
+    const Support& on = point.on[0];
+    const Obstacle& obstacle = block_.obstacles[on.collider];
+    const double s = point.path.duration, now = block_.frame_time(point.i, point.left - s);
+    Support there = on;
+    there.n = end.n;
+    there.curvature = end.curvature;
+    there.vc = obstacle.shape->velocity_at(end.P, now);
+    const Vec3d v0 = on.vc + point.slip, v1 = tangential_to(there, v0 + s * end.a);
+    there.ac = obstacle.acceleration_at(end.P, v1, now);
+    const Vec3d& a = motion_.acceleration(point.i);
+    const Vec3d a1 = there.ac + tangential_acceleration(slide_on(there, v1, a, 0, 0), a - there.ac, end.n);
+    end.v = tangential_to(there, v0 + 0.5 * s * (end.a + a1));
 }
 
 // In the surface's frame. False where the surface does not bear the point up to there: it waits.
@@ -188,7 +243,7 @@ bool CurvedMotion::find_end_velocity(CollidingPoint& point) const
         if (s > shortest) return wait_for(point, shortest), false;
     }
     const Vec3d pull = a - on.ac;
-    const Vec3d a1 = next.kind == Slide::Moves ? next.a : Vec3d(pull - pull.dot(end.n) * end.n);
+    const Vec3d a1 = tangential_acceleration(next, pull, end.n);
     if (on.viscosity > 0) {
         const Propagator by = respond(on.viscosity, 0, s);
         end.v = by.v_of_v * turned(point.slip) + 0.5 * by.v_of_G * (turned(point.drive) + a1);

@@ -36,8 +36,12 @@ private:
     void leave_surface(CollidingPoint& point) const;
     void meet_kink(CollidingPoint& point, const Vec3d& n);
     void project(std::span<const CollidingPoint> points, const Obstacle& obstacle);
+    void step_to_surface(std::size_t i, std::size_t j, const Obstacle& obstacle);
     void end_piece(CollidingPoint& point, std::size_t j) const;
+    void draw_chord(CollidingPoint& point) const;
+    void follow_surface(std::span<CollidingPoint> points, const Obstacle& obstacle);
     bool find_end_velocity(CollidingPoint& point) const;
+    void find_end_velocity_on_moving(CollidingPoint& point) const;
 
     const CollisionBlock& block_;
     const FreeMotion& motion_;

@@ -113,8 +113,15 @@ bool PathPlanner::chatters(CollidingPoint& point) const
 void PathPlanner::ride(CollidingPoint& point)
 {
     const Support& on = point.on[0];
-    block_.P[point.i] += point.left * (on.vc + 0.5 * point.left * on.ac);
-    block_.v[point.i] = on.vc + point.left * on.ac;
+    Vec3d &P = block_.P[point.i], &v = block_.v[point.i];
+    if (const MovingBody* body = block_.obstacles[on.collider].body) {
+        const double now = block_.frame_time(point.i, point.left);
+        const MovingBody::State there = body->follow(body->material_at(P, now), now + point.left);
+        P = there.P, v = there.v;
+        return;
+    }
+    P += point.left * (on.vc + 0.5 * point.left * on.ac);
+    v = on.vc + point.left * on.ac;
 }
 
 void PathPlanner::finish_path(CollidingPoint& point)
@@ -136,6 +143,7 @@ void PathPlanner::finish_path(CollidingPoint& point)
         const Obstacle& obstacle = block_.obstacles[on.collider];
         const double now = block_.frame_time(point.i, point.left);
         on.vc = obstacle.shape->velocity_at(P, now);
+        if (point.kind == CollidingPoint::Curved) v = tangential_to(on, v);
         on.ac = obstacle.acceleration_at(P, point.stops ? on.vc : v, now);
     }
     if (point.stops) v = on.vc;

@@ -38,7 +38,8 @@ Vec3d tangential_to(const Support& on, const Vec3d& v)
 // With a the acceleration in the surface's frame, N = g - κ |vt|² the normal force per mass, g = -a·n, at = a + g n:
 //
 //   at rest    the point stays while |at| <= μ N, else a' = at (1 - μ N / |at|)
-//   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece
+//   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece, or at its
+//              end where friction could turn the point about
 Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double left, double least)
 {
     const Vec3d& n = support.n;

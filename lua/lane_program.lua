@@ -31,6 +31,10 @@ local function new_program(layout, holder)
   return program
 end
 
+-- Nodes by how their values vary: not within a chunk; mostly not from tile to tile, as they come from the column `dt`,
+-- of which newborn points alone have other values than the rest; from point to point.
+local shared, steady, varying = 0, 1, 2
+
 local reads_lane = { visited = true, Random = true, LoadTime = true, LoadStep = true, Index = true, LoadFlag = true }
 
 local is_choice = { Choose = true, Least = true, Most = true } -- their third operand is a node, too
@@ -40,17 +44,17 @@ local function operands(node)
   return { node.a, node.b, is_choice[node.op] and node.c or nil }
 end
 
--- The node of an operation; the same for the same one. number: of a column, a group, a function, a constant.
+-- The node of an operation; the same for the same one. number: of a column, a group, a function, a constant. varies:
+-- beyond what its operands do.
 function Program:emit(op, a, b, c, number, varies)
   local key = ("%s %s %s %s %s"):format(op, a or "", b or "", c or "", number and ("%.17g"):format(number) or "")
   local id = self.known[key]
   if id then return id end
   local nodes = self.nodes
   if #nodes >= most_nodes then give_up "it is long" end
-  local shared = not (varies or reads_lane[op])
   local node = { op = op, a = a, b = b, c = c, number = number }
-  for _, operand in ipairs(operands(node)) do shared = shared and nodes[operand].shared end
-  node.shared = shared
+  node.varies = varies or reads_lane[op] and varying or shared
+  for _, operand in ipairs(operands(node)) do node.varies = math.max(node.varies, nodes[operand].varies) end
   id = #nodes + 1
   nodes[id] = node
   self.known[key] = id
@@ -216,8 +220,9 @@ function Program:initial(key)
   local column = self.layout.columns[key]
   local load = loads[column.type]
   if not load then give_up("the attribute " .. column.name .. " is a text") end
+  local varies = column.uniform and shared or column.name == "dt" and steady or varying
   local function component(k)
-    return self:emit(load, nil, nil, k - 1, key - 1, not column.uniform)
+    return self:emit(load, nil, nil, k - 1, key - 1, varies)
   end
   local size = sizes[column.type]
   if not size then return { kind = "number", id = component(1) } end
@@ -305,7 +310,9 @@ end
 local function instruction(nodes, slot_of, node)
   local c = node.c or 0
   if is_choice[node.op] then c = slot_of[node.c] end
-  if node.op == "Random" then c = nodes[node.a].shared and nodes[node.b].shared and 1 or 0 end
+  if node.op == "Random" then
+    c = nodes[node.a].varies == shared and nodes[node.b].varies == shared and 1 or 0
+  end
   return { op = node.op, slot_of[node] or 0, node.a and slot_of[node.a] or 0, node.b and slot_of[node.b] or 0, c,
            node.number or 0 }
 end
@@ -315,8 +322,8 @@ end
 function Program:assemble(stores_of)
   local nodes, needed = self.nodes, self:needed(stores_of)
   local slot_of, constants, next_slot = self:given_slots(needed)
-  local result = { constants = constants, inputs = #self.getters, shared = {}, code = {}, kills = false,
-                   functions1 = self.functions1, functions2 = self.functions2 }
+  local result = { constants = constants, inputs = #self.getters, shared = {}, steady = {}, code = {}, kills = false,
+                   steady_column = (self:place_of "dt" or 1) - 1, functions1 = self.functions1, functions2 = self.functions2 }
   local function new_slot()
     next_slot = next_slot + 1
     return next_slot - 1
@@ -326,10 +333,10 @@ function Program:assemble(stores_of)
   local code, last = {}, {}
   for id, node in ipairs(nodes) do
     if needed[id] and not is_given[node.op] then
-      if node.shared and not has_effect[node.op] then
+      if node.varies < varying and not has_effect[node.op] then
         slot_of[id] = new_slot()
         slot_of[node] = slot_of[id]
-        result.shared[#result.shared + 1] = instruction(nodes, slot_of, node)
+        table.insert(node.varies == shared and result.shared or result.steady, instruction(nodes, slot_of, node))
       else
         code[#code + 1] = id
         for _, operand in ipairs(operands(node)) do last[operand] = #code end
@@ -349,7 +356,7 @@ function Program:assemble(stores_of)
     end
     result.code[place] = instruction(nodes, slot_of, node)
     for _, operand in ipairs(operands(node)) do
-      if last[operand] == place and not nodes[operand].shared and operand ~= self.visited then
+      if last[operand] == place and nodes[operand].varies == varying and operand ~= self.visited then
         free[#free + 1] = slot_of[operand]
         last[operand] = nil -- it may be an operand twice
       end

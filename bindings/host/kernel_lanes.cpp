@@ -91,6 +91,8 @@ LaneProgram program_of(lua_State* L)
     program.inputs = size_of(L, "inputs");
     program.slots = size_of(L, "slots");
     program.shared = instructions_of(L, "shared");
+    program.steady = instructions_of(L, "steady");
+    program.steady_column = static_cast<std::uint16_t>(size_of(L, "steady_column"));
     program.code = instructions_of(L, "code");
     add_functions(L, "functions1", functions1, program.functions1);
     add_functions(L, "functions2", functions2, program.functions2);

@@ -1,13 +1,14 @@
 #include "runtime/lanes/lane_program.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "runtime/lanes/lane_tile.h"
 
 namespace rapid {
 namespace {
 
-bool execute(std::span<const LaneInstruction> code, LaneTile tile)
+bool execute(std::span<const LaneInstruction> code, LaneTile& tile)
 {
     return std::all_of(code.begin(), code.end(), [&](const LaneInstruction& now) { return now.operation(tile, now); });
 }
@@ -25,7 +26,22 @@ void LaneRunner::begin(const LaneProgram& program, const LaneChunk& chunk)
     for (const double value : {chunk.number, chunk.time, chunk.dt, chunk.substep}) fill(value);
     for (const double value : program.constants) fill(value);
     for (const double value : chunk.inputs) fill(value);
-    execute(program.shared, {slots_.data(), program, chunk, 0, 0});
+    LaneTile none(slots_.data(), program, chunk, 0, 0);
+    execute(program.shared, none);
+    steady_size_ = 0;
+}
+
+// Computes what is steady, unless the tile before had the same values.
+void LaneRunner::keep_steady(LaneTile& now)
+{
+    const LaneProgram& program = now.program;
+    if (program.steady.empty()) return;
+    const float* const values = static_cast<const float*>(now.chunk.columns[program.steady_column].data) + now.first;
+    const std::size_t bytes = now.size * sizeof(float);
+    if (now.size <= steady_size_ && std::memcmp(steady_.data(), values, bytes) == 0) return;
+    execute(program.steady, now);
+    std::memcpy(steady_.data(), values, bytes);
+    steady_size_ = now.size;
 }
 
 bool LaneRunner::run_tile(const LaneProgram& program, const LaneChunk& chunk, std::size_t first, std::size_t size)
@@ -41,7 +57,9 @@ bool LaneRunner::run_tile(const LaneProgram& program, const LaneChunk& chunk, st
         if (std::all_of(members.begin(), members.end(), [](std::uint8_t member) { return member == 0; })) return true;
         choose([&](std::size_t i) { return i < size && members[i] != 0; });
     }
-    return execute(program.code, {slots_.data(), program, chunk, first, size});
+    LaneTile now(slots_.data(), program, chunk, first, size);
+    keep_steady(now);
+    return execute(program.code, now);
 }
 
 }  // namespace rapid

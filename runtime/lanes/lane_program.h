@@ -5,6 +5,7 @@
 // results are those of the same operations for one point at a time, to the bit.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,7 +43,9 @@ struct LaneProgram {
     std::vector<double> constants;
     std::size_t inputs = 0;
     std::vector<LaneInstruction> shared;  // of what all points share: once for a chunk
-    std::vector<LaneInstruction> code;    // for each tile; the stores are its end
+    std::vector<LaneInstruction> steady;  // of a float column that mostly has one value: for tiles of other values
+    std::uint16_t steady_column = 0;
+    std::vector<LaneInstruction> code;  // for each tile; the stores are its end
     std::size_t slots = first_constant;
     std::vector<Function1> functions1;
     std::vector<Function2> functions2;
@@ -96,8 +99,11 @@ public:
 private:
     void begin(const LaneProgram& program, const LaneChunk& chunk);
     bool run_tile(const LaneProgram& program, const LaneChunk& chunk, std::size_t first, std::size_t size);
+    void keep_steady(LaneTile& now);
 
     std::vector<Slot> slots_;
+    std::array<float, tile> steady_;  // the values of which the slots hold what is steady
+    std::size_t steady_size_ = 0;
 };
 
 }  // namespace rapid

@@ -107,6 +107,24 @@ describe("a kernel as a program of lanes", function()
     assert.truthy(#lanes > 100)
   end)
 
+  it("has the same bits where newborn points move for a part of the frame", function()
+    local text = [[
+return rapid.create { seed = 9 }
+  :emit { source = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} }, rate = 12000, birth = "random", life = {0.05, 0.2},
+          velocity = {1, 2, 3}, spread = 40, attributes = { heat = 1 } }
+  :points("k", function(p)
+      p.heat = p.heat * math.exp(-p.dt) + math.sin(9 * p.dt)
+      p.v = p.v * (1 - p.dt) + vec3(math.cos(p.dt), p.dt, 0)
+      if p.age > 0.1 then p:join "old" end
+    end)
+  :points { name = "of_old", group = "old", kernel = function(p) p.heat = p.heat - p.dt * p.dt end }
+  :solve {}]]
+    local lanes, single, none = both(text, {1, 6})
+    assert.same({}, none)
+    assert.same(single, lanes)
+    assert.truthy(#lanes > 1000)
+  end)
+
   it("follows a parameter whose value changes", function()
     local node = scene.folder:write("swell.lua", [[
 local rapid = require "rapid"

@@ -78,6 +78,30 @@ TEST_CASE("of a tile in which a value is none nothing is stored", "[lanes]")
         if (i != 200) CHECK(x[i] == (i >= 128 && i < 256 ? 5.0f : 10.0f));
 }
 
+TEST_CASE("what is steady is computed anew where its column, or the chunk, has other values", "[lanes]")
+{
+    // into = column 0 times dt, the latter by slot 3
+    LaneProgram program;
+    program.steady = {{lane_operation("LoadFloat"), 5, 0, 0, 0, 0}, {lane_operation("Multiply"), 6, 5, 3, 0, 0}};
+    program.steady_column = 0;
+    program.code = {{lane_operation("StoreFloat"), 0, 6, 0, 0, 1}};
+    program.slots = 7;
+    std::vector<float> from(900, 3.0f), into(900);
+    from[300] = 4.0f;                                         // within a tile
+    std::fill(from.begin() + 512, from.begin() + 640, 5.0f);  // a tile
+    std::iota(from.end() - 10, from.end(), 7.0f);             // in the last one, which is short
+    LaneRunner runner;
+    for (const double dt : {2.0, 3.0, 0.5}) {
+        const LaneChunk::Memory memory[] = {{from.data(), sizeof(float)}, {into.data(), sizeof(float)}};
+        LaneChunk chunk;
+        chunk.size = from.size();
+        chunk.dt = dt;
+        chunk.columns = memory;
+        runner.run(program, chunk, [](std::size_t, std::size_t) { FAIL(); });
+        for (std::size_t i = 0; i < from.size(); ++i) CHECK(into[i] == from[i] * static_cast<float>(dt));
+    }
+}
+
 TEST_CASE("random numbers of lanes are those of a kernel, one by one", "[lanes]")
 {
     std::vector<std::int64_t> ids(300);

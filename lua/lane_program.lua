@@ -323,7 +323,8 @@ function Program:assemble(stores_of)
   local nodes, needed = self.nodes, self:needed(stores_of)
   local slot_of, constants, next_slot = self:given_slots(needed)
   local result = { constants = constants, inputs = #self.getters, shared = {}, steady = {}, code = {}, kills = false,
-                   steady_column = (self:place_of "dt" or 1) - 1, functions1 = self.functions1, functions2 = self.functions2 }
+                   steady_column = (self:place_of "dt" or 1) - 1, functions1 = self.functions1,
+                   functions2 = self.functions2 }
   local function new_slot()
     next_slot = next_slot + 1
     return next_slot - 1

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 
 #include "runtime/items.h"
 #include "runtime/simd.h"
@@ -43,11 +44,12 @@ constexpr std::size_t packs = 2;  // side by side, as each operation waits for t
 struct Draw {
     Wide c0[packs], c1[packs], c2[packs], c3[packs];
 
-    template <class Item>
-    [[gnu::always_inline]] Draw(RandomKey key, const Item& item_at, std::size_t begin, std::uint64_t use)
+    // items_of(p): those of a pack.
+    template <class Items>
+    [[gnu::always_inline]] Draw(RandomKey key, const Items& items_of, std::uint64_t use)
     {
         for (std::size_t p = 0; p < packs; ++p) {
-            for (std::uint32_t l = 0; l < lanes; ++l) c0[p][l] = item_at(begin + p * lanes + l);
+            c0[p] = items_of(p);
             c1[p] = c0[p] >> 32;
             c2[p] = Wide{} + use;
             c3[p] = c2[p] >> 32;
@@ -69,12 +71,24 @@ struct Draw {
 
 constexpr std::size_t at_once = packs * lanes;
 
+// For Draw: the items from `begin` on, one by one.
+template <class Item>
+[[gnu::always_inline]] inline auto one_by_one(const Item& item_at, std::size_t begin)
+{
+    return [&item_at, begin ](std::size_t p) __attribute__((always_inline))
+    {
+        Wide items;
+        for (std::uint32_t l = 0; l < lanes; ++l) items[l] = item_at(begin + p * lanes + l);
+        return items;
+    };
+}
+
 template <class Item>
 void draw(RandomKey key, const Item& item_at, std::uint64_t use, std::span<std::array<double, 4>> out)
 {
     constexpr double unit = 1.0 / 4294967296.0;
     for (std::size_t begin = 0; begin < out.size(); begin += at_once) {
-        const Draw drawn(key, item_at, begin, use);
+        const Draw drawn(key, one_by_one(item_at, begin), use);
         for (std::size_t p = 0; p < packs; ++p) {
             const std::size_t first = begin + p * lanes;
             if (first >= out.size()) break;
@@ -113,18 +127,24 @@ void uniform53(RandomKey key, std::span<const std::uint64_t> items, std::uint64_
 {
     // The lanes behind the last item repeat it.
     const auto item_at = [&](std::size_t i) { return items[std::min(i, items.size() - 1)]; };
-    const auto whole_at = [&](std::size_t i) { return items[i]; };
     for (std::size_t begin = 0; begin < items.size(); begin += at_once) {
         const bool is_whole = begin + at_once <= items.size();
-        const Draw drawn = is_whole ? Draw(key, whole_at, begin, use) : Draw(key, item_at, begin, use);
+        const auto whole = [&](std::size_t p) __attribute__((always_inline))
+        {
+            Wide pack;
+            std::memcpy(&pack, items.data() + begin + p * lanes, sizeof pack);
+            return pack;
+        };
+        const Draw drawn = is_whole ? Draw(key, whole, use) : Draw(key, one_by_one(item_at, begin), use);
         for (std::size_t p = 0; p < packs; ++p) {
-            const Doubles n0 = as_doubles(drawn.c0[p]) * 0x1p-32,
-                          sum = n0 + as_doubles(drawn.c1[p]) * 0x1p-32 * 0x1p-32;
+            const Doubles n0 = as_doubles(drawn.c0[p]) * 0x1p-32, sum = n0 + as_doubles(drawn.c1[p]) * 0x1p-64;
             const Doubles number = sum < 1.0 ? sum : n0;
-            for (std::uint32_t l = 0; l < lanes; ++l) {
-                const std::size_t i = begin + p * lanes + l;
-                if (i < items.size()) out[i] = number[l];
+            const std::size_t first = begin + p * lanes;
+            if (is_whole) {
+                store_pack(number, out.data() + first);
+                continue;
             }
+            for (std::size_t i = first; i < std::min(first + lanes, items.size()); ++i) out[i] = number[i - first];
         }
     }
 }

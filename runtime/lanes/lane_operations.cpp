@@ -131,13 +131,16 @@ bool random(Tile& tile, const Now& now)
     const LaneChunk& chunk = tile.chunk;
     const double *const use = tile.numbers(now.a), *const frame = tile.numbers(now.b);
     double* const into = tile.numbers(now.to);
-    std::array<std::uint64_t, Tile::points> ids;
-    const char* const from = static_cast<const char*>(chunk.ids.data) + tile.first * chunk.ids.stride;
-    for (std::size_t i = 0; i < tile.size; ++i)
-        ids[i] = *reinterpret_cast<const std::uint64_t*>(from + i * chunk.ids.stride);
+    const std::size_t step = chunk.ids.stride / sizeof(std::uint64_t);
+    const std::uint64_t* ids = static_cast<const std::uint64_t*>(chunk.ids.data) + tile.first * step;
+    std::array<std::uint64_t, Tile::points> same;
+    if (step == 0) {
+        same.fill(*ids);
+        ids = same.data();
+    }
     if (now.c) {
         const RandomKey key = frame[0] != 0 ? key_in_frame(chunk.random, frame[0]) : chunk.random;
-        uniform53(key, {ids.data(), tile.size}, std::bit_cast<std::uint64_t>(use[0] + 0.0), {into, tile.size});
+        uniform53(key, {ids, tile.size}, std::bit_cast<std::uint64_t>(use[0] + 0.0), {into, tile.size});
     } else {
         for (std::size_t i = 0; i < tile.size; ++i) into[i] = kernel_random(chunk.random, ids[i], use[i], frame[i]);
     }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <type_traits>
@@ -14,6 +15,8 @@
 
 namespace rapid {
 namespace {
+
+typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
 
 constexpr double most_float = std::numeric_limits<float>::max();
 
@@ -255,6 +258,14 @@ bool load_flag(Tile& tile, const Now& now)
 {
     const LaneChunk::Memory& memory = tile.chunk.groups[now.number];
     const auto* const from = static_cast<const std::uint8_t*>(memory.data) + tile.first * memory.stride;
+    if (memory.stride == 1 && tile.size == Tile::points) {
+        tile.fill(now.to, [&](std::size_t k) {
+            Bytes members;
+            std::memcpy(&members, from + k * lanes, sizeof members);
+            return as_doubles(__builtin_convertvector(members != 0, Flags));
+        });
+        return true;
+    }
     double* const into = tile.numbers(now.to);
     for (std::size_t i = 0; i < Tile::points; ++i)
         into[i] = std::bit_cast<double>(-std::int64_t{i < tile.size && from[i * memory.stride] != 0});
@@ -265,11 +276,16 @@ bool load_flag(Tile& tile, const Now& now)
 void put_flags(const Tile& tile, const Now& now, std::uint8_t* into)
 {
     into += tile.first;
-    if (tile.visits_all())
-        for (std::size_t i = 0; i < Tile::points; ++i) into[i] = tile.is_set(now.a, i);
-    else
+    if (!tile.visits_all()) {
         for (std::size_t i = 0; i < tile.size; ++i)
             if (tile.visits(i)) into[i] = tile.is_set(now.a, i);
+        return;
+    }
+    const Doubles* const a = tile.slot(now.a);
+    for (std::size_t k = 0; k < Tile::packs; ++k) {
+        const std::uint64_t flags = bytes(as_flags(a[k])) & 0x0101010101010101;
+        std::memcpy(into + k * lanes, &flags, sizeof flags);
+    }
 }
 bool store_flag(Tile& tile, const Now& now)
 {

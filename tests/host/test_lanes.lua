@@ -83,6 +83,7 @@ describe("a kernel as a program of lanes", function()
     ["groups"] = "if p:within \"high\" then p:leave \"high\" else p:join \"low\" end  "
       .. "p.heat = p:within \"low\" and 1 or 0",
     ["whole numbers"] = "p.instance = p.instance + math.floor(p.P.x) * 2  p.heat = p.id + p.index",
+    ["a whole number that a float is rounded to"] = "p.heat = 3 - 1e-12 * p.P.x  p.instance = p.heat",
     ["death"] = "if p.P.x > 2 and p:rand(9) < 0.5 then p:kill() end",
     ["what it has written"] = "p.heat = 1 / 3  p.v = vec3(p.heat, p.heat * 3, 0)  p.heat = p.v.x - 1 / 3",
   } do
@@ -105,6 +106,15 @@ describe("a kernel as a program of lanes", function()
     assert.same({}, none)
     assert.same(single, lanes)
     assert.truthy(#lanes > 100)
+  end)
+
+  it("keeps a float rounded that goes into a column of doubles", function()
+    local text = head .. [[
+  :action("inside", function(p) p.v = p.v / 3  p.P = p.v end)
+  :gravity {} :solve {}]]
+    local lanes, single, none = both(text)
+    assert.same({}, none)
+    assert.same(single, lanes)
   end)
 
   it("has the same bits where newborn points move for a part of the frame", function()

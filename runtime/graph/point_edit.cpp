@@ -5,6 +5,7 @@
 
 #include "runtime/at_node.h"
 #include "runtime/first_error.h"
+#include "runtime/points/buffer.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -30,12 +31,13 @@ void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points
         at_node(pass->now.node, pass->now.location, [&] { pass->begin(); });
         chunk = std::max(chunk, pass->chunk());
     }
-    const auto alive = remove ? std::make_unique_for_overwrite<std::uint8_t[]>(points.size()) : nullptr;
+    const Buffer marks(remove ? points.size() : 0);
+    auto* const alive = remove ? static_cast<std::uint8_t*>(marks.data()) : nullptr;
     FirstError first;
     for_each_chunk(
         points.size(),
         [&](std::size_t begin, std::size_t end) {
-            const Stretch stretch{begin, end, alive ? alive.get() + begin : nullptr};
+            const Stretch stretch{begin, end, alive ? alive + begin : nullptr};
             if (alive) std::fill_n(stretch.alive, stretch.size(), std::uint8_t{1});
             for (std::size_t k = 0; k < passes.size(); ++k) {
                 const auto visit = [&] {
@@ -48,7 +50,7 @@ void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points
     first.rethrow();
     if (!remove) return;
     const std::size_t size = points.size();
-    points.keep({alive.get(), size});
+    points.keep({alive, size});
     passes.front()->now.figures.died += size - points.size();
 }
 

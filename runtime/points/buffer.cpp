@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t page = 4096;
+constexpr std::size_t page = SparePages::page;
 constexpr std::size_t line = 64;
 // Blocks from here on are pages of their own: below it mremap costs more than the copy that it saves.
 constexpr std::size_t mapped_from = std::size_t{1} << 18;
@@ -34,6 +34,7 @@ SparePages::Block new_pages(std::size_t bytes)
     if (void* in_file = map_in_file(bytes)) return {in_file, bytes};
     SparePages::Block block = SparePages::all().take(bytes);
     if (block.begin) return block;
+    bytes = SparePages::room_for(bytes);
     block = {mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes};
     if (block.begin == MAP_FAILED) throw std::bad_alloc();
     madvise(block.begin, bytes, MADV_HUGEPAGE);

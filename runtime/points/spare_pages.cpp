@@ -3,12 +3,14 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <bit>
 #include <utility>
 
 namespace rapid {
 namespace {
 
 constexpr std::size_t most_spare_bytes = std::size_t{1} << 26;
+constexpr std::size_t most_block_bytes = most_spare_bytes / 4;
 
 void unmap(SparePages::Block block)
 {
@@ -29,6 +31,12 @@ void SparePages::keep(std::size_t blocks)
     blocks_.resize(std::max(blocks, blocks_.size()));
 }
 
+std::size_t SparePages::room_for(std::size_t bytes)
+{
+    const std::size_t step = std::max(std::bit_floor(bytes) / 4, page), room = (bytes + step - 1) / step * step;
+    return room <= most_block_bytes ? room : bytes;
+}
+
 SparePages::Block SparePages::take(std::size_t bytes)
 {
     const std::lock_guard lock(mutex_);
@@ -43,7 +51,7 @@ SparePages::Block SparePages::take(std::size_t bytes)
 
 void SparePages::give(Block block)
 {
-    if (block.bytes > most_spare_bytes / 4) return unmap(block);
+    if (block.bytes > most_block_bytes) return unmap(block);
     const std::lock_guard lock(mutex_);
     bytes_ += block.bytes;
     const auto empty = std::find_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return !b.begin; });

@@ -10,6 +10,8 @@ namespace rapid {
 
 class SparePages {
 public:
+    static constexpr std::size_t page = 4096;  // bytes
+
     struct Block {
         void* begin = nullptr;
         std::size_t bytes = 0;
@@ -22,6 +24,10 @@ public:
     // one of the run before, all columns of a frame are given back at once.
     explicit SparePages(std::size_t blocks = 4) : blocks_(blocks) {}
     void keep(std::size_t blocks);
+
+    // How many bytes to map for so many: some more where the block may be kept, so that a column which grows a little
+    // from frame to frame finds that of the frame before large enough. Pages that nothing touches take no memory.
+    static std::size_t room_for(std::size_t bytes);
 
     // At least so many bytes, and at most twice as many; null where there are none.
     Block take(std::size_t bytes);

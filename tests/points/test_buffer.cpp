@@ -78,6 +78,19 @@ TEST_CASE("pages that are given back serve the next of about their size, and no 
     CHECK(static_cast<char*>(same.data())[same.capacity() - 1] == 1);
 }
 
+TEST_CASE("buffers that are each a little larger than the one before mostly take its pages", "[buffer]")
+{
+    std::size_t bytes = 3'000'000, others = 0, count = 0;
+    std::uintptr_t before = 0;
+    for (; bytes < 12'000'000; bytes += bytes / 50, ++count) {
+        const Buffer buffer(bytes);
+        others += address(buffer) / 4096 != before;
+        before = address(buffer) / 4096;
+    }
+    CHECK(count > 60);
+    CHECK(others <= 9);  // two doublings in steps of an eighth to a quarter, and the first
+}
+
 TEST_CASE("growing bit by bit moves the values a few times, not every time", "[buffer]")
 {
     Buffer buffer;

@@ -47,6 +47,18 @@ TEST_CASE("pages of all columns of a frame serve those of the next, where so man
     CHECK(!pages.take(mib).begin);
 }
 
+TEST_CASE("room is whole pages, at most a quarter more than what is asked for, and none more for what is not kept",
+          "[spare_pages]")
+{
+    for (std::size_t bytes = 1; bytes < 17 * mib; bytes += 999 + bytes / 7) {
+        const std::size_t room = SparePages::room_for(bytes);
+        CHECK(room >= bytes);
+        CHECK(room <= bytes + std::max<std::size_t>(bytes / 4, 4095));
+        CHECK((room % 4096 == 0 || room == bytes));
+    }
+    CHECK(SparePages::room_for(17 * mib + 1) == 17 * mib + 1);
+}
+
 TEST_CASE("of more pages than are kept those that came first go back to the system", "[spare_pages]")
 {
     SparePages few(3);

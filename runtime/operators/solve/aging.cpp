@@ -1,10 +1,10 @@
 #include "runtime/operators/solve/aging.h"
 
 #include <limits>
-#include <memory>
 
 #include "runtime/operators/solve/step_recorder.h"
 #include "runtime/parallel.h"
+#include "runtime/points/buffer.h"
 #include "runtime/points/members.h"
 
 namespace rapid {
@@ -34,7 +34,8 @@ std::size_t age_points(PointSet& points, const std::string& group, double frame_
     const Strided<float> life = lives ? lives->read() : Strided<float>{&immortal, 0};
     const Strided<std::uint8_t> members = members_of(points, group);
 
-    const auto keep = std::make_unique_for_overwrite<std::uint8_t[]>(points.size());
+    const Buffer marks(points.size());
+    const std::span keep(static_cast<std::uint8_t*>(marks.data()), points.size());
     const std::span<float> age = ages->write();
     for_each_chunk(points.size(), [&, h](std::size_t begin, std::size_t end) {
         // Contiguous, so that the loops vectorise.
@@ -44,7 +45,7 @@ std::size_t age_points(PointSet& points, const std::string& group, double frame_
         const float* __restrict last = contiguous(life, begin, end, life_buffer);
         const std::uint8_t* __restrict is_member = contiguous(members, begin, end, member_buffer);
         float* __restrict a = age.data() + begin;
-        std::uint8_t* __restrict stays = keep.get() + begin;
+        std::uint8_t* __restrict stays = keep.data() + begin;
         const std::size_t size = end - begin;
         for (std::size_t i = 0; i < size; ++i) whole[i] = aging.after_frame(a[i]);
         for (std::size_t i = 0; i < size; ++i) {
@@ -54,8 +55,8 @@ std::size_t age_points(PointSet& points, const std::string& group, double frame_
         }
     });
     const std::size_t before = points.size();
-    if (lives && recorder) recorder->remove_old(points, {keep.get(), before});
-    if (lives) points.keep({keep.get(), points.size()});
+    if (lives && recorder) recorder->remove_old(points, keep);
+    if (lives) points.keep(keep);
     return before - points.size();
 }
 

@@ -1,5 +1,8 @@
 #include "runtime/operators/emit/birth_velocity.h"
 
+#include <algorithm>
+#include <array>
+
 namespace rapid {
 
 BirthVelocity::BirthVelocity(const Vec3d& velocity, const Interval& speed, double spread, double inherit,
@@ -20,13 +23,22 @@ void BirthVelocity::find(std::span<const Birthplace> places, std::span<const Dra
 {
     const bool moves = inherit_ != 0 && source_.moves();
     const Strided<Vec3f> source_v = source_.values().v().read();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-        const double speed = speed_.is_single() ? speed_.min : speed_.at(speed_draws[i][0]);
-        const Vec3d mean = velocity_ + speed * places[i].N.cast<double>();
-        Vec3d sum = inherited_ + (is_random_ ? cone_.turn(mean, draws[i][cone_draw], draws[i][turn_draw]) : mean);
-        if (source_v_differs_) sum += inherit_ * source_.value(source_v, places[i]).cast<double>();
-        if (moves) sum += inherit_ * source_motion[i];
-        v[i] = sum.cast<float>();
+    std::array<Vec3d, 64> buffer;
+    for (std::size_t begin = 0; begin < places.size(); begin += buffer.size()) {
+        const std::size_t size = std::min(buffer.size(), places.size() - begin);
+        const std::span<Vec3d> own = std::span(buffer).first(size);
+        for (std::size_t k = 0; k < size; ++k) {
+            const double speed = speed_.is_single() ? speed_.min : speed_.at(speed_draws[begin + k][0]);
+            own[k] = velocity_ + speed * places[begin + k].N.cast<double>();
+        }
+        if (is_random_) cone_.turn(own, draws.subspan(begin, size));
+        for (std::size_t k = 0; k < size; ++k) {
+            const std::size_t i = begin + k;
+            Vec3d sum = inherited_ + own[k];
+            if (source_v_differs_) sum += inherit_ * source_.value(source_v, places[i]).cast<double>();
+            if (moves) sum += inherit_ * source_motion[i];
+            v[i] = sum.cast<float>();
+        }
     }
 }
 

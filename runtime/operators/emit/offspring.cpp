@@ -137,6 +137,7 @@ void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end)
                                   [](std::size_t i, const Brood& b) { return i < b.first; }) -
                  1;
     std::array<Draws, 64> draws;
+    std::array<Vec3d, 64> own, of_parent;  // m/s
     for (std::size_t i = begin; i < end;) {
         if (i >= brood->first + brood->count) ++brood;
         const std::size_t k = i - brood->first;
@@ -148,7 +149,7 @@ void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end)
         for (const DrawValues& draw : columns.drawn) draw(i, count, number);
         const ParentPaths::Parent& of = parents_[brood->parent];
         ParentPaths::Piece piece = parents_.piece(of, brood->begin);
-        for (std::size_t j = 0; j < count; ++j, ++i) {
+        for (std::size_t j = 0; j < count; ++j) {
             double t = brood->begin;
             if (brood->spacing > 0)
                 t += (static_cast<double>(k + j + 1) - brood->due) * brood->spacing;
@@ -157,17 +158,20 @@ void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end)
             t = std::min(t, brood->end);
             if (!piece.holds(t)) piece = parents_.piece(of, t);
             const ParentPaths::Moment moment = brood->hit == Brood::no_hit ? piece.at(t) : moment_of_hit(brood->hit);
-            Vec3d v = traits_.velocity;
-            if (!is_zero(traits_.speed)) v += speed_of(number + j) * normal_of(*brood, moment.v);
-            if (turns) v = cone.turn(v, draws[j][cone_draw], draws[j][turn_draw]);
-            columns.P[i] = moment.P.cast<float>();
-            columns.v[i] = (v + traits_.share * moment.v).cast<float>();
+            of_parent[j] = moment.v;
+            own[j] = traits_.velocity;
+            if (!is_zero(traits_.speed)) own[j] += speed_of(number + j) * normal_of(*brood, moment.v);
+            columns.P[i + j] = moment.P.cast<float>();
             const double L = record.h - t + traits_.wait;
-            if (!columns.dt.empty()) columns.dt[i] = static_cast<float>(L);
-            if (!columns.birthtime.empty()) columns.birthtime[i] = static_cast<float>(now_.frame.time - L);
-            if (!columns.life.empty()) columns.life[i] = static_cast<float>(traits_.life->at(draws[j][life_draw]));
-            if (!columns.parent.empty()) columns.parent[i] = parent;
+            if (!columns.dt.empty()) columns.dt[i + j] = static_cast<float>(L);
+            if (!columns.birthtime.empty()) columns.birthtime[i + j] = static_cast<float>(now_.frame.time - L);
+            if (!columns.life.empty()) columns.life[i + j] = static_cast<float>(traits_.life->at(draws[j][life_draw]));
+            if (!columns.parent.empty()) columns.parent[i + j] = parent;
         }
+        if (turns) cone.turn(std::span(own).first(count), draws);
+        for (std::size_t j = 0; j < count; ++j)
+            columns.v[i + j] = (own[j] + traits_.share * of_parent[j]).cast<float>();
+        i += count;
     }
 }
 

@@ -37,11 +37,17 @@ local shared, steady, varying = 0, 1, 2
 
 local reads_lane = { visited = true, Random = true, LoadTime = true, LoadStep = true, Index = true, LoadFlag = true }
 
-local is_choice = { Choose = true, Least = true, Most = true } -- their third operand is a node, too
+-- What takes three nodes. Of two operations in one the second takes the result of the first; of a difference that is on
+-- the left or, named From, on the right.
+local takes_three = { Choose = true, Least = true, Most = true }
+local of_two = { Add = true, Subtract = true, Multiply = true }
+for first in pairs(of_two) do
+  for _, second in ipairs { "Add", "Subtract", "SubtractFrom", "Multiply" } do takes_three[first .. second] = true end
+end
 
 -- The operands of a node that are nodes.
 local function operands(node)
-  return { node.a, node.b, is_choice[node.op] and node.c or nil }
+  return { node.a, node.b, takes_three[node.op] and node.c or nil }
 end
 
 -- The node of an operation; the same for the same one. number: of a column, a group, a function, a constant. varies:
@@ -291,6 +297,33 @@ function Program:needed(stores_of)
   return needed
 end
 
+-- Puts an operation and the one that alone takes its result into one, which saves writing and reading it.
+function Program:fuse(needed, stores_of)
+  local nodes, uses = self.nodes, {}
+  local function count(ids)
+    for _, id in ipairs(ids) do uses[id] = (uses[id] or 0) + 1 end
+  end
+  for id, node in ipairs(nodes) do
+    if needed[id] then count(operands(node)) end
+  end
+  for _, store in ipairs(stores_of) do count(store.nodes) end
+  local function is_first(id)
+    return uses[id] == 1 and nodes[id].varies == varying and of_two[nodes[id].op]
+  end
+  for id, node in ipairs(nodes) do
+    if needed[id] and of_two[node.op] then
+      local on_left = is_first(node.a)
+      if on_left or is_first(node.b) then
+        local place, other = node.a, node.b
+        if not on_left then place, other = other, place end
+        local first, second = nodes[place], not on_left and node.op == "Subtract" and "SubtractFrom" or node.op
+        nodes[id] = { op = first.op .. second, a = first.a, b = first.b, c = other, varies = varying }
+        needed[place] = nil
+      end
+    end
+  end
+end
+
 -- The first slots, of what is given; the constants in their order, and the slot behind.
 function Program:given_slots(needed)
   local slot_of, constants = { [self.visited] = 0 }, {}
@@ -309,7 +342,7 @@ end
 
 local function instruction(nodes, slot_of, node)
   local c = node.c or 0
-  if is_choice[node.op] then c = slot_of[node.c] end
+  if takes_three[node.op] then c = slot_of[node.c] end
   if node.op == "Random" then
     c = nodes[node.a].varies == shared and nodes[node.b].varies == shared and 1 or 0
   end
@@ -321,6 +354,7 @@ end
 -- stores_of: the instructions at its end, { op, nodes, component, number }: of one node, or of the three of a vector.
 function Program:assemble(stores_of)
   local nodes, needed = self.nodes, self:needed(stores_of)
+  self:fuse(needed, stores_of)
   local slot_of, constants, next_slot = self:given_slots(needed)
   local result = { constants = constants, inputs = #self.getters, shared = {}, steady = {}, code = {}, kills = false,
                    steady_column = (self:place_of "dt" or 1) - 1, functions1 = self.functions1,

@@ -39,6 +39,18 @@ bool of_two(Tile& tile, const Now& now)
     return true;
 }
 
+// t = g(f(a, b), c), and g(c, f(a, b)).
+template <class F, class G>
+bool of_three(Tile& tile, const Now& now)
+{
+    const Doubles *const a = tile.slot(now.a), *const b = tile.slot(now.b), *const c = tile.slot(now.c);
+    tile.fill(now.to, [&](std::size_t k) { return G()(F()(a[k], b[k]), c[k]); });
+    return true;
+}
+struct SubtractFrom {
+    Doubles operator()(const Doubles& a, const Doubles& b) const { return b - a; }
+};
+
 // Of functions of one number, by lanes.
 template <class F>
 struct ByLane {
@@ -351,6 +363,18 @@ constexpr std::pair<std::string_view, LaneOperation> operations[] = {
     {"Subtract", of_two<std::minus<>>},
     {"Multiply", of_two<std::multiplies<>>},
     {"Divide", of_two<std::divides<>>},
+    {"AddAdd", of_three<std::plus<>, std::plus<>>},
+    {"AddSubtract", of_three<std::plus<>, std::minus<>>},
+    {"AddSubtractFrom", of_three<std::plus<>, SubtractFrom>},
+    {"AddMultiply", of_three<std::plus<>, std::multiplies<>>},
+    {"SubtractAdd", of_three<std::minus<>, std::plus<>>},
+    {"SubtractSubtract", of_three<std::minus<>, std::minus<>>},
+    {"SubtractSubtractFrom", of_three<std::minus<>, SubtractFrom>},
+    {"SubtractMultiply", of_three<std::minus<>, std::multiplies<>>},
+    {"MultiplyAdd", of_three<std::multiplies<>, std::plus<>>},
+    {"MultiplySubtract", of_three<std::multiplies<>, std::minus<>>},
+    {"MultiplySubtractFrom", of_three<std::multiplies<>, SubtractFrom>},
+    {"MultiplyMultiply", of_three<std::multiplies<>, std::multiplies<>>},
     {"Modulo", of_two<Modulo>},
     {"Negate", of_one<std::negate<>>},
     {"SquareRoot", of_one<SquareRoot>},

@@ -110,11 +110,13 @@ describe("a kernel as a program of lanes", function()
 
   it("keeps a float rounded that goes into a column of doubles", function()
     local text = head .. [[
-  :action("inside", function(p) p.v = p.v / 3  p.P = p.v end)
-  :gravity {} :solve {}]]
-    local lanes, single, none = both(text)
+  :action("inside", function(p) p.heat = 1 / 3  p.v = vec3(p.heat, 0, 0) end)
+  :action("lost", function(p) p.v = (p.v - vec3(1 / 3, 0, 0)) * 1e9 end)
+  :solve {}]]
+    local lanes, single, none, frames = both(text)
     assert.same({}, none)
     assert.same(single, lanes)
+    assert.near(9.93, frames[4][1].v.x, 0.01) -- 1e9 (float(1/3) - 1/3)
   end)
 
   it("has the same bits where newborn points move for a part of the frame", function()

@@ -183,6 +183,34 @@ TEST_CASE("the least and the largest fail where their order of arguments counts"
     }
 }
 
+TEST_CASE("two operations in one round twice, as one after the other", "[lanes]")
+{
+    using Two = double (*)(double, double);
+    const std::pair<std::string, Two> of_two[] = {{"Add", [](double a, double b) { return a + b; }},
+                                                  {"Subtract", [](double a, double b) { return a - b; }},
+                                                  {"SubtractFrom", [](double a, double b) { return b - a; }},
+                                                  {"Multiply", [](double a, double b) { return a * b; }}};
+    const double a = 1 + 0x1p-30, b = 3 - 0x1p-31, c = -3;  // the product needs more digits than a double has
+    for (const auto& [first, f] : of_two)
+        for (const auto& [second, g] : of_two) {
+            const LaneOperation operation = lane_operation(first + second);
+            CHECK((operation != nullptr) == (first != "SubtractFrom"));
+            if (!operation) continue;
+            LaneProgram program;
+            program.constants = {a, b, c};
+            program.code = {{operation, 8, 5, 6, 7, 0}, {lane_operation("StoreDoubleVector"), 0, 8, 5, 6, 0}};
+            program.slots = 9;
+            std::vector<Vec3d> into(200);
+            const LaneChunk::Memory memory[] = {{into.data(), sizeof(Vec3d)}};
+            LaneChunk chunk;
+            chunk.size = into.size();
+            chunk.columns = memory;
+            LaneRunner().run(program, chunk, [](std::size_t, std::size_t) { FAIL(); });
+            INFO(first << second);
+            for (const Vec3d& value : into) CHECK(value == Vec3d(g(f(a, b), c), a, b));
+        }
+}
+
 TEST_CASE("operations are found by their names", "[lanes]")
 {
     CHECK(lane_operation("Add"));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -389,13 +390,17 @@ void BirthSource::place(RandomKey key, const Items& births, bool in_order, std::
 
     const std::uint64_t n = values_.size();
     const Strided<Vec3f> P = values_.P().read(), N = normals_.read();
+    const bool draws = !chances_.empty() || !in_order;
+    std::array<std::array<double, 4>, 64> numbers;
     for (std::size_t i = 0; i < out.size(); ++i) {
+        const std::size_t k = i % numbers.size();
+        if (draws && k == 0)
+            uniform4(key, births.from(i), pick_use, std::span(numbers).first(std::min(numbers.size(), out.size() - i)));
+        const auto& u = numbers[k];
         std::uint64_t point = births[i] % n;
         if (!chances_.empty()) {
-            const auto u = uniform4(key, births[i], pick_use);
             point = static_cast<std::uint64_t>(chances_.draw(u[0], u[1]));
         } else if (!in_order) {
-            const auto u = uniform4(key, births[i], pick_use);
             point = std::min(n - 1, static_cast<std::uint64_t>((u[0] + u[1] * 0x1p-32) * static_cast<double>(n)));
         }
         out[i] = {P[point], has_normals_ ? direction(N[point]) : Vec3f(Vec3f::Zero()),

@@ -6,7 +6,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "runtime/error.h"
@@ -47,9 +50,12 @@ public:
 
     void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const override
     {
+        std::array<Numbers, 64> numbers;  // of the first trials
         for (std::size_t i = 0; i < out.size(); ++i) {
+            const std::size_t k = i % numbers.size();
+            if (k == 0) uniform4(key, first + i, 0, std::span(numbers).first(std::min(numbers.size(), out.size() - i)));
             out[i] = Birthplace{};
-            out[i].P = draw(key, first + i);
+            out[i].P = draw(key, first + i, numbers[k]);
         }
     }
 
@@ -58,10 +64,12 @@ private:
     // At the least part the probability of needing more is exp(-100).
     static constexpr std::uint64_t most_trials = 10'000'000;
 
-    Vec3f draw(RandomKey key, std::uint64_t birth) const
+    using Numbers = std::array<double, 4>;
+
+    // u: the numbers of the first trial.
+    Vec3f draw(RandomKey key, std::uint64_t birth, Numbers u) const
     {
-        for (std::uint64_t trial = 0; trial < most_trials; ++trial) {
-            const auto u = uniform4(key, birth, trial << 32);
+        for (std::uint64_t trial = 0; trial < most_trials; u = uniform4(key, birth, ++trial << 32)) {
             const auto n = static_cast<std::size_t>(u[0] * double(cells_.cells.size()));
             const Vec3d in_cell = Vec3d(u[1], u[2], u[3]).cwiseProduct(cells_.edge);
             const Vec3f P = (cells_.low(cells_.cells[n]) + in_cell).template cast<float>();

@@ -132,9 +132,10 @@ TEST_CASE("the position of a birth depends on the key and its number alone", "[s
         constexpr std::size_t n = 20'000;
         const auto all = births(scatter, n);
         std::vector<Birthplace> apart(n);
-        for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
+        const auto place = [&](std::size_t begin, std::size_t end) {
             scatter->place(RandomKey(1, "emit1"), begin, std::span(apart).subspan(begin, end - begin));
-        });
+        };
+        for_each_chunk(n, place, 37);
         CHECK(std::equal(all.begin(), all.end(), apart.begin(), same));
         const auto other_key = births(scatter, n, 2);
         CHECK_FALSE(std::equal(all.begin(), all.end(), other_key.begin(), same));

@@ -68,9 +68,10 @@ void require_in_range(const PointSet& points, Strided<std::uint8_t> members, con
 
     std::atomic<std::size_t> first = points.size();
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
-        bool any = values.stride == 0;
-        for (std::size_t i = begin; values.stride && i < end; ++i) any |= bounds.excludes(values.data[i]);
-        if (!any) return;
+        std::uint32_t excluded = values.stride == 0;  // a count: a loop over a flag is not made one over vectors
+        if (values.stride)
+            for (std::size_t i = begin; i < end; ++i) excluded += bounds.excludes(values.data[i]);
+        if (excluded == 0) return;
         for (std::size_t i = begin; i < end; ++i) {
             if (!members[i] || !bounds.excludes(values[i])) continue;
             for (std::size_t known = first; i < known && !first.compare_exchange_weak(known, i);) {

@@ -45,6 +45,15 @@ CellGrid::Run CellGrid::row(std::int64_t i0, std::int64_t i1, std::int64_t j, st
     return run(first, first + static_cast<std::uint64_t>(i1 - i0));
 }
 
+CellGrid::Runs CellGrid::around(const std::array<std::int64_t, 3>& cell) const
+{
+    const auto [i, j, k] = cell;
+    Runs runs;
+    for (int dk = -1; dk <= 1; ++dk)
+        for (int dj = -1; dj <= 1; ++dj) runs.add(row(i - 1, i + 1, j + dj, k + dk));
+    return runs;
+}
+
 std::size_t CellGrid::cell_of_sphere(std::size_t sphere) const
 {
     return static_cast<std::size_t>(std::upper_bound(begin_.begin(), begin_.end(), static_cast<std::uint32_t>(sphere)) -

@@ -3,6 +3,7 @@
 // either.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -43,6 +44,22 @@ public:
     }
     // In the cells from i0 to i1 of a row.
     Run row(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const;
+
+    // Those in a cell and its neighbours that hold any.
+    class Runs {
+    public:
+        void add(const Run& run)
+        {
+            if (run.begin < run.end) all_[size_++] = run;
+        }
+        const Run* begin() const { return all_; }
+        const Run* end() const { return all_ + size_; }
+
+    private:
+        Run all_[9];
+        int size_ = 0;
+    };
+    Runs around(const std::array<std::int64_t, 3>& cell) const;
 
     // Cells in memory, the empty ones left out where the grid is sparse: the key of each, and its spheres.
     std::size_t cells() const { return begin_.empty() ? 0 : begin_.size() - 1; }

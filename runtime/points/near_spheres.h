@@ -1,4 +1,4 @@
-// Which spheres of some runs of cells touch one of them: eight at a time, in single precision.
+// Which spheres of some runs of cells touch one, of their grid or of another: eight at a time, in single precision.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +16,14 @@ constexpr float near_rounding = 1 + 0x1p-20f;
 // The rounding of the distance of two places in single precision, m; extent: m, how far they are from the middle.
 inline float near_blur(double extent) { return static_cast<float>(2 * (0x1p-22 * extent)); }
 
-// Calls f(sphere, certain) for the spheres of some runs that are near the sphere m, in single precision. All are tested
-// before any is reported: the number of hits in a run can't be predicted.
+// Calls f(sphere, certain) for the spheres of some runs of `grid` that are near the sphere m of `own`, in single
+// precision. All are tested before any is reported: the number of hits in a run can't be predicted.
 template <class Ranges, class F>
-inline void for_near_spheres(const CellGrid& grid, std::size_t m, const Ranges& runs, float blur, const F& f)
+inline void for_near_spheres(const CellGrid& own, std::size_t m, const CellGrid& grid, const Ranges& runs, float blur,
+                             const F& f)
 {
-    const float x = grid.x[m], y = grid.y[m], z = grid.z[m];
-    const float most = near_rounding * grid.r[m] + blur, least = (2 - near_rounding) * grid.r[m] - blur;
+    const float x = own.x[m], y = own.y[m], z = own.z[m];
+    const float most = near_rounding * own.r[m] + blur, least = (2 - near_rounding) * own.r[m] - blur;
     typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
     // Of each group of eight a bit in every byte, which is the lane's.
     constexpr std::uint64_t first_bits = 0x0101010101010101;

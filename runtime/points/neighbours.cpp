@@ -53,20 +53,17 @@ void Neighbours::find(const Vec3d& X, std::vector<std::uint32_t>& indices) const
 {
     indices.clear();
     if (P_.empty()) return;
-    std::int64_t c[3];
-    for (int k = 0; k < 3; ++k) c[k] = cell_coordinate(X[k] / radius_ - middle_[k], grid_.width);
-    for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k)
-        for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j) {
-            const CellGrid::Run run = grid_.row(c[0] - 1, c[0] + 1, j, k);
-            for (std::uint32_t o = run.begin; o < run.end; ++o)
-                if (is_near(grid_.place[o], X)) indices.push_back(grid_.place[o]);
-        }
+    std::array<std::int64_t, 3> cell;
+    for (std::size_t k = 0; k < 3; ++k) cell[k] = cell_coordinate(X[k] / radius_ - middle_[k], grid_.width);
+    for (const CellGrid::Run& run : grid_.around(cell))
+        for (std::uint32_t o = run.begin; o < run.end; ++o)
+            if (is_near(grid_.place[o], X)) indices.push_back(grid_.place[o]);
     sort_few(indices);
 }
 
-Neighbours::Runs Neighbours::around(std::uint64_t key) const
+CellGrid::Runs Neighbours::around(std::uint64_t key) const
 {
-    Runs runs;
+    CellGrid::Runs runs;
     for (int k = -1; k <= 1; ++k)
         for (int j = -1; j <= 1; ++j) {
             const std::uint64_t middle = key + static_cast<std::uint64_t>(k) * grid_.layer_step() +
@@ -76,11 +73,11 @@ Neighbours::Runs Neighbours::around(std::uint64_t key) const
     return runs;
 }
 
-void Neighbours::list(std::size_t sphere, const Runs& runs, std::vector<std::uint32_t>& near) const
+void Neighbours::list(std::size_t sphere, const CellGrid::Runs& runs, std::vector<std::uint32_t>& near) const
 {
     near.clear();
     const Vec3d& X = P_[grid_.place[sphere]];
-    for_near_spheres(grid_, sphere, runs, blur_, [&](std::uint32_t o, bool certain) {
+    for_near_spheres(grid_, sphere, grid_, runs, blur_, [&](std::uint32_t o, bool certain) {
         const std::uint32_t point = grid_.place[o];
         if (certain || is_near(point, X)) near.push_back(point);
     });

@@ -33,7 +33,7 @@ public:
             for (std::size_t m = begin; m < end; ++cell) {
                 const std::size_t last = std::min<std::size_t>(end, grid_.end(cell));
                 if (m == last) continue;
-                const Runs runs = around(grid_.key(cell));
+                const CellGrid::Runs runs = around(grid_.key(cell));
                 for (; m < last; ++m) {
                     list(m, runs, near);
                     f(grid_.place[m], near);
@@ -43,20 +43,8 @@ public:
     }
 
 private:
-    struct Runs {
-        CellGrid::Run all[9];
-        int size = 0;
-
-        void add(const CellGrid::Run& run)
-        {
-            if (run.begin < run.end) all[size++] = run;
-        }
-        const CellGrid::Run* begin() const { return all; }
-        const CellGrid::Run* end() const { return all + size; }
-    };
-
-    Runs around(std::uint64_t key) const;
-    void list(std::size_t sphere, const Runs& runs, std::vector<std::uint32_t>& near) const;
+    CellGrid::Runs around(std::uint64_t key) const;
+    void list(std::size_t sphere, const CellGrid::Runs& runs, std::vector<std::uint32_t>& near) const;
     bool is_near(std::uint32_t point, const Vec3d& X) const
     {
         return (P_[point] - X).squaredNorm() <= radius_ * radius_;

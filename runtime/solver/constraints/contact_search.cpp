@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -157,7 +158,7 @@ void ContactSearch::find_within(const CellGrid& grid)
             for (; m < end; ++m) {
                 runs[0].begin = static_cast<std::uint32_t>(m + 1);
                 const std::uint32_t a = grid.place[m];
-                for_near_spheres(grid, m, runs, blur_, [&](std::uint32_t o, bool certain) {
+                for_near_spheres(grid, m, grid, runs, blur_, [&](std::uint32_t o, bool certain) {
                     const std::uint32_t b = grid.place[o];
                     if (!certain && !touch(spheres_, a, b)) return;
                     pairs.emplace_back(std::min(a, b), std::max(a, b));
@@ -168,29 +169,26 @@ void ContactSearch::find_within(const CellGrid& grid)
     for_each_chunk(grid.size(), look, spheres_a_task);
 }
 
-// All of the neighbourhood of each sphere of the finer grid in the coarser.
+// All of the neighbourhood of each sphere of the finer grid in the coarser, of which many that follow each other are in
+// one cell.
 void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
 {
     std::vector<Found>& found = room_for(fine.size());
     const auto look = [&](std::size_t first, std::size_t last) {
         Found& pairs = found[first / spheres_a_task];
         pairs.clear();
+        std::array<std::int64_t, 3> cell{}, last_cell{};
+        CellGrid::Runs runs;
         for (std::size_t m = first; m < last; ++m) {
             const std::uint32_t a = fine.place[m];
-            std::int64_t c[3];
-            for (int k = 0; k < 3; ++k) c[k] = cell_coordinate(spheres_.P[a][k] - spheres_.middle[k], coarse.width);
-            const float x = fine.x[m], y = fine.y[m], z = fine.z[m], r = near_rounding * fine.r[m] + blur_;
-            for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k)
-                for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j) {
-                    const CellGrid::Run run = coarse.row(c[0] - 1, c[0] + 1, j, k);
-                    for (std::uint32_t o = run.begin; o < run.end; ++o) {
-                        const float dx = coarse.x[o] - x, dy = coarse.y[o] - y, dz = coarse.z[o] - z;
-                        const float sum = near_rounding * coarse.r[o] + r;
-                        if (dx * dx + dy * dy + dz * dz >= sum * sum) continue;
-                        const std::uint32_t b = coarse.place[o];
-                        if (touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));
-                    }
-                }
+            for (std::size_t k = 0; k < 3; ++k)
+                cell[k] = cell_coordinate(spheres_.P[a][k] - spheres_.middle[k], coarse.width);
+            if (m == first || cell != last_cell) runs = coarse.around(cell);
+            last_cell = cell;
+            for_near_spheres(fine, m, coarse, runs, blur_, [&](std::uint32_t o, bool certain) {
+                const std::uint32_t b = coarse.place[o];
+                if (certain || touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));
+            });
         }
     };
     for_each_chunk(fine.size(), look, spheres_a_task);

@@ -1,5 +1,6 @@
 #include "runtime/solver/constraints/pair_estimate.h"
 
+#include <array>
 #include <numeric>
 #include <vector>
 
@@ -14,16 +15,13 @@ constexpr std::size_t samples = 64;
 double neighbours(const CellGrid& grid, const SpheresView& spheres, std::uint32_t sphere)
 {
     const Vec3d at = spheres.P[sphere] - spheres.middle;
-    std::int64_t c[3];
+    std::array<std::int64_t, 3> c;
     for (int axis = 0; axis < 3; ++axis) c[axis] = cell_coordinate(at[axis], grid.width);
     std::size_t found = 0;
-    for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k)
-        for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j) {
-            const CellGrid::Run run = grid.row(c[0] - 1, c[0] + 1, j, k);
-            for (std::uint32_t o = run.begin; o < run.end; ++o) {
-                const double reach = double(grid.r[o]) + double(spheres.reach[sphere]);
-                found += (Vec3d(grid.x[o], grid.y[o], grid.z[o]) - at).squaredNorm() < reach * reach;
-            }
+    for (const CellGrid::Run& run : grid.around(c))
+        for (std::uint32_t o = run.begin; o < run.end; ++o) {
+            const double reach = double(grid.r[o]) + double(spheres.reach[sphere]);
+            found += (Vec3d(grid.x[o], grid.y[o], grid.z[o]) - at).squaredNorm() < reach * reach;
         }
     return static_cast<double>(found);
 }

@@ -81,7 +81,7 @@ endfunction()
 function(rapid_link_parts target)
   # The linker takes of the libraries what the parts refer to.
   target_link_libraries(${target} PRIVATE ${ARGN} OpenVDB::openvdb assimp::assimp PNG::PNG Minizip::Minizip ZLIB::ZLIB
-    pugixml::pugixml Blosc::blosc Xxhash::Xxhash ${CMAKE_DL_LIBS})
+    pugixml::pugixml Blosc::blosc Deflate::deflate Xxhash::Xxhash ${CMAKE_DL_LIBS})
   target_link_options(${target} PRIVATE -Wl,--as-needed)
 endfunction()
 

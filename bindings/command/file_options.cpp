@@ -45,7 +45,7 @@ void read_camera(const std::string& text, PictureSettings& pictures)
 
 PictureSize read_size(const std::string& text)
 {
-    constexpr int most = 16384;  // pixels an edge: a picture of 3 GiB
+    constexpr int most = 16384;  // pixels an edge: of a picture that takes 10 GiB to draw
     PictureSize size;
     const char* const end = text.data() + text.size();
     const auto width = std::from_chars(text.data(), end, size.width);

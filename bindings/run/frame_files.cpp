@@ -125,7 +125,7 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
 // Each pattern of pictures keeps what it has drawn of the scene.
 void FrameFiles::require_picture_memory(std::size_t patterns) const
 {
-    constexpr double bytes_a_pixel = 34;  // in layers of the scene 31, in the picture 3
+    constexpr double bytes_a_pixel = 40;  // in layers of the scene 31, in the picture 3, in the file's rows 6
     const double bytes = bytes_a_pixel * static_cast<double>(patterns) * picture_->width * picture_->height;
     if (!fits_in_memory(bytes))
         throw beyond_memory(fmt::format("pictures of {}x{}", picture_->width, picture_->height), bytes,

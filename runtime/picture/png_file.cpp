@@ -1,12 +1,14 @@
 #include "runtime/picture/png_file.h"
 
 #include <fmt/format.h>
+#include <libdeflate.h>
 #include <png.h>
 
-#include <csetjmp>
-#include <cstdlib>
+#include <algorithm>
+#include <initializer_list>
+#include <memory>
 #include <new>
-#include <utility>
+#include <string_view>
 
 namespace rapid {
 namespace {
@@ -19,76 +21,61 @@ struct PngImage : png_image {
     PngImage& operator=(const PngImage&) = delete;
 };
 
-// libpng reports errors by longjmp, which must not cross a C++ frame with destructors: the callback only records the
-// error, and the frame that it returns to holds nothing else.
-struct PngOutput {
+std::string big_endian(std::initializer_list<std::uint32_t> numbers)
+{
     std::string bytes;
-    std::string error;
-    bool has_memory = true;
-};
-
-// libpng and zlib say in words of their own that memory ran out, each another: noted where it happens.
-void* allocate(png_structp png, png_alloc_size_t size)
-{
-    void* const block = std::malloc(size);
-    if (!block) static_cast<PngOutput*>(png_get_mem_ptr(png))->has_memory = false;
-    return block;
+    for (const std::uint32_t number : numbers)
+        for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(number >> shift);
+    return bytes;
 }
 
-void release(png_structp, void* block) { std::free(block); }
-
-void note_error(png_structp png, png_const_charp message)
+// A chunk of the file (PNG specification, 5.3): the length of the data, its name, the data, and a checksum of both.
+void append_chunk(std::string& file, std::string_view name, std::string_view data)
 {
-    static_cast<PngOutput*>(png_get_error_ptr(png))->error = message;
-    png_longjmp(png, 1);
+    file.reserve(file.size() + data.size() + 12);
+    file += big_endian({static_cast<std::uint32_t>(data.size())});
+    const std::size_t begin = file.size();
+    file.append(name).append(data);
+    file += big_endian({libdeflate_crc32(0, file.data() + begin, file.size() - begin)});
 }
 
-void take_bytes(png_structp png, png_bytep data, png_size_t size)
+// The rows, each behind a byte for its filter (9.2), in zlib's format. No filter: the dither of a picture repeats every
+// eight pixels, which the compression finds, and a filter would hide.
+std::string compressed(const Picture& picture)
 {
-    PngOutput& output = *static_cast<PngOutput*>(png_get_io_ptr(png));
-    try {
-        output.bytes.append(reinterpret_cast<const char*>(data), size);
-        return;
-    } catch (const std::bad_alloc&) {
-        output.has_memory = false;
-    }
-    png_error(png, "out of memory");
-}
-
-void encode(const Picture& picture, PngOutput& output)
-{
-    png_structp png =
-        png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &output, note_error, nullptr, &output, allocate, release);
-    if (!png) {
-        output.error = "libpng does not start";
-        return;
-    }
-    png_infop info = png_create_info_struct(png);
-    if (!info || setjmp(png_jmpbuf(png))) {
-        png_destroy_write_struct(&png, &info);
-        return;
-    }
-    png_set_write_fn(png, &output, take_bytes, nullptr);
-    png_set_IHDR(png, info, static_cast<png_uint_32>(picture.width), static_cast<png_uint_32>(picture.height), 8,
-                 PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB_gAMA_and_cHRM(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
-    // Level 4 takes a third of the time of level 6, for a tenth more bytes.
-    png_set_compression_level(png, 4);
-    png_write_info(png, info);
-    for (int y = 0; y < picture.height; ++y) png_write_row(png, picture.pixel(0, y));
-    png_write_end(png, info);
-    png_destroy_write_struct(&png, &info);
+    const std::size_t row = 3 * static_cast<std::size_t>(picture.width),
+                      rows = static_cast<std::size_t>(picture.height);
+    std::string plain(rows * (1 + row), '\0');
+    for (std::size_t y = 0; y < rows; ++y) std::copy_n(&picture.rgb[y * row], row, &plain[y * (1 + row) + 1]);
+    // Level 1 takes a quarter of the time of level 6, for a fifth more bytes.
+    const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
+        libdeflate_alloc_compressor(1), libdeflate_free_compressor);
+    if (!compressor) throw std::bad_alloc();
+    std::string result(libdeflate_zlib_compress_bound(compressor.get(), plain.size()), '\0');
+    result.resize(libdeflate_zlib_compress(compressor.get(), plain.data(), plain.size(), result.data(), result.size()));
+    return result;
 }
 
 }  // namespace
 
 std::string encode_png(const Picture& picture)
 {
-    PngOutput output;
-    encode(picture, output);
-    if (!output.has_memory) throw Error("can't be written: out of memory");
-    if (!output.error.empty()) throw Error(fmt::format("can't be written: {}", output.error));
-    return std::move(output.bytes);
+    using namespace std::string_literals;
+    try {
+        std::string file = "\x89PNG\r\n\x1a\n";
+        const auto width = static_cast<std::uint32_t>(picture.width),
+                   height = static_cast<std::uint32_t>(picture.height);
+        append_chunk(file, "IHDR", big_endian({width, height}) + "\x08\x02\0\0\0"s);  // 8 bits of red, green and blue
+        append_chunk(file, "sRGB", "\0"s);                                            // perceptual
+        // The same for readers that know no sRGB (11.3.2.5): gamma, white point and primaries, times 100,000.
+        append_chunk(file, "gAMA", big_endian({45455}));
+        append_chunk(file, "cHRM", big_endian({31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000}));
+        append_chunk(file, "IDAT", compressed(picture));
+        append_chunk(file, "IEND", "");
+        return file;
+    } catch (const std::bad_alloc&) {
+        throw Error("can't be written: out of memory");
+    }
 }
 
 Picture read_png(const std::filesystem::path& file)

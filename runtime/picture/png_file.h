@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-// The file's bytes. Error: libpng's.
+// The file's bytes. Error: there is not enough memory.
 std::string encode_png(const Picture& picture);
 
 // Error: it can't be read, or is no .png.

@@ -108,11 +108,11 @@ describe("pictures", function()
     local scene = "return " .. two .. " :solve {}"
     local result = run(folder, scene, "-o a.####.png --size 4000x4000")
     assert.equal(2, result.status)
-    assert.match("^%-o a%.####%.png: pictures of 4000x4000 would take about 519 MiB, and %d+ MiB are free of " ..
+    assert.match("^%-o a%.####%.png: pictures of 4000x4000 would take about 610 MiB, and %d+ MiB are free of " ..
       "300 MiB; give a smaller %-%-size, or set %-%-memory\n$", result.stderr)
     -- Two of which one would fit.
     result = run(folder, scene, "-o a.####.png -o b.####.png --size 2200x2200")
-    assert.match("^%-o b%.####%.png: pictures of 2200x2200 would take about 314 MiB", result.stderr)
+    assert.match("^%-o b%.####%.png: pictures of 2200x2200 would take about 369 MiB", result.stderr)
     assert.equal(0, run(folder, scene, "-o a.####.png --size 2200x2200").status)
   end)
 end)

@@ -78,7 +78,6 @@ float opacity_of(const Column<float>* Alpha, std::size_t i)
 
 // How points look in this picture.
 struct PointLook {
-    const PointSet& points;
     const PictureScene& scene;
     const PictureView& view;
     const Light& light;
@@ -86,20 +85,22 @@ struct PointLook {
     Lens lens;
     float far;  // m, the depth at which colours have faded halfway to the background
     std::vector<std::uint8_t> styles;
+    const Strided<Vec3f> P, v;
     const Column<Vec3f>* Cd;
     const Column<float>*Alpha, *pscale, *age;
     Trails trails;
 
     PointLook(const PointSet& drawn, const TileGrid& grid, const PictureScene& in, const PictureView& from,
               const Light& lit)
-        : points(drawn),
-          scene(in),
+        : scene(in),
           view(from),
           light(lit),
           tiles(grid),
           lens(Lens::of_camera(from.camera, grid.width, grid.height)),
           far(static_cast<float>((from.camera.target - from.camera.position).norm())),
           styles(styles_of(drawn, in)),
+          P(drawn.P().read()),
+          v(drawn.v().read()),
           Cd(drawn.find<Vec3f>("Cd")),
           Alpha(drawn.find<float>("Alpha")),
           pscale(drawn.find<float>("pscale")),
@@ -114,7 +115,7 @@ struct PointLook {
             const Vec3f c = (*Cd)[i].cwiseMax(0.0f).cwiseMin(1e4f);
             if (c.allFinite()) return c;
         }
-        const float speed = points.v()[i].norm() / static_cast<float>(view.full_speed);
+        const float speed = v[i].norm() / static_cast<float>(view.full_speed);
         const std::vector<Vec3f>& table = speed_colours();
         // A square root: most points are slow, and differences among them show.
         const float at = std::isfinite(speed) ? std::sqrt(std::clamp(speed, 0.0f, 1.0f)) : 1;
@@ -154,11 +155,11 @@ struct PointLook {
     }
 
     // The way back to where the point was when the shutter opened, or was born after.
-    void expose(std::size_t i, const PointStyle& how, const Vec3f& P, Mark& m) const
+    void expose(std::size_t i, const PointStyle& how, Mark& m) const
     {
         const float open = std::min(static_cast<float>(how.shutter),
                                     age ? std::max(0.0f, (*age)[i]) : static_cast<float>(how.shutter));
-        const Vec3f before = lens.project(P - open * points.v()[i]);
+        const Vec3f before = lens.project(P[i] - open * v[i]);
         if (!before.allFinite() || before.z() < 1e-3f * far) return;
         const float dx = before.x() - m.x, dy = before.y() - m.y, length = std::hypot(dx, dy);
         constexpr float shortest = 0.5f;  // pixels
@@ -173,8 +174,7 @@ struct PointLook {
     Mark mark(std::size_t i) const
     {
         Mark m{};
-        const Vec3f P = points.P()[i];
-        const Vec3f s = lens.project(P);
+        const Vec3f s = lens.project(P[i]);
         if (!s.allFinite() || s.z() < 1e-3f * far) return m;
         m.opacity = opacity_of(Alpha, i);
         if (m.opacity == 0) return m;
@@ -183,7 +183,7 @@ struct PointLook {
         m.depth = s.z();
         m.metres = pscale && (*pscale)[i] > 0 ? (*pscale)[i] : 0;
         const PointStyle& how = style(scene, styles.empty() ? 0 : styles[i]);
-        if (how.shutter > 0) expose(i, how, P, m);
+        if (how.shutter > 0) expose(i, how, m);
         size(m);
         if (m.radius == 0 && trails.count(i) == 0) return m;
         m.additive = how.additive;
@@ -193,8 +193,8 @@ struct PointLook {
         // A colour brighter than white shines, and no shadow dims it.
         const float shining = m.additive ? 1 : glow(own);
         if (shining < 1) {
-            const float lamp =
-                light.past_meshes(P, Vec3f::Zero()) * light.past_other_points(P, m.metres, (1 - shining) * m.opacity);
+            const float lamp = light.past_meshes(P[i], Vec3f::Zero()) *
+                               light.past_other_points(P[i], m.metres, (1 - shining) * m.opacity);
             const float lit = 0.30f + 0.80f * lamp;
             m.colour *= lit + shining * (1 - lit);
         }
@@ -382,6 +382,12 @@ private:
     std::array<Pixel, tile_pixels> pixels_;
 };
 
+// Depths are positive: their bits are in their order.
+std::uint64_t depth_key(float depth, std::size_t mark)
+{
+    return std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | mark;
+}
+
 }  // namespace
 
 std::vector<float> shadow_opacity(const PointSet& points, const PictureScene& scene)
@@ -432,7 +438,7 @@ Marks make_marks(const PointSet& points, const TileGrid& tiles, const PictureSce
     for_each_block([&](std::size_t i, std::vector<std::uint32_t>& next) {
         if (marks.all[i].radius > 0)
             for_each_tile_of(marks.all[i], tiles,
-                             [&](int t) { marks.of_tiles[next[t]++] = static_cast<std::uint32_t>(i); });
+                             [&](int t) { marks.of_tiles[next[t]++] = depth_key(marks.all[i].depth, i); });
     });
     return marks;
 }
@@ -440,17 +446,17 @@ Marks make_marks(const PointSet& points, const TileGrid& tiles, const PictureSce
 void draw_marks(const Marks& marks, const TileGrid& tiles, int tile, const SurfaceTile& surfaces, const Lens& lens,
                 const Light& light, std::span<Vec3f> colour)
 {
-    // Depths are positive: their bits are in their order.
     thread_local OfThread<std::vector<std::uint64_t>> kept;
     std::vector<std::uint64_t>& order = *kept;
-    order.clear();
-    for (std::uint32_t i = marks.first[tile]; i < marks.first[tile + 1]; ++i) {
-        const std::uint32_t mark = marks.of_tiles[i];
-        order.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(marks.all[mark].depth)} << 32 | mark);
-    }
+    order.assign(marks.of_tiles.begin() + marks.first[tile], marks.of_tiles.begin() + marks.first[tile + 1]);
     std::sort(order.begin(), order.end());
     TilePainter painter(tiles, tile, surfaces, lens, light);
-    for (const std::uint64_t key : order) painter.composite(marks.all[static_cast<std::uint32_t>(key)]);
+    constexpr std::size_t ahead = 8;  // marks that are fetched: in the order of depth they are anywhere in memory
+    const auto mark = [&](std::size_t k) -> const Mark& { return marks.all[static_cast<std::uint32_t>(order[k])]; };
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        if (k + ahead < order.size()) __builtin_prefetch(&mark(k + ahead));
+        painter.composite(mark(k));
+    }
     painter.finish(colour);
 }
 

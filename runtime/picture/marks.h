@@ -28,8 +28,8 @@ std::vector<float> shadow_opacity(const PointSet& points, const PictureScene& sc
 // Marks in the order of the points, then the pieces of their trails, and which may be in which tile.
 struct Marks {
     std::vector<Mark> all;
-    std::vector<std::uint32_t> first;  // of each tile's in `of_tiles`, and the end
-    std::vector<std::uint32_t> of_tiles;
+    std::vector<std::uint32_t> first;     // of each tile's in `of_tiles`, and the end
+    std::vector<std::uint64_t> of_tiles;  // a mark's place in `all`, and above it the bits of its depth, to sort by
 };
 
 Marks make_marks(const PointSet& points, const TileGrid& tiles, const PictureScene& scene, const PictureView& view,

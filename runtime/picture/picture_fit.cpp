@@ -27,12 +27,13 @@ Box3d trimmed_bounds(const PointSet& points, const std::string& group, double ah
     const Strided<std::uint8_t> members = members_of(points, group);
     constexpr std::size_t sample_size = 20000;
     const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
+    const Strided<Vec3f> all_P = points.P().read(), all_v = points.v().read();
     const Column<float>* pscale = points.find<float>("pscale");
     std::vector<double> lows[3], highs[3];  // of the balls
     for (std::size_t i = 0; i < points.size(); i += group.empty() ? step : 1) {
         if (!members[i]) continue;
-        const Vec3d P = points.P()[i].cast<double>();
-        Vec3d later = P + ahead * points.v()[i].cast<double>();
+        const Vec3d P = all_P[i].cast<double>();
+        Vec3d later = P + ahead * all_v[i].cast<double>();
         later.y() = std::max(later.y(), std::min(P.y(), floor));
         if (!P.allFinite() || !later.allFinite()) continue;
         const double radius = pscale && std::isfinite((*pscale)[i]) ? std::max(0.0, double{(*pscale)[i]}) : 0;
@@ -60,9 +61,10 @@ double fast_speed(const PointSet& points)
 {
     constexpr std::size_t sample_size = 20000;
     const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
+    const Strided<Vec3f> v = points.v().read();
     std::vector<double> speeds;
     for (std::size_t i = 0; i < points.size(); i += step) {
-        const double speed = points.v()[i].cast<double>().norm();
+        const double speed = v[i].cast<double>().norm();
         if (std::isfinite(speed)) speeds.push_back(speed);
     }
     if (speeds.empty()) return 0;

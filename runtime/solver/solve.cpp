@@ -12,19 +12,33 @@
 namespace rapid {
 namespace {
 
-// Of points that look at one another, before the first that does: their constraints, when these begin.
+// The values from begin to end: of a column that is the same everywhere, the one.
+std::span<const Vec3f> values(const Strided<Vec3f>& column, std::size_t begin, std::size_t end)
+{
+    return {&column[begin], column.stride == 0 ? 1 : end - begin};
+}
+
 void require_finite(const PointSet& points, const SolveOptions& options)
 {
     const PointErrors errors(points, options.frame);
     const Strided<Vec3f> P = points.P().read(), v = points.v().read();
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
+        if (all_finite(values(P, begin, end)) && all_finite(values(v, begin, end))) return;
         for (std::size_t i = begin; i < end; ++i) errors.require_finite(i, P[i], v[i], PointErrors::before_step);
     });
+}
+
+// Whether all points are at rest, as one velocity for all tells without a look at each, and nothing acts on them.
+bool nothing_moves(const PointSet& points, const Dynamics& dynamics)
+{
+    const Strided<Vec3f> v = points.v().read();
+    return dynamics.empty() && v.stride == 0 && v[0].isZero(0) && !nonzero_forces_of(points);
 }
 
 SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement* refinement)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
+    // Of points that look at one another, before the first that does: their constraints, when these begin.
     if (!dynamics.constraints().empty() || options.interacts) require_finite(points, options);
     StepContext context(points, dynamics, options);
     if (context.scene.constraints.empty() && !options.interacts)
@@ -41,6 +55,7 @@ SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptio
 SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
     if (points.empty()) return {};
+    if (nothing_moves(points, dynamics)) return require_finite(points, options), SolveResult();
     const SolveResult result = advance(points, dynamics, options, nullptr);
     if (auto* force = points.find<Vec3f>("force")) force->fill(Vec3f::Zero());
     return result;

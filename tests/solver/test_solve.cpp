@@ -191,6 +191,32 @@ TEST_CASE("a point that is not finite stops the step, and is named", "[solve]")
               ", 1}");
 }
 
+TEST_CASE("points at rest on which nothing acts stay, without a write", "[solve]")
+{
+    std::vector<Vec3f> positions(5000, Vec3f(1, 2, 3));
+    Scene scene(points(positions));
+    const Vec3f* const before = scene.points.P().read().data;
+    scene.run(3);
+    CHECK(scene.points.P().read().data == before);
+    CHECK(scene.points.v().read().stride == 0);
+    CHECK(same_bits(scene.points, points(positions)));
+
+    SECTION("but a position that is not finite is told")
+    {
+        positions[4500] = {1, nan, 3};
+        scene.points = points(positions);
+        CHECK(error_of(scene) ==
+              "point 4500, frame 4: P is {1, nan, 3} before the step; a node before this one made it so; it has P = "
+              "{1, nan, 3}, v = {0, 0, 0}");
+    }
+    SECTION("and a force moves them")
+    {
+        scene.points.add({"force", Vec3f(0, 24, 0)});
+        scene.run(1);
+        CHECK(scene.points.v()[4500] == Vec3f(0, 1, 0));
+    }
+}
+
 TEST_CASE("a velocity that becomes infinite in the step stops it, and is named", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).v({{0, 0, 0}, {3e38f, 0, 0}}));

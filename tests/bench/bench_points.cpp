@@ -1,11 +1,16 @@
-// The cost of what every frame does to a point set: births, deaths, and a copy of which one column is written.
+// The cost of what every frame does to a point set: births, deaths, and a copy of which one column is written; and of
+// finding neighbours.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
+#include <optional>
 #include <string>
 
+#include "runtime/points/neighbours.h"
 #include "runtime/points/point_set.h"
 #include "runtime/random.h"
+#include "runtime/solver/constraints/contact_search.h"
 
 namespace rapid {
 namespace {
@@ -76,6 +81,56 @@ void copy_and_write_one(benchmark::State& state)
     state.SetItemsProcessed(state.iterations() * state.range(0));
 }
 BENCHMARK(copy_and_write_one)->Arg(10000)->Arg(1000000)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// A lattice of points a metre apart, each moved by up to 0.3 m along each axis, in the order of the lattice.
+std::vector<Vec3f> jittered_lattice(int edge)
+{
+    std::vector<Vec3f> P;
+    const RandomKey key(7, "lattice");
+    for (int x = 0; x < edge; ++x)
+        for (int y = 0; y < edge; ++y)
+            for (int z = 0; z < edge; ++z) {
+                const auto u = uniform4(key, P.size(), 0);
+                const Vec3d moved = 0.6 * (Vec3d(u[0], u[1], u[2]) - Vec3d::Constant(0.5));
+                P.push_back((Vec3d(x, y, z) + moved).cast<float>());
+            }
+    return P;
+}
+
+constexpr double reach = 1.1;  // m, between neighbours; some six of each
+
+// On one thread: what :interact and :detail do for each point, and the search for contacts of as many grains.
+void find_neighbours(benchmark::State& state)
+{
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    const std::vector<Vec3f> P = jittered_lattice(static_cast<int>(state.range(0)));
+    for (auto _ : state) {
+        std::size_t pairs = 0;
+        Neighbours(P, reach).for_each(
+            [&](std::uint32_t, const std::vector<std::uint32_t>& near) { pairs += near.size(); });
+        benchmark::DoNotOptimize(pairs);
+    }
+    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(P.size()));
+}
+BENCHMARK(find_neighbours)->Arg(100)->Unit(benchmark::kMillisecond);
+
+void find_contacts(benchmark::State& state)
+{
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    std::vector<Vec3d> P;
+    for (const Vec3f& at : jittered_lattice(static_cast<int>(state.range(0)))) P.push_back(at.cast<double>());
+    const float radius = reach / 2;
+    const Strided<float> radii{&radius, 0};
+    ContactSearch search;
+    Pairs pairs;
+    for (auto _ : state) {
+        const RadiusGrids grids(radii, P.size(), std::nullopt, 1);
+        search.find(P, radii, grids, pairs);
+        benchmark::DoNotOptimize(pairs);
+    }
+    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(P.size()));
+}
+BENCHMARK(find_contacts)->Arg(100)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace rapid

@@ -139,14 +139,20 @@ public:
         forces();
         colliders();
         grains();
+        neighbours();
         formats();
         small_scenes();
         static_level_set();
+        deforming_figure();
+        still_points();
+        first_frame();
+        pictures();
         tolerance_check();
         scripts();
         main_job();
         output();
         examples();
+        growth();
         by_hand();  // last: it reads points, and the peak of a process counts what it was forked with
     }
 
@@ -302,6 +308,18 @@ private:
              ""});
     }
 
+    // Six of each of a million points, on one thread.
+    void neighbours()
+    {
+        const std::string name = "a million neighbour queries / the search for contacts";
+        if (!asked(name)) return;
+        const auto medians = measure("bench_points", {"find_neighbours/100", "find_contacts/100"});
+        const double ours = medians.at("find_neighbours/100").at("cpu_time"),
+                     theirs = medians.at("find_contacts/100").at("cpu_time");
+        add({name, ours / theirs, 1, "", false,
+             fmt::format("{:.3g} and {:.3g} million a second", 1000 / ours, 1000 / theirs)});
+    }
+
     void formats()
     {
         const auto write = [](const char* format) {
@@ -357,6 +375,99 @@ private:
             }
         }
         add({name, median(ms), 0.1, "ms", false, fmt::format("the first two: {:.3g} ms", 2 * median(of_first))});
+    }
+
+    // A ring that leans from frame to frame, 96 around by 32 across.
+    void write_figure(int frames) const
+    {
+        constexpr int around = 96, across = 32;
+        constexpr double turn = 6.283185307179586;
+        for (int frame = 1; frame <= frames; ++frame) {
+            std::ofstream file(scratch_ / fmt::format("figure.{:04}.obj", frame));
+            for (int i = 0; i < around; ++i)
+                for (int j = 0; j < across; ++j) {
+                    const double a = turn * i / around, b = turn * j / across, r = 0.6 + 0.22 * std::cos(b);
+                    const double y = r * std::sin(a);
+                    file << fmt::format("v {} {} {}\n", r * std::cos(a) + 0.02 * frame * y, y, 0.22 * std::sin(b));
+                }
+            const auto vertex = [](int i, int j) { return 1 + i % around * across + j % across; };
+            for (int i = 0; i < around; ++i)
+                for (int j = 0; j < across; ++j)
+                    file << fmt::format("f {} {} {} {}\n", vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1),
+                                        vertex(i, j + 1));
+        }
+    }
+
+    // The time that building its bands takes, by --stats.
+    void deforming_figure()
+    {
+        const std::string name = "three :collide on a deforming level set / one, time to build it";
+        if (!asked(name)) return;
+        write_figure(12);
+        const fs::path stats = scratch_ / "figure.json";
+        const auto build_seconds = [&](int colliders) {
+            std::string text =
+                "local figure = rapid.levelset.from_mesh(rapid.mesh.read \"figure.####.obj\", { voxel = 0.01 })\n"
+                "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2 } } :gravity {}\n";
+            for (int k = 0; k < colliders; ++k) text += "  :collide { shape = figure }\n";
+            run(command(scene("figure", text + "  :solve {}\n"), {"-f", "1-12", "--stats", stats.string()}));
+            std::ifstream file(stats);
+            const json all = json::parse(file);
+            double seconds = 0;
+            for (const json& frame : all.at("frames"))
+                if (frame.contains("bands"))
+                    for (const json& band : frame.at("bands")) seconds += double(band.at("seconds"));
+            return seconds;
+        };
+        std::vector<double> three, one;
+        for (int k = 0; k < repeat_; ++k) three.push_back(build_seconds(3)), one.push_back(build_seconds(1));
+        add({name, median(three) / median(one), 1.1, "", false,
+             fmt::format("{:.3f} s, {:.3f} s", median(three), median(one))});
+    }
+
+    // Of the frames after the first two, by --stats.
+    void still_points()
+    {
+        const std::string name = "a million points at rest, a frame";
+        if (!asked(name)) return;
+        const fs::path still = scene("at_rest",
+                                     "return rapid.create {\n"
+                                     "    points = rapid.points.grid { size = {2, 2, 2}, spacing = 0.02 } }\n"
+                                     "  :solve {}\n");
+        const fs::path stats = scratch_ / "at_rest.json";
+        std::vector<double> ms;
+        for (int k = 0; k < repeat_; ++k) {
+            run(command(still, {"-f", "1-24", "--stats", stats.string()}));
+            std::ifstream file(stats);
+            const json all = json::parse(file);
+            for (const json& frame : all.at("frames"))
+                if (frame.at("frame") > 2) ms.push_back(1000 * double(frame.at("seconds").at("total")));
+        }
+        add({name, median(ms), 1, "ms", false, ""});
+    }
+
+    void first_frame()
+    {
+        const std::string name = "first.lua: a run of its first frame";
+        if (!asked(name)) return;
+        const Ended ended = in_turn({command(graphs_ / "first.lua", {"-f", "1-1"})})[0];
+        add({name, 1000 * ended.seconds, 50, "ms", false, fmt::format("{:.3f} s of processor", ended.processor)});
+    }
+
+    // Frames of first.lua that have 60,000 points, less the same without pictures, of as many attributes, and less what
+    // the first two take.
+    void pictures()
+    {
+        const std::string name = "a .png of 1280 x 720, 60,000 points, processor time";
+        if (!asked(name)) return;
+        const fs::path graph = graphs_ / "first.lua";
+        const std::string files = (scratch_ / "picture.####.png").string();
+        const std::vector<Ended> ended = in_turn({command(graph, {"-f", "71-120", "--keep-all", "-o", files}),
+                                                  command(graph, {"-f", "71-120", "--keep-all"}),
+                                                  command(graph, {"-f", "71-72", "--keep-all", "-o", files}),
+                                                  command(graph, {"-f", "71-72", "--keep-all"})});
+        const double seconds = (ended[0].processor - ended[1].processor) - (ended[2].processor - ended[3].processor);
+        add({name, 1000 * seconds / 48, 40, "ms", false, ""});
     }
 
     // Of the README's scenes mill alone has a tolerance. It is checked in each of the first four steps, of few points,
@@ -491,6 +602,32 @@ private:
                  fmt::format("{:.3f} s, {:.3f} s", ended[0].processor, ended[1].processor)});
             add({memory, ended[0].bytes / ended[1].bytes, 1.0, "", false,
                  fmt::format("{:.0f} MB, {:.0f} MB", ended[0].bytes / 1e6, ended[1].bytes / 1e6)});
+        }
+    }
+
+    // The exponent of the processor time in the number of points, over two decades, and the part of a run in which one
+    // of two threads waits for the other; of each run less its first frame, for what starting takes.
+    void growth()
+    {
+        const std::vector<std::pair<std::string, double>> scenes = {
+            {"first", 500000}, {"sparks", 1000000}, {"spray", 975000}, {"embers", 500000}, {"magic", 300000}};
+        for (const auto& [scene, rate] : scenes) {
+            const std::string small = scene + ".lua: 100,000 points / 10,000, exponent of the processor time";
+            const std::string large = scene + ".lua: a million points / 100,000, exponent of the processor time";
+            const std::string alone = scene + ".lua: time of one thread alone, of the processor time";
+            if (!asked(small) && !asked(large) && !asked(alone)) continue;
+            const auto with = [&, &file = scene, births = rate](double part, const char* frames) {
+                return command(graphs_ / (file + ".lua"),
+                               {"--threads", "2", "-f", frames, "--set", fmt::format("rate={}", part * births)});
+            };
+            const std::vector<Ended> ended = in_turn({with(0.01, "1-1"), with(0.01, "1-48"), with(0.1, "1-1"),
+                                                      with(0.1, "1-48"), with(1, "1-1"), with(1, "1-48")});
+            const auto taken = [&](int size) { return ended[2 * size + 1].processor - ended[2 * size].processor; };
+            add({small, std::log10(taken(1) / taken(0)), 1.05, "", false, ""});
+            add({large, std::log10(taken(2) / taken(1)), 1.05, "", false, ""});
+            const double processor = taken(2), wall = ended[5].seconds - ended[4].seconds;
+            add({alone, (2 * wall - processor) / processor, 0.01, "", false,
+                 fmt::format("{:.3f} s, {:.3f} s of processor", wall, processor)});
         }
     }
 

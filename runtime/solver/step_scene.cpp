@@ -58,7 +58,7 @@ private:
 const Column<Vec3f>* nonzero_forces_of(const PointSet& points)
 {
     const auto* force = points.find<Vec3f>("force");
-    const bool is_zero = force && force->is_uniform() && !points.empty() && (*force)[0].isZero();
+    const bool is_zero = force && force->is_uniform() && !points.empty() && (*force)[0].isZero(0);
     return is_zero ? nullptr : force;
 }
 

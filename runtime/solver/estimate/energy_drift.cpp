@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "runtime/points/members.h"
+#include "runtime/solver/step_scene.h"
 
 namespace rapid {
 namespace {
@@ -44,9 +45,7 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, const Dy
     before_.clear();
     indices_.clear();
     collides_ = false;
-    const auto* force = points.find<Vec3f>("force");
-    const bool forced = force && !(force->is_uniform() && !points.empty() && (*force)[0].isZero());
-    defined_ = !forced && !spend_energy(dynamics);
+    defined_ = !nonzero_forces_of(points) && !spend_energy(dynamics);
     if (!defined_) return;
     if (!shadows.idle()) indices_.assign(shadows.indices().begin(), shadows.indices().end());
     auto energies = energies_of(shadows.idle() ? points.select({}) : shadows.before(), dynamics);

@@ -12,7 +12,8 @@ bool is_reduced(double x) { return std::abs(x) <= elementary::most_angle; }
 template <class OfLibrary>
 Doubles sine_of_lanes(const Doubles& x, std::int64_t quarters, const OfLibrary& of_library)
 {
-    Doubles value = elementary::sine(x, quarters);
+    Doubles value = by_registers(
+        x, [&](const Register& part) __attribute__((always_inline)) { return elementary::sine(part, quarters); });
     if (!any(!(magnitude(x) <= elementary::most_angle))) return value;
     for (std::uint32_t l = 0; l < lanes; ++l)
         if (!is_reduced(x[l])) value[l] = of_library(x[l]);

@@ -13,18 +13,16 @@ namespace rapid {
 
 namespace elementary {
 
-// What a double or a pack of them is in bits.
+// What a double or a vector of them is in bits.
 template <class T>
-struct Bits;
+struct Bits {
+    typedef std::int64_t Signed __attribute__((vector_size(sizeof(T))));
+    typedef std::uint64_t Unsigned __attribute__((vector_size(sizeof(T))));
+};
 template <>
 struct Bits<double> {
     using Signed = std::int64_t;
     using Unsigned = std::uint64_t;
-};
-template <>
-struct Bits<Doubles> {
-    using Signed = Flags;
-    typedef std::uint64_t Unsigned __attribute__((vector_size(8 * lanes)));
 };
 
 constexpr double most_angle = 0x1p20;    // rad, that is reduced exactly
@@ -138,6 +136,10 @@ SineAndCosine sine_and_cosine(double x);
 // The same of each lane.
 Doubles sine(const Doubles& x);
 Doubles cosine(const Doubles& x);
-[[gnu::always_inline]] inline Doubles exponential(const Doubles& x) { return elementary::exponential(x); }
+[[gnu::always_inline]] inline Doubles exponential(const Doubles& x)
+{
+    return by_registers(
+        x, [](const Register& part) __attribute__((always_inline)) { return elementary::exponential(part); });
+}
 
 }  // namespace rapid

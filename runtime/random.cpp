@@ -5,17 +5,26 @@
 #include <cstring>
 
 #include "runtime/items.h"
-#include "runtime/simd.h"
 
-#if defined(__AVX2__)
+#if defined(__SSE2__)
 #include <immintrin.h>
 #endif
 
 namespace rapid {
 namespace {
 
+// As many numbers as a register has room for: wider ones would go through memory between the products.
+#if defined(__AVX512F__)
+constexpr std::uint32_t width = 8;
+#elif defined(__AVX2__)
+constexpr std::uint32_t width = 4;
+#else
+constexpr std::uint32_t width = 2;
+#endif
+
 // Numbers of 32 bits, each in 64: what is above them does not count.
-typedef std::uint64_t Wide __attribute__((vector_size(8 * lanes)));
+typedef std::uint64_t Wide __attribute__((vector_size(8 * width)));
+typedef double Reals __attribute__((vector_size(8 * width)));
 
 // The low 32 bits of each lane, times m. g++ multiplies 64 bits by 64 where it may, which takes three times as long.
 [[gnu::always_inline]] inline Wide product(const Wide& a, std::uint32_t m)
@@ -23,19 +32,18 @@ typedef std::uint64_t Wide __attribute__((vector_size(8 * lanes)));
 #if defined(__AVX512F__)
     return std::bit_cast<Wide>(_mm512_mul_epu32(std::bit_cast<__m512i>(a), _mm512_set1_epi64(m)));
 #elif defined(__AVX2__)
-    const auto halves = std::bit_cast<std::array<__m256i, 2>>(a);
-    const __m256i by = _mm256_set1_epi64x(m);
-    return std::bit_cast<Wide>(
-        std::array<__m256i, 2>{_mm256_mul_epu32(halves[0], by), _mm256_mul_epu32(halves[1], by)});
+    return std::bit_cast<Wide>(_mm256_mul_epu32(std::bit_cast<__m256i>(a), _mm256_set1_epi64x(m)));
+#elif defined(__SSE2__)
+    return std::bit_cast<Wide>(_mm_mul_epu32(std::bit_cast<__m128i>(a), _mm_set1_epi64x(m)));
 #else
     return (a & 0xffffffffu) * (Wide{} + m);
 #endif
 }
 
-[[gnu::always_inline]] inline Doubles as_doubles(const Wide& a)
+[[gnu::always_inline]] inline Reals as_reals(const Wide& a)
 {
     // 2^52 and the number, less 2^52.
-    return std::bit_cast<Doubles>((a & 0xffffffffu) | std::bit_cast<std::uint64_t>(0x1p52)) - 0x1p52;
+    return std::bit_cast<Reals>((a & 0xffffffffu) | std::bit_cast<std::uint64_t>(0x1p52)) - 0x1p52;
 }
 
 constexpr std::size_t packs = 2;  // side by side, as each operation waits for the one before it
@@ -69,7 +77,7 @@ struct Draw {
     }
 };
 
-constexpr std::size_t at_once = packs * lanes;
+constexpr std::size_t at_once = packs * width;
 
 // For Draw: the items from `begin` on, one by one.
 template <class Item>
@@ -78,7 +86,7 @@ template <class Item>
     return [&item_at, begin ](std::size_t p) __attribute__((always_inline))
     {
         Wide items;
-        for (std::uint32_t l = 0; l < lanes; ++l) items[l] = item_at(begin + p * lanes + l);
+        for (std::uint32_t l = 0; l < width; ++l) items[l] = item_at(begin + p * width + l);
         return items;
     };
 }
@@ -90,11 +98,11 @@ void draw(RandomKey key, const Item& item_at, std::uint64_t use, std::span<std::
     for (std::size_t begin = 0; begin < out.size(); begin += at_once) {
         const Draw drawn(key, one_by_one(item_at, begin), use);
         for (std::size_t p = 0; p < packs; ++p) {
-            const std::size_t first = begin + p * lanes;
+            const std::size_t first = begin + p * width;
             if (first >= out.size()) break;
-            const Doubles n0 = as_doubles(drawn.c0[p]) * unit, n1 = as_doubles(drawn.c1[p]) * unit,
-                          n2 = as_doubles(drawn.c2[p]) * unit, n3 = as_doubles(drawn.c3[p]) * unit;
-            const std::size_t n = std::min<std::size_t>(lanes, out.size() - first);
+            const Reals n0 = as_reals(drawn.c0[p]) * unit, n1 = as_reals(drawn.c1[p]) * unit,
+                        n2 = as_reals(drawn.c2[p]) * unit, n3 = as_reals(drawn.c3[p]) * unit;
+            const std::size_t n = std::min<std::size_t>(width, out.size() - first);
             for (std::size_t l = 0; l < n; ++l) out[first + l] = {n0[l], n1[l], n2[l], n3[l]};
         }
     }
@@ -132,19 +140,19 @@ void uniform53(RandomKey key, std::span<const std::uint64_t> items, std::uint64_
         const auto whole = [&](std::size_t p) __attribute__((always_inline))
         {
             Wide pack;
-            std::memcpy(&pack, items.data() + begin + p * lanes, sizeof pack);
+            std::memcpy(&pack, items.data() + begin + p * width, sizeof pack);
             return pack;
         };
         const Draw drawn = is_whole ? Draw(key, whole, use) : Draw(key, one_by_one(item_at, begin), use);
         for (std::size_t p = 0; p < packs; ++p) {
-            const Doubles n0 = as_doubles(drawn.c0[p]) * 0x1p-32, sum = n0 + as_doubles(drawn.c1[p]) * 0x1p-64;
-            const Doubles number = sum < 1.0 ? sum : n0;
-            const std::size_t first = begin + p * lanes;
+            const Reals n0 = as_reals(drawn.c0[p]) * 0x1p-32, sum = n0 + as_reals(drawn.c1[p]) * 0x1p-64;
+            const Reals number = sum < 1.0 ? sum : n0;
+            const std::size_t first = begin + p * width;
             if (is_whole) {
-                store_pack(number, out.data() + first);
+                std::memcpy(out.data() + first, &number, sizeof number);
                 continue;
             }
-            for (std::size_t i = first; i < std::min(first + lanes, items.size()); ++i) out[i] = number[i - first];
+            for (std::size_t i = first; i < std::min(first + width, items.size()); ++i) out[i] = number[i - first];
         }
     }
 }

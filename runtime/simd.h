@@ -33,11 +33,12 @@ using Indices = std::array<std::uint32_t, lanes>;
 typedef std::int64_t Flags __attribute__((vector_size(8 * lanes)));
 typedef std::int32_t FloatFlags __attribute__((vector_size(4 * lanes)));
 
+typedef std::int8_t LaneBytes __attribute__((vector_size(lanes)));
+
 // One byte per lane: lane l is the bits from 8 l on.
 [[gnu::always_inline]] inline std::uint64_t bytes(const Flags& flags)
 {
-    typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
-    return std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, Bytes));
+    return std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, LaneBytes));
 }
 [[gnu::always_inline]] inline bool any(const Flags& flags) { return bytes(flags) != 0; }
 // One bit per lane: lane l is bit l.
@@ -70,6 +71,27 @@ template <class Pack, class T>
 {
     static_assert(sizeof pack == lanes * sizeof *to);
     std::memcpy(to, &pack, sizeof pack);
+}
+
+// As many doubles as a register holds. Where that is less than a pack, g++ compares and chooses lane by lane in a pack.
+#if defined(__AVX512F__)
+typedef Doubles Register;
+#elif defined(__AVX__)
+typedef double Register __attribute__((vector_size(32)));
+#else
+typedef double Register __attribute__((vector_size(16)));
+#endif
+
+// f of each part of a pack.
+template <class F>
+[[gnu::always_inline]] inline Doubles by_registers(const Doubles& x, const F& f)
+{
+    struct Parts {
+        Register of[sizeof(Doubles) / sizeof(Register)];
+    };
+    Parts parts = std::bit_cast<Parts>(x);
+    for (Register& part : parts.of) part = f(part);
+    return std::bit_cast<Doubles>(parts);
 }
 
 [[gnu::always_inline]] inline Doubles least(const Doubles& a, const Doubles& b) { return a < b ? a : b; }

@@ -16,8 +16,6 @@
 namespace rapid {
 namespace {
 
-typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
-
 constexpr double most_float = std::numeric_limits<float>::max();
 
 using Tile = LaneTile;
@@ -272,7 +270,7 @@ bool load_flag(Tile& tile, const Now& now)
     const auto* const from = static_cast<const std::uint8_t*>(memory.data) + tile.first * memory.stride;
     if (memory.stride == 1 && tile.size == Tile::points) {
         tile.fill(now.to, [&](std::size_t k) {
-            Bytes members;
+            LaneBytes members;
             std::memcpy(&members, from + k * lanes, sizeof members);
             return as_doubles(__builtin_convertvector(members != 0, Flags));
         });

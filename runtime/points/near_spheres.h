@@ -24,7 +24,6 @@ inline void for_near_spheres(const CellGrid& own, std::size_t m, const CellGrid&
 {
     const float x = own.x[m], y = own.y[m], z = own.z[m];
     const float most = near_rounding * own.r[m] + blur, least = (2 - near_rounding) * own.r[m] - blur;
-    typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
     // Of each group of eight a bit in every byte, which is the lane's.
     constexpr std::uint64_t first_bits = 0x0101010101010101;
     std::uint64_t near = 0, certain = 0;
@@ -45,7 +44,7 @@ inline void for_near_spheres(const CellGrid& own, std::size_t m, const CellGrid&
             const Floats r = load_pack(&grid.r[o]), d2 = dx * dx + dy * dy + dz * dz;
             const Floats reach = near_rounding * r + most, within = (2 - near_rounding) * r + least;
             const FloatFlags flags = ((d2 < reach * reach) & 1) | ((d2 < within * within) & (within > 0) & 2);
-            const auto bytes = std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, Bytes));
+            const auto bytes = std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, LaneBytes));
             const std::uint32_t count = std::min<std::uint32_t>(lanes, run.end - o);
             const std::uint64_t there =
                 first_bits & (count == lanes ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * count) - 1);

@@ -29,12 +29,11 @@ constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
 void sort_pack(std::uint32_t* first, std::uint32_t count)
 {
     typedef std::uint32_t Numbers __attribute__((vector_size(4 * lanes)));
-    typedef std::int8_t Bytes __attribute__((vector_size(lanes)));
     Numbers all;
     for (std::uint32_t l = 0; l < lanes; ++l) all[l] = l < count ? first[l] : UINT32_MAX;
     for (std::uint32_t l = 0; l < count; ++l) {
         const std::uint32_t value = all[l];
-        first[std::popcount(std::bit_cast<std::uint64_t>(__builtin_convertvector(all < value, Bytes))) / 8] = value;
+        first[std::popcount(std::bit_cast<std::uint64_t>(__builtin_convertvector(all < value, LaneBytes))) / 8] = value;
     }
 }
 

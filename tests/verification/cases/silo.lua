@@ -20,7 +20,8 @@ for k = 0, 37 * 4 * 51 - 1 do
   P[k + 1] = {width * ((i + 0.5) / 37 - 0.5), 1.06 * d * (layer + 0.5), depth * ((j + 0.5) / 4 - 0.5)}
   pscale[k + 1] = d / 2 * (0.9 + 0.2 * ((k * 0.618034) % 1))
 end
-local chain = rapid.create { fps = 24, points = rapid.points.from { P = P, pscale = pscale } }
+local seed = rapid.param("seed", 1, "of the shaking")
+local chain = rapid.create { fps = 24, seed = seed, points = rapid.points.from { P = P, pscale = pscale } }
   :points("shake", function(p, frame)
     if frame.number == 2 then p.v = vec3(p:rand(1) - 0.5, p:rand(2) - 0.5, p:rand(3) - 0.5) / 2 end
     if p.P.y < -8 * d then p:kill() end
@@ -59,14 +60,24 @@ end
 
 -- Volume of bulk a second, per sqrt(g) and length of the slot: C (D - k d)^(3/2). And the density just above the slot,
 -- by that of the bulk.
-local function flow(gap)
-  local result = scene.run(silo, { frames = {opens, ends}, set = { gap = gap } })
+local function flow_of(gap, seed)
+  local result = scene.run(silo, { frames = {opens, ends}, set = { gap = gap, seed = seed } })
   local bulk, at_slot = density(result[opens], 5 * d, 25 * d, width / 2), 0
   for frame = begins, ends do
     at_slot = at_slot + density(result[frame], 0, 2 * d, gap / 2) / (ends - begins + 1)
   end
   local rate = (inside(result[begins]) - inside(result[ends])) * 24 / (ends - begins)
   return rate / bulk / depth / math.sqrt(g), at_slot / bulk
+end
+
+-- The mean of four silos: of one, the exponent below has a standard deviation of 0.035 (of ten seeds, 1.57 to 1.69).
+local function flow(gap)
+  local rate, looser, seeds = 0, 0, 4
+  for seed = 1, seeds do
+    local of_one, looser_of_one = flow_of(gap, seed)
+    rate, looser = rate + of_one / seeds, looser + looser_of_one / seeds
+  end
+  return rate, looser
 end
 
 local measured

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "runtime/items.h"
+#include "runtime/simd.h"
 
 #if defined(__SSE2__)
 #include <immintrin.h>
@@ -13,18 +14,10 @@
 namespace rapid {
 namespace {
 
-// As many numbers as a register has room for: wider ones would go through memory between the products.
-#if defined(__AVX512F__)
-constexpr std::uint32_t width = 8;
-#elif defined(__AVX2__)
-constexpr std::uint32_t width = 4;
-#else
-constexpr std::uint32_t width = 2;
-#endif
-
-// Numbers of 32 bits, each in 64: what is above them does not count.
-typedef std::uint64_t Wide __attribute__((vector_size(8 * width)));
-typedef double Reals __attribute__((vector_size(8 * width)));
+// Numbers of 32 bits, each in 64: what is above them does not count. As many as a register has room for: wider ones
+// would go through memory between the products.
+typedef std::uint64_t Wide __attribute__((vector_size(sizeof(Register))));
+constexpr std::uint32_t width = sizeof(Register) / sizeof(double);
 
 // The low 32 bits of each lane, times m. g++ multiplies 64 bits by 64 where it may, which takes three times as long.
 [[gnu::always_inline]] inline Wide product(const Wide& a, std::uint32_t m)
@@ -40,10 +33,10 @@ typedef double Reals __attribute__((vector_size(8 * width)));
 #endif
 }
 
-[[gnu::always_inline]] inline Reals as_reals(const Wide& a)
+[[gnu::always_inline]] inline Register as_reals(const Wide& a)
 {
     // 2^52 and the number, less 2^52.
-    return std::bit_cast<Reals>((a & 0xffffffffu) | std::bit_cast<std::uint64_t>(0x1p52)) - 0x1p52;
+    return std::bit_cast<Register>((a & 0xffffffffu) | std::bit_cast<std::uint64_t>(0x1p52)) - 0x1p52;
 }
 
 constexpr std::size_t packs = 2;  // side by side, as each operation waits for the one before it
@@ -100,8 +93,8 @@ void draw(RandomKey key, const Item& item_at, std::uint64_t use, std::span<std::
         for (std::size_t p = 0; p < packs; ++p) {
             const std::size_t first = begin + p * width;
             if (first >= out.size()) break;
-            const Reals n0 = as_reals(drawn.c0[p]) * unit, n1 = as_reals(drawn.c1[p]) * unit,
-                        n2 = as_reals(drawn.c2[p]) * unit, n3 = as_reals(drawn.c3[p]) * unit;
+            const Register n0 = as_reals(drawn.c0[p]) * unit, n1 = as_reals(drawn.c1[p]) * unit,
+                           n2 = as_reals(drawn.c2[p]) * unit, n3 = as_reals(drawn.c3[p]) * unit;
             const std::size_t n = std::min<std::size_t>(width, out.size() - first);
             for (std::size_t l = 0; l < n; ++l) out[first + l] = {n0[l], n1[l], n2[l], n3[l]};
         }
@@ -145,8 +138,8 @@ void uniform53(RandomKey key, std::span<const std::uint64_t> items, std::uint64_
         };
         const Draw drawn = is_whole ? Draw(key, whole, use) : Draw(key, one_by_one(item_at, begin), use);
         for (std::size_t p = 0; p < packs; ++p) {
-            const Reals n0 = as_reals(drawn.c0[p]) * 0x1p-32, sum = n0 + as_reals(drawn.c1[p]) * 0x1p-64;
-            const Reals number = sum < 1.0 ? sum : n0;
+            const Register n0 = as_reals(drawn.c0[p]) * 0x1p-32, sum = n0 + as_reals(drawn.c1[p]) * 0x1p-64;
+            const Register number = sum < 1.0 ? sum : n0;
             const std::size_t first = begin + p * width;
             if (is_whole) {
                 std::memcpy(out.data() + first, &number, sizeof number);

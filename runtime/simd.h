@@ -76,7 +76,7 @@ template <class Pack, class T>
 // As many doubles as a register holds. Where that is less than a pack, g++ compares and chooses lane by lane in a pack.
 #if defined(__AVX512F__)
 typedef Doubles Register;
-#elif defined(__AVX__)
+#elif defined(__AVX2__)
 typedef double Register __attribute__((vector_size(32)));
 #else
 typedef double Register __attribute__((vector_size(16)));

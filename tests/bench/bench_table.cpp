@@ -231,6 +231,24 @@ private:
         return words;
     }
 
+    // The frames of a run, as --stats tells of them.
+    json frames_of(const fs::path& graph, Words options) const
+    {
+        const fs::path stats = scratch_ / "stats.json";
+        options.insert(options.end(), {"--stats", stats.string()});
+        run(command(graph, options));
+        std::ifstream file(stats);
+        return json::parse(file).at("frames");
+    }
+
+    // s, in which the bands of its level sets were built.
+    static double band_seconds(const json& frame)
+    {
+        double seconds = 0;
+        for (const json& band : frame.value("bands", json::array())) seconds += double(band.at("seconds"));
+        return seconds;
+    }
+
     // Medians of whole runs, in turn.
     std::vector<Ended> in_turn(const std::vector<Words>& commands) const
     {
@@ -361,19 +379,12 @@ private:
                                      "  :gravity {}\n"
                                      "  :collide { shape = rapid.levelset.from_mesh(body, { voxel = 0.02 }) }\n"
                                      "  :solve {}\n");
-        const fs::path stats = scratch_ / "still.json";
         std::vector<double> ms, of_first;
-        for (int k = 0; k < repeat_; ++k) {
-            run(command(still, {"-f", "1-24", "--stats", stats.string()}));
-            std::ifstream file(stats);
-            const json all = json::parse(file);
-            for (const json& frame : all.at("frames")) {
-                double seconds = frame.at("seconds").at("graph");
-                if (frame.contains("bands"))
-                    for (const json& band : frame.at("bands")) seconds += double(band.at("seconds"));
+        for (int k = 0; k < repeat_; ++k)
+            for (const json& frame : frames_of(still, {"-f", "1-24"})) {
+                const double seconds = double(frame.at("seconds").at("graph")) + band_seconds(frame);
                 (frame.at("frame") <= 2 ? of_first : ms).push_back(1000 * seconds);
             }
-        }
         add({name, median(ms), 0.1, "ms", false, fmt::format("the first two: {:.3g} ms", 2 * median(of_first))});
     }
 
@@ -404,19 +415,14 @@ private:
         const std::string name = "three :collide on a deforming level set / one, time to build it";
         if (!asked(name)) return;
         write_figure(12);
-        const fs::path stats = scratch_ / "figure.json";
         const auto build_seconds = [&](int colliders) {
             std::string text =
                 "local figure = rapid.levelset.from_mesh(rapid.mesh.read \"figure.####.obj\", { voxel = 0.01 })\n"
                 "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2 } } :gravity {}\n";
             for (int k = 0; k < colliders; ++k) text += "  :collide { shape = figure }\n";
-            run(command(scene("figure", text + "  :solve {}\n"), {"-f", "1-12", "--stats", stats.string()}));
-            std::ifstream file(stats);
-            const json all = json::parse(file);
             double seconds = 0;
-            for (const json& frame : all.at("frames"))
-                if (frame.contains("bands"))
-                    for (const json& band : frame.at("bands")) seconds += double(band.at("seconds"));
+            for (const json& frame : frames_of(scene("figure", text + "  :solve {}\n"), {"-f", "1-12"}))
+                seconds += band_seconds(frame);
             return seconds;
         };
         std::vector<double> three, one;
@@ -434,15 +440,10 @@ private:
                                      "return rapid.create {\n"
                                      "    points = rapid.points.grid { size = {2, 2, 2}, spacing = 0.02 } }\n"
                                      "  :solve {}\n");
-        const fs::path stats = scratch_ / "at_rest.json";
         std::vector<double> ms;
-        for (int k = 0; k < repeat_; ++k) {
-            run(command(still, {"-f", "1-24", "--stats", stats.string()}));
-            std::ifstream file(stats);
-            const json all = json::parse(file);
-            for (const json& frame : all.at("frames"))
+        for (int k = 0; k < repeat_; ++k)
+            for (const json& frame : frames_of(still, {"-f", "1-24"}))
                 if (frame.at("frame") > 2) ms.push_back(1000 * double(frame.at("seconds").at("total")));
-        }
         add({name, median(ms), 1, "ms", false, ""});
     }
 
@@ -477,15 +478,12 @@ private:
         const std::string name = "mill.lua: checking its tolerance, of the time of the run";
         if (!asked(name)) return;
         constexpr int first = 6, every = 4, last = 71;
-        const fs::path stats = scratch_ / "mill.json";
         std::vector<double> parts;
         for (int k = 0; k < repeat_; ++k) {
-            run(command(graphs_ / "mill.lua",
-                        {"-f", fmt::format("1-{}", last), "--threads", "1", "--stats", stats.string()}));
-            std::ifstream file(stats);
-            const json all = json::parse(file);
             std::vector<double> seconds(1);
-            for (const json& frame : all.at("frames")) seconds.push_back(frame.at("seconds").at("total"));
+            for (const json& frame :
+                 frames_of(graphs_ / "mill.lua", {"-f", fmt::format("1-{}", last), "--threads", "1"}))
+                seconds.push_back(frame.at("seconds").at("total"));
             double checks = 0, total = 0;
             for (const double s : seconds) total += s;
             for (int f = first; f < last; f += every)

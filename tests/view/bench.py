@@ -92,6 +92,9 @@ def set_parameter(browser, name, value):
 
 
 def choose(browser, name, value):
+    """The choices of files come with the next status after the first of them is read."""
+    browser.wait("[...document.getElementById(%s).options].some((o) => o.value === %s)"
+                 % (json.dumps(name), json.dumps(value)))
     browser.run("const s = document.getElementById(arguments[0]); s.value = arguments[1];"
                 "s.dispatchEvent(new Event('change'));", name, value)
 

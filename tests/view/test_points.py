@@ -26,7 +26,8 @@ def a_click_on_a_point_tells_its_values_as_run_writes_them(bench):
           return [box.left + (0.5 + at[0] / at[2] / 2) * box.width, box.top + (0.5 - at[1] / at[2] / 2) * box.height];""",
                             [row["Px"], row["Py"], row["Pz"]])
         browser.click_at(*place)
-        browser.wait(f"rapidView.state.point === {int(row['id'])} && document.querySelector('#attributes')")
+        browser.wait("document.querySelector('#attributes [data-attribute=\"id\"] td')?.textContent === "
+                     f"'{int(row['id'])}'")
         shown = browser.run("""return Object.fromEntries([...document.querySelectorAll('#attributes tr')].map((row) =>
           [row.dataset.attribute, row.querySelector('td').textContent]))""")
         for text, name in zip([*shown["P"].split(), shown["heat"], shown["pscale"]], ("Px", "Py", "Pz", "heat", "pscale")):

@@ -1,15 +1,15 @@
 // Functions of the deferred part of the library: all that needs OpenVDB or Assimp. It is a library of its own
 // (rapid_deferred), which is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols takes
-// 40 ms at each start, and a scene without level sets, meshes from files and .vdb needs none of them.
+// 40 ms at each start, and a scene without meshes from files, .vdb and tools of level sets needs none of them.
 //
 // A function is declared in the header of its subject:
 //
-//   RAPID_DEFERRED(level_set_sphere, LevelSetPtr(double radius));
+//   RAPID_DEFERRED(offset_level_set, LevelSetPtr(const LevelSetPtr& shape, double metres));
 //
 // and defined in a source that includes OpenVDB or Assimp, and so belongs to the deferred part (RapidLayer.cmake):
 //
-//   LevelSetPtr sphere(double radius) { ... }
-//   RAPID_DEFINE(level_set_sphere, sphere);
+//   LevelSetPtr offset(const LevelSetPtr& shape, double metres) { ... }
+//   RAPID_DEFINE(offset_level_set, offset);
 #pragma once
 
 #include <atomic>

@@ -1,51 +1,35 @@
-// Copies the tree of a level set into the flat table of a BakedGrid.
+#include "runtime/shapes/level_set/bake.h"
+
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
-
-#include "runtime/shapes/level_set/level_set_grid.h"
+#include <cmath>
+#include <utility>
 
 namespace rapid {
 namespace {
 
-using openvdb::Coord;
-using openvdb::FloatGrid;
-using openvdb::FloatTree;
-using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with the tree*/ false>;
+using Place = BlockTable::Place;
 
 constexpr int block = BakedGrid::block, edge = BakedGrid::edge;
 
-// A block of the tree: a leaf's values, or one value.
-struct Source {
-    const float* values = nullptr;
-    float constant = 0;
-
-    float at(int i, int j, int k) const { return values ? values[(i * block + j) * block + k] : constant; }
-};
-
-Source source_at(const Accessor& accessor, const Coord& origin)
+// The block at a place and its seven upper neighbours: bit 2 of the index is +x, bit 1 +y, bit 0 +z.
+std::array<BlockValues, 8> neighbourhood(const BlockTable::Reader& at, const Place& place)
 {
-    if (const auto* leaf = accessor.probeConstLeaf(origin)) return {leaf->buffer().data(), 0};
-    return {nullptr, accessor.getValue(origin)};
+    std::array<BlockValues, 8> blocks;
+    for (int n = 0; n < 8; ++n) blocks[n] = at(place + Place(n >> 2, n >> 1 & 1, n & 1));
+    return blocks;
 }
 
-// The block at `origin` and its seven upper neighbours: bit 2 of the index is +x, bit 1 +y, bit 0 +z.
-std::array<Source, 8> neighbourhood(const Accessor& accessor, const Coord& origin)
-{
-    std::array<Source, 8> sources;
-    for (int n = 0; n < 8; ++n)
-        sources[n] = source_at(accessor, origin.offsetBy((n & 4) * 2, (n & 2) * 4, (n & 1) * 8));
-    return sources;
-}
-
-void copy_block(const std::array<Source, 8>& sources, float* into)
+void copy_block(const std::array<BlockValues, 8>& blocks, float* into)
 {
     for (int i = 0; i < edge; ++i)
         for (int j = 0; j < edge; ++j)
             for (int k = 0; k < edge; ++k)
-                *into++ = sources[(i >> 3) << 2 | (j >> 3) << 1 | k >> 3].at(i & 7, j & 7, k & 7);
+                *into++ = blocks[(i >> 3) << 2 | (j >> 3) << 1 | k >> 3].at(i & 7, j & 7, k & 7);
 }
 
 // Figures of the field from the cells of some blocks.
@@ -130,17 +114,16 @@ void count_blocks_between(BakedGrid& baked)
 
 class Baker {
 public:
-    explicit Baker(const FloatGrid& grid) : grid_(grid), tree_(grid.tree())
+    explicit Baker(const BlockTable& blocks) : blocks_(blocks)
     {
-        baked_.voxel = grid.voxelSize()[0];
-        baked_.background = grid.background();
+        baked_.voxel = blocks.voxel;
+        baked_.background = blocks.background;
     }
 
     BakedGrid bake()
     {
-        openvdb::CoordBBox leaves;
-        if (!tree_.evalLeafBoundingBox(leaves)) return baked_;
-        cover(leaves);
+        if (blocks_.with_values.isEmpty()) return baked_;
+        cover();
         find_leaves();
         number_varying_blocks();
         count_blocks_between(baked_);
@@ -155,53 +138,46 @@ public:
     }
 
 private:
-    // Blocks below the lowest leaves hold the cells between them and the constant beyond.
-    void cover(const openvdb::CoordBBox& leaves)
+    // Blocks below the lowest with values hold the cells between them and the constant beyond.
+    void cover()
     {
-        low_ = leaves.min().offsetBy(-block);
-        const auto blocks = [&](int axis) { return (leaves.max()[axis] + 1 - low_[axis]) / block; };
-        baked_.blocks = {blocks(0), blocks(1), blocks(2)};
-        const auto corner = grid_.indexToWorld(low_);
-        baked_.origin = {corner[0], corner[1], corner[2]};
+        low_ = blocks_.with_values.min() - Place::Ones();
+        baked_.blocks = blocks_.with_values.max() - low_ + Place::Ones();
+        baked_.origin = blocks_.to_world((block * low_).cast<double>());
         in_slab_ = std::size_t(baked_.blocks.y()) * baked_.blocks.z();
         baked_.index.resize(in_slab_ * baked_.blocks.x());
         is_leaf_.resize(baked_.index.size());
         varying_.assign(baked_.blocks.x() + 1, 0);
     }
 
-    Eigen::Vector3i position(std::size_t b) const
+    Place position(std::size_t b) const
     {
         const std::size_t in = b % in_slab_, n_z = std::size_t(baked_.blocks.z());
         return {static_cast<int>(b / in_slab_), static_cast<int>(in / n_z), static_cast<int>(in % n_z)};
     }
-    Coord block_origin(std::size_t b) const
-    {
-        const Eigen::Vector3i at = block * position(b);
-        return low_.offsetBy(at.x(), at.y(), at.z());
-    }
 
-    // Calls f(block, accessor) for all blocks, slabs of x in parallel.
+    // Calls f(block, reader) for all blocks, slabs of x in parallel.
     template <class F>
     void for_each_block(const F& f) const
     {
         tbb::parallel_for(0, baked_.blocks.x(), [&](int x) {
-            const Accessor accessor(tree_);
-            for (std::size_t b = x * in_slab_; b < (x + 1) * in_slab_; ++b) f(b, accessor);
+            const BlockTable::Reader reader = blocks_.reader();
+            for (std::size_t b = x * in_slab_; b < (x + 1) * in_slab_; ++b) f(b, reader);
         });
     }
 
     void find_leaves()
     {
-        for_each_block([&](std::size_t b, const Accessor& accessor) {
-            const Source source = source_at(accessor, block_origin(b));
-            is_leaf_[b] = source.values != nullptr;
-            baked_.index[b] = source.at(0, 0, 0) < 0 ? BakedGrid::inside : BakedGrid::outside;
+        for_each_block([&](std::size_t b, const BlockTable::Reader& at) {
+            const BlockValues here = at(low_ + position(b));
+            is_leaf_[b] = here.values != nullptr;
+            baked_.index[b] = here.at(0, 0, 0) < 0 ? BakedGrid::inside : BakedGrid::outside;
         });
     }
 
     bool has_leaf_above(std::size_t b) const
     {
-        const Eigen::Vector3i at = position(b), &n = baked_.blocks;
+        const Place at = position(b), &n = baked_.blocks;
         for (int k = 1; k < 8; ++k) {
             const int x = at.x() + (k >> 2), y = at.y() + (k >> 1 & 1), z = at.z() + (k & 1);
             if (x < n.x() && y < n.y() && z < n.z() && is_leaf_[(std::size_t(x) * n.y() + y) * n.z() + z]) return true;
@@ -213,11 +189,11 @@ private:
     // of x is numbered by itself, and moved up by those before it later: the numbers depend on the grid alone.
     void number_varying_blocks()
     {
-        for_each_block([&](std::size_t b, const Accessor& accessor) {
+        for_each_block([&](std::size_t b, const BlockTable::Reader& at) {
             bool varies = is_leaf_[b];
             if (!varies && has_leaf_above(b)) {
                 std::array<float, BakedGrid::block_values> values;
-                copy_block(neighbourhood(accessor, block_origin(b)), values.data());
+                copy_block(neighbourhood(at, low_ + position(b)), values.data());
                 varies = std::any_of(values.begin(), values.end(), [&](float v) { return v != values[0]; });
             }
             if (varies) baked_.index[b] = varying_[b / in_slab_ + 1]++;
@@ -231,12 +207,12 @@ private:
         return tbb::parallel_deterministic_reduce(
             tbb::blocked_range<int>(0, baked_.blocks.x()), Survey(),
             [&](const tbb::blocked_range<int>& slabs, Survey sum) {
-                const Accessor accessor(tree_);
+                const BlockTable::Reader at = blocks_.reader();
                 for (std::size_t b = slabs.begin() * in_slab_; b < slabs.end() * in_slab_; ++b) {
                     if (baked_.index[b] < 0) continue;
                     baked_.index[b] += varying_[b / in_slab_];
                     float* values = baked_.values.data() + std::size_t(baked_.index[b]) * BakedGrid::block_values;
-                    copy_block(neighbourhood(accessor, block_origin(b)), values);
+                    copy_block(neighbourhood(at, low_ + position(b)), values);
                     sum.join(survey_block(values, block * position(b)));
                 }
                 return sum;
@@ -247,17 +223,16 @@ private:
             });
     }
 
-    const FloatGrid& grid_;
-    const FloatTree& tree_;
+    const BlockTable& blocks_;
     BakedGrid baked_;
-    Coord low_;                          // the lowest voxel
+    Place low_ = Place::Zero();          // the lowest block
     std::size_t in_slab_ = 0;            // blocks of one x
-    std::vector<std::uint8_t> is_leaf_;  // by block
+    std::vector<std::uint8_t> is_leaf_;  // by block: it has values
     std::vector<std::int32_t> varying_;  // blocks with values in the slabs before x, shape [blocks x + 1]
 };
 
 }  // namespace
 
-BakedGrid bake(const FloatGrid& grid) { return Baker(grid).bake(); }
+BakedGrid bake(const BlockTable& blocks) { return Baker(blocks).bake(); }
 
 }  // namespace rapid

@@ -8,7 +8,7 @@
 // few steps.
 //
 // Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes a block, 1.4 times the leaf that
-// it copies (which is kept, for building and for files). index, shape [blocks x, y, z], z fastest, covers the box
+// it copies. index, shape [blocks x, y, z], z fastest, covers the box
 // around the band: 4 bytes for each 8^3 voxels, empty or not.
 #pragma once
 

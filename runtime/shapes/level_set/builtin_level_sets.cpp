@@ -1,22 +1,21 @@
 // Built-in level sets, from formulas of their distance: exact at every voxel of the band.
 #include <fmt/format.h>
-#include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <span>
 
 #include "runtime/error.h"
-#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/baked_level_set.h"
+#include "runtime/shapes/level_set/buildable.h"
+#include "runtime/shapes/level_set/voxel_blocks.h"
 
 namespace rapid {
 namespace {
-
-using openvdb::Coord;
-using openvdb::FloatGrid;
-using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double pi = std::numbers::pi;
 
@@ -29,83 +28,76 @@ struct Formula {
     double thickness;  // m, of its thinnest part
 };
 
-// The leaves that the band may touch: an octree down to the size of a leaf, without the cubes whose centre is farther
-// from the surface than the band and their half diagonal.
-void find_leaves(const Formula& formula, const openvdb::math::Transform& transform, double half_width,
-                 const Coord& origin, int size, std::vector<Coord>& found)
+// The blocks that the band may touch: an octree down to their size, without the cubes whose centre is farther from the
+// surface than the band and their half diagonal. Coordinates in blocks.
+void find_blocks(const Formula& formula, const VoxelFrame& frame, double half_width, const VoxelBlocks::Place& lowest,
+                 int size, std::vector<VoxelBlocks::Place>& found)
 {
-    const double voxel = transform.voxelSize()[0], half = 0.5 * size;
-    const auto c = transform.indexToWorld(openvdb::Vec3d(origin.x() + half, origin.y() + half, origin.z() + half));
-    if (std::abs(formula.distance({c[0], c[1], c[2]})) > half_width + std::numbers::sqrt3 * half * voxel) return;
-    if (size == Leaf::DIM) {
-        found.push_back(origin);
+    const double half = 0.5 * VoxelBlocks::edge * size;  // voxels
+    const Vec3d center = frame.to_world((VoxelBlocks::edge * lowest).cast<double>() + Vec3d::Constant(half));
+    if (std::abs(formula.distance(center)) > half_width + std::numbers::sqrt3 * half * frame.voxel) return;
+    if (size == 1) {
+        found.push_back(lowest);
         return;
     }
     const int h = size / 2;
     for (int n = 0; n < 8; ++n)
-        find_leaves(formula, transform, half_width, origin.offsetBy((n & 4 ? h : 0), (n & 2 ? h : 0), (n & 1 ? h : 0)),
-                    h, found);
+        find_blocks(formula, frame, half_width, lowest + h * VoxelBlocks::Place(n >> 2, n >> 1 & 1, n & 1), h, found);
 }
 
-// Null where no voxel of the leaf is in the band.
-std::unique_ptr<Leaf> fill_leaf(const Formula& formula, const openvdb::math::Transform& transform, float half_width,
-                                const Coord& origin)
-{
-    auto leaf = std::make_unique<Leaf>(origin, half_width);
-    for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-        const auto P = transform.indexToWorld(leaf->offsetToGlobalCoord(n));
-        const float phi = static_cast<float>(formula.distance({P[0], P[1], P[2]}));
-        if (std::abs(phi) < half_width)
-            leaf->setValueOn(n, phi);
-        else
-            leaf->setValueOff(n, std::copysign(half_width, phi));
-    }
-    return leaf->isEmpty() ? nullptr : std::move(leaf);
-}
-
-FloatGrid::Ptr build(const Formula& formula, const LevelSetOptions& options)
+VoxelBlocks measure(const Formula& formula, const LevelSetOptions& options)
 {
     require_buildable(formula.what, formula.area, formula.bounds, options);
-    initialize_openvdb();
-    const auto transform = make_transform(options.voxel, formula.bounds);
-    const double half_width = options.half_width * options.voxel;
+    constexpr int edge = VoxelBlocks::edge;
+    VoxelBlocks blocks{frame_around(formula.bounds, options.voxel), options.half_width * options.voxel, {}, {}, {}};
+    const VoxelFrame& frame = blocks.frame;
 
-    const Box3d band(formula.bounds.min().array() - half_width, formula.bounds.max().array() + half_width);
-    const auto low = transform->worldToIndexNodeCentered({band.min().x(), band.min().y(), band.min().z()});
-    const auto high = transform->worldToIndexNodeCentered({band.max().x(), band.max().y(), band.max().z()});
-    const Coord origin = low.offsetBy(-1) & ~(Leaf::DIM - 1);
-    const Coord across = high - origin;
-    int size = Leaf::DIM;
-    while (size <= std::max({across.x(), across.y(), across.z()})) size *= 2;
+    const auto block_of = [&](const Vec3d& P) {
+        return VoxelBlocks::Place((frame.to_voxels(P) / edge).array().floor().matrix().cast<int>());
+    };
+    const Vec3d beyond = Vec3d::Constant(blocks.half_width + frame.voxel);
+    const VoxelBlocks::Place low = block_of(formula.bounds.min() - beyond);
+    const VoxelBlocks::Place across = block_of(formula.bounds.max() + beyond) - low;
+    std::vector<VoxelBlocks::Place> found;
+    find_blocks(formula, frame, blocks.half_width, low,
+                static_cast<int>(std::bit_ceil(static_cast<unsigned>(across.maxCoeff() + 1))), found);
+    std::ranges::sort(found, [](const auto& a, const auto& b) { return std::ranges::lexicographical_compare(a, b); });
 
-    std::vector<Coord> origins;
-    find_leaves(formula, *transform, half_width, origin, size, origins);
-    std::vector<std::unique_ptr<Leaf>> leaves(origins.size());
-    tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
-        leaves[i] = fill_leaf(formula, *transform, static_cast<float>(half_width), origins[i]);
+    blocks.resize(found.size());
+    blocks.places = std::move(found);
+    const float background = blocks.background();
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+        const std::span<float, VoxelBlocks::voxels> values = blocks.of(b);
+        const VoxelBlocks::Place lowest = edge * blocks.places[b];
+        for (int v = 0; v < int(VoxelBlocks::voxels); ++v) {
+            const VoxelBlocks::Place voxel = lowest + VoxelBlocks::Place(v / (edge * edge), v / edge % edge, v % edge);
+            const auto phi = static_cast<float>(formula.distance(frame.to_world(voxel.cast<double>())));
+            const bool is_near = std::abs(phi) < background;
+            values[v] = is_near ? phi : std::copysign(background, phi);
+            if (is_near) VoxelBlocks::mark(blocks.in_band[b], v);
+        }
     });
-
-    auto grid = FloatGrid::create(static_cast<float>(half_width));
-    grid->setTransform(transform);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    grid->setName("surface");
-    for (std::unique_ptr<Leaf>& leaf : leaves)
-        if (leaf) grid->tree().addLeaf(leaf.release());
-    openvdb::tools::signedFloodFill(grid->tree());
-    return grid;
+    blocks.drop_empty([](std::size_t, std::size_t) {});
+    return blocks;
 }
 
-LevelSetPtr make_level_set(Formula formula, const LevelSetOptions& options)
+LevelSetPtr level_set_of(const Formula& formula, const LevelSetOptions& options)
+{
+    const VoxelBlocks blocks = measure(formula, options);
+    const auto grid = [=] { return grid_of_blocks(measure(formula, options)); };
+    const auto rebuild = [formula, voxel = options.voxel](double half_width) {
+        return level_set_of(formula, {voxel, half_width / voxel});
+    };
+    return std::make_shared<BakedLevelSet>(bake(blocks), blocks.voxels_in_band(), BakedLevelSet::Source{grid, rebuild});
+}
+
+LevelSetPtr make_level_set(const Formula& formula, const LevelSetOptions& options)
 {
     require_legal(options);
     if (formula.thickness < options.voxel)
         throw Error(fmt::format("{} vanishes with voxel = {:g} m: it is {:g} m thick; use a voxel of at most {:.3g} m",
                                 formula.what, options.voxel, formula.thickness, formula.thickness / 2));
-    auto grid = build(formula, options);
-    const double voxel = options.voxel;
-    return std::make_shared<GridLevelSet>(std::move(grid), [formula = std::move(formula), voxel](double half_width) {
-        return build(formula, {voxel, half_width / voxel});
-    });
+    return level_set_of(formula, options);
 }
 
 void require_length(const char* shape, const char* name, double value)
@@ -116,7 +108,9 @@ void require_length(const char* shape, const char* name, double value)
 
 Box3d box_around(const Vec3d& center, const Vec3d& half) { return {center - half, center + half}; }
 
-LevelSetPtr sphere(double radius, const Vec3d& center, const LevelSetOptions& options)
+}  // namespace
+
+LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetOptions& options)
 {
     require_length("sphere", "radius", radius);
     return make_level_set({fmt::format("a level set sphere of radius {:g} m", radius),
@@ -125,7 +119,7 @@ LevelSetPtr sphere(double radius, const Vec3d& center, const LevelSetOptions& op
                           options);
 }
 
-LevelSetPtr box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options)
+LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options)
 {
     for (int axis = 0; axis < 3; ++axis) require_length("box", "size", size[axis]);
     const Vec3d half = size / 2;
@@ -139,7 +133,7 @@ LevelSetPtr box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& o
                           options);
 }
 
-LevelSetPtr torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options)
+LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options)
 {
     require_length("torus", "radius", radius);
     require_length("torus", "tube", tube);
@@ -156,9 +150,4 @@ LevelSetPtr torus(double radius, double tube, const Vec3d& center, const LevelSe
         options);
 }
 
-RAPID_DEFINE(level_set_sphere, sphere);
-RAPID_DEFINE(level_set_box, box);
-RAPID_DEFINE(level_set_torus, torus);
-
-}  // namespace
 }  // namespace rapid

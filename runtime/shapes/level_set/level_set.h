@@ -1,7 +1,7 @@
 // A narrow-band level set: the general shape that particles collide with (paper §4).
 //
-// The grid is OpenVDB's, for building and for files; queries run on a flat copy of its leaves behind a coarse index
-// (baked_grid.h), because a sample of the tree costs several times more. OpenVDB stays out of this header.
+// Queries run on a flat table of its blocks behind a coarse index (baked_grid.h), because a sample of OpenVDB's tree
+// costs several times more. Its grid is for tools and files, and is made when one asks for it (grid_on_demand.h).
 #pragma once
 
 #include <filesystem>
@@ -36,20 +36,18 @@ public:
 using LevelSetPtr = std::shared_ptr<const LevelSet>;
 
 // Inside is where the winding number of the mesh is not 0: pieces may overlap, and one that faces inwards inside
-// another is a cavity. Holes smaller than a voxel are closed (see level_set_grid.h).
+// another is a cavity. Holes smaller than a voxel are closed (see grid_on_demand.h).
 //
 // `warnings` collects what is doubtful but usable (a mesh with holes, faces turned inside out), with the numbers.
 // Errors: a voxel size that would take over 2^31 voxels, or that is larger than the mesh (which would vanish), an empty
 // mesh.
-RAPID_DEFERRED(level_set_from_mesh,
-               LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings));
+LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options,
+                                std::vector<std::string>& warnings);
 // Of a mesh with the faces of an earlier one, whose openness is known; without its checks and warnings.
-RAPID_DEFERRED(level_set_of_same_faces,
-               LevelSetPtr(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open));
-RAPID_DEFERRED(level_set_sphere, LevelSetPtr(double radius, const Vec3d& center, const LevelSetOptions& options));
-RAPID_DEFERRED(level_set_box, LevelSetPtr(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options));
-RAPID_DEFERRED(level_set_torus,
-               LevelSetPtr(double radius, double tube, const Vec3d& center, const LevelSetOptions& options));
+LevelSetPtr level_set_of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open);
+LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetOptions& options);
+LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options);
+LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options);
 
 // grid: empty for the only level set in the file. Error: no such file, not a .vdb, no such grid (with the names that
 // there are), not a float level set, an empty grid, a map that is not uniform scale and translation.

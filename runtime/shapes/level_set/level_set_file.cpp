@@ -76,21 +76,20 @@ LevelSetPtr level_set_of_file(const std::filesystem::path& path, const std::stri
         throw Error(
             fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));
 
-    auto level_set =
-        std::make_shared<GridLevelSet>(grid, [grid](double half_width) { return widened(*grid, half_width); });
+    const auto level_set = level_set_of(grid, [grid](double half_width) { return widened(*grid, half_width); });
     if (!level_set->has_surface())
         throw Error(fmt::format("grid \"{}\" of \"{}\" has {} active voxels and no surface; a level set changes sign",
                                 grid->getName(), path.string(), grid->activeVoxelCount()));
     return level_set;
 }
 
-RAPID_DEFINE(read_level_set, level_set_of_file);
-
-}  // namespace
-
-void GridLevelSet::write(const std::filesystem::path& path, const std::string& name) const
+void write_to(const LevelSetGrid& grid, const std::filesystem::path& path, const std::string& name)
 {
-    write_archive(path, {named_grid(*grid_, name)});
+    write_archive(path, {named_grid(*grid.grid, name)});
 }
 
+RAPID_DEFINE(read_level_set, level_set_of_file);
+RAPID_DEFINE(write_level_set_grid, write_to);
+
+}  // namespace
 }  // namespace rapid

@@ -5,28 +5,36 @@
 #include <numeric>
 
 #include "runtime/error.h"
-#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/baked_level_set.h"
+#include "runtime/shapes/level_set/buildable.h"
+#include "runtime/shapes/level_set/mesh_blocks.h"
 
 namespace rapid {
 namespace {
 
-using openvdb::FloatGrid;
-
-FloatGrid::Ptr build(const Mesh& mesh, bool balanced, const LevelSetOptions& options)
+std::shared_ptr<const BakedLevelSet> build(const MeshPtr& mesh, bool balanced, const LevelSetOptions& options)
 {
-    const Box3d bounds = mesh.bounds().cast<double>();
+    const Box3d bounds = mesh->bounds().cast<double>();
     constexpr double far = 2147483648.0;  // voxels; their whole numbers are exact, and OpenVDB's maps can be inverted
     if (const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff();
         !(farthest <= far * options.voxel))
         throw Error(
             fmt::format("mesh \"{}\" reaches {:g} m from the origin, more than 2^31 voxels of {:g} m; put it "
                         "nearer, and move what is made of it",
-                        mesh.name, farthest, options.voxel));
-    require_buildable(fmt::format("mesh \"{}\"", mesh.name), mesh.area(), bounds, options);
-    const auto transform = make_transform(options.voxel, bounds);
-    auto grid = signed_distance(mesh, balanced, *transform, options.half_width * options.voxel);
-    grid->setName("surface");
-    return grid;
+                        mesh->name, farthest, options.voxel));
+    require_buildable(fmt::format("mesh \"{}\"", mesh->name), mesh->area(), bounds, options);
+    const VoxelFrame frame = frame_around(bounds, options.voxel);
+    const double half_width = options.half_width * options.voxel;
+    const auto rebuild = [mesh, balanced, voxel = options.voxel](double wide) {
+        return build(mesh, balanced, {voxel, wide / voxel});
+    };
+    if (!balanced || half_width > MeshBlocks::widest * frame.voxel)
+        return level_set_of_grid(grid_of_mesh(*mesh, balanced, frame, half_width), rebuild);
+    const MeshBlocks measured = measure(*mesh, frame, half_width);
+    if (measured.overlap) return level_set_of_grid(grid_without_faces_inside(measured), rebuild);
+    const auto grid = [=] { return grid_of_blocks(measure(*mesh, frame, half_width).blocks); };
+    return std::make_shared<BakedLevelSet>(bake(measured.blocks), measured.blocks.voxels_in_band(),
+                                           BakedLevelSet::Source{grid, rebuild});
 }
 
 // The bounds of the connected parts of a mesh.
@@ -82,13 +90,12 @@ void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& o
                         options.voxel, mesh.name, size, size / 30));
 }
 
-LevelSetPtr of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)
+}  // namespace
+
+LevelSetPtr level_set_of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open)
 {
     const bool balanced = open.unbalanced_edges == 0;
-    const auto rebuild = [mesh, balanced, voxel = options.voxel](double half_width) {
-        return build(*mesh, balanced, {voxel, half_width / voxel});
-    };
-    auto level_set = std::make_shared<GridLevelSet>(build(*mesh, balanced, options), rebuild);
+    const auto level_set = build(mesh, balanced, options);
     if (!level_set->has_surface()) {
         if (!balanced)
             throw Error(
@@ -108,21 +115,15 @@ LevelSetPtr of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, c
     return level_set;
 }
 
-LevelSetPtr from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
+LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options, std::vector<std::string>& warnings)
 {
     require_legal(options);
     if (mesh->triangles.empty())
         throw Error(fmt::format("mesh \"{}\" has no faces; a level set needs a closed surface", mesh->name));
-    initialize_openvdb();
-
     const Mesh::Openness open = mesh->openness();
-    LevelSetPtr level_set = of_same_faces(mesh, options, open);
+    LevelSetPtr level_set = level_set_of_same_faces(mesh, options, open);
     warn(*mesh, open, options, warnings);
     return level_set;
 }
 
-RAPID_DEFINE(level_set_from_mesh, from_mesh);
-RAPID_DEFINE(level_set_of_same_faces, of_same_faces);
-
-}  // namespace
 }  // namespace rapid

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "runtime/error.h"
+#include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 
@@ -62,7 +63,7 @@ LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius,
         require_buildable(fmt::format("a level set of {} points", balls->size()), area, bounds,
                           {voxel, half_width / voxel});
         auto grid = FloatGrid::create(static_cast<float>(half_width));
-        grid->setTransform(make_transform(voxel, bounds));
+        grid->setTransform(transform_of(frame_around(bounds, voxel)));
         grid->setGridClass(openvdb::GRID_LEVEL_SET);
         grid->setName("surface");
         openvdb::tools::ParticlesToLevelSet<FloatGrid> rasterizer(*grid);
@@ -71,7 +72,7 @@ LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius,
         openvdb::tools::pruneLevelSet(grid->tree());
         return grid;
     };
-    return std::make_shared<GridLevelSet>(build(options.half_width * voxel), build);
+    return level_set_of(build(options.half_width * voxel), build);
 }
 
 RAPID_DEFINE(level_set_from_points, from_points);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/error.h"
+#include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 #include "runtime/shapes/level_set/placed.h"
@@ -24,7 +25,7 @@ double area_of(const FloatGrid& grid)
 // The grid of a level set, with its rotation if it has one.
 FloatGrid::ConstPtr grid_in_world(const LevelSetPtr& shape)
 {
-    if (const auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid->shared_grid();
+    if (const auto grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape)) return grid->grid()->grid;
     const auto& turned = dynamic_cast<const PlacedLevelSet&>(*shape);
     const FloatGrid::ConstPtr rest = grid_in_world(turned.rest());
     const Eigen::Matrix4d pose = turned.pose().affine().matrix();
@@ -76,9 +77,9 @@ LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
             voxel, size.x(), size.y(), size.z(), size.minCoeff() / 3));
     // Before OpenVDB refuses the voxel size.
     require_buildable("the resampled level set", area_of(*grid_in_world(shape)), shape->bounds(), {voxel, half_width});
-    const auto transform = make_transform(voxel, shape->bounds());
+    const auto transform = transform_of(frame_around(shape->bounds(), voxel));
     const auto build = [=](double metres) { return resampled_to(shape, *transform, metres); };
-    return std::make_shared<GridLevelSet>(build(half_width * voxel), build);
+    return level_set_of(build(half_width * voxel), build);
 }
 
 RAPID_DEFINE(resample_level_set, resampled);

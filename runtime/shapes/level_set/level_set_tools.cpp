@@ -20,7 +20,6 @@ namespace {
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
-using GridPtr = std::shared_ptr<const GridLevelSet>;
 
 // Voxel sizes that differ by a smaller part are equal but for rounding.
 constexpr double same_size = 1e-6;
@@ -28,16 +27,16 @@ constexpr double same_size = 1e-6;
 constexpr double same_place = 1e-4;
 
 // On voxels along the axes: a rotated level set is resampled.
-GridPtr on_axes(const LevelSetPtr& shape)
+BakedPtr on_axes(const LevelSetPtr& shape)
 {
-    if (auto grid = std::dynamic_pointer_cast<const GridLevelSet>(shape)) return grid;
-    return std::dynamic_pointer_cast<const GridLevelSet>(resample_level_set(shape, shape->voxel()));
+    if (auto grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape)) return grid;
+    return std::dynamic_pointer_cast<const BakedLevelSet>(resample_level_set(shape, shape->voxel()));
 }
 
-LevelSetPtr finished(FloatGrid::Ptr grid, GridLevelSet::Rebuild rebuild, const std::string& what)
+LevelSetPtr finished(FloatGrid::Ptr grid, RebuildGrid rebuild, const std::string& what)
 {
     grid->setName("surface");
-    auto result = std::make_shared<GridLevelSet>(std::move(grid), std::move(rebuild));
+    auto result = level_set_of(std::move(grid), std::move(rebuild));
     if (!result->has_surface()) throw Error(fmt::format("nothing is left of {}", what));
     return result;
 }
@@ -89,23 +88,23 @@ FloatGrid::Ptr rebanded(const FloatGrid& grid, double shift, double half_width)
 // The level set on the voxels of `like`, with a band of exactly `half_width` metres.
 FloatGrid::Ptr aligned(const LevelSetPtr& shape, const FloatGrid& like, double half_width)
 {
-    const GridPtr grid = std::dynamic_pointer_cast<const GridLevelSet>(shape);
+    const BakedPtr grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape);
     const double voxel = like.voxelSize()[0];
     if (!grid || std::abs(grid->voxel() - voxel) > same_size * voxel)
         return resampled_to(shape, like.transform(), half_width);
-    const openvdb::Vec3d place = like.worldToIndex(grid->grid().indexToWorld(Coord(0)));
+    const openvdb::Vec3d place = like.worldToIndex(grid_of(*grid).indexToWorld(Coord(0)));
     const Coord whole = Coord::round(place);
     const openvdb::Vec3d off = place - whole.asVec3d();
     if (std::max({std::abs(off[0]), std::abs(off[1]), std::abs(off[2])}) > same_place)
         return resampled_to(shape, like.transform(), half_width);
-    const auto wide = std::static_pointer_cast<const GridLevelSet>(grid->with_band(half_width));
-    return rebanded(wide->grid(), like.transform(), 1, 0, half_width, whole);
+    const auto wide = std::static_pointer_cast<const BakedLevelSet>(grid->with_band(half_width));
+    return rebanded(grid_of(*wide), like.transform(), 1, 0, half_width, whole);
 }
 
-FloatGrid::Ptr combine(const GridPtr& a, const LevelSetPtr& b, Combine how, double half_width)
+FloatGrid::Ptr combine(const BakedPtr& a, const LevelSetPtr& b, Combine how, double half_width)
 {
-    const auto wide = std::static_pointer_cast<const GridLevelSet>(a->with_band(half_width));
-    const FloatGrid::Ptr first = rebanded(wide->grid(), 0, half_width), second = aligned(b, *first, half_width);
+    const auto wide = std::static_pointer_cast<const BakedLevelSet>(a->with_band(half_width));
+    const FloatGrid::Ptr first = rebanded(grid_of(*wide), 0, half_width), second = aligned(b, *first, half_width);
     switch (how) {
         case Combine::Union:
             return openvdb::tools::csgUnionCopy(*first, *second);
@@ -124,7 +123,7 @@ LevelSetPtr combined(const LevelSetPtr& a, const LevelSetPtr& b, Combine how, st
             fmt::format("the second level set has a voxel of {:g} m and the first of {:g} m; it is "
                         "resampled to that (:resample says which is wanted)",
                         b->voxel(), a->voxel()));
-    const GridPtr first = on_axes(a);
+    const BakedPtr first = on_axes(a);
     const auto build = [=](double half_width) { return combine(first, b, how, half_width); };
     const char* what = how == Combine::Union       ? "the union"
                        : how == Combine::Intersect ? "the intersection; the two do not overlap"
@@ -139,10 +138,10 @@ LevelSetPtr offset(const LevelSetPtr& shape, double metres)
         fmt::format("the level set {:g} m inwards; its size is {:.3g} x {:.3g} x {:.3g} m", -metres,
                     shape->bounds().sizes().x(), shape->bounds().sizes().y(), shape->bounds().sizes().z());
     if (-metres > shape->bounds().sizes().minCoeff() / 2) throw Error(fmt::format("nothing is left of {}", what));
-    const GridPtr grid = on_axes(shape);
+    const BakedPtr grid = on_axes(shape);
     const auto build = [=](double half_width) {
         const double reach = half_width + std::abs(metres) + grid->voxel();
-        return rebanded(std::static_pointer_cast<const GridLevelSet>(grid->with_band(reach))->grid(), metres,
+        return rebanded(grid_of(*std::static_pointer_cast<const BakedLevelSet>(grid->with_band(reach))), metres,
                         half_width);
     };
     return finished(build(grid->band()), build, what);
@@ -150,8 +149,8 @@ LevelSetPtr offset(const LevelSetPtr& shape, double metres)
 
 LevelSetPtr smoothed(const LevelSetPtr& shape, int width, int iterations)
 {
-    const GridPtr source = on_axes(shape);
-    const FloatGrid::Ptr grid = source->grid().deepCopy();
+    const BakedPtr source = on_axes(shape);
+    const FloatGrid::Ptr grid = grid_of(*source).deepCopy();
     openvdb::tools::LevelSetFilter<FloatGrid> filter(*grid);
     for (int i = 0; i < iterations; ++i) filter.gaussian(width);
     return finished(
@@ -164,16 +163,16 @@ LevelSetPtr moved(const LevelSetPtr& shape, const Pose& pose)
     if (const auto turned = std::dynamic_pointer_cast<const PlacedLevelSet>(shape))
         return std::make_shared<PlacedLevelSet>(turned->rest(), pose * turned->pose());
     if (!pose.rotation.vec().isZero(0)) return std::make_shared<PlacedLevelSet>(shape, pose);
-    const GridPtr grid = std::dynamic_pointer_cast<const GridLevelSet>(shape);
+    const BakedPtr grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape);
     if (const double voxel = pose.scale * grid->voxel(); !(voxel >= least_voxel))
         throw Error(fmt::format("the scaled level set would have voxels of {:g} m; they must be at least {:g} m", voxel,
                                 least_voxel));
-    auto transform = grid->grid().transform().copy();
+    auto transform = grid_of(*grid).transform().copy();
     transform->postScale(pose.scale);
     transform->postTranslate({pose.translation.x(), pose.translation.y(), pose.translation.z()});
     const auto build = [=](double half_width) {
-        const auto wide = std::static_pointer_cast<const GridLevelSet>(grid->with_band(half_width / pose.scale));
-        return rebanded(wide->grid(), *transform, pose.scale, 0, half_width);
+        const auto wide = std::static_pointer_cast<const BakedLevelSet>(grid->with_band(half_width / pose.scale));
+        return rebanded(grid_of(*wide), *transform, pose.scale, 0, half_width);
     };
     return finished(build(pose.scale * grid->band()), build, "the moved level set");
 }

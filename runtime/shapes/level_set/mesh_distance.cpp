@@ -1,9 +1,9 @@
 // The signed distance from a mesh, on a grid.
 //
-// In a narrow band the distance is that to the nearest triangle (mesh_band.h). The voxels of a wide one have too many
-// triangles about them to ask each: there it is OpenVDB's, whose triangle may be the wrong one beyond two voxels (by up
-// to 0.7 of a voxel), corrected to a thousandth of a voxel. The sign is that of the winding number. A mesh without one
-// has OpenVDB's distances and signs.
+// In a narrow band it is measured (mesh_blocks.h), and faces inside are left out here. The voxels of a wide one have
+// too many triangles about them to ask each: there the distance is OpenVDB's, whose triangle may be the wrong one
+// beyond two voxels (by up to 0.7 of a voxel), corrected to a thousandth of a voxel. The sign is that of the winding
+// number. A mesh without one has OpenVDB's distances and signs.
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
@@ -19,7 +19,7 @@
 
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
-#include "runtime/shapes/level_set/mesh_band.h"
+#include "runtime/shapes/level_set/mesh_blocks.h"
 #include "runtime/shapes/level_set/prism.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/mesh/ray_crossings.h"
@@ -35,24 +35,13 @@ using Leaf = FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, /*registered with the tree*/ false>;
 using NearestAccessor = openvdb::tree::ValueAccessor<const openvdb::Int32Tree, /*registered with the tree*/ false>;
 
-constexpr double widest_measured = 5;  // voxels
 constexpr std::int32_t no_triangle = -1;
 
 Vec3d center(const Coord& voxel) { return {double(voxel.x()), double(voxel.y()), double(voxel.z())}; }
 
 // A mesh in voxels.
 struct InVoxels {
-    std::shared_ptr<Mesh> mesh = std::make_shared<Mesh>();
-
-    InVoxels(const Mesh& world, const openvdb::math::Transform& transform)
-    {
-        mesh->triangles = world.triangles;
-        mesh->positions.reserve(world.positions.size());
-        for (const Vec3f& P : world.positions) {
-            const openvdb::Vec3d there = transform.worldToIndex(openvdb::Vec3d(P.x(), P.y(), P.z()));
-            mesh->positions.push_back(Vec3d(there.x(), there.y(), there.z()).cast<float>());
-        }
-    }
+    MeshPtr mesh;
 
     Vec3d corner(std::int32_t triangle, int k) const
     {
@@ -106,52 +95,18 @@ struct Band {
     }
 };
 
-struct BandBlock {
-    std::unique_ptr<Leaf> distance;
-    std::unique_ptr<openvdb::Int32Tree::LeafNodeType> nearest;
-};
-
-// Empty where no voxel of the block is in the band.
-BandBlock measured_block(const MeshBand& band, std::size_t b, double voxel, float half_width)
+Band measured_band(const MeshBlocks& measured)
 {
-    const Eigen::Vector3i origin = band.origin(b);
-    const Coord lowest(origin.x(), origin.y(), origin.z());
-    BandBlock block = {std::make_unique<Leaf>(lowest, half_width, false),
-                       std::make_unique<openvdb::Int32Tree::LeafNodeType>(lowest, no_triangle, true)};
-    const std::span<std::int32_t, MeshBand::voxels> triangles(block.nearest->buffer().data(), MeshBand::voxels);
-    std::array<float, MeshBand::voxels> far;
-    if (band.measure(b, far, triangles) == 0) return {};
-    float* values = block.distance->buffer().data();
-    for (openvdb::Index v = 0; v < MeshBand::voxels; ++v) {
-        if (triangles[v] < 0) continue;
-        values[v] = far[v] * static_cast<float>(voxel);
-        block.distance->setValueOn(v);
-    }
-    return block;
-}
-
-Band measured_band(const Mesh& mesh, const openvdb::math::Transform& transform, double half_width)
-{
-    static_assert(MeshBand::block == Leaf::DIM && MeshBand::voxels == Leaf::SIZE);
-    const double voxel = transform.voxelSize()[0];
-    const auto distance = FloatGrid::create(static_cast<float>(half_width));
+    using NearestLeaf = openvdb::Int32Tree::LeafNodeType;
+    const VoxelBlocks& blocks = measured.blocks;
     const auto nearest = Int32Grid::create(no_triangle);
-    distance->setTransform(transform.copy());
-    const MeshBand band(mesh, half_width / voxel);
-    std::vector<BandBlock> blocks(band.size());
-    for_each_chunk(
-        band.size(),
-        [&](std::size_t begin, std::size_t end) {
-            for (std::size_t b = begin; b < end; ++b)
-                blocks[b] = measured_block(band, b, voxel, distance->background());
-        },
-        8);
-    for (BandBlock& block : blocks) {
-        if (!block.distance) continue;
-        distance->tree().addLeaf(block.distance.release());
-        nearest->tree().addLeaf(block.nearest.release());
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+        const VoxelBlocks::Place lowest = VoxelBlocks::edge * blocks.places[b];
+        auto leaf = std::make_unique<NearestLeaf>(Coord(lowest.x(), lowest.y(), lowest.z()), no_triangle, true);
+        std::copy_n(measured.nearest.data() + b * VoxelBlocks::voxels, VoxelBlocks::voxels, leaf->buffer().data());
+        nearest->tree().addLeaf(leaf.release());
     }
-    return {distance, nearest};
+    return {tree_of(blocks), nearest};
 }
 
 // A better distance (m) of a voxel, and its triangle.
@@ -271,34 +226,19 @@ Band corrected_band(const InVoxels& mesh, const openvdb::math::Transform& transf
     return band;
 }
 
-// Negative where the winding number is not 0, by whole rows of voxels along x. Returns whether any faces lie inside:
-// with a winding number other than 0 on both their sides.
+// Returns whether any faces lie inside.
 bool sign_by_windings(Band& band, const RayCrossings& faces)
 {
-    std::atomic<bool> overlaps = false;
+    std::atomic<bool> overlap = false;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, band.leaves.size()), [&](const auto& range) {
         std::vector<RayCrossings::Crossing> crossings;
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            Leaf& leaf = *band.leaves[i];
-            const Coord origin = leaf.origin();
-            float* values = leaf.buffer().data();
-            for (int y = 0; y < BakedGrid::block; ++y)
-                for (int z = 0; z < BakedGrid::block; ++z) {
-                    faces.along_x(origin.y() + y, origin.z() + z, crossings);
-                    int windings = 0;
-                    auto beyond = crossings.rbegin();
-                    for (int x = BakedGrid::block - 1; x >= 0; --x) {
-                        for (; beyond != crossings.rend() && beyond->x > origin.x() + x; ++beyond) {
-                            overlaps = overlaps || (windings != 0 && windings + beyond->turn != 0);
-                            windings += beyond->turn;
-                        }
-                        float& value = values[Leaf::coordToOffset(Coord(x, y, z))];
-                        value = std::copysign(value, windings != 0 ? -1.0f : 1.0f);
-                    }
-                }
+            const Coord lowest = band.leaves[i]->origin();
+            const std::span<float, VoxelBlocks::voxels> values(band.leaves[i]->buffer().data(), VoxelBlocks::voxels);
+            if (sign_by_windings(faces, {lowest.x(), lowest.y(), lowest.z()}, values, crossings)) overlap = true;
         }
     });
-    return overlaps;
+    return overlap;
 }
 
 // Where pieces of a mesh overlap, the faces inside are no surface: voxels with such a nearest face take the nearest
@@ -343,22 +283,38 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
             if (*it <= -half_width) it.setValueOff();
 }
 
-}  // namespace
-
-FloatGrid::Ptr signed_distance(const Mesh& world, bool balanced, const openvdb::math::Transform& transform,
-                               double half_width)
+LevelSetGridPtr finished(const FloatGrid::Ptr& grid)
 {
-    const InVoxels mesh(world, transform);
-    if (!balanced)
-        return by_openvdb(*mesh.mesh, transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr);
-    Band band = half_width <= widest_measured * transform.voxelSize()[0]
-                    ? measured_band(*mesh.mesh, transform, half_width)
-                    : corrected_band(mesh, transform, half_width);
-    const RayCrossings faces(mesh.mesh);
-    if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
-    openvdb::tools::signedFloodFill(band.distance->tree());
-    band.distance->setGridClass(openvdb::GRID_LEVEL_SET);
-    return band.distance;
+    openvdb::tools::signedFloodFill(grid->tree());
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setName("surface");
+    return std::make_shared<const LevelSetGrid>(LevelSetGrid{grid});
 }
 
+LevelSetGridPtr without_faces_inside(const MeshBlocks& blocks)
+{
+    initialize_openvdb();
+    Band band = measured_band(blocks);
+    ignore_faces_inside(band, InVoxels{blocks.mesh}, RayCrossings(blocks.mesh));
+    return finished(band.distance);
+}
+
+LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& frame, double half_width)
+{
+    initialize_openvdb();
+    const InVoxels mesh{in_voxels(world, frame)};
+    const auto transform = transform_of(frame);
+    if (!balanced)
+        return finished(
+            by_openvdb(*mesh.mesh, *transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr));
+    Band band = corrected_band(mesh, *transform, half_width);
+    const RayCrossings faces(mesh.mesh);
+    if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
+    return finished(band.distance);
+}
+
+RAPID_DEFINE(grid_without_faces_inside, without_faces_inside);
+RAPID_DEFINE(grid_of_mesh, of_mesh);
+
+}  // namespace
 }  // namespace rapid

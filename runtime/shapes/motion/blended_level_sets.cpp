@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/shapes/motion/moving_contact.h"
 
@@ -15,8 +15,8 @@ constexpr double least_slope2 = 0.25;  // where the gradients of both cancel, th
 class BlendedDistance {
 public:
     explicit BlendedDistance(const BlendedInterval& interval)
-        : a_(std::static_pointer_cast<const GridLevelSet>(interval.a)),
-          b_(std::static_pointer_cast<const GridLevelSet>(interval.b)),
+        : a_(std::static_pointer_cast<const BakedLevelSet>(interval.a)),
+          b_(std::static_pointer_cast<const BakedLevelSet>(interval.b)),
           begin_(interval.begin),
           end_(interval.end),
           duration_(interval.duration),
@@ -97,7 +97,7 @@ private:
         return duration_ > 0 ? begin_ + (end_ - begin_) * std::clamp(time / duration_, 0.0, 1.0) : end_;
     }
 
-    std::shared_ptr<const GridLevelSet> a_, b_;
+    std::shared_ptr<const BakedLevelSet> a_, b_;
     double begin_, end_, duration_, rate_;  // parts of b; s; 1/s
     double travel_;                         // m
 };
@@ -228,12 +228,11 @@ private:
     std::function<std::shared_ptr<const BlendedLevelSets>(double)> widen_;
 };
 
-std::shared_ptr<const BlendedLevelSets> blended(BlendedInterval interval)
+}  // namespace
+
+std::shared_ptr<const BlendedLevelSets> blended_level_sets(BlendedInterval interval)
 {
     return std::make_shared<Blended>(std::move(interval));
 }
 
-RAPID_DEFINE(blended_level_sets, blended);
-
-}  // namespace
 }  // namespace rapid

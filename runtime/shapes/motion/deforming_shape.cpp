@@ -5,7 +5,7 @@
 #include <map>
 #include <mutex>
 
-#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/motion/moving_body.h"
 #include "runtime/shapes/motion/moving_contact.h"
 #include "runtime/shapes/motion/moving_triangles.h"
@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-using GridPtr = std::shared_ptr<const GridLevelSet>;
+using BakedPtr = std::shared_ptr<const BakedLevelSet>;
 
 // The acceleration of a point that keeps to a face, by a difference of velocities, which are polynomials of second
 // degree but for the turning normal; m an interval².
@@ -28,7 +28,7 @@ Vec3d by_difference(const MovingTriangles& faces, const MaterialPoint& point, do
 class DeformingDistance {
 public:
     // begin: null where the interval begins with a jump; then the end's is carried back along the curves.
-    DeformingDistance(GridPtr begin, GridPtr end, MovingTriangles faces, double duration)
+    DeformingDistance(BakedPtr begin, BakedPtr end, MovingTriangles faces, double duration)
         : begin_(std::move(begin)),
           end_(std::move(end)),
           faces_(std::move(faces)),
@@ -115,7 +115,7 @@ public:
         return point.face >= 0 && static_cast<std::size_t>(point.face) < faces_.triangles();
     }
 
-    const GridLevelSet& end() const { return *end_; }
+    const BakedLevelSet& end() const { return *end_; }
     double band() const { return begin_ ? std::min(begin_->band(), end_->band()) : end_->band(); }
     double slope_bound() const
     {
@@ -145,7 +145,7 @@ private:
         Vec3d gradient = Vec3d::Zero();  // as turned to now
         bool agrees = false;             // no other part of the body is nearer
     };
-    EndSample sample_end(const GridLevelSet& level_set, const MovingTriangles::Place& place, const Vec3d& P,
+    EndSample sample_end(const BakedLevelSet& level_set, const MovingTriangles::Place& place, const Vec3d& P,
                          const Eigen::Matrix3d& now, double t, double then) const
     {
         Vec3d X = P;
@@ -165,7 +165,7 @@ private:
         return sample;
     }
 
-    GridPtr begin_, end_;
+    BakedPtr begin_, end_;
     MovingTriangles faces_;
     double duration_;               // s
     double fastest_, most_curved_;  // of the faces: m/s, m/s²
@@ -378,8 +378,9 @@ private:
     double duration_;  // s
 };
 
-// Of a mesh that several users have, once.
-std::shared_ptr<const TriangleTree> tree_of(const MeshPtr& mesh)
+}  // namespace
+
+std::shared_ptr<const TriangleTree> triangle_tree(const MeshPtr& mesh)
 {
     static std::mutex mutex;
     static std::map<std::weak_ptr<const Mesh>, std::weak_ptr<const TriangleTree>, std::owner_less<>> known;
@@ -390,23 +391,19 @@ std::shared_ptr<const TriangleTree> tree_of(const MeshPtr& mesh)
     return tree;
 }
 
-std::shared_ptr<const MovingBody> surface(const std::shared_ptr<const TriangleTree>& tree,
-                                          std::vector<Cubic<Vec3d>> curves, double duration)
+std::shared_ptr<const MovingBody> deforming_surface(const std::shared_ptr<const TriangleTree>& tree,
+                                                    std::vector<Cubic<Vec3d>> curves, double duration)
 {
     return std::make_shared<DeformingSurface>(MovingTriangles(tree, std::move(curves)), duration);
 }
 
-ShapePtr between(const LevelSetPtr& begin, const LevelSetPtr& end, const std::shared_ptr<const TriangleTree>& tree,
-                 std::vector<Cubic<Vec3d>> curves, double duration)
+ShapePtr deforming_shape(const LevelSetPtr& begin, const LevelSetPtr& end,
+                         const std::shared_ptr<const TriangleTree>& tree, std::vector<Cubic<Vec3d>> curves,
+                         double duration)
 {
-    return std::make_shared<DeformingShape>(DeformingDistance(std::static_pointer_cast<const GridLevelSet>(begin),
-                                                              std::static_pointer_cast<const GridLevelSet>(end),
+    return std::make_shared<DeformingShape>(DeformingDistance(std::static_pointer_cast<const BakedLevelSet>(begin),
+                                                              std::static_pointer_cast<const BakedLevelSet>(end),
                                                               MovingTriangles(tree, std::move(curves)), duration));
 }
 
-RAPID_DEFINE(triangle_tree, tree_of);
-RAPID_DEFINE(deforming_shape, between);
-RAPID_DEFINE(deforming_surface, surface);
-
-}  // namespace
 }  // namespace rapid

@@ -88,6 +88,6 @@ struct BlendedInterval {
     std::int32_t tag;
     std::function<std::shared_ptr<const BlendedLevelSets>(double band)> widen;
 };
-RAPID_DEFERRED(blended_level_sets, std::shared_ptr<const BlendedLevelSets>(BlendedInterval interval));
+std::shared_ptr<const BlendedLevelSets> blended_level_sets(BlendedInterval interval);
 
 }  // namespace rapid

@@ -1,18 +1,16 @@
 #include "runtime/shapes/motion/moving_triangles.h"
 
-#include <openvdb/math/Proximity.h>
-
 #include <algorithm>
 #include <limits>
 #include <numeric>
 #include <utility>
 
+#include "runtime/shapes/mesh/nearest_on_triangle.h"
+
 namespace rapid {
 namespace {
 
 constexpr std::int32_t most_in_leaf = 4;
-
-openvdb::Vec3d vdb(const Vec3d& P) { return {P.x(), P.y(), P.z()}; }
 
 struct Ordering {
     TriangleTree& tree;
@@ -107,15 +105,13 @@ std::array<Vec3d, 3> MovingTriangles::corners(std::int32_t triangle, double t) c
 
 void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const
 {
-    const std::array<Vec3d, 3> corner = corners(triangle, t);
-    openvdb::Vec3d weights;
-    const openvdb::Vec3d on =
-        openvdb::math::closestPointOnTriangleToPoint(vdb(corner[0]), vdb(corner[1]), vdb(corner[2]), vdb(P), weights);
-    const Vec3d there(on.x(), on.y(), on.z());
+    const auto [a, b, c] = corners(triangle, t);
+    const auto [of_b, of_c] = nearest_weights(P, a, b, c);
+    const Vec3d there = a + of_b * (b - a) + of_c * (c - a);
     const double squared = (there - P).squaredNorm();
     if (!(squared < best)) return;
     best = squared;
-    place = {triangle, weights[1], weights[2], there, 0};
+    place = {triangle, of_b, of_c, there, 0};
 }
 
 MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::int32_t hint) const

@@ -89,8 +89,8 @@ TEST_CASE("the slope bound of a cell with one voxel raised is that of its steepe
 TEST_CASE("a baked sphere takes no more than 1.8 times its leaves' values", "[level set]")
 {
     const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.02, 3});
-    const auto& grid = dynamic_cast<const GridLevelSet&>(*sphere);
-    CHECK(grid.baked().bytes() < 1.8 * 2048 * grid.grid().tree().leafCount());
+    const auto& grid = dynamic_cast<const BakedLevelSet&>(*sphere);
+    CHECK(grid.baked().bytes() < 1.8 * 2048 * grid_of(grid).tree().leafCount());
     CHECK(grid.baked().slope < 1.02);  // the shells between blocks have no steps
 }
 
@@ -106,7 +106,7 @@ TEST_CASE("distances of many points are to the bit those of each", "[level set]"
 {
     const auto shape = GENERATE(0, 1);
     const auto sphere = level_set_sphere(1, {0.3, -0.2, 5}, {0.05, 3});
-    const BakedGrid baked = shape == 0 ? bake(*noise(1.0f)) : dynamic_cast<const GridLevelSet&>(*sphere).baked();
+    const BakedGrid baked = shape == 0 ? bake(*noise(1.0f)) : dynamic_cast<const BakedLevelSet&>(*sphere).baked();
     const BakedSampler sampler(baked);
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> place(-3, 7);
@@ -127,7 +127,7 @@ TEST_CASE("beyond the band the distance is a bound of the right sign, larger tha
     const double radius = 2, voxel = 0.05, half_width = 3 * voxel;
     const Vec3d center{0.3, -0.2, 5};
     const auto sphere = level_set_sphere(radius, center, {voxel, 3});
-    const BakedSampler sampler(dynamic_cast<const GridLevelSet&>(*sphere).baked());
+    const BakedSampler sampler(dynamic_cast<const BakedLevelSet&>(*sphere).baked());
     std::mt19937_64 random(8);
     std::uniform_real_distribution<double> offset(-3, 3);
     double largest = 0;

@@ -1,20 +1,15 @@
-#include "runtime/shapes/level_set/level_set.h"
+#include "runtime/shapes/level_set/buildable.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/VolumeToMesh.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "runtime/error.h"
 #include "runtime/memory_budget.h"
-#include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/baked_grid.h"
 
 namespace rapid {
-
-void initialize_openvdb()
-{
-    static const bool once = (openvdb::initialize(), true);
-    static_cast<void>(once);
-}
 
 void require_legal(const LevelSetOptions& options)
 {
@@ -59,55 +54,5 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     throw beyond_memory(fmt::format("{} with voxel = {:g} m", what, options.voxel), bytes,
                         fmt::format("a voxel of at least {:.3g} m fits", larger(bytes / memory, bytes / memory)));
 }
-
-openvdb::math::Transform::Ptr make_transform(double voxel, const Box3d& bounds)
-{
-    // Beyond this the corners of a mesh, in single precision, would be off by more than 1/2048 of a voxel.
-    constexpr double far = 16384;  // voxels
-    auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-    const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff() / voxel;
-    if (farthest > far) {
-        const Vec3d whole = (bounds.center() / voxel).array().round().matrix() * voxel;
-        transform->postTranslate({whole.x(), whole.y(), whole.z()});
-    }
-    return transform;
-}
-
-GridLevelSet::GridLevelSet(openvdb::FloatGrid::ConstPtr grid, Rebuild rebuild)
-    : grid_(std::move(grid)),
-      rebuild_(std::move(rebuild)),
-      baked_(std::make_shared<BakedGrid>(bake(*grid_))),
-      active_voxels_(grid_->activeVoxelCount())
-{
-}
-
-MeshPtr GridLevelSet::surface() const
-{
-    std::call_once(surface_once_, [this] {
-        std::vector<openvdb::Vec3s> points;
-        std::vector<openvdb::Vec4I> quads;
-        openvdb::tools::volumeToMesh(*grid_, points, quads, 0.0);
-        auto mesh = std::make_shared<Mesh>();
-        mesh->name = "level set";
-        for (const openvdb::Vec3s& P : points) mesh->positions.emplace_back(P.x(), P.y(), P.z());
-        for (const openvdb::Vec4I& quad : quads) {  // clockwise seen from outside
-            const Eigen::Vector4i q(quad[0], quad[1], quad[2], quad[3]);
-            mesh->triangles.push_back({q[0], q[2], q[1]});
-            mesh->triangles.push_back({q[0], q[3], q[2]});
-        }
-        surface_ = std::move(mesh);
-    });
-    return surface_;
-}
-
-LevelSetPtr GridLevelSet::with_band(double metres) const
-{
-    if (metres <= band()) return shared_from_this();
-    // A little more, so that rounding to the grid's single precision leaves at least `metres`.
-    return std::make_shared<GridLevelSet>(rebuild_(metres * (1 + 1e-6)), rebuild_);
-}
-
-ScatterPtr GridLevelSet::surface_scatter() const { return scatter_on_surface(baked_, surface()); }
-ScatterPtr GridLevelSet::volume_scatter() const { return scatter_in_volume(baked_); }
 
 }  // namespace rapid

@@ -1,0 +1,50 @@
+#include "runtime/shapes/level_set/baked_level_set.h"
+
+#include <tbb/task_arena.h>
+
+#include <utility>
+
+#include "runtime/shapes/level_set/scatter_level_set.h"
+
+namespace rapid {
+namespace {
+
+// The value, made by the first call. Meanwhile the thread takes no other work, which might ask for the same.
+template <class Ptr, class Make>
+const Ptr& once(std::mutex& mutex, Ptr& value, const Make& make)
+{
+    const std::lock_guard lock(mutex);
+    if (!value) tbb::this_task_arena::isolate([&] { value = make(); });
+    return value;
+}
+
+}  // namespace
+
+BakedLevelSet::BakedLevelSet(BakedGrid baked, std::uint64_t active_voxels, Source source)
+    : baked_(std::make_shared<BakedGrid>(std::move(baked))), active_voxels_(active_voxels), source_(std::move(source))
+{
+}
+
+const LevelSetGridPtr& BakedLevelSet::grid() const { return once(grid_mutex_, grid_, source_.grid); }
+
+MeshPtr BakedLevelSet::surface() const
+{
+    return once(surface_mutex_, surface_, [this] { return surface_of_grid(*grid()); });
+}
+
+LevelSetPtr BakedLevelSet::with_band(double metres) const
+{
+    if (metres <= band()) return shared_from_this();
+    // A little more, so that rounding to the grid's single precision leaves at least `metres`.
+    return source_.rebuild(metres * (1 + 1e-6));
+}
+
+void BakedLevelSet::write(const std::filesystem::path& path, const std::string& name) const
+{
+    write_level_set_grid(*grid(), path, name);
+}
+
+ScatterPtr BakedLevelSet::surface_scatter() const { return scatter_on_surface(baked_, surface()); }
+ScatterPtr BakedLevelSet::volume_scatter() const { return scatter_in_volume(baked_); }
+
+}  // namespace rapid

@@ -1,0 +1,88 @@
+#include "runtime/shapes/level_set/voxel_blocks.h"
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+
+#include "runtime/shapes/level_set/bake.h"
+
+namespace rapid {
+namespace {
+
+// The numbers of the blocks in the box around them, or the side of the surface where there is none.
+class Around {
+public:
+    explicit Around(const VoxelBlocks& blocks)
+    {
+        for (const VoxelBlocks::Place& place : blocks.places) box_.extend(place);
+        if (box_.isEmpty()) return;
+        size_ = box_.max() - box_.min() + VoxelBlocks::Place::Ones();
+        index_.assign(std::size_t(size_.x()) * size_.y() * size_.z(), BakedGrid::outside);
+        for (std::size_t b = 0; b < blocks.size(); ++b) index_[at(blocks.places[b])] = static_cast<std::int32_t>(b);
+        std::int32_t side = BakedGrid::outside;
+        for (std::size_t i = 0; i < index_.size(); ++i) {
+            if (i % size_.z() == 0) side = BakedGrid::outside;
+            if (index_[i] < 0)
+                index_[i] = side;
+            else
+                side = blocks.of(index_[i]).back() < 0 ? BakedGrid::inside : BakedGrid::outside;
+        }
+    }
+
+    const Eigen::AlignedBox3i& box() const { return box_; }
+    // A block's number, or BakedGrid::outside or inside.
+    std::int32_t operator[](const VoxelBlocks::Place& place) const
+    {
+        return box_.contains(place) ? index_[at(place)] : BakedGrid::outside;
+    }
+
+private:
+    std::size_t at(const VoxelBlocks::Place& place) const
+    {
+        const VoxelBlocks::Place from = place - box_.min();
+        return (std::size_t(from.x()) * size_.y() + from.y()) * size_.z() + from.z();
+    }
+
+    Eigen::AlignedBox3i box_;
+    VoxelBlocks::Place size_;
+    std::vector<std::int32_t> index_;
+};
+
+}  // namespace
+
+std::uint64_t VoxelBlocks::voxels_in_band() const
+{
+    std::uint64_t sum = 0;
+    for (const Flags& flags : in_band)
+        for (const std::uint64_t word : flags) sum += std::popcount(word);
+    return sum;
+}
+
+void VoxelBlocks::resize(std::size_t blocks)
+{
+    places.resize(blocks);
+    values.resize(blocks * voxels);
+    in_band.resize(blocks);
+}
+
+void VoxelBlocks::move_block(std::size_t from, std::size_t to)
+{
+    places[to] = places[from];
+    in_band[to] = in_band[from];
+    std::ranges::copy(of(from), of(to).begin());
+}
+
+BakedGrid bake(const VoxelBlocks& blocks)
+{
+    const Around around(blocks);
+    const float beyond = blocks.background();
+    const auto at = [&](const VoxelBlocks::Place& place) {
+        const std::int32_t b = around[place];
+        return b >= 0 ? BlockValues{blocks.of(b).data(), 0}
+                      : BlockValues{nullptr, b == BakedGrid::inside ? -beyond : beyond};
+    };
+    return bake(BlockTable{around.box(), blocks.frame.voxel, beyond,
+                           [&](const Vec3d& P) { return blocks.frame.to_world(P); }, [&] { return std::ref(at); }});
+}
+
+}  // namespace rapid

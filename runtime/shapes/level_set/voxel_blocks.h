@@ -1,0 +1,63 @@
+// The narrow band of a level set as it is measured: the blocks of 8³ voxels that have some of it. A level set for
+// queries is baked from it, and OpenVDB's grid made (grid_on_demand.h).
+//
+// Layout: by block, each shape [8, 8, 8], z fastest, as of OpenVDB's leaves.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/shapes/level_set/baked_grid.h"
+#include "runtime/shapes/level_set/voxel_frame.h"
+
+namespace rapid {
+
+struct VoxelBlocks {
+    static constexpr int edge = BakedGrid::block;
+    static constexpr std::size_t voxels = edge * edge * edge;  // of a block
+    using Place = Eigen::Vector3i;                             // in blocks
+    using Flags = std::array<std::uint64_t, voxels / 64>;      // a bit a voxel
+
+    VoxelFrame frame;
+    double half_width;           // m
+    std::vector<Place> places;   // each once
+    std::vector<float> values;   // m; the background, with the right sign, beyond the band
+    std::vector<Flags> in_band;  // the others are beyond it
+
+    std::size_t size() const { return places.size(); }
+    float background() const { return static_cast<float>(half_width); }
+    std::span<float, voxels> of(std::size_t b) { return std::span<float, voxels>(values.data() + b * voxels, voxels); }
+    std::span<const float, voxels> of(std::size_t b) const
+    {
+        return std::span<const float, voxels>(values.data() + b * voxels, voxels);
+    }
+    std::uint64_t voxels_in_band() const;
+
+    // Space for so many blocks; their values and places are to be set.
+    void resize(std::size_t blocks);
+    // Leaves out the blocks without voxels in the band. kept(from, to): a block has moved.
+    template <class Moved>
+    void drop_empty(const Moved& moved)
+    {
+        std::size_t n = 0;
+        for (std::size_t b = 0; b < size(); ++b) {
+            if (in_band[b] == Flags{}) continue;
+            if (n != b) move_block(b, n), moved(b, n);
+            ++n;
+        }
+        resize(n);
+    }
+
+    static void mark(Flags& flags, std::size_t voxel) { flags[voxel / 64] |= std::uint64_t{1} << voxel % 64; }
+
+private:
+    void move_block(std::size_t from, std::size_t to);
+};
+
+// A copy for queries. Beyond the band is inside or outside by the blocks before, along z, as signs change only within
+// the band.
+BakedGrid bake(const VoxelBlocks& blocks);
+
+}  // namespace rapid

@@ -23,12 +23,15 @@ void require_legal(const LevelSetOptions& options)
 void require_buildable(std::string_view what, double area, const Box3d& bounds, const LevelSetOptions& options)
 {
     constexpr double most = 2147483648.0;  // 2^31
-    // Of the tree while it is built, and of the baked copy: 30 to 60 bytes a voxel of a smooth surface at half widths
-    // of 3 to 10, where a third to two thirds of a leaf is in the band.
+    // Of the blocks while they are built, and of the baked copy: 30 to 60 bytes a voxel of a smooth surface at half
+    // widths of 3 to 10, where a third to two thirds of a leaf is in the band.
     constexpr double bytes_a_voxel = 64;
 
     // Far from the surface leaves are whole.
     constexpr double bytes_a_voxel_around = 16;
+
+    // Of the index, and of that of the blocks as they were measured.
+    constexpr double bytes_a_block = 2 * sizeof(std::int32_t);
 
     // Of a convex body the band outside is area h + M h² + 4/3 pi h³ (Steiner's formula), and M is at most that of the
     // bounds, pi times the sum of their edges.
@@ -38,7 +41,7 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     const double around = M_PI * size.sum() * h * h + 4.0 / 3 * M_PI * h * h * h;
     const double near = std::min(in_band, across.prod()), voxels = std::min(near + around, across.prod());
     const double indexed = (across / BakedGrid::block + Vec3d::Constant(2)).prod();
-    const double bytes = near * bytes_a_voxel + (voxels - near) * bytes_a_voxel_around + indexed * sizeof(std::int32_t);
+    const double bytes = near * bytes_a_voxel + (voxels - near) * bytes_a_voxel_around + indexed * bytes_a_block;
 
     // The larger voxel for which the band (which shrinks with its square) and the index (with its cube) fit.
     const auto larger = [&](double band_excess, double index_excess) {

@@ -61,7 +61,6 @@ VoxelBlocks measure(const Formula& formula, const LevelSetOptions& options)
     std::vector<VoxelBlocks::Place> found;
     find_blocks(formula, frame, blocks.half_width, low,
                 static_cast<int>(std::bit_ceil(static_cast<unsigned>(across.maxCoeff() + 1))), found);
-    std::ranges::sort(found, [](const auto& a, const auto& b) { return std::ranges::lexicographical_compare(a, b); });
 
     blocks.resize(found.size());
     blocks.places = std::move(found);

@@ -4,6 +4,7 @@
 #include <openvdb/tools/VolumeToMesh.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>

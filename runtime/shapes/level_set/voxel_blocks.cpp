@@ -1,5 +1,7 @@
 #include "runtime/shapes/level_set/voxel_blocks.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <bit>
 #include <memory>
@@ -19,14 +21,14 @@ public:
         size_ = box_.max() - box_.min() + VoxelBlocks::Place::Ones();
         index_.assign(std::size_t(size_.x()) * size_.y() * size_.z(), BakedGrid::outside);
         for (std::size_t b = 0; b < blocks.size(); ++b) index_[at(blocks.places[b])] = static_cast<std::int32_t>(b);
-        std::int32_t side = BakedGrid::outside;
-        for (std::size_t i = 0; i < index_.size(); ++i) {
-            if (i % size_.z() == 0) side = BakedGrid::outside;
-            if (index_[i] < 0)
-                index_[i] = side;
-            else
-                side = blocks.of(index_[i]).back() < 0 ? BakedGrid::inside : BakedGrid::outside;
-        }
+        tbb::parallel_for(std::size_t{0}, index_.size() / size_.z(), [&](std::size_t row) {
+            std::int32_t side = BakedGrid::outside;
+            for (std::size_t i = row * size_.z(); i < (row + 1) * size_.z(); ++i)
+                if (index_[i] < 0)
+                    index_[i] = side;
+                else
+                    side = blocks.of(index_[i]).back() < 0 ? BakedGrid::inside : BakedGrid::outside;
+        });
     }
 
     const Eigen::AlignedBox3i& box() const { return box_; }

@@ -37,7 +37,7 @@ struct VoxelBlocks {
 
     // Space for so many blocks; their values and places are to be set.
     void resize(std::size_t blocks);
-    // Leaves out the blocks without voxels in the band. kept(from, to): a block has moved.
+    // Leaves out the blocks without voxels in the band. moved(from, to): of a block that has.
     template <class Moved>
     void drop_empty(const Moved& moved)
     {

@@ -12,7 +12,9 @@
 //   warm_start()                    applies the impulses of the last sub-step
 //   project()                       P = x~ + Δx by Gauss-Seidel, `iterations` times; Δx = w ∇C p dt
 //   v + Δx/dt                       never the difference of stored positions
-//   solve_velocities()              friction; what is left along rigid rows; rows that break
+//   solve_velocities()              friction; what is left along rigid rows; rows that break; beside shapes and rods
+//                                   `iterations` times
+//   add_forces()                    records the impulses, where Substep::forces is there
 //   correct_penetration()           what is left too deep after all shapes
 //
 // w is the inverse mass times v_of_a / dt, with v_of_a the mobility of the velocity under drag and springs: so that
@@ -144,6 +146,7 @@ public:
     virtual void warm_start(Substep&) {}
     virtual void project(Substep& step) = 0;
     virtual void solve_velocities(Substep&) {}
+    virtual void add_forces(const Substep&) {}
     virtual void correct_penetration(Substep&) {}
 
     // The last sub-step is over: keeps what the next frame begins with.

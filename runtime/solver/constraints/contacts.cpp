@@ -413,7 +413,6 @@ void Contacts::solve_velocities(Substep& step)
                 const Doubles overlap = solve_pack(pack, step, weights, &part_recovered, impact_speed);
                 if (recovers_deep && any(overlap > deep_part_of_reach * widen(pack.reach))) deep_[b].push_back(&pack);
                 store(pack);
-                if (step.forces) add_forces(pack, step);
                 if (heavy_.any()) HeavyContacts::pass_on_support(pack, step);
                 if (!some_asleep) return;
                 for_each_contact(pack,
@@ -463,8 +462,13 @@ std::span<const float> Contacts::recorded() const
     return records_ ? std::span<const float>(material_.radius) : std::span<const float>();
 }
 
+void Contacts::add_forces(const Substep& step)
+{
+    sweep([&](const ContactPack& pack) { add_pack_forces(pack, step); });
+}
+
 // Friction is the same throughout the sub-step: its work is along the way that the points slip.
-void Contacts::add_forces(const ContactPack& pack, const Substep& step)
+void Contacts::add_pack_forces(const ContactPack& pack, const Substep& step)
 {
     ContactForces& forces = *step.forces;
     for (std::uint32_t l = 0; l < pack.count; ++l) {

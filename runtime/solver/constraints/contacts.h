@@ -48,6 +48,7 @@ public:
     void warm_start(Substep& step) override;
     void project(Substep& step) override;
     void solve_velocities(Substep& step) override;
+    void add_forces(const Substep& step) override;
     void correct_penetration(Substep& step) override;
     Residual close(Substep& step) override;
 
@@ -78,7 +79,7 @@ private:
     void begin(ContactPack& pack, const Substep& step) const;
     void limit_carried(ContactPack& pack, const Substep& step) const;
     void store(const ContactPack& pack);
-    static void add_forces(const ContactPack& pack, const Substep& step);
+    static void add_pack_forces(const ContactPack& pack, const Substep& step);
     template <class F>
     void sweep(const F& f);
     template <class T, class F>

@@ -126,7 +126,10 @@ void Projection::advance(Substep& step)
         if (shapes_) shapes_->solve_velocities(step);
     }
     for (Holding* holding : holdings_) holding->release(step);
-    if (shapes_ && step.forces) shapes_->add_forces(step);
+    if (step.forces) {
+        each([&](Coupling& coupling) { coupling.add_forces(step); });
+        if (shapes_) shapes_->add_forces(step);
+    }
     each([&](Coupling& coupling) { coupling.correct_penetration(step); });
     const ContactEnergy change = close_bound(step, false);
     const double credit = credited();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tests/solver/constraints/granular.h"
+#include "tests/solver/constraints/rods.h"
 
 namespace rapid {
 namespace {
@@ -111,6 +112,28 @@ TEST_CASE("an oblique impact is recorded by its impulses, on both points", "[con
     CHECK(std::hypot(n, t) == Approx(impulse.norm()).epsilon(1e-5));
     CHECK(t == Approx(mu * n).epsilon(1e-5));
     CHECK(normal(scene, 1) == Approx(normal(scene, 0)));
+}
+
+TEST_CASE("beside a rod a contact is recorded once, by any number of iterations", "[contact_forces]")
+{
+    const int iterations = GENERATE(1, 2, 8);
+    CAPTURE(iterations);
+    const double mass = 2;
+    Granular scene(points({{0, 0.1f, 0}, {0, 0.3f, 0}, {1, 0.1f, 0}, {1, 0.3f, 0}})
+                       .set<float>("pscale", std::vector<float>(4, 0.1f))
+                       .set<float>("mass", std::vector<float>(4, static_cast<float>(mass))),
+                   0, 0.5f);
+    record(scene);
+    scene.dynamics.add(test::rods({{1, 3}}, 1));  // between the tops, level: it bears nothing
+    scene.options.iterations = iterations;
+    scene.gravity().floor(0, 0.5f).substeps(16).run(48);
+    for (const std::size_t bottom : {0u, 2u}) {
+        CAPTURE(bottom);
+        CHECK(normal(scene, bottom + 1) == Approx(mass * g).epsilon(2e-3));
+        CHECK(normal(scene, bottom) == Approx(3 * mass * g).epsilon(2e-3));
+        CHECK(contacts(scene, bottom + 1) == 1);
+        CHECK(contacts(scene, bottom) == 2);
+    }
 }
 
 TEST_CASE("what sleeps keeps the forces that it fell asleep under", "[contact_forces]")

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace rapid {
 namespace {
@@ -32,13 +31,6 @@ float Ground::line(float x, float pixel) const
     const float seen = std::clamp((width + 0.5f * pixel - away) / pixel, 0.0f, 1.0f);
     // Lines closer than a few pixels would shimmer.
     return seen * std::clamp(1.5f - 4 * pixel / spacing, 0.0f, 1.0f);
-}
-
-float Ground::depth(const Vec3f& origin, const Vec3f& ray) const
-{
-    const float towards = normal.dot(ray);
-    const float t = (offset - normal.dot(origin)) / towards;
-    return towards != 0 && t > 0 && std::isfinite(t) ? t : std::numeric_limits<float>::infinity();
 }
 
 ShadedSample Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,

@@ -1,6 +1,9 @@
 // The ground of a picture: the planes of the scene, or a grid of lines where there are none.
 #pragma once
 
+#include <cmath>
+#include <limits>
+
 #include "runtime/picture/light.h"
 
 namespace rapid {
@@ -23,7 +26,12 @@ struct Ground {
     Ground(const PictureScene::Plane& plane, const PictureView& view, bool is_solid);
 
     // Where the ray meets the plane; infinite where it does not.
-    float depth(const Vec3f& origin, const Vec3f& ray) const;
+    float depth(const Vec3f& origin, const Vec3f& ray) const
+    {
+        const float towards = normal.dot(ray);
+        const float t = (offset - normal.dot(origin)) / towards;
+        return towards != 0 && t > 0 && std::isfinite(t) ? t : std::numeric_limits<float>::infinity();
+    }
 
     // Whether it is a wall between the eye and the scene, seen from behind: then it is transparent.
     bool stands_before(const Vec3f& eye) const { return normal.dot(eye) < offset && normal.dot(center) >= offset; }

@@ -25,11 +25,6 @@ struct Lens {
         const float scale = parallel ? focal : focal / depth;
         return {center_x + scale * d.dot(right), center_y - scale * d.dot(up), depth};
     }
-    // Through the raster's point x, y; not normalised: a metre of depth long. Perspective alone.
-    Vec3f ray(float x, float y) const
-    {
-        return forward + right * ((x - center_x) / focal) + up * ((center_y - y) / focal);
-    }
 };
 
 }  // namespace rapid

@@ -177,9 +177,12 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
         y_.extend(std::max(y.begin - 2, 0), std::min(y.end + 1, cells - 1));
         z_.extend(z.begin, slices - 1);
     }
+    // A load and a store take a tenth of the time of an exchange, and nobody else is there.
     for_each_row([&](std::size_t row) {
-        for (std::size_t i = row + x_.begin; i < row + x_.end; ++i)
-            covered_[i] = static_cast<float>(sums_[i].exchange(0, std::memory_order_relaxed)) / unit;
+        for (std::size_t i = row + x_.begin; i < row + x_.end; ++i) {
+            covered_[i] = static_cast<float>(sums_[i].load(std::memory_order_relaxed)) / unit;
+            sums_[i].store(0, std::memory_order_relaxed);
+        }
     });
     blur_covered();
     tbb::parallel_for(y_.begin, y_.end, [&](int y) {

@@ -9,6 +9,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 
 #include "runtime/of_thread.h"
@@ -279,11 +280,13 @@ private:
     // The part of the pixel's samples that no surface nearer than `depth` hides.
     float past_surfaces(std::size_t pixel, float depth) const
     {
+        // As vectors, for g++ branches at each of the samples.
         constexpr int samples = surface_samples * surface_samples;
-        const float* of_pixel = &surfaces_.depth[samples * pixel];
-        int past = 0;
-        for (int k = 0; k < samples; ++k) past += of_pixel[k] > depth;
-        return static_cast<float>(past) / samples;
+        typedef float Depths __attribute__((vector_size(samples * sizeof(float))));
+        Depths of_pixel;
+        std::memcpy(&of_pixel, &surfaces_.depth[samples * pixel], sizeof of_pixel);
+        const auto past = of_pixel > depth;  // -1, or 0
+        return static_cast<float>(-(past[0] + past[1] + past[2] + past[3])) / samples;
     }
 
     static void add(Pixel& pixel, const Mark& m, float cover, const Vec3f& colour)

@@ -84,8 +84,8 @@ Picture Painter::draw(const PointSet& points, const PictureOptions& options,
                 colour[lit.pixel] -= (1 - light.past_points(lit.cell)) * lit.lamp;
         if (!empty) draw_marks(marks, tiles, tile, still, lens, light, colour);
         for (int y = top; y < tiles.bottom(tile); ++y)
-            for (int x = 0; x < across; ++x)
-                write_pixel(colour[static_cast<std::size_t>((y - top) * tile_size + x)], left + x, y, row(y) + 3 * x);
+            write_pixels({&colour[static_cast<std::size_t>((y - top) * tile_size)], static_cast<std::size_t>(across)},
+                         left, y, row(y));
     });
     return picture;
 }

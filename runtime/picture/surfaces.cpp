@@ -75,6 +75,8 @@ struct DrawnBody {
     }
 };
 
+constexpr int samples_a_pixel = surface_samples * surface_samples;
+
 // What is nearest at a sample.
 struct Sample {
     Vec3f colour, lamp, P;
@@ -94,6 +96,11 @@ public:
           near_scene_(view.bounds.cast<float>()),
           extent_(std::max(1e-6f, near_scene_.diagonal().norm()))
     {
+        constexpr auto at = [](int half) { return 0.5f * static_cast<float>(half); };
+        for (int k = 0; k <= 2 * surface_samples * options.width; ++k)
+            columns_.push_back(lens_.forward + lens_.right * ((at(k) - lens_.center_x) / lens_.focal));
+        for (int k = 0; k <= 2 * surface_samples * options.height; ++k)
+            rows_.push_back(lens_.up * ((lens_.center_y - at(k)) / lens_.focal));
         const float near = 1e-3f * static_cast<float>((view.camera.target - view.camera.position).norm());
         for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
             auto& drawn = scene.bodies[b].role == PictureScene::Body::Collider ? colliders_ : emitters_;
@@ -106,7 +113,36 @@ public:
         if (scene.planes.empty() && options.grid) grounds_.emplace_back(PictureScene::Plane(), view, false);
     }
 
-    SurfaceTile draw(int tile) const
+    SurfaceTile draw(int tile) const { return has_body(tile) ? draw_bodies(tile) : draw_open(tile); }
+
+    const TileGrid& tiles() const { return tiles_; }
+
+private:
+    using Pixel = std::array<Sample*, samples_a_pixel>;
+
+    bool has_body(int tile) const
+    {
+        const auto has = [&](const DrawnBody& body) { return body.first[tile] != body.first[tile + 1]; };
+        return std::any_of(colliders_.begin(), colliders_.end(), has) ||
+               std::any_of(emitters_.begin(), emitters_.end(), has);
+    }
+
+    // Backdrop and grounds alone, which need no more samples at once than those of a pixel.
+    SurfaceTile draw_open(int tile) const
+    {
+        SurfaceTile result = empty_tile();
+        std::array<Sample, samples_a_pixel> samples;
+        Pixel pixel;
+        for (int k = 0; k < samples_a_pixel; ++k) pixel[k] = &samples[k];
+        for (int y = tiles_.top(tile); y < tiles_.bottom(tile); ++y)
+            for (int x = tiles_.left(tile); x < tiles_.right(tile); ++x) {
+                draw_background(x, y, pixel);
+                add_pixel(result, tile, x, y, pixel);
+            }
+        return finished(tile, std::move(result));
+    }
+
+    SurfaceTile draw_bodies(int tile) const
     {
         constexpr int across = tile_size * surface_samples;
         thread_local OfThread<std::vector<Sample>> kept;
@@ -117,46 +153,51 @@ public:
         const auto sample = [&](int x, int y) -> Sample& {
             return samples[static_cast<std::size_t>((y - part.y0) * across + x - part.x0)];
         };
-        for (int y = tiles_.top(tile); y < tiles_.bottom(tile); ++y)
-            for (int x = tiles_.left(tile); x < tiles_.right(tile); ++x) draw_background(x, y, sample);
+        const auto for_each_pixel = [&](const auto& f) {
+            for (int y = tiles_.top(tile); y < tiles_.bottom(tile); ++y)
+                for (int x = tiles_.left(tile); x < tiles_.right(tile); ++x) {
+                    Pixel pixel;
+                    for (int k = 0; k < samples_a_pixel; ++k)
+                        pixel[k] = &sample(x * surface_samples + k % surface_samples,
+                                           y * surface_samples + k / surface_samples);
+                    f(x, y, pixel);
+                }
+        };
+        for_each_pixel([&](int x, int y, const Pixel& pixel) { draw_background(x, y, pixel); });
         for (const DrawnBody& body : colliders_) draw_collider(body, tile, part, sample);
         for (int y = part.y0; y < part.y1; ++y)
             for (int x = part.x0; x < part.x1; ++x)
                 if (sample(x, y).triangle) shade(sample(x, y), x, y);
         for (const DrawnBody& body : emitters_) draw_emitter(body, tile, part, sample);
-        return condensed(tile, samples);
+        SurfaceTile result = empty_tile();
+        for_each_pixel([&](int x, int y, const Pixel& pixel) { add_pixel(result, tile, x, y, pixel); });
+        return finished(tile, std::move(result));
     }
 
-    const TileGrid& tiles() const { return tiles_; }
+    // Through a place on the raster of samples, in half samples; not normalised: a metre of depth long.
+    Vec3f ray(int half_x, int half_y) const { return columns_[half_x] + rows_[half_y]; }
 
-private:
     // Backdrop and grounds, shaded once a pixel: lines on the ground are computed smooth. Depths are a sample's own.
-    template <class Samples>
-    void draw_background(int x, int y, const Samples& sample) const
+    void draw_background(int x, int y, const Pixel& pixel) const
     {
-        constexpr float to_sample = surface_samples;
-        const Vec3f ray =
-            lens_.ray((static_cast<float>(x) + 0.5f) * to_sample, (static_cast<float>(y) + 0.5f) * to_sample);
+        const Vec3f middle = ray((2 * x + 1) * surface_samples, (2 * y + 1) * surface_samples);
         const Vec3f open = backdrop(x, y, options_);
         const Ground* nearest = nullptr;
         float t = infinite;
         for (const Ground& ground : grounds_)
-            if (const float depth = ground.depth(lens_.origin, ray); depth < t) t = depth, nearest = &ground;
+            if (const float depth = ground.depth(lens_.origin, middle); depth < t) t = depth, nearest = &ground;
         ShadedSample shaded{open, Vec3f::Zero()};
         Vec3f P = Vec3f::Zero();
         if (nearest) {
-            P = lens_.origin + ray * t;
-            shaded = nearest->shade(P, t, lens_.focal / to_sample, ray, open, light_);
+            P = lens_.origin + middle * t;
+            shaded = nearest->shade(P, t, lens_.focal / surface_samples, middle, open, light_);
         }
-        for (int j = 0; j < surface_samples; ++j)
-            for (int i = 0; i < surface_samples; ++i) {
-                const int sx = x * surface_samples + i, sy = y * surface_samples + j;
-                float depth = infinite;
-                if (nearest && nearest->solid)
-                    depth = nearest->depth(lens_.origin,
-                                           lens_.ray(static_cast<float>(sx) + 0.5f, static_cast<float>(sy) + 0.5f));
-                sample(sx, sy) = {shaded.colour, shaded.lamp, P, depth, nullptr, Vec3f::Zero()};
-            }
+        for (int k = 0; k < samples_a_pixel; ++k) {
+            const int sx = x * surface_samples + k % surface_samples, sy = y * surface_samples + k / surface_samples;
+            const bool solid = nearest && nearest->solid;
+            const float depth = solid ? nearest->depth(lens_.origin, ray(2 * sx + 1, 2 * sy + 1)) : infinite;
+            *pixel[k] = {shaded.colour, shaded.lamp, P, depth, nullptr, Vec3f::Zero()};
+        }
     }
 
     // Calls f(sample, weights, depth, triangle) for the samples of a body that nothing drawn before hides.
@@ -222,64 +263,74 @@ private:
                         });
     }
 
-    // From samples to pixels.
-    SurfaceTile condensed(int tile, const std::vector<Sample>& samples) const
+    static SurfaceTile empty_tile()
     {
-        constexpr int a_pixel = surface_samples * surface_samples, across = tile_size * surface_samples;
-        SurfaceTile result;
-        result.colour.resize(tile_pixels, Vec3f::Zero());
-        result.bytes.resize(3 * tile_pixels);
-        result.depth.resize(tile_pixels * a_pixel, infinite);
-        result.nearest = infinite;
-        result.farthest = 0;
-        for (int y = 0; y < tiles_.bottom(tile) - tiles_.top(tile); ++y)
-            for (int x = 0; x < tiles_.right(tile) - tiles_.left(tile); ++x) {
-                const auto pixel = static_cast<std::size_t>(y * tile_size + x);
-                std::array<const Sample*, a_pixel> of_pixel;
-                for (int k = 0; k < a_pixel; ++k)
-                    of_pixel[k] =
-                        &samples[static_cast<std::size_t>((y * surface_samples + k / surface_samples) * across +
-                                                          x * surface_samples + k % surface_samples)];
-                for (int k = 0; k < a_pixel; ++k) {
-                    result.colour[pixel] += of_pixel[k]->colour / a_pixel;
-                    result.depth[pixel * a_pixel + k] = of_pixel[k]->depth;
-                    result.nearest = std::min(result.nearest, of_pixel[k]->depth);
-                    result.farthest = std::max(result.farthest, of_pixel[k]->depth);
-                }
-                add_lit(result, static_cast<std::uint32_t>(pixel), of_pixel);
-                write_pixel(result.colour[pixel], tiles_.left(tile) + x, tiles_.top(tile) + y,
-                            &result.bytes[3 * pixel]);
-            }
+        SurfaceTile tile;
+        tile.colour.resize(tile_pixels, Vec3f::Zero());
+        tile.bytes.resize(3 * tile_pixels);
+        tile.depth.resize(tile_pixels * samples_a_pixel, infinite);
+        tile.nearest = infinite;
+        tile.farthest = 0;
+        return tile;
+    }
+
+    SurfaceTile finished(int tile, SurfaceTile result) const
+    {
+        const int left = tiles_.left(tile), top = tiles_.top(tile);
+        const auto across = static_cast<std::size_t>(tiles_.right(tile) - left);
+        for (int y = top; y < tiles_.bottom(tile); ++y) {
+            const auto row = static_cast<std::size_t>((y - top) * tile_size);
+            write_pixels({&result.colour[row], across}, left, y, &result.bytes[3 * row]);
+        }
         if (result.nearest == infinite) result.depth = {};
         result.lit.shrink_to_fit();
         return result;
     }
 
+    // From samples to a pixel.
+    void add_pixel(SurfaceTile& result, int tile, int x, int y, const Pixel& samples) const
+    {
+        const auto pixel = static_cast<std::size_t>((y - tiles_.top(tile)) * tile_size + x - tiles_.left(tile));
+        for (int k = 0; k < samples_a_pixel; ++k) {
+            result.colour[pixel] += samples[k]->colour / samples_a_pixel;
+            result.depth[pixel * samples_a_pixel + k] = samples[k]->depth;
+            result.nearest = std::min(result.nearest, samples[k]->depth);
+            result.farthest = std::max(result.farthest, samples[k]->depth);
+        }
+        add_lit(result, static_cast<std::uint32_t>(pixel), samples);
+    }
+
     // Samples that are near each other among the cells of shadows share an entry.
-    template <std::size_t N>
-    void add_lit(SurfaceTile& tile, std::uint32_t pixel, const std::array<const Sample*, N>& samples) const
+    void add_lit(SurfaceTile& tile, std::uint32_t pixel, const Pixel& samples) const
     {
         const std::size_t first = tile.lit.size();
+        const Sample* before = nullptr;
+        std::size_t entry = 0;  // of `before`
         for (const Sample* sample : samples) {
             if (sample->lamp.isZero(0)) continue;
-            const Vec3f cell = light_.cell_of(sample->P);
-            const auto same = std::find_if(
-                tile.lit.begin() + static_cast<std::ptrdiff_t>(first), tile.lit.end(),
-                [&](const SurfaceTile::Lit& other) { return (other.cell - cell).squaredNorm() < 0.25f * 0.25f; });
-            const Vec3f lamp = sample->lamp / N;
-            if (same != tile.lit.end()) {
-                same->lamp += lamp;
-                continue;
-            }
-            tile.lit.push_back({pixel, lamp, cell});
-            tile.cells.extend(cell);
+            const Vec3f lamp = sample->lamp / samples_a_pixel;
+            if (!before || sample->P != before->P) entry = entry_of(tile, first, pixel, light_.cell_of(sample->P));
+            tile.lit[entry].lamp += lamp;
+            before = sample;
         }
+    }
+
+    static std::size_t entry_of(SurfaceTile& tile, std::size_t first, std::uint32_t pixel, const Vec3f& cell)
+    {
+        const auto same = std::find_if(
+            tile.lit.begin() + static_cast<std::ptrdiff_t>(first), tile.lit.end(),
+            [&](const SurfaceTile::Lit& other) { return (other.cell - cell).squaredNorm() < 0.25f * 0.25f; });
+        if (same != tile.lit.end()) return static_cast<std::size_t>(same - tile.lit.begin());
+        tile.lit.push_back({pixel, Vec3f::Zero(), cell});
+        tile.cells.extend(cell);
+        return tile.lit.size() - 1;
     }
 
     const PictureOptions& options_;
     const Light& light_;
     TileGrid tiles_;
     Lens lens_;
+    std::vector<Vec3f> columns_, rows_;  // at each half sample: parts of a ray, which is their sum
     std::vector<DrawnBody> colliders_, emitters_;
     std::vector<Ground> grounds_;
     Box3f near_scene_;

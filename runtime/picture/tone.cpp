@@ -1,8 +1,14 @@
 #include "runtime/picture/tone.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <tuple>
 #include <vector>
+
+#include "runtime/error.h"
+#include "runtime/simd.h"
 
 namespace rapid {
 namespace {
@@ -29,40 +35,66 @@ const std::vector<float>& curve()
     return values;
 }
 
+constexpr int dither_size = 8;  // pixels, along both edges
+constexpr int channels = 3;
+using DitherRow = std::array<float, channels * dither_size>;  // all channels of a pixel have the same
+
 // Bayer's thresholds of an ordered dither, from 1/128 to 127/128.
-const std::array<float, 64>& thresholds()
+const std::array<DitherRow, dither_size>& thresholds()
 {
-    static const std::array<float, 64> values = [] {
-        std::array<float, 64> table{};
-        for (int y = 0; y < 8; ++y)
-            for (int x = 0; x < 8; ++x) {
+    static const std::array<DitherRow, dither_size> values = [] {
+        std::array<DitherRow, dither_size> table{};
+        for (int y = 0; y < dither_size; ++y)
+            for (int x = 0; x < dither_size; ++x) {
                 int threshold = 0;
                 for (int bit = 0; bit < 3; ++bit) {
                     const int a = x >> bit & 1, b = y >> bit & 1;
                     threshold |= ((a ^ b) << 1 | b) << (2 * (2 - bit));
                 }
-                table[static_cast<std::size_t>(8 * y + x)] = (static_cast<float>(threshold) + 0.5f) / 64;
+                std::fill_n(&table[y][channels * x], channels, (static_cast<float>(threshold) + 0.5f) / 64);
             }
         return table;
     }();
     return values;
 }
 
+// The channels of dither_size pixels.
+void write_block(const float* light, const DitherRow& dither, const float* table, std::uint8_t* rgb)
+{
+    typedef std::uint8_t Bytes __attribute__((vector_size(lanes)));
+    for (std::size_t k = 0; k < dither.size(); k += lanes) {
+        const Floats given = load_pack(light + k);
+        Floats root, low, high;
+        for (std::uint32_t l = 0; l < lanes; ++l) root[l] = std::sqrt(given[l]);
+        // Written so that NaN becomes 0.
+        const Floats at = (given > 0 ? (root > most ? Floats{} + most : root) : Floats{}) * (steps / most);
+        const FloatFlags step = __builtin_convertvector(at, FloatFlags);
+        for (std::uint32_t l = 0; l < lanes; ++l) low[l] = table[step[l]], high[l] = table[step[l] + 1];
+        const Floats wanted = low + (at - __builtin_convertvector(step, Floats)) * (high - low);
+        const Floats dithered = wanted + load_pack(dither.data() + k);
+        const FloatFlags values = __builtin_convertvector(dithered > 255 ? Floats{} + 255 : dithered, FloatFlags);
+        const Bytes bytes = __builtin_convertvector(values, Bytes);
+        std::memcpy(rgb + k, &bytes, sizeof bytes);
+    }
+}
+
 }  // namespace
 
-void write_pixel(const Vec3f& light, int x, int y, std::uint8_t* rgb)
+void write_pixels(std::span<const Vec3f> light, int x, int y, std::uint8_t* rgb)
 {
-    static const float* const table = curve().data();
-    static const std::array<float, 64>& dither = thresholds();
-    const float threshold = dither[static_cast<std::size_t>(8 * (y & 7) + (x & 7))];
-    for (int c = 0; c < 3; ++c) {
-        // Written so that NaN becomes 0.
-        const float t = light[c] > 0 ? std::min(std::sqrt(light[c]), most) : 0;
-        const float at = t * (steps / most);
-        const auto step = static_cast<int>(at);
-        const float low = table[step], wanted = low + (at - static_cast<float>(step)) * (table[step + 1] - low);
-        rgb[c] = static_cast<std::uint8_t>(std::min(wanted + threshold, 255.0f));
-    }
+    RAPID_ASSERT(x % dither_size == 0);
+    const float* const table = curve().data();
+    const DitherRow& dither = thresholds()[static_cast<std::size_t>(y % dither_size)];
+    constexpr std::size_t block = std::tuple_size_v<DitherRow>;
+    const float* from = light.data()->data();
+    std::size_t left = channels * light.size();
+    for (; left >= block; left -= block, from += block, rgb += block) write_block(from, dither, table, rgb);
+    if (left == 0) return;
+    std::array<float, block> rest{};
+    std::copy_n(from, left, rest.begin());
+    std::array<std::uint8_t, block> of_rest;
+    write_block(rest.data(), dither, table, of_rest.data());
+    std::copy_n(of_rest.begin(), left, rgb);
 }
 
 }  // namespace rapid

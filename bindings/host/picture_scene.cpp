@@ -81,6 +81,18 @@ void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen:
     }
 }
 
+bool SceneOfPlan::may_have_colliders() const
+{
+    return std::any_of(plan_.nodes.begin(), plan_.nodes.end(), [](const PlannedNode& planned) {
+        const auto& arguments = planned.node->arguments;
+        return planned.node->type->kind == NodeKind::Dynamic &&
+               std::any_of(arguments.begin(), arguments.end(), [](const auto& argument) {
+                   return argument.first != "transform" &&
+                          (argument.second.function() || argument.second.template get<ObjectPtr>());
+               });
+    });
+}
+
 std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
 {
     if (still_) return still_;

@@ -16,6 +16,8 @@ public:
     // Functions of the frame and motions are evaluated at the frame's time. A level set is turned into a mesh once, and
     // again where it was not in the frame before.
     std::shared_ptr<const PictureScene> at(std::int64_t frame);
+    // Whether it may in some frame; evaluates nothing.
+    bool may_have_colliders() const;
 
 private:
     void add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place, PictureScene::Body::Role role);

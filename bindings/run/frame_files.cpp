@@ -9,6 +9,7 @@
 #include "runtime/io/text_table.h"
 #include "runtime/memory_budget.h"
 #include "runtime/operators/rasterize.h"
+#include "runtime/picture/surfaces.h"
 
 namespace rapid {
 namespace {
@@ -125,7 +126,8 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
 // Each pattern of pictures keeps what it has drawn of the scene.
 void FrameFiles::require_picture_memory(std::size_t patterns) const
 {
-    constexpr double bytes_a_pixel = 40;  // in layers of the scene 31, in the picture 3, in the file's rows 6
+    constexpr double of_picture = 3, of_file = 6;  // rows, plain and compressed
+    const double bytes_a_pixel = surface_bytes_a_pixel(scene_->may_have_colliders()) + of_picture + of_file;
     const double bytes = bytes_a_pixel * static_cast<double>(patterns) * picture_->width * picture_->height;
     if (!fits_in_memory(bytes))
         throw beyond_memory(fmt::format("pictures of {}x{}", picture_->width, picture_->height), bytes,

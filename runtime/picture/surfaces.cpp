@@ -282,7 +282,7 @@ private:
             const auto row = static_cast<std::size_t>((y - top) * tile_size);
             write_pixels({&result.colour[row], across}, left, y, &result.bytes[3 * row]);
         }
-        if (result.nearest == infinite) result.depth = {};
+        if (result.nearest == infinite) result.depth = std::vector<float>();  // {} would keep its memory
         result.lit.shrink_to_fit();
         return result;
     }

@@ -46,6 +46,14 @@ struct SurfaceTile {
     Box3f cells;  // bounds of the places
 };
 
+// Of the tiles; where there are colliders, of pixels that show one and that the lamp may reach.
+constexpr double surface_bytes_a_pixel(bool colliders)
+{
+    constexpr double open = sizeof(Vec3f) + 3;
+    constexpr double covered = surface_samples * surface_samples * sizeof(float) + sizeof(SurfaceTile::Lit);
+    return colliders ? open + covered : open;
+}
+
 // Whether a mesh is a vessel: most points are inside, and the sides between them and the viewer are left out.
 bool holds_points(const Mesh& mesh, const PointSet& points);
 

@@ -37,6 +37,18 @@ describe("the memory of a run", function()
     assert.truthy(many - few < 1, ("%g MiB after 100 frames, %g after 1,000"):format(few, many))
   end)
 
+  it("is for large pictures no more than a refusal says, and nearly that where a floor fills them", function()
+    for shape, least in pairs { ["plane {}"] = 0.6, ["sphere { radius = 0.5 }"] = 0.2 } do
+      local text = "return rapid.create { points = two } :collide { shape = rapid.shape." .. shape .. " } :solve {}"
+      local function of(size, more) return "--size " .. size .. " -o picture.####.png" .. (more or "") end
+      local small, large = peak(text, 2, of "32x18"), peak(text, 2, of "2000x1500")
+      local refused = scene.command("run", text, "-f 1-2 " .. of("2000x1500", " --memory 150M"))
+      local told = tonumber(refused.stderr:match "would take about (%d+) MiB")
+      assert.truthy(large - small < 1.05 * told and large - small > least * told,
+        ("%s: %g MiB in place of %g, %d told"):format(shape, large, small, told))
+    end
+  end)
+
   -- The peak varies by a few MiB with the moments of collections; 300 surfaces are hundreds.
   it("holds no surface of earlier frames where pictures show it", function()
     local small = "--size 32x18 -o picture.####.png"

@@ -105,14 +105,17 @@ end)
 describe("pictures", function()
   it("that memory has no room for are refused before the first frame", function()
     local folder = command.folder()
-    local scene = "return " .. two .. " :solve {}"
+    local scene = "return " .. two .. " :collide { shape = rapid.shape.plane {} } :solve {}"
     local result = run(folder, scene, "-o a.####.png --size 4000x4000")
     assert.equal(2, result.status)
-    assert.match("^%-o a%.####%.png: pictures of 4000x4000 would take about 610 MiB, and %d+ MiB are free of " ..
+    assert.match("^%-o a%.####%.png: pictures of 4000x4000 would take about 1%.0 GiB, and %d+ MiB are free of " ..
       "300 MiB; give a smaller %-%-size, or set %-%-memory\n$", result.stderr)
     -- Two of which one would fit.
-    result = run(folder, scene, "-o a.####.png -o b.####.png --size 2200x2200")
-    assert.match("^%-o b%.####%.png: pictures of 2200x2200 would take about 369 MiB", result.stderr)
-    assert.equal(0, run(folder, scene, "-o a.####.png --size 2200x2200").status)
+    result = run(folder, scene, "-o a.####.png -o b.####.png --size 1600x1600")
+    assert.match("^%-o b%.####%.png: pictures of 1600x1600 would take about 332 MiB", result.stderr)
+    assert.equal(0, run(folder, scene, "-o a.####.png --size 1600x1600").status)
+    -- Nothing but points.
+    result = run(folder, "return " .. two .. " :gravity {} :solve {}", "-o a.####.png --size 4000x4000")
+    assert.match("pictures of 4000x4000 would take about 366 MiB", result.stderr)
   end)
 end)

@@ -1,0 +1,61 @@
+// What the still part of a picture takes.
+#include "runtime/picture/surfaces.h"
+
+#include "tests/test.h"
+
+namespace rapid {
+namespace {
+
+// From 10 m in front of the origin, a little above.
+PictureView view_from_above()
+{
+    PictureView view;
+    view.camera = {Vec3d(0, 4, 10), Vec3d::Zero(), 1.2};
+    view.bounds = Box3d(Vec3d(-3, -3, -3), Vec3d(3, 3, 3));
+    view.line_spacing = 1;
+    return view;
+}
+
+double allocated(const std::vector<SurfaceTile>& tiles)
+{
+    std::size_t bytes = 0;
+    for (const SurfaceTile& tile : tiles)
+        bytes += sizeof tile.colour[0] * tile.colour.capacity() + tile.bytes.capacity() +
+                 sizeof(float) * tile.depth.capacity() + sizeof(SurfaceTile::Lit) * tile.lit.capacity();
+    return static_cast<double>(bytes);
+}
+
+double bytes_a_pixel(const PictureScene& scene)
+{
+    const PictureOptions options{.width = 20 * tile_size, .height = 15 * tile_size};
+    const PictureView view = view_from_above();
+    const std::vector<bool> vessels(scene.bodies.size());
+    return allocated(draw_surfaces(options, scene, view, vessels, Light(scene, view))) /
+           (options.width * options.height);
+}
+
+PictureScene with_block()
+{
+    auto mesh = std::make_shared<Mesh>();
+    mesh->positions = {{-1, 1, -1}, {-1, 1, 1}, {1, 1, 1}, {1, 1, -1}};
+    mesh->triangles = {{0, 1, 2}, {0, 2, 3}};
+    PictureScene scene;
+    scene.planes.push_back({Vec3d(0, 1, 0), 0});
+    scene.bodies.push_back({mesh, PictureScene::Body::Collider});
+    return scene;
+}
+
+TEST_CASE("the surfaces of a picture take no more than is reckoned with", "[picture][surfaces]")
+{
+    CHECK(bytes_a_pixel({}) == Approx(surface_bytes_a_pixel(false)));  // the grid takes no light from points
+
+    PictureScene walls;  // all over the picture
+    walls.planes.push_back({Vec3d(0, 1, 0), 0});
+    walls.planes.push_back({Vec3d(0, 0, 1), -20});
+    CHECK(bytes_a_pixel(walls) == Approx(surface_bytes_a_pixel(true)));
+
+    CHECK(bytes_a_pixel(with_block()) < surface_bytes_a_pixel(true));
+}
+
+}  // namespace
+}  // namespace rapid

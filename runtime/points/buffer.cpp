@@ -109,6 +109,20 @@ void Buffer::reserve(std::size_t bytes)
     *this = std::move(grown);
 }
 
+void Buffer::give_up(std::size_t bytes)
+{
+    data_ = static_cast<char*>(data_) + bytes;
+    capacity_ -= bytes;
+}
+
+void Buffer::take_back()
+{
+    // Pages keep their stagger, to a line.
+    const std::size_t back = given_up() - (mapped_ ? given_up() % page / line * line : 0);
+    data_ = static_cast<char*>(data_) - back;
+    capacity_ += back;
+}
+
 void Buffer::release()
 {
     if (mapped_ && unmap_in_file(block_, block_bytes_)) return;

@@ -30,6 +30,13 @@ public:
     // Makes room for at least `bytes`; what was written stays. Throws std::bad_alloc.
     void reserve(std::size_t bytes);
 
+    // Gives up the first bytes: those behind them are the first from now on, and are not moved.
+    void give_up(std::size_t bytes);
+    // Bytes that were given up, and less than a page more.
+    std::size_t given_up() const { return block_ ? static_cast<char*>(data_) - static_cast<char*>(block_) : 0; }
+    // Takes them back, but for less than a page: the first is 64-byte aligned again. What was written is not moved.
+    void take_back();
+
 private:
     void release();
 

@@ -3,7 +3,8 @@
 // Copying a column copies a pointer; the first write after a copy clones the values. A value that all points share is
 // held once: `pscale = 0.02` costs four bytes, not four bytes a point.
 //
-// Layout: shape [size], contiguous, 64-byte aligned; vec3 is packed x y z, as OpenVDB and Houdini hold it.
+// Layout: shape [size], contiguous; vec3 is packed x y z, as OpenVDB and Houdini hold it. 64-byte aligned until points
+// are removed.
 #pragma once
 
 #include <cstdint>
@@ -27,6 +28,8 @@ struct Compaction {
     };
     std::vector<Run> runs;
     std::size_t kept = 0;
+    std::size_t longest = 0;  // of the runs: its number
+    std::size_t ahead = 0;    // points in the runs before it
 
     // From a mask, shape [size]; points with 0 are removed.
     static Compaction from_mask(std::span<const std::uint8_t> keep);
@@ -143,16 +146,12 @@ public:
     // Removes all points that are in no run; the others keep their order.
     void keep(const Compaction& compaction)
     {
-        if (values_) {
-            const T* from = data();
-            std::shared_ptr<Buffer> into = is_shared() ? std::make_shared<Buffer>(bytes_of(compaction.kept)) : values_;
-            T* to = static_cast<T*>(into->data());
-            for (const auto& run : compaction.runs) {
-                if (to != from + run.begin)
-                    std::memmove(static_cast<void*>(to), from + run.begin, run.size * sizeof(T));
-                to += run.size;
-            }
+        if (values_ && is_shared()) {
+            auto into = std::make_shared<Buffer>(bytes_of(compaction.kept));
+            pack(static_cast<T*>(into->data()), data(), compaction.runs);
             values_ = std::move(into);
+        } else if (values_) {
+            close_up(compaction);
         }
         size_ = compaction.kept;
     }
@@ -181,6 +180,36 @@ private:
 
     const T* data() const { return static_cast<const T*>(values_->data()); }
     T* mutable_data() { return values_ ? static_cast<T*>(values_->data()) : nullptr; }
+
+    // Puts runs one behind the other; `to` is not behind the first of them.
+    static void pack(T* to, const T* from, std::span<const Compaction::Run> runs)
+    {
+        for (const auto& run : runs) {
+            if (to != from + run.begin) std::memmove(static_cast<void*>(to), from + run.begin, run.size * sizeof(T));
+            to += run.size;
+        }
+    }
+
+    // The longest run stays in its place, and the others close up to it: it is the old that die, so most of a column is
+    // not moved. This leaves room before the first value, at most a quarter of what the values take.
+    void close_up(const Compaction& compaction)
+    {
+        const std::span runs = compaction.runs;
+        T* const from = mutable_data();
+        const auto& longest = runs.empty() ? Compaction::Run{size_, 0} : runs[compaction.longest];
+        const std::size_t left = (longest.begin - compaction.ahead) * sizeof(T);
+        if (runs.empty() || values_->given_up() + left > compaction.kept * sizeof(T) / 4) {
+            values_->take_back();
+            return pack(mutable_data(), from, runs);
+        }
+        T* to = from + longest.begin;
+        for (std::size_t k = compaction.longest; k-- > 0;) {
+            to -= runs[k].size;
+            std::memmove(static_cast<void*>(to), from + runs[k].begin, runs[k].size * sizeof(T));
+        }
+        pack(from + longest.begin + longest.size, from, runs.subspan(compaction.longest + 1));
+        values_->give_up(left);
+    }
 
     // Makes the values this column's alone, expanded, with room for `size` of them.
     void own(std::size_t size)

@@ -19,6 +19,10 @@ Compaction Compaction::from_mask(std::span<const std::uint8_t> keep)
         if (i == keep.size()) break;
         const void* removed = std::memchr(keep.data() + i, 0, keep.size() - i);
         const std::size_t end = removed ? static_cast<const std::uint8_t*>(removed) - keep.data() : keep.size();
+        if (result.runs.empty() || end - i > result.runs[result.longest].size) {
+            result.longest = result.runs.size();
+            result.ahead = result.kept;
+        }
         result.runs.push_back({i, end - i});
         result.kept += end - i;
         i = end;

@@ -47,6 +47,41 @@ TEST_CASE("room that is there already is kept where it is", "[buffer]")
     CHECK(buffer.data() == before);
 }
 
+TEST_CASE("bytes that are given up can be taken back, and growth takes along only what is behind them", "[buffer]")
+{
+    const std::size_t bytes = GENERATE(std::size_t{1} << 12, std::size_t{1} << 20);  // from the heap, and pages
+    Buffer buffer(bytes);
+    const auto values = words(buffer, bytes);
+    std::iota(values.begin(), values.end(), std::uint64_t{0});
+    const std::uintptr_t before = address(buffer);
+    const std::size_t room = buffer.capacity();
+
+    buffer.give_up(120);
+    CHECK(address(buffer) == before + 120);
+    CHECK(buffer.capacity() == room - 120);
+    CHECK(buffer.given_up() >= 120);
+    CHECK(buffer.given_up() < 120 + 4096);
+    buffer.reserve(8 * bytes);
+    CHECK(words(buffer, bytes)[0] == 15);
+    CHECK(words(buffer, bytes - 120).back() == bytes / 8 - 1);
+    buffer.take_back();
+    CHECK(address(buffer) % 64 == 0);
+    CHECK(buffer.capacity() >= 8 * bytes);
+    std::memset(buffer.data(), 1, buffer.capacity());
+
+    Buffer other(bytes);
+    const std::uintptr_t begin = address(other);
+    other.give_up(bytes);
+    other.take_back();
+    CHECK(address(other) / 4096 == begin / 4096);
+    CHECK(other.capacity() >= bytes);
+
+    Buffer none(0);
+    CHECK(none.given_up() == 0);
+    none.take_back();
+    CHECK(none.capacity() == 0);
+}
+
 TEST_CASE("buffers of one size take each other's pages, wherever they begin in them", "[buffer]")
 {
     constexpr std::size_t bytes = 12'000'000;

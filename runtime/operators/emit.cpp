@@ -416,9 +416,10 @@ void Emit::emit(Flow& flow, Births births, const Evaluation& now)
         for (std::size_t begin = chunk_begin; begin < chunk_end; begin += batch_size)
             fill(newborn, chosen, begin, std::span(places).first(std::min(batch_size, chunk_end - begin)), ages,
                  velocities, now);
+        const Items in_frame = chosen.in_frame(0);
+        for (std::size_t i = chunk_begin; i < chunk_end; ++i)
+            newborn.id[i] = first_id + static_cast<std::int64_t>(in_frame[i]);
     });
-    const Items in_frame = chosen.in_frame(0);
-    for (std::size_t i = 0; i < n; ++i) newborn.id[i] = first_id + static_cast<std::int64_t>(in_frame[i]);
     now.figures.born += n;
     if (birth.edit) birth.edit->edit(points, points.size() - n, now);
 }

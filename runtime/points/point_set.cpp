@@ -164,29 +164,33 @@ void PointSet::remove_group(std::string_view name)
     if (const auto found = groups_.find(name); found != groups_.end()) groups_.erase(found);
 }
 
-void PointSet::append(std::size_t n)
-{
-    for (auto& [name, column] : columns_) std::visit([n](auto& c) { c.append(n); }, column);
-    for (auto& [name, members] : groups_) members.append(n, std::uint8_t{0});
-    size_ += n;
-}
+void PointSet::append(std::size_t n) { append(n, {}, {}); }
 
 void PointSet::append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups)
 {
+    // In parallel, as the system clears pages when they are first written.
+    std::vector<std::function<void(std::size_t begin, std::size_t end)>> fills;
+    const auto append_to = [&](auto& column, const auto& value) {
+        if (column.is_uniform()) return column.append(n, value);
+        fills.emplace_back([added = column.append_for_writing(n), value](std::size_t begin, std::size_t end) {
+            std::uninitialized_fill(added.data() + begin, added.data() + end, value);
+        });
+    };
     for (auto& [name, column] : columns_)
         std::visit(
             [&, &key = name](auto& c) {
                 const auto given =
                     std::find_if(values.begin(), values.end(), [&](const auto& s) { return s.name == key; });
-                if (given == values.end())
-                    c.append(n);
-                else
-                    c.append(n, std::get<std::decay_t<decltype(c.fallback())>>(given->fallback));
+                using T = std::decay_t<decltype(c.fallback())>;
+                append_to(c, given == values.end() ? c.fallback() : std::get<T>(given->fallback));
             },
             column);
     for (auto& [name, members] : groups_)
-        members.append(n, std::uint8_t{std::find(groups.begin(), groups.end(), name) != groups.end()});
+        append_to(members, std::uint8_t{std::find(groups.begin(), groups.end(), name) != groups.end()});
     size_ += n;
+    for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
+        for (const auto& fill : fills) fill(begin, end);
+    });
 }
 
 void PointSet::keep(std::span<const std::uint8_t> mask)

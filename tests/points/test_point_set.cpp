@@ -45,6 +45,28 @@ TEST_CASE("appended points are at the origin, at rest, without an id, and have e
     CHECK(int{(*set.find_group("hot"))[2]} == 0);
 }
 
+TEST_CASE("as many points as fill several chunks are appended with values of their own, on any thread",
+          "[point_set][threads]")
+{
+    constexpr std::size_t n = 10000;
+    PointSet set = points({{1, 2, 3}, {4, 5, 6}}).set<float>("heat", {5, 6}).group("hot", {0});
+    set.append(n, {{"v", Vec3f(0, 1, 0)}, {"heat", 0.25f}}, {"hot"});
+
+    REQUIRE(set.size() == n + 2);
+    const auto count = [&](const auto& column, const auto& value) {
+        std::size_t found = 0;
+        for (std::size_t i = 2; i < set.size(); ++i) found += column[i] == value;
+        return found;
+    };
+    CHECK(count(set.P(), Vec3f(0, 0, 0)) == n);
+    CHECK(count(set.v(), Vec3f(0, 1, 0)) == n);
+    CHECK(count(set.id(), std::int64_t{-1}) == n);
+    CHECK(count(set.column<float>("heat"), 0.25f) == n);
+    CHECK(count(*set.find_group("hot"), std::uint8_t{1}) == n);
+    CHECK(set.P()[1] == Vec3f(4, 5, 6));
+    CHECK(int{(*set.find_group("hot"))[1]} == 0);
+}
+
 TEST_CASE("removing points keeps the order, ids and values of the others", "[point_set]")
 {
     PointSet set = points({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}).group("odd", {1, 3});

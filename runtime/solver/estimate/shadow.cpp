@@ -1,10 +1,12 @@
 #include "runtime/solver/estimate/shadow.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
 
+#include "runtime/parallel.h"
 #include "runtime/shapes/path.h"
 #include "runtime/solver/estimate/resolution.h"
 
@@ -26,9 +28,13 @@ std::uint64_t rank_of(std::int64_t id)
 // Whether points are in order of id, as they are unless a script or a merge has reordered them.
 bool are_sorted(Strided<std::int64_t> ids, std::size_t size)
 {
-    if (ids.stride == 0) return size < 2;
-    bool sorted = true;
-    for (std::size_t i = 1; i < size; ++i) sorted &= ids.data[i - 1] < ids.data[i];
+    if (ids.stride == 0 || size < 2) return size < 2;
+    std::atomic<bool> sorted = true;
+    for_each_chunk(size - 1, [&](std::size_t begin, std::size_t end) {
+        bool ascend = true;
+        for (std::size_t i = begin; i < end; ++i) ascend &= ids.data[i] < ids.data[i + 1];
+        if (!ascend) sorted.store(false, std::memory_order_relaxed);
+    });
     return sorted;
 }
 
@@ -45,35 +51,41 @@ void prefetch(const PointSet& points, std::span<const std::uint32_t> indices)
     }
 }
 
+// The index of the first id from `from` on that is not lower, where ids ascend; not far before `guess`.
+std::size_t lower_bound(Strided<std::int64_t> ids, std::size_t size, std::size_t from, std::size_t guess,
+                        std::int64_t id)
+{
+    std::size_t begin = std::clamp(guess + 1, from, size), end = size;
+    for (std::size_t step = 16; begin > from && ids[begin - 1] >= id; step *= 2)
+        end = begin, begin -= std::min(step, begin - from);
+    while (begin < end) {
+        const std::size_t middle = begin + (end - begin) / 2;
+        if (ids[middle] < id)
+            begin = middle + 1;
+        else
+            end = middle;
+    }
+    return begin;
+}
+
 // The index of the point with each of the ascending ids; `gone` where there is none. before: the previous indices,
-// which are mostly right.
+// which are mostly right, or all too high by as many points as have been removed before.
 std::vector<std::uint32_t> indices_of(std::span<const std::int64_t> ids, const PointSet& points,
                                       std::span<const std::uint32_t> before)
 {
     const Strided<std::int64_t> all = points.id().read();
     std::vector<std::uint32_t> indices(ids.size(), gone);
-    std::size_t from = 0;
+    std::size_t from = 0, removed = 0;
     bool missed = false;
     for (std::size_t k = 0; k < ids.size(); ++k) {
         if (before[k] < points.size() && all[before[k]] == ids[k]) {
-            indices[k] = before[k];
             from = before[k];
-            continue;
+        } else {
+            from = lower_bound(all, points.size(), from, before[k] - std::min<std::size_t>(removed, before[k]), ids[k]);
+            missed |= from == points.size() || all[from] != ids[k];
+            removed = before[k] - std::min<std::size_t>(from, before[k]);
         }
-        std::size_t count = points.size() - from;
-        while (count > 0) {  // lower bound
-            const std::size_t half = count / 2;
-            if (all[from + half] < ids[k]) {
-                from += half + 1;
-                count -= half + 1;
-            } else {
-                count = half;
-            }
-        }
-        if (from < points.size() && all[from] == ids[k])
-            indices[k] = static_cast<std::uint32_t>(from);
-        else
-            missed = true;
+        if (from < points.size() && all[from] == ids[k]) indices[k] = static_cast<std::uint32_t>(from);
     }
     if (!missed || are_sorted(all, points.size())) return indices;  // missed points have died
     std::fill(indices.begin(), indices.end(), gone);
@@ -107,6 +119,7 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
     prefetch(points, indices_);
     indices_ = indices_of(ids_, points, indices_);
     keep_found(indices_, ids_, dP_, dv_, rounding_);
+    prefetch(points, indices_);
 
     const Strided<std::int64_t> id = points.id().read();
     std::vector<std::pair<std::int64_t, std::uint32_t>> born;
@@ -177,7 +190,8 @@ void Shadows::add_rounding(const PointSet& solved)
         for (int axis = 0; axis < 3; ++axis) {
             const double way = 0.5 * point.dt * (double(point.v[axis]) + double(v1[axis]));
             const double moved = double(P1[axis]) - double(point.P[axis]);
-            const double lost = std::remainder(way - moved, spacing_at(P1[axis]));
+            const double off = way - moved, spacing = spacing_at(P1[axis]);
+            const double lost = off - spacing * std::nearbyint(off / spacing);  // exact: a power of two
             if (std::isfinite(lost)) point.displacement[axis] += lost;
         }
         point.P = P1;

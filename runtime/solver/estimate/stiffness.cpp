@@ -36,10 +36,15 @@ constexpr double step_rounding = 1e-6;  // relative error of a step from these d
 std::vector<std::uint32_t> sample_of(const PointSet& points, const std::string& group)
 {
     const Strided<std::uint8_t> members = members_of(points, group);
+    std::vector<std::uint32_t> indices;
+    if (members.stride == 0) {  // all, or none
+        const std::size_t n = members[0] ? std::min(points.size(), most_sampled) : 0;
+        for (std::size_t k = 0; k < n; ++k) indices.push_back(static_cast<std::uint32_t>(k * points.size() / n));
+        return indices;
+    }
     std::size_t count = 0, passed = 0;
     for (std::size_t i = 0; i < points.size(); ++i) count += members[i];
     const std::size_t n = std::min(count, most_sampled);
-    std::vector<std::uint32_t> indices;
     for (std::size_t i = 0; i < points.size() && indices.size() < n; ++i)
         if (members[i] && passed++ == indices.size() * count / n) indices.push_back(static_cast<std::uint32_t>(i));
     return indices;

@@ -17,14 +17,16 @@ constexpr double farthest_cell = 1 << 20;
 // Cells a sphere up to which all of them are kept, empty or not: finding one is then a look-up.
 constexpr double dense_below = 8;
 
-}  // namespace
-
-std::size_t bucket_size(std::size_t n) { return std::clamp<std::size_t>(n / 8, 2048, 8192); }
-
+// Along an axis. Cells farther than some from the middle are all the last one: neighbours stay neighbours, and a key
+// fits 64 bits.
 std::int64_t cell_coordinate(double x, double width)
 {
     return static_cast<std::int64_t>(std::clamp(std::floor(x / width), -farthest_cell, farthest_cell));
 }
+
+}  // namespace
+
+std::size_t bucket_size(std::size_t n) { return std::clamp<std::size_t>(n / 8, 2048, 8192); }
 
 CellGrid::Run CellGrid::find_run(std::uint64_t a, std::uint64_t b) const
 {
@@ -35,22 +37,23 @@ CellGrid::Run CellGrid::find_run(std::uint64_t a, std::uint64_t b) const
             begin_[static_cast<std::size_t>(last - key_.begin())]};
 }
 
-CellGrid::Run CellGrid::row(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const
+CellGrid::Cell CellGrid::cell_at(const Vec3d& X) const
 {
-    if (j < least_[1] || j >= least_[1] + count_[1] || k < least_[2] || k >= least_[2] + count_[2]) return {0, 0};
-    i0 = std::max(i0, least_[0]);
-    i1 = std::min(i1, least_[0] + count_[0] - 1);
-    if (i0 > i1) return {0, 0};
-    const std::uint64_t first = key_of(i0, j, k);
-    return run(first, first + static_cast<std::uint64_t>(i1 - i0));
+    return {cell_coordinate(X.x(), width), cell_coordinate(X.y(), width), cell_coordinate(X.z(), width)};
 }
 
-CellGrid::Runs CellGrid::around(const std::array<std::int64_t, 3>& cell) const
+CellGrid::Runs CellGrid::around(const Cell& cell) const
 {
-    const auto [i, j, k] = cell;
     Runs runs;
-    for (int dk = -1; dk <= 1; ++dk)
-        for (int dj = -1; dj <= 1; ++dj) runs.add(row(i - 1, i + 1, j + dj, k + dk));
+    std::int64_t first[3];
+    std::array<std::uint64_t, 3> cells;
+    for (std::size_t k = 0; k < 3; ++k) {
+        first[k] = std::max(cell[k] - 1, least_[k]);
+        const std::int64_t end = std::min(cell[k] + 2, least_[k] + count_[k]);
+        if (first[k] >= end) return runs;
+        cells[k] = static_cast<std::uint64_t>(end - first[k]);
+    }
+    add_rows(runs, key_of(first[0], first[1], first[2]), cells);
     return runs;
 }
 
@@ -65,7 +68,7 @@ void CellSorter::fill(CellGrid& grid, const SpheresView& spheres, std::span<cons
     const std::size_t n = members.size();
     const std::size_t cells = bound(grid, spheres, members);
     find_keys(grid, spheres, members);
-    for (std::vector<float>* column : {&grid.x, &grid.y, &grid.z, &grid.r}) column->resize(n + lanes);
+    for (PageArray<float>* column : {&grid.x, &grid.y, &grid.z, &grid.r}) column->resize(n + lanes);
     grid.place.resize(n);
     if (grid.dense_)
         sort_dense(grid, cells, spheres, members);
@@ -78,7 +81,7 @@ std::size_t CellSorter::bound(CellGrid& grid, const SpheresView& spheres, std::s
 {
     Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
     for (const std::uint32_t i : members) {
-        const Eigen::Array3d at = (spheres.P[i] - spheres.middle).array();
+        const Eigen::Array3d at = spheres.in_grid(spheres.P[i]).array();
         low = low.min(at), high = high.max(at);
     }
     double all = 1;
@@ -97,10 +100,10 @@ void CellSorter::find_keys(const CellGrid& grid, const SpheresView& spheres, std
     keys_.resize(members.size());
     for_each_chunk(members.size(), [&](std::size_t first, std::size_t last) {
         for (std::size_t m = first; m < last; ++m) {
+            const Vec3d at = per_width * spheres.in_grid(spheres.P[members[m]]);
             std::int64_t c[3];
             for (int k = 0; k < 3; ++k) {
-                const double x = (spheres.P[members[m]][k] - spheres.middle[k]) * per_width;
-                c[k] = static_cast<std::int64_t>(std::clamp(std::floor(x), -farthest_cell, farthest_cell));
+                c[k] = static_cast<std::int64_t>(std::clamp(std::floor(at[k]), -farthest_cell, farthest_cell));
                 c[k] = std::clamp(c[k], grid.least_[k] + 1, grid.least_[k] + grid.count_[k] - 2);
             }
             keys_[m] = grid.key_of(c[0], c[1], c[2]);
@@ -110,7 +113,7 @@ void CellSorter::find_keys(const CellGrid& grid, const SpheresView& spheres, std
 
 inline CellSorter::Sphere CellSorter::sphere(const SpheresView& spheres, std::uint32_t place, std::uint64_t cell)
 {
-    const Vec3f at = (spheres.P[place] - spheres.middle).cast<float>();
+    const Vec3f at = spheres.in_grid(spheres.P[place]).cast<float>();
     return {at.x(), at.y(), at.z(), spheres.reach[place], place, static_cast<std::uint32_t>(cell)};
 }
 
@@ -165,13 +168,14 @@ void CellSorter::sort_sparse(CellGrid& grid, const SpheresView& spheres, std::sp
         return std::pair(keys_[a], a) < std::pair(keys_[b], b);
     });
     grid.key_.clear();
-    grid.begin_.clear();
+    grid.begin_.resize(n + 1);
     for (std::size_t m = 0; m < n; ++m) {
         if (m > 0 && keys_[order_[m]] == grid.key_.back()) continue;
+        grid.begin_[grid.key_.size()] = static_cast<std::uint32_t>(m);
         grid.key_.push_back(keys_[order_[m]]);
-        grid.begin_.push_back(static_cast<std::uint32_t>(m));
     }
-    grid.begin_.push_back(static_cast<std::uint32_t>(n));
+    grid.begin_[grid.key_.size()] = static_cast<std::uint32_t>(n);
+    grid.begin_.resize(grid.key_.size() + 1);
     for_each_chunk(n, [&](std::size_t first, std::size_t last) {
         for (std::size_t m = first; m < last; ++m) put(grid, m, sphere(spheres, members[order_[m]], 0));
     });

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/points/column.h"
+#include "runtime/points/page_array.h"
 #include "runtime/simd.h"
 #include "runtime/vec.h"
 
@@ -16,9 +17,12 @@ namespace rapid {
 
 // The spheres of a search, of which a grid takes those that it is told.
 struct SpheresView {
-    std::span<const Vec3d> P;
-    Strided<float> reach;  // m
-    Vec3d middle;          // of all of them: what cells count from
+    std::span<const Vec3d> P;  // m
+    Strided<float> reach;      // in units of the grid
+    Vec3d middle;              // m, of all of them: what cells count from
+    double scale = 1;          // units of the grid in a metre
+
+    Vec3d in_grid(const Vec3d& X) const { return scale * (X - middle); }
 };
 
 // Sorts by buckets that fit a cache first; kept between grids for its memory.
@@ -27,9 +31,9 @@ class CellSorter;
 // The cells of one grid, with a border of empty ones.
 class CellGrid {
 public:
-    double width = 0;                  // m, of a cell
-    std::vector<std::uint32_t> place;  // of each sphere, its index in the set
-    std::vector<float> x, y, z, r;     // from the middle of the scene, m; padded for whole simd packs
+    double width = 0;                // of a cell, in units of the grid, as all that follows
+    PageArray<std::uint32_t> place;  // of each sphere, its index in the set
+    PageArray<float> x, y, z, r;     // from the middle of the scene; padded for whole simd packs
 
     std::size_t size() const { return place.size(); }
 
@@ -42,10 +46,8 @@ public:
     {
         return dense_ ? Run{begin_[first], begin_[last + 1]} : find_run(first, last);
     }
-    // In the cells from i0 to i1 of a row.
-    Run row(std::int64_t i0, std::int64_t i1, std::int64_t j, std::int64_t k) const;
 
-    // Those in a cell and its neighbours that hold any.
+    // Of several rows, those that are not empty.
     class Runs {
     public:
         void add(const Run& run)
@@ -59,7 +61,44 @@ public:
         Run all_[9];
         int size_ = 0;
     };
-    Runs around(const std::array<std::int64_t, 3>& cell) const;
+    // In a cell and its neighbours: in any cell; in cells of a row that hold spheres, by their keys.
+    using Cell = std::array<std::int64_t, 3>;  // its coordinates
+    Cell cell_at(const Vec3d& X) const;
+    Runs around(const Cell& cell) const;
+    Runs around(std::uint64_t first, std::uint64_t last) const
+    {
+        Runs runs;
+        add_rows(runs, first - layer_step() - row_step() - 1, {last - first + 3, 3, 3});
+        return runs;
+    }
+    // Half of these: in the cells themselves, which are first, and in those behind them.
+    Runs behind(std::uint64_t first, std::uint64_t last) const
+    {
+        Runs runs;
+        add_rows(runs, first, {last - first + 2, 1, 1});
+        add_rows(runs, first + row_step() - 1, {last - first + 3, 1, 1});
+        add_rows(runs, first + layer_step() - row_step() - 1, {last - first + 3, 3, 1});
+        return runs;
+    }
+
+    // Calls f(begin, end, first, last) for the spheres from `begin` to `end`, by cells that follow each other in a row
+    // and hold some: by as many as have a few spheres together, whose neighbours are then looked up once.
+    template <class F>
+    void for_each_stretch(std::size_t begin, std::size_t end, const F& f) const
+    {
+        constexpr std::size_t few = 4;
+        std::size_t cell = cell_of_sphere(begin);
+        for (std::size_t m = begin; m < end; ++cell) {
+            if (m == begin_[cell + 1]) continue;
+            const std::size_t first = cell;
+            while (begin_[cell + 1] < std::min(m + few, end) && key(cell + 1) == key(cell) + 1 &&
+                   begin_[cell + 1] < begin_[cell + 2])
+                ++cell;
+            const std::size_t last = std::min<std::size_t>(end, begin_[cell + 1]);
+            f(m, last, first, cell);
+            m = last;
+        }
+    }
 
     // Cells in memory, the empty ones left out where the grid is sparse: the key of each, and its spheres.
     std::size_t cells() const { return begin_.empty() ? 0 : begin_.size() - 1; }
@@ -75,6 +114,15 @@ private:
     friend class CellSorter;
 
     Run find_run(std::uint64_t first, std::uint64_t last) const;
+    // Those of a box of so many cells along each axis, of which this is the first.
+    void add_rows(Runs& runs, std::uint64_t first, const std::array<std::uint64_t, 3>& cells) const
+    {
+        for (std::uint64_t k = 0; k < cells[2]; ++k)
+            for (std::uint64_t j = 0; j < cells[1]; ++j) {
+                const std::uint64_t row = first + k * layer_step() + j * row_step();
+                runs.add(run(row, row + cells[0] - 1));
+            }
+    }
 
     std::uint64_t key_of(std::int64_t i, std::int64_t j, std::int64_t k) const
     {
@@ -85,13 +133,9 @@ private:
 
     std::int64_t least_[3], count_[3];  // cell coordinates
     std::vector<std::uint64_t> key_;    // of the cells that are not empty; not used where dense
-    std::vector<std::uint32_t> begin_;  // of these cells' spheres; of all cells where dense
+    PageArray<std::uint32_t> begin_;    // of these cells' spheres; of all cells where dense
     bool dense_ = false;
 };
-
-// Along an axis. Cells farther than some from the middle are all the last one: neighbours stay neighbours, and a key
-// fits 64 bits.
-std::int64_t cell_coordinate(double x, double width);
 
 class CellSorter {
 public:
@@ -112,10 +156,10 @@ private:
                     std::span<const std::uint32_t> members);
     void sort_sparse(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members);
 
-    std::vector<std::uint64_t> keys_;           // of the cell of each sphere
-    std::vector<Sphere> spheres_;               // by buckets
+    PageArray<std::uint64_t> keys_;             // of the cell of each sphere
+    PageArray<Sphere> spheres_;                 // by buckets
     std::vector<std::uint32_t> starts_, ends_;  // by bucket and source
-    std::vector<std::uint32_t> order_;
+    PageArray<std::uint32_t> order_;
 };
 
 // How many items are sorted together: in the second-level cache, and on all threads.

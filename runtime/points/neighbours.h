@@ -9,6 +9,7 @@
 #include "runtime/parallel.h"
 #include "runtime/points/cell_grid.h"
 #include "runtime/points/near_spheres.h"
+#include "runtime/points/sort_few.h"
 #include "runtime/vec.h"
 
 namespace rapid {
@@ -17,6 +18,8 @@ class Neighbours {
 public:
     // P: shape [n], m, copied. radius: of the queries, > 0, m. Error: below 2^-30 of the largest coordinate.
     Neighbours(std::span<const Vec3f> P, double radius);
+    Neighbours(const Neighbours&) = delete;
+    Neighbours& operator=(const Neighbours&) = delete;
 
     // The indices of the points at most the radius from X, ascending. From any number of threads.
     void find(const Vec3d& X, std::vector<std::uint32_t>& indices) const;
@@ -28,31 +31,31 @@ public:
     void for_each(const F& f) const
     {
         for_each_chunk(grid_.size(), [&](std::size_t begin, std::size_t end) {
-            std::vector<std::uint32_t> near;
-            std::size_t cell = grid_.cell_of_sphere(begin);
-            for (std::size_t m = begin; m < end; ++cell) {
-                const std::size_t last = std::min<std::size_t>(end, grid_.end(cell));
-                if (m == last) continue;
-                const CellGrid::Runs runs = around(grid_.key(cell));
+            NearSpheres spheres;
+            std::vector<std::uint32_t> found, near;
+            grid_.for_each_stretch(begin, end, [&](std::size_t m, std::size_t last, std::size_t from, std::size_t to) {
+                spheres.gather(grid_, grid_.around(grid_.key(from), grid_.key(to)));
+                found.resize(std::max<std::size_t>(found.size(), spheres.size() + most_sorted_by_rank));
                 for (; m < last; ++m) {
-                    list(m, runs, near);
+                    list(m, spheres, found, near);
                     f(grid_.place[m], near);
                 }
-            }
+            });
         });
     }
 
 private:
-    CellGrid::Runs around(std::uint64_t key) const;
-    void list(std::size_t sphere, const CellGrid::Runs& runs, std::vector<std::uint32_t>& near) const;
+    // found: with room for all of the spheres, and for sorting; what is in it is of no use.
+    void list(std::size_t sphere, const NearSpheres& spheres, std::span<std::uint32_t> found,
+              std::vector<std::uint32_t>& near) const;
     bool is_near(std::uint32_t point, const Vec3d& X) const
     {
         return (P_[point] - X).squaredNorm() <= radius_ * radius_;
     }
 
-    std::vector<Vec3d> P_;
+    PageArray<Vec3d> P_;
     double radius_;
-    Vec3d middle_ = Vec3d::Zero();  // in radii, as all of the grid
+    SpheresView spheres_;  // in radii, so that none is too small for single precision
     float blur_ = 0;
     CellGrid grid_;
 };

@@ -32,13 +32,13 @@ TEST_CASE("neighbours are those that all pairs give, of a set and of any place, 
     std::uniform_real_distribution<float> in(-1, 1);
     std::vector<Vec3f> P;
     double radius = 0.2;
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0; i < 5000; ++i) {  // more than a chunk
         Vec3f at(in(random), in(random), in(random));
         if (shape == 1) at += Vec3f(1e4f, -1e4f, 3e3f);
         if (shape == 2) at = 0.1f * at + Vec3f(static_cast<float>(i % 7) * 1e5f, 0, 0);
         if (shape == 3)
             at = 0.25f * Vec3f(static_cast<float>(i % 10), static_cast<float>(i / 10 % 10),
-                               static_cast<float>(i / 100 % 10));  // each place twice
+                               static_cast<float>(i / 100 % 10));  // each place five times
         if (shape == 4) at *= 1e-30f;
         P.push_back(at);
     }

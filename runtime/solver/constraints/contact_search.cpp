@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -13,6 +11,7 @@
 #include "runtime/memory_budget.h"
 #include "runtime/parallel.h"
 #include "runtime/points/near_spheres.h"
+#include "runtime/points/sort_few.h"
 #include "runtime/solver/constraints/pair_estimate.h"
 
 namespace rapid {
@@ -24,32 +23,6 @@ constexpr std::size_t spheres_a_task = 2048;
 
 // Pairs are numbered by 32 bits.
 constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
-
-// Each number, which differs from the others, goes behind those that are less: without a branch that is mispredicted.
-void sort_pack(std::uint32_t* first, std::uint32_t count)
-{
-    typedef std::uint32_t Numbers __attribute__((vector_size(4 * lanes)));
-    Numbers all;
-    for (std::uint32_t l = 0; l < lanes; ++l) all[l] = l < count ? first[l] : UINT32_MAX;
-    for (std::uint32_t l = 0; l < count; ++l) {
-        const std::uint32_t value = all[l];
-        first[std::popcount(std::bit_cast<std::uint64_t>(__builtin_convertvector(all < value, LaneBytes))) / 8] = value;
-    }
-}
-
-// Lists are short, mostly: std::sort would take longer to start.
-void sort_few(std::uint32_t* first, std::uint32_t* last)
-{
-    if (last - first < 2) return;
-    if (last - first <= lanes) return sort_pack(first, static_cast<std::uint32_t>(last - first));
-    if (last - first > 32) return std::sort(first, last);
-    for (std::uint32_t* next = first + 1; next < last; ++next) {
-        const std::uint32_t value = *next;
-        std::uint32_t* hole = next;
-        for (; hole > first && hole[-1] > value; --hole) *hole = hole[-1];
-        *hole = value;
-    }
-}
 
 // What single precision can't decide.
 bool touch(const SpheresView& spheres, std::uint32_t a, std::uint32_t b)
@@ -140,30 +113,21 @@ std::vector<ContactSearch::Found>& ContactSearch::room_for(std::size_t spheres)
 void ContactSearch::find_within(const CellGrid& grid)
 {
     std::vector<Found>& found = room_for(grid.size());
-    const std::uint64_t row = grid.row_step(), layer = grid.layer_step();
     const auto look = [&](std::size_t first, std::size_t last) {
         Found& pairs = found[first / spheres_a_task];
         pairs.clear();
-        std::size_t c = grid.cell_of_sphere(first);
-        for (std::size_t m = first; m < last; ++c) {
-            const std::size_t end = std::min<std::size_t>(last, grid.end(c));
-            if (m == end) continue;
-            const std::uint64_t key = grid.key(c);
-            CellGrid::Run runs[5] = {grid.run(key, key + 1), grid.run(key + row - 1, key + row + 1)};
-            for (int d = 0; d < 3; ++d) {
-                const std::uint64_t above = key + layer + static_cast<std::uint64_t>(d) * row - row;
-                runs[2 + d] = grid.run(above - 1, above + 1);
-            }
+        NearSpheres spheres;
+        grid.for_each_stretch(first, last, [&](std::size_t m, std::size_t end, std::size_t from, std::size_t to) {
+            spheres.gather(grid, grid.behind(grid.key(from), grid.key(to)));
             for (; m < end; ++m) {
-                runs[0].begin = static_cast<std::uint32_t>(m + 1);
-                const std::uint32_t a = grid.place[m];
-                for_near_spheres(grid, m, grid, runs, blur_, [&](std::uint32_t o, bool certain) {
+                const std::uint32_t a = grid.place[m], skipped = static_cast<std::uint32_t>(m + 1) - grid.begin(from);
+                spheres.for_each(grid, m, blur_, skipped, [&](std::uint32_t o, bool certain) {
                     const std::uint32_t b = grid.place[o];
                     if (!certain && !touch(spheres_, a, b)) return;
                     pairs.emplace_back(std::min(a, b), std::max(a, b));
                 });
             }
-        }
+        });
     };
     for_each_chunk(grid.size(), look, spheres_a_task);
 }
@@ -176,15 +140,14 @@ void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
     const auto look = [&](std::size_t first, std::size_t last) {
         Found& pairs = found[first / spheres_a_task];
         pairs.clear();
-        std::array<std::int64_t, 3> cell{}, last_cell{};
-        CellGrid::Runs runs;
+        CellGrid::Cell cell{}, last_cell{};
+        NearSpheres spheres;
         for (std::size_t m = first; m < last; ++m) {
             const std::uint32_t a = fine.place[m];
-            for (std::size_t k = 0; k < 3; ++k)
-                cell[k] = cell_coordinate(spheres_.P[a][k] - spheres_.middle[k], coarse.width);
-            if (m == first || cell != last_cell) runs = coarse.around(cell);
+            cell = coarse.cell_at(spheres_.in_grid(spheres_.P[a]));
+            if (m == first || cell != last_cell) spheres.gather(coarse, coarse.around(cell));
             last_cell = cell;
-            for_near_spheres(fine, m, coarse, runs, blur_, [&](std::uint32_t o, bool certain) {
+            spheres.for_each(fine, m, blur_, 0, [&](std::uint32_t o, bool certain) {
                 const std::uint32_t b = coarse.place[o];
                 if (certain || touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));
             });
@@ -233,10 +196,11 @@ void ContactSearch::sort(Pairs& pairs, std::size_t points)
         std::fill(end + first, end + last, 0);
         for (const auto& pair : here) ++end[pair.first];
         std::exclusive_scan(end + first, end + last, end + first, start);
-        for (const auto& pair : here) pairs.other[end[pair.first]++] = pair.second;
+        PageArray<std::uint32_t> others(here.size() + most_sorted_by_rank);
+        for (const auto& pair : here) others[end[pair.first]++ - start] = pair.second;
         std::uint32_t begin = start;
         for (std::size_t i = first; i < last; begin = end[i++])
-            sort_few(pairs.other.data() + begin, pairs.other.data() + end[i]);
+            sort_few(others.data() + (begin - start), end[i] - begin, pairs.other.data() + begin);
     };
     for_each_chunk(points + 1, sort_bucket, each_size);
 }

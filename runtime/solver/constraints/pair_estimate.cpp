@@ -1,6 +1,5 @@
 #include "runtime/solver/constraints/pair_estimate.h"
 
-#include <array>
 #include <numeric>
 #include <vector>
 
@@ -14,11 +13,9 @@ constexpr std::size_t samples = 64;
 // The spheres of a grid that touch one of the set, itself included where it is in the grid.
 double neighbours(const CellGrid& grid, const SpheresView& spheres, std::uint32_t sphere)
 {
-    const Vec3d at = spheres.P[sphere] - spheres.middle;
-    std::array<std::int64_t, 3> c;
-    for (int axis = 0; axis < 3; ++axis) c[axis] = cell_coordinate(at[axis], grid.width);
+    const Vec3d at = spheres.in_grid(spheres.P[sphere]);
     std::size_t found = 0;
-    for (const CellGrid::Run& run : grid.around(c))
+    for (const CellGrid::Run& run : grid.around(grid.cell_at(at)))
         for (std::uint32_t o = run.begin; o < run.end; ++o) {
             const double reach = double(grid.r[o]) + double(spheres.reach[sphere]);
             found += (Vec3d(grid.x[o], grid.y[o], grid.z[o]) - at).squaredNorm() < reach * reach;

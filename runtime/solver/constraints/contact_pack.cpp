@@ -28,7 +28,9 @@ void ContactPacks::pack(std::size_t block, std::span<const std::uint32_t> pairs,
         const std::uint32_t l = pack.count++;
         pack.i[l] = i, pack.j[l] = j, pack.pair[l] = k;
         if (pack.count == lanes) room &= ~(std::uint64_t{1} << p);
-        a = b = {window, (std::uint64_t{2} << p) - 1};
+        // Number by number: one written in two parts and copied whole at once would stall.
+        a.window = b.window = window;
+        a.packs = b.packs = (std::uint64_t{2} << p) - 1;
     }
     for (ContactPack& pack : packs) pack.repeat_first();
 }

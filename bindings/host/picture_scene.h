@@ -16,7 +16,7 @@ public:
     // Functions of the frame and motions are evaluated at the frame's time. A level set is turned into a mesh once, and
     // again where it was not in the frame before.
     std::shared_ptr<const PictureScene> at(std::int64_t frame);
-    // Whether it may in some frame; evaluates nothing.
+    // Whether the scene may have colliders in any frame; evaluates nothing.
     bool may_have_colliders() const;
 
 private:

@@ -1,6 +1,7 @@
 // Functions of the deferred part of the library: all that needs OpenVDB or Assimp. It is a library of its own
 // (rapid_deferred), which is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols takes
-// 40 ms at each start, and a scene without meshes from files, .vdb and tools of level sets needs none of them.
+// 40 ms at each start, and many a scene needs none of them: one without meshes from files, .vdb, and what asks for the
+// grid of a level set (grid_on_demand.h).
 //
 // A function is declared in the header of its subject:
 //

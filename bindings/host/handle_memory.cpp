@@ -45,8 +45,8 @@ std::size_t weight_of(const Object& object)
 {
     constexpr std::size_t bytes_of_node = 1024;  // of a graph's
     if (dynamic_cast<const NodeHandle*>(&object)) return bytes_of_node;
-    // A level set is up to two grids of floats: the one for queries, whose blocks are about half full, and OpenVDB's,
-    // which some get later.
+    // A level set is two grids of floats, the one for queries, whose blocks are about half full, and OpenVDB's, which
+    // some get later and all are charged for.
     constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
     constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // of grids that do not tell their size
     if (dynamic_cast<const PlacedLevelSet*>(&object)) return 0;    // its level set is another's, which weighs

@@ -282,6 +282,7 @@ private:
     {
         // As vectors, for g++ branches at each of the samples.
         constexpr int samples = surface_samples * surface_samples;
+        static_assert(samples == 4);
         typedef float Depths __attribute__((vector_size(samples * sizeof(float))));
         Depths of_pixel;
         std::memcpy(&of_pixel, &surfaces_.depth[samples * pixel], sizeof of_pixel);

@@ -27,7 +27,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
 local baked = [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.5 } }
-  :gravity {} :collide { shape = rapid.levelset.sphere { radius = 0.5, voxel = 0.1 } } :solve {}
+  :gravity {} :collide { shape = rapid.levelset.sphere { radius = 0.5, voxel = 0.1 }:offset(0.01) } :solve {}
 ]]
 
 -- Everything in Lua that a run calls: kernels, with states of their own, functions of the frame and of the points.

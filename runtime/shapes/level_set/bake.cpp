@@ -124,7 +124,7 @@ public:
     {
         if (blocks_.with_values.isEmpty()) return baked_;
         cover();
-        find_leaves();
+        find_blocks_with_values();
         number_varying_blocks();
         count_blocks_between(baked_);
         const Survey survey = copy_values();
@@ -146,7 +146,7 @@ private:
         baked_.origin = blocks_.to_world((block * low_).cast<double>());
         in_slab_ = std::size_t(baked_.blocks.y()) * baked_.blocks.z();
         baked_.index.resize(in_slab_ * baked_.blocks.x());
-        is_leaf_.resize(baked_.index.size());
+        has_values_.resize(baked_.index.size());
         varying_.assign(baked_.blocks.x() + 1, 0);
     }
 
@@ -166,32 +166,33 @@ private:
         });
     }
 
-    void find_leaves()
+    void find_blocks_with_values()
     {
         for_each_block([&](std::size_t b, const BlockTable::Reader& at) {
             const BlockValues here = at(low_ + position(b));
-            is_leaf_[b] = here.values != nullptr;
+            has_values_[b] = here.values != nullptr;
             baked_.index[b] = here.at(0, 0, 0) < 0 ? BakedGrid::inside : BakedGrid::outside;
         });
     }
 
-    bool has_leaf_above(std::size_t b) const
+    bool has_values_above(std::size_t b) const
     {
         const Place at = position(b), &n = baked_.blocks;
         for (int k = 1; k < 8; ++k) {
             const int x = at.x() + (k >> 2), y = at.y() + (k >> 1 & 1), z = at.z() + (k & 1);
-            if (x < n.x() && y < n.y() && z < n.z() && is_leaf_[(std::size_t(x) * n.y() + y) * n.z() + z]) return true;
+            if (x < n.x() && y < n.y() && z < n.z() && has_values_[(std::size_t(x) * n.y() + y) * n.z() + z])
+                return true;
         }
         return false;
     }
 
-    // The blocks with values of their own: leaves, and their lower neighbours where the cells between vary. Each slab
-    // of x is numbered by itself, and moved up by those before it later: the numbers depend on the grid alone.
+    // Those with values, and their lower neighbours where the cells between vary. Each slab of x is numbered by itself,
+    // and moved up by those before it later: the numbers depend on the blocks alone.
     void number_varying_blocks()
     {
         for_each_block([&](std::size_t b, const BlockTable::Reader& at) {
-            bool varies = is_leaf_[b];
-            if (!varies && has_leaf_above(b)) {
+            bool varies = has_values_[b];
+            if (!varies && has_values_above(b)) {
                 std::array<float, BakedGrid::block_values> values;
                 copy_block(neighbourhood(at, low_ + position(b)), values.data());
                 varies = std::any_of(values.begin(), values.end(), [&](float v) { return v != values[0]; });
@@ -225,10 +226,10 @@ private:
 
     const BlockTable& blocks_;
     BakedGrid baked_;
-    Place low_ = Place::Zero();          // the lowest block
-    std::size_t in_slab_ = 0;            // blocks of one x
-    std::vector<std::uint8_t> is_leaf_;  // by block: it has values
-    std::vector<std::int32_t> varying_;  // blocks with values in the slabs before x, shape [blocks x + 1]
+    Place low_ = Place::Zero();             // the lowest block
+    std::size_t in_slab_ = 0;               // blocks of one x
+    std::vector<std::uint8_t> has_values_;  // by block
+    std::vector<std::int32_t> varying_;     // blocks with values in the slabs before x, shape [blocks x + 1]
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// A narrow-band level set copied for queries: every leaf of the tree with its upper neighbours' first voxels, in one
-// flat table behind a coarse index. The eight corners of a cell are then always in one block, found by two loads.
+// A narrow-band level set copied for queries: every block of voxels with its upper neighbours' first ones, in one flat
+// table behind a coarse index. The eight corners of a cell are then always in one block, found by two loads.
 //
 // Between voxels the field is trilinear: the same as OpenVDB's BoxSampler everywhere in the band, to float rounding;
 // the gradient is the derivative of that interpolant. Beyond the band the distance is a bound of the right sign and the
@@ -7,9 +7,9 @@
 // the nearest with values; beyond the index, the distance to the box around the surface: so a walk from far away takes
 // few steps.
 //
-// Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes a block, 1.4 times the leaf that
-// it copies. index, shape [blocks x, y, z], z fastest, covers the box
-// around the band: 4 bytes for each 8^3 voxels, empty or not.
+// Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes a block, 1.4 times its own
+// voxels. index, shape [blocks x, y, z], z fastest, covers the box around the band: 4 bytes for each 8^3 voxels, empty
+// or not.
 #pragma once
 
 #include <algorithm>

@@ -30,8 +30,8 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     // Far from the surface leaves are whole.
     constexpr double bytes_a_voxel_around = 16;
 
-    // Of the index, and of that of the blocks as they were measured.
-    constexpr double bytes_a_block = 2 * sizeof(std::int32_t);
+    // Of the index, and while it is made of that of the blocks as they were measured, and of which have values.
+    constexpr double bytes_a_block = 2 * sizeof(std::int32_t) + 1;
 
     // Of a convex body the band outside is area h + M h² + 4/3 pi h³ (Steiner's formula), and M is at most that of the
     // bounds, pi times the sum of their edges.

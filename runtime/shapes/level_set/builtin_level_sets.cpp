@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numbers>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/baked_level_set.h"
@@ -47,7 +51,6 @@ void find_blocks(const Formula& formula, const VoxelFrame& frame, double half_wi
 
 VoxelBlocks measure(const Formula& formula, const LevelSetOptions& options)
 {
-    require_buildable(formula.what, formula.area, formula.bounds, options);
     constexpr int edge = VoxelBlocks::edge;
     VoxelBlocks blocks{frame_around(formula.bounds, options.voxel), options.half_width * options.voxel, {}, {}, {}};
     const VoxelFrame& frame = blocks.frame;
@@ -82,6 +85,7 @@ VoxelBlocks measure(const Formula& formula, const LevelSetOptions& options)
 
 LevelSetPtr level_set_of(const Formula& formula, const LevelSetOptions& options)
 {
+    require_buildable(formula.what, formula.area, formula.bounds, options);
     const VoxelBlocks blocks = measure(formula, options);
     const auto grid = [=] { return grid_of_blocks(measure(formula, options)); };
     const auto rebuild = [formula, voxel = options.voxel](double half_width) {

@@ -1,5 +1,6 @@
 // What of a level set is OpenVDB's: its grid, for files, tools and its surface as a mesh, made when one of them asks. A
-// scene that only collides with level sets of meshes never loads OpenVDB (runtime/deferred.h).
+// scene that only collides with level sets of closed meshes never loads OpenVDB (runtime/deferred.h), as long as no
+// pieces overlap and no band is wider than five voxels.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +11,14 @@
 
 #include "runtime/deferred.h"
 #include "runtime/shapes/level_set/level_set.h"
-#include "runtime/shapes/level_set/mesh_blocks.h"
 
 namespace rapid {
 
+class BakedLevelSet;
 struct LevelSetGrid;  // level_set_grid.h
+struct MeshBlocks;
+struct VoxelBlocks;
+struct VoxelFrame;
 using LevelSetGridPtr = std::shared_ptr<const LevelSetGrid>;
 
 RAPID_DEFERRED(grid_of_blocks, LevelSetGridPtr(const VoxelBlocks& blocks));
@@ -28,8 +32,8 @@ RAPID_DEFERRED(grid_of_mesh,
 
 // A level set of a grid. rebuild: its surface with another half width, m.
 RAPID_DEFERRED(level_set_of_grid,
-               std::shared_ptr<const class BakedLevelSet>(const LevelSetGridPtr& grid,
-                                                          std::function<LevelSetPtr(double half_width)> rebuild));
+               std::shared_ptr<const BakedLevelSet>(const LevelSetGridPtr& grid,
+                                                    std::function<LevelSetPtr(double half_width)> rebuild));
 
 // The zero crossing.
 RAPID_DEFERRED(surface_of_grid, MeshPtr(const LevelSetGrid& grid));

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "runtime/shapes/level_set/baked_level_set.h"
+#include "runtime/shapes/level_set/voxel_blocks.h"
 
 namespace rapid {
 

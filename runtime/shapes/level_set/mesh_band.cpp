@@ -215,8 +215,7 @@ MeshBand::MeshBand(const Mesh& mesh, double half_width) : mesh_(mesh), half_widt
     }
 }
 
-std::size_t MeshBand::measure(std::size_t b, std::span<float, voxels> distance,
-                              std::span<std::int32_t, voxels> nearest) const
+void MeshBand::measure(std::size_t b, std::span<float, voxels> distance, std::span<std::int32_t, voxels> nearest) const
 {
     const Vec3d from = origin(b).cast<double>();
     const auto corners_from_here = [&](std::int32_t triangle) {
@@ -228,7 +227,6 @@ std::size_t MeshBand::measure(std::size_t b, std::span<float, voxels> distance,
     Rows rows(static_cast<float>(half_width_ * half_width_ * (1 + 1e-4)));
     for (std::size_t i = blocks_[b].first; i < blocks_[b].end; ++i)
         rows.take(corners_from_here(triangles_[i]), triangles_[i], half_width_);
-    std::size_t within = 0;
     for (std::size_t v = 0; v < voxels; ++v) {
         nearest[v] = rows.nearest[v / block][v % block];
         double d = half_width_;
@@ -238,9 +236,7 @@ std::size_t MeshBand::measure(std::size_t b, std::span<float, voxels> distance,
         }
         if (d >= half_width_) d = half_width_, nearest[v] = -1;
         distance[v] = static_cast<float>(d);
-        within += nearest[v] >= 0;
     }
-    return within;
 }
 
 }  // namespace rapid

@@ -26,9 +26,8 @@ public:
     // The lowest voxel of a block.
     Eigen::Vector3i origin(std::size_t b) const { return block * blocks_[b].place; }
     // Of each voxel of a block the nearest triangle, and how far that is, in voxels: -1 and half_width where all are
-    // beyond the band. Of equally near ones the first. Returns how many are within it.
-    std::size_t measure(std::size_t b, std::span<float, voxels> distance,
-                        std::span<std::int32_t, voxels> nearest) const;
+    // beyond the band. Of equally near ones the first.
+    void measure(std::size_t b, std::span<float, voxels> distance, std::span<std::int32_t, voxels> nearest) const;
 
 private:
     struct Block {

@@ -1,5 +1,6 @@
 #include "runtime/shapes/level_set/mesh_blocks.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 

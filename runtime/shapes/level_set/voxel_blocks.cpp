@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <memory>
+#include <functional>
 
 #include "runtime/shapes/level_set/bake.h"
 

@@ -5,10 +5,13 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <memory>
+#include <new>
 #include <numbers>
 #include <random>
 
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/mesh_blocks.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -79,15 +82,20 @@ int winding_number(const Mesh& mesh, const Vec3d& P)
 
 TEST_CASE("a level set of a mesh is to the bit what is baked from its OpenVDB grid", "[level set][baked]")
 {
-    rc::prop("", [] {
+    int measured = 0;  // the others are baked from the grid in any case
+    rc::prop("", [&] {
         // Far away its voxels are counted from there.
         const MeshPtr mesh = any_mesh(*rc::gen::inRange(0, 3) == 0 ? Vec3d(2000, -3000, 2500) : Vec3d::Zero());
-        const LevelSetOptions options{between(0.04, 0.12), between(2, 5)};
+        const LevelSetOptions options{between(0.04, 0.12), between(2, MeshBlocks::widest)};
+        const double wider = between(2, 8);  // voxels
         std::vector<std::string> warnings;
         const LevelSetPtr level_set = level_set_from_mesh(mesh, options, warnings);
         require_same_as_grid(level_set);
-        require_same_as_grid(level_set->with_band(between(2, 8) * options.voxel));
+        require_same_as_grid(level_set->with_band(wider * options.voxel));
+        const VoxelFrame frame = frame_around(mesh->bounds().cast<double>(), options.voxel);
+        measured += !measure(*mesh, frame, options.half_width * options.voxel).overlap;
     });
+    CHECK(measured > 30);
 }
 
 TEST_CASE("spheres, boxes and tori are to the bit what is baked from their OpenVDB grids", "[level set][baked]")
@@ -138,6 +146,22 @@ TEST_CASE("the grid and the surface of a level set are made once, whoever asks",
         REQUIRE(grids[i] == grids[0]);
     }
     CHECK(surfaces[0]->openness().closed());
+}
+
+TEST_CASE("a level set whose grid could not be made is asked for it again", "[level set][baked]")
+{
+    int asked = 0;
+    const auto grid = [&]() -> LevelSetGridPtr {
+        if (++asked < 3) throw std::bad_alloc();
+        return std::make_shared<const LevelSetGrid>();
+    };
+    const BakedLevelSet level_set(BakedGrid(), 0, {grid, {}});
+    CHECK_THROWS_AS(level_set.grid(), std::bad_alloc);
+    CHECK_THROWS_AS(level_set.surface(), std::bad_alloc);
+    const LevelSetGridPtr made = level_set.grid();
+    CHECK(made);
+    CHECK(level_set.grid() == made);
+    CHECK(asked == 3);
 }
 
 }  // namespace rapid

@@ -50,16 +50,13 @@ TEST_CASE("each voxel of a mesh's band has the distance to the nearest triangle,
             const Eigen::Vector3i origin = band.origin(b);
             near.insert({origin.x(), origin.y(), origin.z()});
             if (b % every != 0) continue;
-            const std::size_t within = band.measure(b, distance, nearest);
-            std::size_t found = 0;
+            band.measure(b, distance, nearest);
             for (int v = 0; v < int(MeshBand::voxels); ++v) {
                 const double exact =
                     test::distance_to_all(mesh, (origin + Eigen::Vector3i(v / 64, v / 8 % 8, v % 8)).cast<double>());
                 RC_ASSERT(std::abs(distance[v] - std::min(exact, half_width)) <= 1e-6 * (1 + size));
                 RC_ASSERT((nearest[v] >= 0) == (distance[v] < static_cast<float>(half_width)));
-                found += nearest[v] >= 0;
             }
-            RC_ASSERT(within == found);
         }
         std::uniform_real_distribution<double> in(-15 - size, 15 + size);
         for (int k = 0; k < 300; ++k) {

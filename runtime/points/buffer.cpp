@@ -117,7 +117,7 @@ void Buffer::give_up(std::size_t bytes)
 
 void Buffer::take_back()
 {
-    // Pages keep their stagger, to a line.
+    // The offset in a page stays, to a line.
     const std::size_t back = given_up() - (mapped_ ? given_up() % page / line * line : 0);
     data_ = static_cast<char*>(data_) - back;
     capacity_ += back;

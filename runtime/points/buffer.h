@@ -2,9 +2,9 @@
 //
 // Large blocks are whole pages from the system, grown with mremap: growing moves page-table entries, never values, and
 // pages that nothing has touched take no memory. A few of those given back, 64 MiB at most, are kept for who next needs
-// as many. Small blocks come from the heap. The start is 64-byte aligned, and
-// staggered: columns that all begin at the same offset in their pages cost a loop over several of them 12 to 25 %
-// (4 KiB aliasing).
+// as many. Small blocks come from the heap. The start is 64-byte aligned until bytes are given up, and staggered:
+// columns that all begin at the same offset in their pages cost a loop over several of them 12 to 25 % (4 KiB
+// aliasing).
 #pragma once
 
 #include <cstddef>

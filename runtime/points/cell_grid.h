@@ -3,6 +3,7 @@
 // either.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -33,7 +34,7 @@ class CellGrid {
 public:
     double width = 0;                // of a cell, in units of the grid, as all that follows
     PageArray<std::uint32_t> place;  // of each sphere, its index in the set
-    PageArray<float> x, y, z, r;     // from the middle of the scene; padded for whole simd packs
+    PageArray<float> x, y, z, r;     // from the middle of the scene; padded for whole simd packs by any numbers
 
     std::size_t size() const { return place.size(); }
 
@@ -61,10 +62,11 @@ public:
         Run all_[9];
         int size_ = 0;
     };
-    // In a cell and its neighbours: in any cell; in cells of a row that hold spheres, by their keys.
     using Cell = std::array<std::int64_t, 3>;  // its coordinates
     Cell cell_at(const Vec3d& X) const;
+    // In any cell and its neighbours.
     Runs around(const Cell& cell) const;
+    // In the cells of a row from key `first` to `last`, which hold spheres, and their neighbours.
     Runs around(std::uint64_t first, std::uint64_t last) const
     {
         Runs runs;

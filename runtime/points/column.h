@@ -196,9 +196,10 @@ private:
     {
         const std::span runs = compaction.runs;
         T* const from = mutable_data();
-        const auto& longest = runs.empty() ? Compaction::Run{size_, 0} : runs[compaction.longest];
+        if (runs.empty()) return values_->take_back();
+        const Compaction::Run& longest = runs[compaction.longest];
         const std::size_t left = (longest.begin - compaction.ahead) * sizeof(T);
-        if (runs.empty() || values_->given_up() + left > compaction.kept * sizeof(T) / 4) {
+        if (values_->given_up() + left > compaction.kept * sizeof(T) / 4) {
             values_->take_back();
             return pack(mutable_data(), from, runs);
         }

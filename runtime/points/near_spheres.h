@@ -15,7 +15,7 @@ namespace rapid {
 // A sum of radii in single precision, with room for the rounding of what it is compared with.
 constexpr float near_rounding = 1 + 0x1p-20f;
 
-// The rounding of the distance of two places in single precision, m; extent: m, how far they are from the middle.
+// The rounding of the distance of two places in single precision; extent: how far they are from the middle.
 inline float near_blur(double extent) { return static_cast<float>(2 * (0x1p-22 * extent)); }
 
 // The spheres of some runs, copied side by side: runs are shorter than a pack, mostly, and are looked through once for

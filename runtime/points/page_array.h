@@ -1,5 +1,5 @@
-// An array in a block of pages (buffer.h), for values that are all written before they are read: what is as large as a
-// set of points and soon gone would else be cleared first, page by page by the system, too.
+// An array in a block of pages (buffer.h), whose values are not cleared: for what is as large as a set of points, soon
+// gone, and written before it is used.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ public:
     PageArray() = default;
     explicit PageArray(std::size_t size) { resize(size); }
     PageArray(const PageArray& other) : PageArray(other.size_) { std::copy(other.begin(), other.end(), begin()); }
-    PageArray(PageArray&& other) noexcept = default;
+    PageArray(PageArray&& other) noexcept : buffer_(std::move(other.buffer_)), size_(std::exchange(other.size_, 0)) {}
     PageArray& operator=(PageArray other) noexcept
     {
         buffer_ = std::move(other.buffer_);

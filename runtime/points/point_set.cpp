@@ -168,10 +168,11 @@ void PointSet::append(std::size_t n) { append(n, {}, {}); }
 
 void PointSet::append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups)
 {
+    if (n == 0) return;
     // In parallel, as the system clears pages when they are first written.
     std::vector<std::function<void(std::size_t begin, std::size_t end)>> fills;
     const auto append_to = [&](auto& column, const auto& value) {
-        if (column.is_uniform()) return column.append(n, value);
+        if (column.is_uniform() || column.size() == 0) return column.append(n, value);
         fills.emplace_back([added = column.append_for_writing(n), value](std::size_t begin, std::size_t end) {
             std::uninitialized_fill(added.data() + begin, added.data() + end, value);
         });

@@ -47,7 +47,7 @@ TEST_CASE("room that is there already is kept where it is", "[buffer]")
     CHECK(buffer.data() == before);
 }
 
-TEST_CASE("bytes that are given up can be taken back, and growth takes along only what is behind them", "[buffer]")
+TEST_CASE("bytes that are given up can be taken back, and what is behind them stays as the block grows", "[buffer]")
 {
     const std::size_t bytes = GENERATE(std::size_t{1} << 12, std::size_t{1} << 20);  // from the heap, and pages
     Buffer buffer(bytes);

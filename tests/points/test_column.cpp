@@ -224,8 +224,8 @@ TEST_CASE("the longest run of the points that stay is not moved", "[column]")
 
 TEST_CASE("a column whose oldest points die while others are born stays where it is, within a quarter", "[column]")
 {
-    // 64 of 4,096 each time: where nothing took the room before them back, they would leave it behind 64 times.
-    constexpr std::size_t size = 4096, dead = 64;
+    // A 64th each time: where nothing took the room before them back, they would leave it behind 64 times.
+    const std::size_t size = GENERATE(std::size_t{1} << 12, std::size_t{1} << 17), dead = size / 64;  // heap, and pages
     Column<std::int64_t> column;
     std::int64_t next = 0;
     const auto bear = [&](std::size_t n) {
@@ -239,7 +239,7 @@ TEST_CASE("a column whose oldest points die while others are born stays where it
     for (std::int64_t round = 0; round < 1000; ++round) {
         column.keep(Compaction::from_mask(mask));
         const std::int64_t* const first = &std::as_const(column)[0];
-        REQUIRE(*first == (round + 1) * std::int64_t{dead});
+        REQUIRE(*first == (round + 1) * static_cast<std::int64_t>(dead));
         REQUIRE(first[size - 1] == next - 1);
         if (first < begin || first >= end) ++moved, begin = first, end = first + size / 4 + 1;
         bear(dead);

@@ -169,6 +169,21 @@ TEST_CASE("a set's bytes are those of its columns and groups", "[point_set]")
     CHECK(set.bytes() == 21 * 1000 + 12);
 }
 
+TEST_CASE("the first points of a set have one value in columns that were written while it had none", "[point_set]")
+{
+    PointSet set = points(std::vector<Vec3f>{}).set<float>("heat", {});
+    set.v().write();
+    set.column<float>("heat").write();
+    set.group("hot").write();
+    set.append(0, {{"heat", 2.0f}}, {"hot"});
+    set.append(1000, {{"heat", 2.0f}}, {"hot"});
+    CHECK(set.v().is_uniform());
+    CHECK(set.column<float>("heat").is_uniform());
+    CHECK(set.column<float>("heat")[999] == 2.0f);
+    CHECK(set.group("hot").is_uniform());
+    CHECK(set.group("hot")[999] == 1);
+}
+
 TEST_CASE("a parameter is one number for all points, or an attribute that gives each its own", "[per_point]")
 {
     const PointSet set = points({{0, 0, 0}, {1, 0, 0}}).set<float>("grip", {0.1f, 0.2f});

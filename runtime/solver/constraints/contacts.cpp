@@ -29,7 +29,7 @@ constexpr double overlap_recovery = 0.8, overlap_recovery_asleep = 0.1;
 // by so many more sweeps, forwards and backwards, which costs little as they are few. Contacts that have had an overlap
 // beyond this part of the sum of the radii are looked at again.
 constexpr double deep_overlap = 0.02, deep_part_of_reach = 0.005;
-constexpr int deep_sweeps = 2;
+constexpr int deep_sweeps = 2;  // even: forces are recorded in the order of the first sweep
 
 // With 1.5 columns of grain overlap even less, but their grains are off the converged path by twice as far.
 // Where points may sleep it is left out: piles would take longer to come to rest.

@@ -51,7 +51,8 @@ void prefetch(const PointSet& points, std::span<const std::uint32_t> indices)
     }
 }
 
-// The index of the first id from `from` on that is not lower, where ids ascend; not far before `guess`.
+// The index of the first id from `from` on that is not lower, where ids ascend; found quickly where it is not far
+// before `guess`.
 std::size_t lower_bound(Strided<std::int64_t> ids, std::size_t size, std::size_t from, std::size_t guess,
                         std::int64_t id)
 {

@@ -136,6 +136,31 @@ TEST_CASE("beside a rod a contact is recorded once, by any number of iterations"
     }
 }
 
+TEST_CASE("beside a rod friction is recorded once, and its work too, by any number of iterations", "[contact_forces]")
+{
+    const auto impact = [](int iterations, double& force) {
+        Granular scene(points({{-0.15f, 0, 0}, {0.15f, 0, 0}, {5, 0, 0}, {6, 0, 0}})
+                           .v({{4, 3, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}})
+                           .set<float>("pscale", std::vector<float>(4, 0.1f))
+                           .set<float>("mass", {1, 3, 1, 1}),
+                       0.5f, 0.2f);
+        record(scene);
+        scene.dynamics.add(test::rods({{2, 3}}, 1));
+        scene.options.iterations = iterations;
+        scene.collide(make_plane({0, 1, 0}, -5), 0.0f).substeps(4).run(1);
+        force = friction(scene);
+        REQUIRE(scene.last.ledger);
+        REQUIRE(scene.last.ledger->by.split);
+        return scene.last.ledger->by.split->friction;
+    };
+    double once = 0, often = 0;
+    const double work_once = impact(1, once), work_often = impact(8, often);
+    CHECK(once > 0);
+    CHECK(often == Approx(once));
+    CHECK(work_once < 0);
+    CHECK(work_often == Approx(work_once));
+}
+
 TEST_CASE("what sleeps keeps the forces that it fell asleep under", "[contact_forces]")
 {
     Granular scene(column(5, 0.02f, 1), 0, 0.5f);

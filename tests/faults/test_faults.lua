@@ -150,8 +150,8 @@ describe("a fault of the system", function()
   end)
 
   it("of memory is an error, too", function()
-    for _, scene_of in ipairs { { text = plain, requests = 12000 }, { text = scripted, requests = 22000 },
-      { text = baked, requests = 15000 } } do
+    for _, scene_of in ipairs { { text = plain, requests = 17000 }, { text = scripted, requests = 25000 },
+      { text = baked, requests = 18000 } } do
       local list = {}
       for i = 1, math.floor(faults / 6) do
         list[i] = ("alloc:%d:%d%s"):format(1 + below(scene_of.requests), errors.ENOMEM, i % 2 == 1 and "+" or "")

@@ -282,7 +282,7 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
             if (*it <= -half_width) it.setValueOff();
 }
 
-LevelSetGridPtr finished(const FloatGrid::Ptr& grid)
+LevelSetGridPtr as_level_set(const FloatGrid::Ptr& grid)
 {
     openvdb::tools::signedFloodFill(grid->tree());
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -295,7 +295,7 @@ LevelSetGridPtr without_faces_inside(const MeshBlocks& blocks)
     initialize_openvdb();
     Band band = measured_band(blocks);
     ignore_faces_inside(band, InVoxels{blocks.mesh}, RayCrossings(blocks.mesh));
-    return finished(band.distance);
+    return as_level_set(band.distance);
 }
 
 LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& frame, double half_width)
@@ -304,12 +304,12 @@ LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& fram
     const InVoxels mesh{in_voxels(world, frame)};
     const auto transform = transform_of(frame);
     if (!balanced)
-        return finished(
+        return as_level_set(
             by_openvdb(*mesh.mesh, *transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr));
     Band band = corrected_band(mesh, *transform, half_width);
     const RayCrossings faces(mesh.mesh);
     if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
-    return finished(band.distance);
+    return as_level_set(band.distance);
 }
 
 RAPID_DEFINE(grid_without_faces_inside, without_faces_inside);

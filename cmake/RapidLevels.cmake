@@ -12,7 +12,8 @@ set(RAPID_LEVELS "" CACHE STRING "Processors that the hot files are compiled for
 # By the profile of the scenes of graphs and of tests/bench.
 set(rapid_hot_files
   elementary.cpp noise.cpp random.cpp lanes/lane_operations.cpp operators/emit/cone.cpp points/cell_grid.cpp
-  shapes/level_set/baked_level_set.cpp shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp shapes/motion/rigid_field.cpp
+  shapes/level_set/baked_level_set.cpp
+  shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp shapes/motion/rigid_field.cpp
   solver/collision/contact_rounds.cpp solver/collision/curved_motion.cpp solver/collision/slide.cpp
   solver/constraints/contact_pack.cpp solver/constraints/contact_search.cpp solver/constraints/contacts.cpp
   solver/constraints/neighbour_list.cpp solver/constraints/pair_blocks.cpp solver/motion/ballistic_batch.cpp

@@ -14,6 +14,7 @@
 #include "runtime/of_thread.h"
 #include "runtime/parallel.h"
 #include "runtime/points/column_files.h"
+#include "runtime/points/id_index.h"
 #include "runtime/points/subset.h"
 
 namespace rapid {
@@ -84,19 +85,6 @@ struct Bucket {
     std::size_t first = 0, size = 0;
 };
 
-// The first place from `begin` on with an id that is not below another.
-std::size_t first_from(const Strided<std::int64_t>& ids, std::size_t begin, std::size_t end, std::int64_t id)
-{
-    while (begin < end) {
-        const std::size_t middle = begin + (end - begin) / 2;
-        if (ids[middle] < id)
-            begin = middle + 1;
-        else
-            end = middle;
-    }
-    return begin;
-}
-
 std::vector<Bucket> buckets_of(const std::vector<PointSet>& parts)
 {
     const auto largest = std::max_element(parts.begin(), parts.end(),
@@ -113,7 +101,7 @@ std::vector<Bucket> buckets_of(const std::vector<PointSet>& parts)
             if (next >= largest->size())
                 at[k] = parts[k].size();
             else
-                at[k] = first_from(ids, at[k], parts[k].size(), largest->id()[next]);
+                at[k] = first_not_below(ids, at[k], parts[k].size(), largest->id()[next]);
             bucket.size += at[k] - bucket.begin[k];
         }
         bucket.end = at;

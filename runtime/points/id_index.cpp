@@ -27,15 +27,8 @@ std::uint32_t IdIndex::find_ascending(std::int64_t id) const
         const auto nth = static_cast<std::uint64_t>(id) - static_cast<std::uint64_t>(ids_[0]);
         if (nth < size_ && ids_[nth] == id) return static_cast<std::uint32_t>(nth);
     }
-    std::size_t low = 0, high = size_;
-    while (low < high) {
-        const std::size_t middle = (low + high) / 2;
-        if (ids_[middle] < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < size_ && ids_[low] == id ? static_cast<std::uint32_t>(low) : none;
+    const std::size_t at = first_not_below(ids_, 0, size_, id);
+    return at < size_ && ids_[at] == id ? static_cast<std::uint32_t>(at) : none;
 }
 
 }  // namespace rapid

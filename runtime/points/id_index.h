@@ -1,6 +1,7 @@
 // Where the points of a set are, by id.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -8,6 +9,21 @@
 #include "runtime/points/column.h"
 
 namespace rapid {
+
+// The first place from `begin` on with an id that is not below another; `end` where there is none. The ids between
+// ascend.
+inline std::size_t first_not_below(const Strided<std::int64_t>& ids, std::size_t begin, std::size_t end,
+                                   std::int64_t id)
+{
+    while (begin < end) {
+        const std::size_t middle = begin + (end - begin) / 2;
+        if (ids[middle] < id)
+            begin = middle + 1;
+        else
+            end = middle;
+    }
+    return begin;
+}
 
 class IdIndex {
 public:

@@ -3,7 +3,6 @@
 // pieces overlap and no band is wider than five voxels.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>

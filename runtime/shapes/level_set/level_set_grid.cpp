@@ -38,8 +38,6 @@ openvdb::FloatGrid::Ptr tree_of(const VoxelBlocks& blocks)
     static_assert(VoxelBlocks::edge == Leaf::DIM && VoxelBlocks::voxels == Leaf::SIZE);
     auto grid = openvdb::FloatGrid::create(blocks.background());
     grid->setTransform(transform_of(blocks.frame));
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    grid->setName("surface");
     std::vector<std::unique_ptr<Leaf>> leaves(blocks.size());
     tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t b) {
         const VoxelBlocks::Place lowest = VoxelBlocks::edge * blocks.places[b];
@@ -53,14 +51,20 @@ openvdb::FloatGrid::Ptr tree_of(const VoxelBlocks& blocks)
     return grid;
 }
 
+LevelSetGridPtr level_set_grid(const openvdb::FloatGrid::Ptr& grid)
+{
+    openvdb::tools::signedFloodFill(grid->tree());
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setName("surface");
+    return std::make_shared<const LevelSetGrid>(LevelSetGrid{grid});
+}
+
 namespace {
 
 LevelSetGridPtr of_blocks(const VoxelBlocks& blocks)
 {
     initialize_openvdb();
-    const auto grid = tree_of(blocks);
-    openvdb::tools::signedFloodFill(grid->tree());
-    return std::make_shared<const LevelSetGrid>(LevelSetGrid{grid});
+    return level_set_grid(tree_of(blocks));
 }
 
 std::shared_ptr<const BakedLevelSet> of_grid(const LevelSetGridPtr& grid, std::function<LevelSetPtr(double)> rebuild)

@@ -28,8 +28,11 @@ using RebuildGrid = std::function<openvdb::FloatGrid::Ptr(double half_width)>;
 // The grid is shared from here on, and must not change.
 BakedPtr level_set_of(openvdb::FloatGrid::ConstPtr grid, RebuildGrid rebuild);
 
-// Beyond the leaves its tiles are outside; signedFloodFill() sets the others.
+// Its tiles are all outside, and it has no class and no name: level_set_grid() mends that.
 openvdb::FloatGrid::Ptr tree_of(const VoxelBlocks& blocks);
+
+// Sets the tiles inside or outside by the voxels beside them.
+LevelSetGridPtr level_set_grid(const openvdb::FloatGrid::Ptr& grid);
 
 // A grid without a known source, widened from its own surface: new voxels get their distance to it as a mesh, and the
 // existing ones keep their values to the bit.

@@ -5,7 +5,6 @@
 // beyond two voxels (by up to 0.7 of a voxel), corrected to a thousandth of a voxel. The sign is that of the winding
 // number. A mesh without one has OpenVDB's distances and signs.
 #include <openvdb/tools/MeshToVolume.h>
-#include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -282,20 +281,12 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
             if (*it <= -half_width) it.setValueOff();
 }
 
-LevelSetGridPtr as_level_set(const FloatGrid::Ptr& grid)
-{
-    openvdb::tools::signedFloodFill(grid->tree());
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
-    grid->setName("surface");
-    return std::make_shared<const LevelSetGrid>(LevelSetGrid{grid});
-}
-
 LevelSetGridPtr without_faces_inside(const MeshBlocks& blocks)
 {
     initialize_openvdb();
     Band band = measured_band(blocks);
     ignore_faces_inside(band, InVoxels{blocks.mesh}, RayCrossings(blocks.mesh));
-    return as_level_set(band.distance);
+    return level_set_grid(band.distance);
 }
 
 LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& frame, double half_width)
@@ -304,12 +295,12 @@ LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& fram
     const InVoxels mesh{in_voxels(world, frame)};
     const auto transform = transform_of(frame);
     if (!balanced)
-        return as_level_set(
+        return level_set_grid(
             by_openvdb(*mesh.mesh, *transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr));
     Band band = corrected_band(mesh, *transform, half_width);
     const RayCrossings faces(mesh.mesh);
     if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
-    return as_level_set(band.distance);
+    return level_set_grid(band.distance);
 }
 
 RAPID_DEFINE(grid_without_faces_inside, without_faces_inside);

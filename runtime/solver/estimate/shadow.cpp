@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "runtime/parallel.h"
+#include "runtime/points/id_index.h"
 #include "runtime/shapes/path.h"
 #include "runtime/solver/estimate/resolution.h"
 
@@ -53,20 +54,13 @@ void prefetch(const PointSet& points, std::span<const std::uint32_t> indices)
 
 // The index of the first id from `from` on that is not lower, where ids ascend; found quickly where it is not far
 // before `guess`.
-std::size_t lower_bound(Strided<std::int64_t> ids, std::size_t size, std::size_t from, std::size_t guess,
-                        std::int64_t id)
+std::size_t first_near(Strided<std::int64_t> ids, std::size_t size, std::size_t from, std::size_t guess,
+                       std::int64_t id)
 {
     std::size_t begin = std::clamp(guess + 1, from, size), end = size;
     for (std::size_t step = 16; begin > from && ids[begin - 1] >= id; step *= 2)
         end = begin, begin -= std::min(step, begin - from);
-    while (begin < end) {
-        const std::size_t middle = begin + (end - begin) / 2;
-        if (ids[middle] < id)
-            begin = middle + 1;
-        else
-            end = middle;
-    }
-    return begin;
+    return first_not_below(ids, begin, end, id);
 }
 
 // The index of the point with each of the ascending ids; `gone` where there is none. before: the previous indices,
@@ -82,7 +76,7 @@ std::vector<std::uint32_t> indices_of(std::span<const std::int64_t> ids, const P
         if (before[k] < points.size() && all[before[k]] == ids[k]) {
             from = before[k];
         } else {
-            from = lower_bound(all, points.size(), from, before[k] - std::min<std::size_t>(removed, before[k]), ids[k]);
+            from = first_near(all, points.size(), from, before[k] - std::min<std::size_t>(removed, before[k]), ids[k]);
             missed |= from == points.size() || all[from] != ids[k];
             removed = before[k] - std::min<std::size_t>(from, before[k]);
         }

@@ -1,7 +1,11 @@
 #include "runtime/solver/estimate/shadow.h"
 
+#include <rapidcheck.h>
+
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <set>
 
 #include "tests/test.h"
 
@@ -102,6 +106,49 @@ TEST_CASE("the shadow of a point dies with it, and stays with a point that moves
     for (std::size_t i = 0; i < left; ++i) reversed[i] = static_cast<std::uint32_t>(left - 1 - i);
     points = points.select(reversed);
     CHECK(frame(shadows, points, 1, 1.5f) == std::vector<double>(left, 2.0));
+}
+
+TEST_CASE("points with shadows are found again wherever others die", "[shadow]")
+{
+    rc::prop("", [] {
+        Shadows shadows;
+        std::int64_t next = 3000;
+        PointSet points = points_with_ids(0, next);
+        frame(shadows, points, 0, 0);
+        for (int f = 0; f < 4; ++f) {
+            // Of a stretch many die, elsewhere few.
+            const auto first = *rc::gen::inRange<std::size_t>(0, points.size());
+            const auto odds = *rc::gen::container<std::vector<int>>(points.size(), rc::gen::inRange(0, 10));
+            std::vector<std::uint8_t> keep(points.size());
+            for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = odds[i] >= (i >= first && i < first + 500 ? 8 : 1);
+            std::set<std::int64_t> expected;
+            for (const std::int64_t id : shadows.ids()) expected.insert(id);
+            for (std::size_t i = 0; i < keep.size(); ++i)
+                if (!keep[i]) expected.erase(points.id()[i]);
+            points.keep(keep);
+            frame(shadows, points, 0, 0);
+            RC_ASSERT(std::set<std::int64_t>(shadows.ids().begin(), shadows.ids().end()) == expected);
+            for (std::size_t k = 0; k < shadows.ids().size(); ++k)
+                RC_ASSERT(points.id()[shadows.indices()[k]] == shadows.ids()[k]);
+        }
+    });
+}
+
+TEST_CASE("what a position loses by rounding is what is left of its way beyond whole spacings", "[shadow]")
+{
+    const float spacing = 0x1p-23f;  // of places from 1 to 2
+    const double h = 0.5, part = GENERATE(0.0, 0.25, -0.375);
+    const int more = GENERATE(0, 3, -2);  // spacings, by what no velocity tells: a contact, a node
+    CAPTURE(part, more);
+    Shadows shadows;
+    PointSet points = points_with_ids(0, 1);
+    points.P().write()[0] = Vec3f(1.5f, 0, 0);
+    points.v().write()[0] = Vec3f(static_cast<float>(part * spacing / h), 0, 0);
+    const auto move = [&](PointSet& set) { set.P().write()[0].x() += static_cast<float>(more) * spacing; };
+    shadows.begin(points, false, h);
+    move(points);
+    shadows.advance(points, move);
+    CHECK(shadows.rounding(false) == Approx((std::abs(part) + 0.5) * spacing));
 }
 
 TEST_CASE("exact frames are not solved again while no shadow differs from its point", "[shadow]")

@@ -15,13 +15,18 @@
 
 #include "runtime/vec.h"
 
-// g++ warns that the calling convention of wide vectors differs between compilers: all functions here are inlined.
+// The calling convention of wide vectors depends on the processor that a file is compiled for, and g++ warns of that.
+// Functions that take or return packs are inlined, or stay within one file.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace rapid {
 
 constexpr std::uint32_t lanes = 8;
 
+// g++ lays a vector type out on multiples of its size. But alignof, by which std::vector allocates, is at most the
+// width of a register: 16 bytes in code for x86-64-v2, whose memory code for x86-64-v4 then takes to be on 64. So each
+// struct of packs states its alignment (alignas), which files of all processor levels then agree on. An `aligned`
+// attribute here would not do: g++ drops it where a pack is the argument of a template, as in Vectors<Doubles>.
 typedef float Floats __attribute__((vector_size(4 * lanes)));
 typedef double Doubles __attribute__((vector_size(8 * lanes)));
 using Indices = std::array<std::uint32_t, lanes>;
@@ -109,7 +114,7 @@ template <class F>
 
 // Eight vectors.
 template <class Eight>
-struct Vectors {
+struct alignas(sizeof(Eight)) Vectors {
     using Scalar = std::remove_cvref_t<decltype(Eight()[0])>;
     Eight x, y, z;
 
@@ -125,7 +130,10 @@ struct Vectors {
     friend Vectors operator-(const Vectors& a, const Vectors& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
     friend Vectors operator*(const Eight& s, const Vectors& a) { return {s * a.x, s * a.y, s * a.z}; }
     friend Vectors operator*(Scalar s, const Vectors& a) { return {s * a.x, s * a.y, s * a.z}; }
-    friend Eight dot(const Vectors& a, const Vectors& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+    [[gnu::always_inline]] friend Eight dot(const Vectors& a, const Vectors& b)
+    {
+        return a.x * b.x + a.y * b.y + a.z * b.z;
+    }
 };
 
 [[gnu::always_inline]] inline Vectors<Doubles> widen(const Vectors<Floats>& a)
@@ -148,7 +156,7 @@ typedef double Four __attribute__((vector_size(32)));
 }
 
 // The transpose of eight rows of four numbers, given two by two.
-struct Columns {
+struct alignas(sizeof(Doubles)) Columns {
     Doubles x, y, z, w;
 };
 [[gnu::always_inline]] inline Columns columns_of(const Doubles& rows01, const Doubles& rows23, const Doubles& rows45,
@@ -165,7 +173,7 @@ struct Columns {
 }
 
 // The transpose back: the rows, two by two.
-struct Rows {
+struct alignas(sizeof(Doubles)) Rows {
     Doubles of01, of23, of45, of67;
 };
 [[gnu::always_inline]] inline Rows rows_of(const Columns& c)

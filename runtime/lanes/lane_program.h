@@ -90,7 +90,7 @@ public:
     }
 
     static constexpr std::size_t packs = tile / lanes;
-    struct Slot {
+    struct alignas(sizeof(Doubles)) Slot {
         Doubles pack[packs];
 
         double* numbers() { return reinterpret_cast<double*>(pack); }

@@ -54,7 +54,7 @@ private:
     LaneRunner::Slot* const slots_;
 };
 
-inline Flags as_flags(const Doubles& x) { return std::bit_cast<Flags>(x); }
-inline Doubles as_doubles(const Flags& x) { return std::bit_cast<Doubles>(x); }
+[[gnu::always_inline]] inline Flags as_flags(const Doubles& x) { return std::bit_cast<Flags>(x); }
+[[gnu::always_inline]] inline Doubles as_doubles(const Flags& x) { return std::bit_cast<Doubles>(x); }
 
 }  // namespace rapid

@@ -7,7 +7,7 @@
 namespace rapid {
 
 // Eight positions with their inverse masses.
-struct PointPack {
+struct alignas(sizeof(Doubles)) PointPack {
     Vectors<Doubles> P;
     Doubles w;
 };

@@ -12,7 +12,7 @@ namespace rapid {
 constexpr std::uint32_t coordinates_per_pack = 3 * lanes;
 
 template <class Pack>
-struct PackedPoints {
+struct alignas(sizeof(Pack)) PackedPoints {
     Pack part[3];
 
     Pack& operator[](std::uint32_t k) { return part[k]; }

@@ -3,6 +3,9 @@
 # on such a processor (ld.so(8), glibc-hwcaps). In a build for this machine there is nothing to choose from: its levels,
 # below `levels`, are compared by tests/package/levels and not installed.
 #
+# Hot files and the others pass objects to each other, so their types have one size and alignment at all levels:
+# runtime/processor_levels lists them, and the library checks that when it is loaded.
+#
 # The same bits: a level changes which instructions compute, not what. No product is fused with a sum (rapid_public), and
 # loops become vectors lane by lane, however wide. Eigen alone asks what the processor has: of __FMA__ it makes fused
 # products, and the order of its sums follows the width of its vectors. With these undefined it is that of x86-64-v2 at
@@ -12,6 +15,7 @@ set(RAPID_LEVELS "" CACHE STRING "Processors that the hot files are compiled for
 # By the profile of the scenes of graphs and of tests/bench.
 set(rapid_hot_files
   elementary.cpp noise.cpp random.cpp lanes/lane_operations.cpp operators/emit/cone.cpp points/cell_grid.cpp
+  processor_levels/shared_types_of_level.cpp
   shapes/level_set/baked_level_set.cpp
   shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp shapes/motion/rigid_field.cpp
   solver/collision/contact_rounds.cpp solver/collision/curved_motion.cpp solver/collision/slide.cpp

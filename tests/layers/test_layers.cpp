@@ -41,6 +41,7 @@ const std::map<std::string, std::set<std::string>> below = {
     {"runtime/solver/estimate",
      {"runtime", "runtime/points", "runtime/shapes", "runtime/solver", "runtime/solver/collision",
       "runtime/solver/constraints"}},
+    {"runtime/processor_levels", {"runtime", "runtime/lanes", "runtime/solver/motion", "runtime/solver/constraints"}},
     {"runtime/graph",
      {"runtime", "runtime/files", "runtime/points", "runtime/shapes", "runtime/shapes/level_set",
       "runtime/shapes/motion", "runtime/solver", "runtime/solver/collision", "runtime/solver/constraints",

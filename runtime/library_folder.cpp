@@ -4,14 +4,17 @@
 
 namespace rapid {
 
-std::filesystem::path library_folder()
+std::filesystem::path library_file()
 {
     Dl_info here{};
-    dladdr(reinterpret_cast<const void*>(&library_folder), &here);
-    // The target of a symbolic link: the parts are beside it.
+    dladdr(reinterpret_cast<const void*>(&library_file), &here);
     std::error_code missing;
-    const auto file = std::filesystem::canonical(here.dli_fname ? here.dli_fname : "", missing);
-    const std::filesystem::path folder = file.parent_path(), above = folder.parent_path();
+    return std::filesystem::canonical(here.dli_fname ? here.dli_fname : "", missing);
+}
+
+std::filesystem::path library_folder()
+{
+    const std::filesystem::path folder = library_file().parent_path(), above = folder.parent_path();
     return above.filename() == "glibc-hwcaps" ? above.parent_path() : folder;
 }
 

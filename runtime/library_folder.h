@@ -5,8 +5,11 @@
 
 namespace rapid {
 
-// The folder of the library's parts, by the file that is loaded: of a build for a newer processor, which lies below in
-// glibc-hwcaps/LEVEL (cmake/RapidLevels.cmake), that of all of them.
+// The file that is loaded, without symbolic links. Empty if the system does not know it.
+std::filesystem::path library_file();
+
+// The folder that holds the other parts of the library. A library for one processor level lies below it, in
+// glibc-hwcaps/LEVEL (cmake/RapidLevels.cmake).
 std::filesystem::path library_folder();
 
 }  // namespace rapid

@@ -1,0 +1,27 @@
+// A program and the library that the loader has found for it must be of one build: with other headers the first call
+// would crash. glibc's loader prefers the library of the processor's level (glibc-hwcaps), which may be left over from
+// an older build or package.
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
+
+#include "runtime/graph/abi.h"
+#include "runtime/graph/library_abi.h"
+#include "runtime/library_folder.h"
+
+namespace rapid {
+namespace {
+
+// Before other initialisers, which call the library.
+[[gnu::constructor(101)]] void check_library()
+{
+    if (std::string_view(library_abi()) == RAPID_ABI) return;
+    std::fprintf(stderr,
+                 "rapid: %s belongs to another build: it is Rapid %s, but the program needs Rapid %s; "
+                 "build or install it again\n",
+                 library_file().c_str(), library_abi(), RAPID_ABI);
+    std::_Exit(2);
+}
+
+}  // namespace
+}  // namespace rapid

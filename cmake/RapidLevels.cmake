@@ -1,7 +1,6 @@
 # Levels of processors: the hot files of the library compiled again for newer processors, each time linked with the
 # objects of all others into a librapid of its own, in the folder below the library's where glibc's loader looks first
-# on such a processor (ld.so(8), glibc-hwcaps). In a build for this machine there is nothing to choose from: its levels,
-# below `levels`, are compared by tests/package/levels and not installed.
+# on such a processor (ld.so(8), glibc-hwcaps).
 #
 # Hot files and the others pass objects to each other, so their types have one size and alignment at all levels:
 # runtime/processor_levels lists them, and the library checks that when it is loaded.
@@ -47,12 +46,8 @@ function(rapid_level level)
   rapid_set_library(${name})
   set_target_properties(${name} PROPERTIES OUTPUT_NAME rapid LINKER_LANGUAGE CXX)
   set(folder glibc-hwcaps/${level})
-  if(RAPID_ARCH STREQUAL "native")
-    set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/levels/${folder})
-    file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/levels)
-    file(CREATE_LINK ../lib/librapid_deferred.so ${PROJECT_BINARY_DIR}/levels/librapid_deferred.so SYMBOLIC)
-  else()
-    set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/${folder})
-    install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/${folder} NAMELINK_SKIP)
-  endif()
+  set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/${folder})
+  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/${folder} NAMELINK_SKIP)
+  # Programs are linked with `rapid` and load a level's library instead, which must not be older.
+  add_dependencies(rapid ${name})
 endfunction()

@@ -175,7 +175,10 @@ local function is_flag(value)
   return value.kind == "flag" or value.kind == "constant" and type(value.value) == "boolean"
 end
 
--- a where the mask is set, else b.
+-- Kinds whose values are all equal; methods are equal if they have the same name.
+local has_one_value = { point = true, frame = true, step = true, params = true, detail = true, method = true }
+
+-- Returns a where the mask is set, else b. Values that no node can choose between are poison.
 function Program:choose_value(mask, a, b)
   if a == b then return a end
   if a.kind == "constant" and b.kind == "constant" and rawequal(a.value, b.value) then return a end
@@ -187,7 +190,7 @@ function Program:choose_value(mask, a, b)
     return result
   elseif is_flag(a) and is_flag(b) then
     return { kind = "flag", id = self:choose(mask, self:flag_node(a), self:flag_node(b)) }
-  elseif a.kind == b.kind and a.kind ~= "constant" and a.name == b.name then
+  elseif a.kind == b.kind and has_one_value[a.kind] and a.name == b.name then
     return a
   end
   return poison

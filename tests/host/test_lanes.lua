@@ -165,6 +165,40 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     end
   end)
 
+  -- What even points leave in x, then what odd ones do; a number made of x, and its values for both.
+  for _, case in ipairs {
+    { "vec3(1, 2, 3)", "quat(5, 6, 7, 1)", "x.x", 1, 5 },
+    { "p.turn", "p.axis", "x.y", 0, 1 },
+    { "1", "vec3(5, 6, 7)", "type(x) == \"number\" and x or x.x", 1, 5 },
+    { "p.P", "5", "type(x) == \"number\" and x or 1", 1, 5 },
+    { "nil", "5", "x or 1", 1, 5 },
+    { "false", "5", "x or 1", 1, 5 },
+    { "nil", "p.P.x > 1e9", "x == false and 5 or 1", 1, 5 },
+    { "\"a\"", "\"b\"", "x == \"a\" and 1 or 5", 1, 5 },
+    { "\"a\"", "1", "x == 1 and 5 or 1", 1, 5 },
+    { "names", "names[1]", "x.near or x[1]", 2.5, 7 },
+    { "math.abs", "math.floor", "x(-0.5)", 0.5, -1 },
+    { "mixed", "math.atan2", "x(4, 0)", 1, math.pi / 2 },
+    { "p.within", "p.rand", "type(x(p, 1)) == \"boolean\" and 1 or 5", 1, 5 },
+    { "frame.detail", "names", "x.near", 9, 2.5 },
+  } do
+    local first, second, result, even, odd = unpack(case)
+    it(("follows a local that is %s for some points and %s for others"):format(first, second), function()
+      local text = head .. ([[
+  :detail("near", function(points) points.detail.near = 9 end)
+  :points("k", function(p, frame)
+      local x
+      if p.id %% 2 == 0 then x = %s else x = %s end
+      p.heat = %s
+    end) :solve {}]]):format(first, second, result)
+      local lanes, single, _, frames = both(text, {1, 2})
+      assert.same(single, lanes)
+      for k = 1, 40 do
+        assert.near(frames[2][k].id % 2 == 0 and even or odd, frames[2][k].heat, 1e-6)
+      end
+    end)
+  end
+
   it("is none that writes a text, or another type", function()
     for body, message in pairs { ["p.name = 3"] = "takes a text, not 3", ["p.name = \"b\""] = false } do
       local text = head:gsub("heat = 0.5", "heat = 0.5, attributes = { name = \"a\" }")

@@ -219,6 +219,9 @@ local loads = { float = "LoadFloat", vec3 = "LoadFloat", quat = "LoadFloat", vec
 local stores = { float = "StoreFloat", vec3 = "StoreFloatVector", quat = "StoreFloat", vec3d = "StoreDoubleVector",
                  int32 = "StoreInt32", int64 = "StoreInt64" }
 local sizes = { vec3 = 3, vec3d = 3, quat = 4 }
+local checks = { int32 = "CheckInt32", int64 = "CheckInt64" }
+-- What a column does to a number that is stored in it.
+local conversions = { float = "Round", vec3 = "Round", quat = "Round", int32 = "Whole", int64 = "Whole" }
 
 function Program:initial(key)
   if key == "kill" then return { kind = "flag", id = self:no_flag() } end
@@ -260,10 +263,11 @@ function Program:store(state, name, value)
       or not size and value.kind ~= "number" then
     give_up("it assigns another type to " .. name)
   end
-  local check = load == "LoadInt32" and "CheckInt32" or load == "LoadInt64" and "CheckInt64" or "CheckFloat"
+  local check = checks[column.type] or "CheckFloat"
   local function kept(id)
     self:emit(check, state.mask, id)
-    return load == "LoadFloat" and self:emit("Round", id) or id
+    local conversion = conversions[column.type]
+    return conversion and self:emit(conversion, id) or id
   end
   if not size then
     state.memory[place] = { kind = "number", id = kept(value.id) }
@@ -413,5 +417,5 @@ end
 return {
   new = new_program, Program = Program, give_up = give_up, constant = constant, nothing = nothing,
   constant_of = constant_of, truth_of = truth_of, as_value = as_value, is_flag = is_flag,
-  component_names = component_names, loads = loads, stores = stores, sizes = sizes,
+  component_names = component_names, conversions = conversions, stores = stores,
 }

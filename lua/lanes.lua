@@ -531,11 +531,10 @@ local function stores_of_memory(program, state)
   local layout, memory, list = program.layout, state.memory, {}
   for place, column in ipairs(layout.columns) do
     local value, op = memory[place], lane.stores[column.type]
-    local rounds = lane.loads[column.type] == "LoadFloat"
-    -- Storing a float rounds it.
+    -- The store converts the number by itself.
     local function stored(id)
       local node = program.nodes[id]
-      return rounds and node.op == "Round" and node.a or id
+      return node.op == lane.conversions[column.type] and node.a or id
     end
     if value and value.kind == "vector" and value.size == 3 then
       list[#list + 1] = { op = op, nodes = { stored(value[1]), stored(value[2]), stored(value[3]) },

@@ -86,6 +86,9 @@ struct Exponential {
 struct Round {  // to a float
     Doubles operator()(const Doubles& a) const { return widen(narrow(a)); }
 };
+struct Whole {  // as an integer, which has no -0
+    Doubles operator()(const Doubles& a) const { return a + 0.0; }
+};
 struct And {
     Flags operator()(const Doubles& a, const Doubles& b) const { return as_flags(a) & as_flags(b); }
 };
@@ -394,6 +397,7 @@ constexpr std::pair<std::string_view, LaneOperation> operations[] = {
     {"Or", of_two<Or>},
     {"Choose", choose},
     {"Round", of_one<Round>},
+    {"Whole", of_one<Whole>},
     {"Random", random},
     {"LoadFloat", load<float>},
     {"LoadDouble", load<double>},

@@ -199,6 +199,22 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     end)
   end
 
+  it("has no -0 in whole numbers, as a point by itself has none", function()
+    local text = head .. [[
+  :points("k", function(p)
+      p.instance, p.parent = -math.abs(p.P.x) * 0, -p.heat * 0
+      p.heat = (1 / p.instance > 0 and 1 or 2) + (1 / p.parent > 0 and 10 or 20)
+    end) :solve {}]]
+    local lanes, single, none, frames = both(text)
+    assert.same({}, none)
+    assert.same(single, lanes)
+    assert.equal(11, frames[4][600].heat)
+    -- In the next kernel of a pass, and where one branch alone assigns.
+    same("p.instance = p.P.x * -0.0",
+      ":points(\"next\", function(p) p.heat = 1 / p.instance > 0 and 1 or -1 end)")
+    same("if p.P.x > 0 then p.instance = p.P.x * -0.0 end  p.heat = math.atan2(p.instance, -1)")
+  end)
+
   it("is none that writes a text, or another type", function()
     for body, message in pairs { ["p.name = 3"] = "takes a text, not 3", ["p.name = \"b\""] = false } do
       local text = head:gsub("heat = 0.5", "heat = 0.5, attributes = { name = \"a\" }")

@@ -211,6 +211,20 @@ TEST_CASE("two operations in one round twice, as one after the other", "[lanes]"
         }
 }
 
+TEST_CASE("a whole number has no -0", "[lanes]")
+{
+    LaneProgram program;
+    program.constants = {-0.0, -3};
+    program.code = {{lane_operation("Whole"), 7, 5, 0, 0, 0},
+                    {lane_operation("Whole"), 8, 6, 0, 0, 0},
+                    {lane_operation("Divide"), 9, 8, 7, 0, 0},
+                    {lane_operation("StoreFloat"), 0, 9, 0, 0, 0}};
+    program.slots = 10;
+    std::vector<float> x(8);
+    CHECK(run(program, x).empty());
+    CHECK(x == std::vector<float>(8, -std::numeric_limits<float>::infinity()));
+}
+
 TEST_CASE("operations are found by their names", "[lanes]")
 {
     CHECK(lane_operation("Add"));

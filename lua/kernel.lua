@@ -314,6 +314,7 @@ local function set_params(values, detail_values)
   for _, value in next, values do
     if type(value) == "userdata" then adopt(value) end
   end
+  if next(values) == nil then return end -- the kernel of no node: its third argument is nil
   setmetatable(values, { __index = function(_, name) refuse.param(name, values) end })
   params = newproxy(true) -- no table: table.insert would write into it
   local of_params = getmetatable(params)

@@ -559,7 +559,8 @@ end
 local function translate(kernel, layout, holder)
   local program = lane.new(layout, holder)
   local done, result = pcall(function()
-    local args = { { kind = "point" }, { kind = layout.action and "step" or "frame" }, { kind = "params" } }
+    local params = next(holder.values) ~= nil and { kind = "params" } or nil
+    local args = { { kind = "point" }, { kind = layout.action and "step" or "frame" }, params }
     local results, state = run(program, kernel, args, { regs = {}, memory = {}, mask = program.visited }, 1)
     if not state then give_up(program.failure) end
     local stores_of = stores_of_memory(program, state)

@@ -215,6 +215,15 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     same("if p.P.x > 0 then p.instance = p.P.x * -0.0 end  p.heat = math.atan2(p.instance, -1)")
   end)
 
+  it("gives the kernel of no node a third argument that is nil", function()
+    local lanes, single, none, frames = both(head .. [[
+  :detail("mean", function(points) points.detail.mean = 2 end)
+  :points("third", function(p, frame, third) p.heat = third and 9 or frame.detail.mean end) :solve {}]])
+    assert.same({}, none)
+    assert.same(single, lanes)
+    assert.equal(2, frames[4][1].heat)
+  end)
+
   it("is none that writes a text, or another type", function()
     for body, message in pairs { ["p.name = 3"] = "takes a text, not 3", ["p.name = \"b\""] = false } do
       local text = head:gsub("heat = 0.5", "heat = 0.5, attributes = { name = \"a\" }")

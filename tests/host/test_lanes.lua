@@ -1,5 +1,5 @@
--- Kernels as programs of lanes: the same bits as one point at a time, of every construct that they know, of random
--- kernels, and where a tile goes back to the kernel itself.
+-- Kernels as programs of lanes: the same bits as one point at a time, of every construct that they know, and where a
+-- tile goes back to the kernel itself. test_random_kernels.lua has random ones.
 local scene = require "testing.scene"
 
 -- Points with values of both signs, zeros and large ones, of all types.
@@ -298,108 +298,6 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
       assert.equal(1, #none)
       assert.truthy(none[1]:find(reason, 1, true), none[1])
       assert.truthy(none[1]:find("scene.lua:13", 1, true), none[1])
-    end
-  end)
-end)
-
-describe("random kernels", function()
-  -- Numbers from 1 to n, the same in each run.
-  local state = 1
-  local function draw(n)
-    state = (state * 16807) % 2147483647
-    return state % n + 1
-  end
-  local function pick(list) return list[draw(#list)] end
-
-  local number, vector
-
-  function vector(depth)
-    if depth == 0 then return pick { "p.P", "p.v", "tint", "a", "vec3(1, p.heat, -2)" } end
-    local less = depth - 1
-    return pick {
-      function() return ("(%s + %s)"):format(vector(less), vector(less)) end,
-      function() return ("(%s - %s * 0.5)"):format(vector(less), vector(less)) end,
-      function() return ("(%s) * (%s)"):format(vector(less), number(less)) end,
-      function() return ("(%s):normalized()"):format(vector(less)) end,
-      function() return ("(%s):cross(%s)"):format(vector(less), vector(less)) end,
-      function() return ("(%s):lerp(%s, %s)"):format(vector(less), vector(less), number(less)) end,
-      function() return ("(%s > 0 and %s or %s)"):format(number(less), vector(less), vector(less)) end,
-      function() return ("vec3(%s, %s, %s)"):format(number(less), number(less), number(less)) end,
-    }()
-  end
-
-  function number(depth)
-    if depth == 0 then
-      return pick { "p.heat", "p.P.x", "p.v.y", "limit", "0.5", "3", "p:rand(1)", "p:rand(2, frame)", "frame.time",
-                    "b" }
-    end
-    local less = depth - 1
-    return pick {
-      function() return ("(%s + %s)"):format(number(less), number(less)) end,
-      function() return ("(%s) * (%s)"):format(number(less), number(less)) end,
-      function() return ("((%s) / (1 + math.abs(%s)))"):format(number(less), number(less)) end,
-      function() return ("((%s) %% 1.5)"):format(number(less)) end,
-      function() return ("math.sin(%s)"):format(number(less)) end,
-      function() return ("math.cos(%s)"):format(number(less)) end,
-      function() return ("math.exp(-math.abs(%s))"):format(number(less)) end,
-      function() return ("math.floor(%s)"):format(number(less)) end,
-      function() return ("math.sqrt(math.abs(%s))"):format(number(less)) end,
-      function() return ("math.max(%s, %s)"):format(number(less), number(less)) end,
-      function() return ("(%s):length()"):format(vector(less)) end,
-      function() return ("(%s):dot(%s)"):format(vector(less), vector(less)) end,
-      function() return ("(%s < %s and %s or %s)"):format(number(less), number(less), number(less), number(less)) end,
-      function() return ("mixed(%s, %s)"):format(number(less), number(less)) end,
-    }()
-  end
-
-  local statement
-  local function block(depth)
-    local lines = {}
-    for k = 1, draw(2) do lines[k] = statement(depth) end
-    return table.concat(lines, "\n")
-  end
-  local function condition(depth)
-    return pick {
-      function() return ("%s < %s"):format(number(depth), number(depth)) end,
-      function() return ("p:within \"high\" or %s > 1"):format(number(depth)) end,
-      function() return ("not (%s >= 0 and %s <= 1)"):format(number(depth), number(depth)) end,
-    }()
-  end
-  -- Values are held below 10, so that none grows beyond a float.
-  function statement(depth)
-    local kinds = {
-      function() return ("b = %s"):format(number(2)) end,
-      function() return ("a = %s"):format(vector(2)) end,
-      function() return ("p.heat = (%s) %% 10"):format(number(3)) end,
-      function() return ("p.v = (%s):normalized() * 3"):format(vector(3)) end,
-      function() return pick { "p:join \"low\"", "p:leave \"high\"", "p.instance = math.floor(p.heat)" } end,
-    }
-    if depth > 0 then
-      kinds[6] = function() return ("if %s then\n%s\nend"):format(condition(1), block(depth - 1)) end
-      kinds[7] = function()
-        return ("if %s then\n%s\nelse\n%s\nend"):format(condition(1), block(depth - 1), block(depth - 1))
-      end
-    end
-    return pick(kinds)()
-  end
-
-  it("have the same bits as one point at a time", function()
-    for _ = 1, 40 do
-      local body = {}
-      for k = 1, 6 do
-        body[k] = (([[  :points("k%d", function(p, frame)
-      local a, b = p.P, 1
-      %s
-      %s
-      p.heat = (p.heat + b + a.x) %% 10
-    end)]]):format(k, statement(2), statement(2)))
-      end
-      local text = head .. table.concat(body, "\n") .. "  :solve {}"
-      local lanes, single, none = both(text, {1, 3})
-      assert.same({}, none)
-      if table.concat(lanes, "\n") ~= table.concat(single, "\n") then
-        assert.equal(text, "a scene with other bits")
-      end
     end
   end)
 end)

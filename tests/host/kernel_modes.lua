@@ -1,0 +1,98 @@
+-- Runs a scene in each of the ways that kernels can be run in, and tells how the results differ, bit by bit.
+--
+--   local kernel_modes = require "tests.host.kernel_modes"     from the folder of the project
+--   kernel_modes.run(folders)                a list of the scenes' folders: each has a scene.lua
+--   kernel_modes.difference(folder)          nil if all modes have the same results or the same error
+--   kernel_modes.outcome(path, options)      all values of all frames as text, or the error
+--
+-- The modes are lanes on 1 and on 7 threads, traces for one point at a time, and the interpreter. No scene can turn the
+-- compiler off: the last mode is a process of its own that reads a copy of Rapid's Lua files with one line changed.
+local command = require "testing.command"
+local ffi = require "ffi"
+local vector = require "vec3"
+
+local kernel_modes = {}
+
+local rapid = require "rapid" -- the module of tests
+
+local frames = {1, 3}
+
+local function text_of(value)
+  if type(value) == "number" then return ("%.17g"):format(value) end
+  if type(value) == "string" then return ("%q"):format(value) end
+  local text = ("%.17g %.17g %.17g"):format(value.x, value.y, value.z)
+  return ffi.istype(vector.quat, value) and ("%s %.17g"):format(text, value.w) or text
+end
+
+-- Also returns the kernels that are no programs of lanes.
+function kernel_modes.outcome(folder, options)
+  options.frames = frames
+  local ok, result = pcall(rapid.run, folder .. "/scene.lua", options)
+  if not ok then return (result:gsub(folder:gsub("%W", "%%%0") .. "/", "")), {} end
+  local lines = {}
+  for frame, points in result:frames() do
+    lines[#lines + 1] = ("frame %d: %d points"):format(frame, #points)
+    local names, groups = points:names(), points:groups()
+    for k = 1, #points do
+      local point = points[k]
+      for _, name in ipairs(names) do lines[#lines + 1] = ("%d %s %s"):format(k, name, text_of(point[name])) end
+      for _, name in ipairs(groups) do
+        lines[#lines + 1] = ("%d within %s %s"):format(k, name, tostring(point:within(name)))
+      end
+    end
+  end
+  return table.concat(lines, "\n"), result.no_lanes or {}
+end
+
+-- An installation whose Lua files do not turn the compiler on again once the graph is loaded.
+local interpreter
+local function make_interpreter()
+  interpreter = command.folder()
+  local made = command.shell([[
+set -e
+mkdir -p "$AT/bin" "$AT/share/rapid"
+cp "$RAPID" "$AT/bin/rapid"
+cp -rL "$(dirname "$RAPID")/../share/rapid/lua" "$AT/share/rapid/"]], { environment = { AT = interpreter.path } })
+  assert(made.status == 0, made.stderr)
+  local path = "share/rapid/lua/host.lua"
+  local text, count = interpreter:read(path):gsub("jit%.on%(%)", "")
+  assert(count == 1, "lua/host.lua turns the compiler on elsewhere")
+  interpreter:write(path, text)
+end
+
+-- Runs the scenes in the interpreter, each of which then has its outcome in the file `interpreted` of its folder.
+function kernel_modes.interpret(folders)
+  if not interpreter then make_interpreter() end
+  local list = interpreter:write("folders", table.concat(folders, "\n") .. "\n")
+  local run = command.shell('exec "$AT/bin/rapid" test tests/host/interpreted_scenes.lua',
+    { environment = { AT = interpreter.path, SCENES = list } })
+  assert(run.status == 0, run.stdout .. run.stderr)
+end
+
+-- The first line in which two outcomes differ; nil if they are equal.
+local function first_difference(a, b)
+  if a == b then return nil end
+  local next_a, next_b = a:gmatch "[^\n]+", b:gmatch "[^\n]+"
+  local line_a, line_b
+  repeat line_a, line_b = next_a(), next_b() until line_a ~= line_b or not line_a
+  return ("%s\n  and %s"):format(tostring(line_a), tostring(line_b))
+end
+
+-- With `interpreted` false all but the interpreter.
+function kernel_modes.difference(folder, interpreted)
+  local traced = kernel_modes.outcome(folder, { threads = 1, watch_traces = true })
+  local lanes, no_lanes = kernel_modes.outcome(folder, { threads = 1, watch_lanes = true })
+  local found = first_difference(traced, lanes)
+  if found then return "traced: " .. found .. " in lanes", no_lanes end
+  found = first_difference(traced, (kernel_modes.outcome(folder, { threads = 7 })))
+  if found then return "traced: " .. found .. " in lanes on 7 threads", no_lanes end
+  if interpreted ~= false then
+    local file = assert(io.open(folder .. "/interpreted", "rb"))
+    found = first_difference(traced, file:read "*a")
+    file:close()
+    if found then return "traced: " .. found .. " interpreted", no_lanes end
+  end
+  return nil, no_lanes, traced
+end
+
+return kernel_modes

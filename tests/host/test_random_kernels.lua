@@ -1,0 +1,76 @@
+-- Random kernels (random_kernels.lua makes them): the same bits, or the same error, in lanes on any number of threads,
+-- traced and interpreted.
+--
+-- In the suite a few are run; RANDOM_KERNELS=13000 RANDOM_KERNELS_SEED=7 rapid test tests/host runs more, and others. A
+-- scene that fails is shown with its seed and number, after all statements that its fault does not need are left out.
+local command = require "testing.command"
+local kernel_modes = require "tests.host.kernel_modes"
+local random_kernels = require "tests.host.random_kernels"
+local shrink = require "tests.host.shrink"
+
+local kernels = tonumber(os.getenv "RANDOM_KERNELS") or 130
+local seed = tonumber(os.getenv "RANDOM_KERNELS_SEED") or 1
+local batch = 50 -- scenes for each process that interprets
+
+local function write_scene(folder, made)
+  local function write(name, text)
+    local file = assert(io.open(("%s/%s.lua"):format(folder, name), "wb"))
+    file:write(text)
+    file:close()
+  end
+  write("scene", "local rapid = require \"rapid\"\n" .. random_kernels.text(made))
+  for name, text in pairs(random_kernels.modules(made)) do write(name, text) end
+end
+
+-- The smallest scene with the fault, as text.
+local function smallest(folder, made, fault)
+  local is_interpreters = fault:find " interpreted$" ~= nil
+  shrink(made, function()
+    write_scene(folder, made)
+    if is_interpreters then kernel_modes.interpret { folder } end
+    local found = kernel_modes.difference(folder, is_interpreters)
+    fault = found or fault
+    return found ~= nil
+  end)
+  local text = { fault, random_kernels.text(made) }
+  for name, module in pairs(random_kernels.modules(made)) do
+    text[#text + 1] = ("-- %s.lua:\n%s"):format(name, module)
+  end
+  return table.concat(text, "\n")
+end
+
+describe("random kernels", function()
+  it(("have the same bits in lanes, traced and interpreted (%d of seed %d)"):format(kernels, seed), function()
+    local made_kernels, in_lanes, errors, number, faults = 0, 0, 0, 0, {}
+    while made_kernels < kernels and #faults < 5 do
+      local folder, scenes, folders = command.folder(), {}, {}
+      while made_kernels < kernels and #scenes < batch do
+        number = number + 1
+        random_kernels.start(seed, number)
+        local made = random_kernels.scene()
+        folders[#folders + 1] = folder:file(tostring(number))
+        assert.equal(0, os.execute("mkdir " .. command.quoted(folders[#folders])))
+        write_scene(folders[#folders], made)
+        scenes[#scenes + 1] = { number = number, made = made, folder = folders[#folders] }
+        made_kernels = made_kernels + #made.kernels
+      end
+      kernel_modes.interpret(folders)
+      for _, scene in ipairs(scenes) do
+        local fault, no_lanes, outcome = kernel_modes.difference(scene.folder)
+        if outcome and outcome:find "^frame" then
+          in_lanes = in_lanes + #scene.made.kernels - #no_lanes
+        else
+          errors = errors + 1
+        end
+        if fault then
+          local text = smallest(scene.folder, scene.made, fault)
+          faults[#faults + 1] = ("scene %d of seed %d: %s"):format(scene.number, seed, text)
+        end
+        collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+      end
+    end
+    assert.equal("", table.concat(faults, "\n\n"))
+    assert.is_true(in_lanes > 0.3 * made_kernels, "few of the kernels are programs of lanes")
+    assert.is_true(errors < 0.5 * number, "many of the scenes end with an error")
+  end)
+end)

@@ -1,12 +1,13 @@
 -- Runs a scene in each of the ways that kernels can be run in, and tells how the results differ, bit by bit.
 --
 --   local kernel_modes = require "tests.host.kernel_modes"     from the folder of the project
---   kernel_modes.run(folders)                a list of the scenes' folders: each has a scene.lua
---   kernel_modes.difference(folder)          nil if all modes have the same results or the same error
---   kernel_modes.outcome(path, options)      all values of all frames as text, or the error
+--   kernel_modes.interpret(folders)          runs scenes in the interpreter; a scene is a folder with a scene.lua
+--   kernel_modes.difference(folder, modes)   nil if these modes have the same results, or the same error, as traces
+--   kernel_modes.outcome(folder, options)    all values of all frames as text, or the error
 --
--- The modes are lanes on 1 and on 7 threads, traces for one point at a time, and the interpreter. No scene can turn the
--- compiler off: the last mode is a process of its own that reads a copy of Rapid's Lua files with one line changed.
+-- The modes are "lanes", on one thread; "threads", lanes on seven; and "interpreted". Traces take one point at a time.
+-- No scene can turn the compiler off: interpreted scenes run in a process of its own that reads a copy of Rapid's Lua
+-- files with one call removed.
 local command = require "testing.command"
 local ffi = require "ffi"
 local vector = require "vec3"
@@ -78,19 +79,27 @@ local function first_difference(a, b)
   return ("%s\n  and %s"):format(tostring(line_a), tostring(line_b))
 end
 
--- With `interpreted` false all but the interpreter.
-function kernel_modes.difference(folder, interpreted)
+-- modes: which are compared with traces on one thread, by name. Also returns the kernels that are no programs of lanes,
+-- and the outcome.
+function kernel_modes.difference(folder, modes)
   local traced = kernel_modes.outcome(folder, { threads = 1, watch_traces = true })
-  local lanes, no_lanes = kernel_modes.outcome(folder, { threads = 1, watch_lanes = true })
-  local found = first_difference(traced, lanes)
-  if found then return "traced: " .. found .. " in lanes", no_lanes end
-  found = first_difference(traced, (kernel_modes.outcome(folder, { threads = 7 })))
-  if found then return "traced: " .. found .. " in lanes on 7 threads", no_lanes end
-  if interpreted ~= false then
+  local no_lanes = {}
+  local outcomes = {}
+  function outcomes.lanes()
+    local text
+    text, no_lanes = kernel_modes.outcome(folder, { threads = 1, watch_lanes = true })
+    return text
+  end
+  function outcomes.threads() return (kernel_modes.outcome(folder, { threads = 7 })) end
+  function outcomes.interpreted()
     local file = assert(io.open(folder .. "/interpreted", "rb"))
-    found = first_difference(traced, file:read "*a")
+    local text = file:read "*a"
     file:close()
-    if found then return "traced: " .. found .. " interpreted", no_lanes end
+    return text
+  end
+  for _, mode in ipairs(modes) do
+    local found = first_difference(traced, outcomes[mode]())
+    if found then return ("traced: %s %s"):format(found, mode), no_lanes end
   end
   return nil, no_lanes, traced
 end

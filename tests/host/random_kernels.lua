@@ -204,8 +204,9 @@ local function loop(scope, depth)
   end
   if scope.only_lanes or chance(0.7) then return { ("for %s = %s do"):format(name, first), body, "end" } end
   if chance(0.3) then return { ("for _, %s in ipairs(shared.list) do"):format(name), body, "end" } end
-  return { ("do local %s = 0 while %s < %d do %s = %s + 1"):format(name, name, 1 + below(3), name, name), body,
-           "end end" }
+  -- A statement of the body may assign the variable that it sees.
+  return { ("do local turns = 0 while turns < %d do turns = turns + 1 local %s = turns"):format(1 + below(3), name),
+           body, "end end" }
 end
 
 local function return_statement(scope)
@@ -306,7 +307,7 @@ function random_kernels.scene()
   fresh = 0
   local scope = inner { calls = {}, only_lanes = chance(0.6) }
   local made = { helpers = block {}, kernels = {}, size = pick(sizes), is_emitted = chance(0.15) }
-  if chance(0.02) then made.size = 9000 end
+  if chance(0.03) then made.size = 4200 end -- two chunks
   for k = 1, below(4) do made.helpers[k] = helper(k, scope) end
   for k = 1, 1 + below(3) do made.kernels[k] = kernel(k, scope) end
   if made.is_emitted and chance(0.5) then made.kernels[#made.kernels + 1] = kernel(0, scope, "birth") end

@@ -390,19 +390,22 @@ local function prepare(rand, adopt, point_names, texts)
     end
     return value
   end
+  jit.on(of_view.__index)
   of_view.__newindex = function(_, name)
     name = describe.name(name)
     error(("detail.%s can't be assigned in a kernel; points.detail.%s can, in :detail"):format(name, name), 0)
   end
 
   local frame_type = ffi.typeof "struct { const double number, time, dt; }"
+  local function field_of_frame(...)
+    local _, name = ...
+    if name == "detail" then return shown.view end
+    error(("the frame has no %q; it has number, time, dt and detail"):format(describe.name(name)), 2)
+  end
+  jit.on(field_of_frame)
   ffi.metatype(frame_type, refuse_operators("the frame is no number; compute with what it has, by name: frame.time", {
     __tostring = function(frame) return ("frame %g"):format(frame.number) end,
-    __index = function(...)
-      local _, name = ...
-      if name == "detail" then return shown.view end
-      error(("the frame has no %q; it has number, time, dt and detail"):format(describe.name(name)), 2)
-    end,
+    __index = field_of_frame,
   }))
   local shared = {
     frame_type = frame_type, draw = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown,

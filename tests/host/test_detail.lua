@@ -176,6 +176,17 @@ points.detail.total = (points.detail.total or 0) + points:sum "heat" points.deta
     assert.equal(10 + 50, result[3][1].n)
   end)
 
+  it("leaves the kernel that reads it compiled", function()
+    for _, node in ipairs { ":points", ":action" } do
+      local result = scene.run(([[
+return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing = 0.5 } }
+  :detail("sum", function(points) points.detail.mean = 0.5 end)
+  %s("k", function(p, frame) p.v = p.v * (1 + frame.detail.mean) end) :solve {}]]):format(node),
+        { frames = {1, 4}, threads = 1, watch_traces = true })
+      assert.same({}, result.trace_aborts)
+    end
+  end)
+
   it("that is not there, or can't be one, is an error", function()
     local function message(body, kernel)
       return scene.error(([[

@@ -30,10 +30,10 @@ local function within_float(x)
   return x >= -MAX and x <= MAX
 end
 
-local function check_whole(limit)
+local function check_whole(least, most)
   return function(name, x)
     if type(x) ~= "number" then wrong_type(name, "a whole number", x) end
-    if not (x >= -limit and x <= limit and floor(x) == x) then
+    if not (x >= least and x <= most and floor(x) == x) then
       error(("attribute %q takes a whole number, not %s"):format(name, describe.value(x)), 0)
     end
   end
@@ -56,11 +56,12 @@ local types = {
     end,
   },
   int32 = {
-    pointer = "int32_t*", scalars = 1, load = load_number, store = store_number, check = check_whole(2147483647),
+    pointer = "int32_t*", scalars = 1, load = load_number, store = store_number,
+    check = check_whole(-2147483648, 2147483647),
   },
   int64 = {
     pointer = "int64_t*", scalars = 1, load = load_number, store = store_number,
-    check = check_whole(9007199254740992),
+    check = check_whole(-9007199254740992, 9007199254740992),
   },
   vec3 = {
     pointer = "float*", scalars = 3,

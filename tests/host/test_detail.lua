@@ -144,6 +144,18 @@ return rapid.create { points = two } :attribute { place = 5, serial = 6, size = 
     assert.same({ 6, 6, 6 }, { points[1].place, points[1].serial, points[1].size })
   end)
 
+  it("assigns the least and the largest integers, as a kernel does, and none beyond them", function()
+    local text = [[
+return rapid.create { points = two } :attribute { instance = 0 }
+  :detail("d", function(points) points[1].instance, points[2].instance = -2147483648, 2147483647 end)
+  :points("k", function(p) if p.id == 1 then p.instance = -p.instance - 1 end end) :solve {}]]
+    assert.same({ -2147483648, -2147483648 }, values(scene.run(text, { frames = {2, 2} })[2], "instance"))
+    for _, beyond in ipairs { "-2147483649", "2147483648" } do
+      local message = scene.error((text:gsub("2147483647", beyond)))
+      assert.truthy(message:find("attribute \"instance\" takes a whole number, not " .. beyond, 1, true), message)
+    end
+  end)
+
   it("runs as often as a long sequence has frames", function()
     local result = scene.run([[
 local chain = rapid.create { points = two } :attribute { n = 0 }

@@ -1,4 +1,4 @@
--- What tests/host/kernel_modes.lua runs in a process whose scenes are interpreted.
+-- Runs scenes for tests/host/kernel_modes.lua, in a process that interprets them.
 local kernel_modes = require "tests.host.kernel_modes"
 
 it("runs each scene of the list", function()
@@ -6,6 +6,6 @@ it("runs each scene of the list", function()
     local file = assert(io.open(folder .. "/interpreted", "wb"))
     file:write((kernel_modes.outcome(folder, { threads = 1 })))
     file:close()
-    collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+    collectgarbage() -- the collector does not count what a result holds outside of Lua
   end
 end)

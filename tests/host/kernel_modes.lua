@@ -1,4 +1,4 @@
--- Runs a scene in each of the ways that kernels can be run in, and tells how the results differ, bit by bit.
+-- Runs a scene in each of the modes that kernels have, and compares the results bit by bit.
 --
 --   local kernel_modes = require "tests.host.kernel_modes"     from the folder of the project
 --   kernel_modes.interpret(folders)          runs scenes in the interpreter; a scene is a folder with a scene.lua
@@ -25,7 +25,7 @@ local function text_of(value)
   return ffi.istype(vector.quat, value) and ("%s %.17g"):format(text, value.w) or text
 end
 
--- Also returns the kernels that are no programs of lanes.
+-- Also returns the list of kernels that are not programs of lanes.
 function kernel_modes.outcome(folder, options)
   options.frames = frames
   local ok, result = pcall(rapid.run, folder .. "/scene.lua", options)
@@ -45,7 +45,7 @@ function kernel_modes.outcome(folder, options)
   return table.concat(lines, "\n"), result.no_lanes or {}
 end
 
--- An installation whose Lua files do not turn the compiler on again once the graph is loaded.
+-- Makes an installation whose Lua files do not turn the compiler on again after the graph is loaded.
 local interpreter
 local function make_interpreter()
   interpreter = command.folder()
@@ -61,7 +61,7 @@ cp -rL "$(dirname "$RAPID")/../share/rapid/lua" "$AT/share/rapid/"]], { environm
   interpreter:write(path, text)
 end
 
--- Runs the scenes in the interpreter, each of which then has its outcome in the file `interpreted` of its folder.
+-- Runs scenes in the interpreter. Their outcomes go to the file `interpreted` in the folder of each.
 function kernel_modes.interpret(folders)
   if not interpreter then make_interpreter() end
   local list = interpreter:write("folders", table.concat(folders, "\n") .. "\n")
@@ -70,7 +70,7 @@ function kernel_modes.interpret(folders)
   assert(run.status == 0, run.stdout .. run.stderr)
 end
 
--- The first line in which two outcomes differ; nil if they are equal.
+-- Returns the first line in which two outcomes differ; nil if they are equal.
 local function first_difference(a, b)
   if a == b then return nil end
   local next_a, next_b = a:gmatch "[^\n]+", b:gmatch "[^\n]+"
@@ -79,8 +79,8 @@ local function first_difference(a, b)
   return ("%s\n  and %s"):format(tostring(line_a), tostring(line_b))
 end
 
--- modes: which are compared with traces on one thread, by name. Also returns the kernels that are no programs of lanes,
--- and the outcome.
+-- modes: the names of those that are compared with traces. Also returns the list of kernels that are not programs of
+-- lanes, and the outcome.
 function kernel_modes.difference(folder, modes)
   local traced = kernel_modes.outcome(folder, { threads = 1, watch_traces = true })
   local no_lanes = {}

@@ -24,11 +24,11 @@ local word, which = "a", "f"
 local shared = { x = 2.5, y = -1, list = { 7, 8, 9 }, inner = { x = -0.75, v = vec3(1, 2, 3), f = mixed }, word = "b" }
 ]]
 
--- Operations whose results differ between the interpreter, traces and lanes: patterns of the templates that are left
--- out.
+-- Patterns of templates that are left out: the results of these operations differ between the interpreter, traces and
+-- lanes.
 local excluded = { "math%.min", "math%.max", "math%.ceil", "clamp", "%^", "%(%-%$I" }
 
--- Expressions without others in them, by kind; of those in `pointwise` no program of lanes can be made.
+-- Expressions without others in them, by kind. Those in `pointwise` are beyond programs of lanes.
 local atoms = {
   N = { "0", "1", "2", "0.5", "3", "(-1)", "(-0.3)", "1e-3", "7.25", "limit", "tiny", "zero", "minus_zero", "large",
         "tint.x", "shared.x", "shared.inner.x", "p.f", "p.g", "p.f", "p.P.x", "p.v.y", "p.Cd.z", "p.axis.y",
@@ -97,7 +97,7 @@ local composed = {
   },
 }
 
--- Where nothing else is possible.
+-- Expressions that are possible everywhere.
 templates.plain = { N = "0.5", I = "2", V = "tint", Q = "spin", B = "on", T = "word", X = "shared", M = "nil",
                     F = "sound", G = "\"a\"" }
 
@@ -111,7 +111,7 @@ local stores = {
   pointwise = { "p.name = $T", "p[$B and \"f\" or \"g\"] = sound($N)" },
 }
 
--- Those that may raise an error.
+-- Statements that may raise an error.
 templates.risky = {
   "p.f = $N", "p.v = $V", "p.instance = $N", "p.parent = $I", "p.instance = $I", "p.f = $M", "p.orient = $Q",
   "p.Cd = $X", "p.v = $M", "p.name = $M", "p.f = ($M).x", "p.f = sound($M + $N)", "p.v.x = $N", "p.f = ($V).q",
@@ -140,7 +140,7 @@ local function without_excluded(list, further)
   return kept
 end
 
--- templates.atoms(only_lanes)[kind] and the like: lists.
+-- Returns a function that takes only_lanes and returns the lists by kind.
 local function by_kind(lists)
   local found = { [true] = {}, [false] = {} }
   for kind in pairs(templates.plain) do
@@ -169,7 +169,7 @@ for i = 1, size do
 end
 ]]
 
--- The beginning of its chain.
+-- The first nodes after the points.
 templates.graph = [[
   :attribute { f = 0.5, g = -1.5, Cd = {1, 1, 1}, axis = {0, 1, 0}, turn = {0, 0, 0, 1}, orient = {0, 0, 0, 1},
                instance = 3, attributes = { name = "a" } }
@@ -179,7 +179,7 @@ templates.graph = [[
     end)
   :group { name = "a", where = function(p) return p.id % 3 == 0 end }]]
 
--- How kernels begin, by their place.
+-- The first lines of kernels, by their place in the chain.
 templates.openings = {
   points = "  :points { name = \"k%d\", reads = names, writes = names, kernel = function(p, frame)",
   group = "  :points { name = \"k%d\", group = \"a\", reads = names, writes = names, kernel = function(p, frame)",
@@ -189,7 +189,7 @@ templates.openings = {
     .. "active = function(f) return f.number == 2 end }",
 }
 
--- The file of a node with a kernel: its number, head and functions are put in.
+-- The file of a node with a kernel, for string.format: its functions, its number, the body of the kernel.
 templates.node = [[
 local rapid = require "rapid"
 %s

@@ -1,4 +1,4 @@
--- Scenes of random kernels by seed and number, which are the same everywhere.
+-- Makes scenes of random kernels. A seed and a number give the same scene everywhere.
 --
 --   local random_kernels = require "tests.host.random_kernels"     from the folder of the project
 --   random_kernels.start(seed, number)
@@ -53,7 +53,7 @@ local function expand(template, scope, depth)
   return (template:gsub("%$(%u)", function(kind) return expression(kind, scope, depth - 1) end))
 end
 
--- A call of one of the scene's functions that returns a value of the kind first.
+-- Returns a call of one of the scene's functions whose first result is of the kind; nil if there is none.
 local function call(kind, scope, depth)
   local possible = {}
   for _, f in ipairs(scope.calls[kind] or {}) do
@@ -90,8 +90,7 @@ function expression(kind, scope, depth)
   return templates.plain[kind]
 end
 
--- Statements are strings, or lists in which strings and blocks, which are lists of statements with `is_block`, take
--- turns.
+-- A statement is a string, or a list of strings and blocks. A block is a list of statements with `is_block`.
 local function block(list)
   list.is_block = true
   return list
@@ -174,7 +173,7 @@ local function branch(scope, depth)
   return made
 end
 
--- Two branches that leave values of different kinds in a local, which is then used.
+-- Makes two branches that leave values of different types in a local, and uses it.
 local function mixture(scope, depth)
   if depth == 0 then return nil end
   local kind = pick { "X", "X", "M", "M", "F" }
@@ -222,7 +221,7 @@ local function early_return(scope, depth)
   return { ("if %s then"):format(expression("B", scope, 2)), list, "end" }
 end
 
--- A function within a function, with locals around it.
+-- Makes a function within the kernel, which sees the locals around it.
 local function nested(scope, depth)
   if depth == 0 or scope.only_lanes then return nil end
   local within = inner(scope)
@@ -235,7 +234,7 @@ local function nested(scope, depth)
   return { ("local function %s(%s)"):format(name, argument), body, "end" }
 end
 
--- Several results of one call, more or fewer than the function has.
+-- Takes two results of a call, which may have fewer or more.
 local function unpacked(scope)
   local kind = pick { "N", "V", "B", "Q" }
   local text = call(kind, scope, 2)
@@ -252,7 +251,7 @@ for _, weighted in ipairs { { declare, 5 }, { assign, 4 }, { store, 8 }, { obser
   for _ = 1, weighted[2] do statements[#statements + 1] = weighted[1] end
 end
 
--- Functions that the kernels call.
+-- Makes a function that kernels call, and adds it to scope.calls.
 local function helper(number, scope)
   local f = { name = "helper" .. number, parameters = {}, only_lanes = scope.only_lanes, p = chance(0.4) }
   f.frame, f.is_pure = f.p and chance(0.3), chance(0.5)

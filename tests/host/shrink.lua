@@ -2,10 +2,10 @@
 --
 --   shrink(made, is_faulty)     changes made; is_faulty() judges it as it is now
 --
--- Kernels, functions and statements are left out one by one, and branches are replaced by what is in them, until no
+-- Kernels, functions and statements are removed one by one, and branches are replaced by their statements, until no
 -- single step keeps the fault.
 
--- All blocks of a tree.
+-- Returns all blocks of a tree.
 local function blocks_of(part, found)
   if type(part) == "table" then
     if part.is_block then found[#found + 1] = part end
@@ -14,7 +14,7 @@ local function blocks_of(part, found)
   return found
 end
 
--- Puts `items` into the place of list[k] if this keeps the fault.
+-- Replaces list[k] by `items` if this keeps the fault.
 local function replace(list, k, items, is_faulty)
   local before = { unpack(list) }
   table.remove(list, k)

@@ -1,8 +1,9 @@
--- Random kernels (random_kernels.lua makes them): the same bits, or the same error, in lanes on any number of threads,
--- traced and interpreted.
+-- Random kernels (random_kernels.lua makes them) have the same bits, or the same error, in lanes on any number of
+-- threads, traced and interpreted.
 --
--- In the suite a few are run; RANDOM_KERNELS=13000 RANDOM_KERNELS_SEED=7 rapid test tests/host runs more, and others. A
--- scene that fails is shown with its seed and number, after all statements that its fault does not need are left out.
+-- The suite runs a few. RANDOM_KERNELS=13000 RANDOM_KERNELS_SEED=7 rapid test tests/host/test_random_kernels.lua runs
+-- more, and others. A scene that fails is shown with its seed and number. Statements that its fault does not need are
+-- removed first.
 local command = require "testing.command"
 local kernel_modes = require "tests.host.kernel_modes"
 local random_kernels = require "tests.host.random_kernels"
@@ -22,12 +23,12 @@ local function write_scene(folder, made)
   for name, text in pairs(random_kernels.modules(made)) do write(name, text) end
 end
 
--- Points go over threads in chunks of 4,096.
+-- A set of up to 4,096 points is one chunk, which one thread edits.
 local function modes_of(made)
   return made.size > 4096 and { "lanes", "threads", "interpreted" } or { "lanes", "interpreted" }
 end
 
--- The smallest scene with the fault, as text.
+-- Returns the smallest scene that has the fault, as text.
 local function smallest(folder, made, fault)
   local modes = { fault:match "%w+$" }
   shrink(made, function()
@@ -71,7 +72,7 @@ describe("random kernels", function()
           local text = smallest(scene.folder, scene.made, fault)
           faults[#faults + 1] = ("scene %d of seed %d: %s"):format(scene.number, seed, text)
         end
-        collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+        collectgarbage() -- the collector does not count what a result holds outside of Lua
       end
     end
     assert.equal("", table.concat(faults, "\n\n"))

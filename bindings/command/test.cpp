@@ -1,20 +1,17 @@
-// rapid test: script-level tests. Each file runs in a child process, so that one that crashes, hangs in a script or
-// ends its process is one failure, and the others run.
-#include <fcntl.h>
+// rapid test: script-level tests. Files run in child processes, several at a time. The report has the order of the
+// files.
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstring>
-#include <nlohmann/json.hpp>
-#include <optional>
+#include <filesystem>
+#include <thread>
 
 #include "bindings/command/child.h"
 #include "bindings/command/command.h"
 #include "bindings/command/or_throw.h"
+#include "bindings/command/test_file.h"
 #include "bindings/command/test_report.h"
 #include "bindings/command/untrusted.h"
 
@@ -22,10 +19,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
-
-// A child's end of the pipe on which it tells its parent of the tests: one JSON object per line.
-constexpr int report_descriptor = 3;
 
 // test_*.lua below a folder, sorted by path; any other file as it is.
 std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
@@ -53,22 +46,6 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
     return files;
 }
 
-// The child: runs the tests of one file and reports each.
-int run_child(const std::string& file, const SceneTestOptions& options)
-{
-    const auto send = [](const json& event) {
-        const std::string line = event.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
-        if (write(report_descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
-            _exit(status_failed);
-    };
-    or_throw(run_scene_tests(file, options, [&](const SceneTestEvent& event) {
-        std::fflush(stdout);
-        send({{"kind", event.kind}, {"name", event.name}, {"message", event.message}});
-    }));
-    send({{"end", true}});
-    return status_done;
-}
-
 class Test : public Command, public Confined {
 public:
     std::string name() const override { return "test"; }
@@ -77,11 +54,19 @@ public:
     void declare(CLI::App& app) override
     {
         app.add_option("FILES", files_, "test files, or folders of test_*.lua")->type_name("")->required();
-        app.add_option("--filter", filter_, "only tests whose name this Lua pattern matches")->type_name("PATTERN");
+        app.add_option("--filter", filter_, "only tests whose name matches this Lua pattern")->type_name("PATTERN");
+        app.add_option_function<std::string>(
+               "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
+               "files that run at a time [default: the number of processors]")
+            ->type_name("N");
         app.add_option("--format", format_, "what is printed: text, tap or junit")
             ->type_name("")
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(TestReport::formats), std::end(TestReport::formats))));
+        app.add_option_function<std::string>(
+               "--slowest", [this](const std::string& text) { slowest_ = read_whole("--slowest", text, 1); },
+               "lists the N slowest tests with their seconds; text only")
+            ->type_name("N");
         untrusted_.declare(app, "test");
         // Internal: the process of one file.
         app.add_option("--child-of", parent_)->group("");
@@ -92,7 +77,7 @@ public:
     void confine(const CommonOptions& common) override
     {
         if (!parent_) return;
-        const auto access = [&] { return SandboxAccess{{folder_of(files_.front())}, {}, report_descriptor + 1}; };
+        const auto access = [&] { return SandboxAccess{{folder_of(files_.front())}, {}, test_report_descriptor + 1}; };
         untrusted_.confine(access, common);
     }
     bool takes_plugins() const override { return parent_.has_value(); }
@@ -101,14 +86,16 @@ public:
     {
         if (parent_) {
             end_with_parent(*parent_);
-            return run_child(files_.front(), options(common));
+            run_tests_as_child(files_.front(), options(common));
+            return status_done;
         }
 
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         setenv("RAPID_BIN", program.c_str(), 0);  // for tests of the command itself
-        const std::vector<fs::path> files = find_tests(files_);
-        report_ = TestReport::make(format_, common.verbose);
-        for (const fs::path& file : files) run_file(program, file, common);
+        if (slowest_ > 0 && format_ != "text")
+            throw Error(fmt::format("--slowest does not go with --format {}; use --format text", format_));
+        report_ = TestReport::make(format_, common.verbose, static_cast<std::size_t>(slowest_));
+        run_files(find_tests(files_), common);
         const TestCounts& counts = counts_;
         if (counts.broken == 0 && counts.passed + counts.failed + counts.skipped == 0)
             throw Error(filter_.empty() ? "no tests were found; a file needs describe and it"
@@ -126,95 +113,45 @@ private:
                 }};
     }
 
-    // If a test ends its process, a new process goes on with the next test of the file.
-    void run_file(const std::string& program, const fs::path& file, const CommonOptions& common)
+    // Files are started in their order, and reported in it as soon as those before them have ended.
+    void run_files(const std::vector<fs::path>& files, const CommonOptions& common)
     {
-        int already_run = 0;
-        while (true) {
-            const Ending ending = run_process(program, file, common, already_run);
-            if (ending.orderly) return;
-            // Its message, if any, is on standard error already.
-            if (ending.running.empty())
-                return add({SceneTestEvent::Broken, file.string(), "", "the tests ended with " + ending.how});
-            add({SceneTestEvent::Failed, file.string(), ending.running,
-                 fmt::format("{}: the test ended the process with {}", file.string(), ending.how)});
-            already_run += ending.started;
+        const auto processors = static_cast<std::int64_t>(std::max(1u, std::thread::hardware_concurrency()));
+        const auto jobs = static_cast<std::size_t>(jobs_ > 0 ? jobs_ : processors);
+        const std::vector<std::string> words = words_of_child(common);
+        std::vector<std::unique_ptr<TestFile>> tests;  // null: reported
+        std::vector<pollfd> running;
+        for (std::size_t reported = 0; reported < files.size();) {
+            running.clear();
+            std::vector<TestFile*> files_of_running;
+            for (std::size_t i = reported; i < files.size() && running.size() < jobs; ++i) {
+                if (i == tests.size())
+                    tests.push_back(std::make_unique<TestFile>(files[i], words, files.size() > 1));
+                if (tests[i]->has_ended()) continue;
+                running.push_back({tests[i]->descriptor(), POLLIN, 0});
+                files_of_running.push_back(tests[i].get());
+            }
+            while (poll(running.data(), running.size(), -1) < 0 && errno == EINTR) {
+            }
+            for (std::size_t i = 0; i < running.size(); ++i)
+                if (running[i].revents != 0) files_of_running[i]->receive();
+            while (reported < tests.size()) {
+                tests[reported]->take_results([this](const TestResult& result) { add(result); });
+                if (!tests[reported]->has_ended()) break;
+                tests[reported++].reset();
+            }
         }
     }
 
-    struct Ending {
-        bool orderly;
-        std::string how;      // if it did not end by itself: "signal 9 (Killed)"
-        std::string running;  // the test that was running then
-        int started;          // tests, in this process
-    };
-    Ending run_process(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run)
-    {
-        int ends[2];
-        if (pipe2(ends, O_CLOEXEC) != 0) throw Error(fmt::format("no pipe: {}", std::strerror(errno)));
-        const pid_t child = spawn(program, file, common, already_run, ends[1]);
-        close(ends[1]);
-        Ending ending = follow(ends[0], file.string());
-        int status = 0;
-        waitpid(child, &status, 0);
-        ending.orderly = ending.orderly && WIFEXITED(status) && WEXITSTATUS(status) == status_done;
-        ending.how = WIFSIGNALED(status) ? fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
-                                         : fmt::format("status {}", WEXITSTATUS(status));
-        return ending;
-    }
-
-    pid_t spawn(const std::string& program, const fs::path& file, const CommonOptions& common, int already_run,
-                int report) const
+    // The arguments of the process of a file, but for those that differ between files.
+    std::vector<std::string> words_of_child(const CommonOptions& common) const
     {
         std::vector<std::string> words = {"rapid", "test", fmt::format("--child-of={}", getpid()),
-                                          fmt::format("--already-run={}", already_run),
                                           fmt::format("--threads={}", common.threads)};
         if (!filter_.empty()) words.push_back("--filter=" + filter_);
         for (const std::string& plugin : common.plugins) words.push_back("--plugin=" + plugin);
         for (std::string& word : untrusted_.words()) words.push_back(std::move(word));
-        words.insert(words.end(), {"--", file.string()});
-        std::vector<char*> arguments;
-        for (std::string& word : words) arguments.push_back(word.data());
-        arguments.push_back(nullptr);
-
-        posix_spawn_file_actions_t actions;
-        posix_spawn_file_actions_init(&actions);
-        posix_spawn_file_actions_adddup2(&actions, report, report_descriptor);
-        pid_t child = 0;
-        std::fflush(stdout);
-        const int error = posix_spawn(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
-        posix_spawn_file_actions_destroy(&actions);
-        if (error != 0) throw Error(fmt::format("can't be started: {}", std::strerror(error))).at({program, 0});
-        return child;
-    }
-
-    // Reads the events of the child until it ends.
-    Ending follow(int descriptor, const std::string& file)
-    {
-        const std::unique_ptr<std::FILE, decltype(&std::fclose)> pipe(fdopen(descriptor, "r"), &std::fclose);
-        Ending ending{false, "", "", 0};
-        char* text = nullptr;
-        std::size_t capacity = 0;
-        auto began = std::chrono::steady_clock::now();
-        while (getline(&text, &capacity, pipe.get()) > 0) {
-            const json event = json::parse(text, nullptr, false);
-            if (event.is_discarded()) break;  // cut off with the process
-            ending.orderly = event.contains("end");
-            if (ending.orderly) break;
-            const auto kind = event.at("kind").get<SceneTestEvent::Kind>();
-            const std::string name = event.at("name");
-            const auto now = std::chrono::steady_clock::now();
-            ending.running = "";
-            if (kind == SceneTestEvent::Started) {
-                ending.running = name;
-                ++ending.started;
-            } else {
-                add({kind, file, name, event.at("message"), std::chrono::duration<double>(now - began).count()});
-            }
-            began = now;
-        }
-        std::free(text);
-        return ending;
+        return words;
     }
 
     void add(const TestResult& result)
@@ -226,6 +163,7 @@ private:
     UntrustedOptions untrusted_;
     std::vector<std::string> files_;
     std::string filter_, format_ = "text";
+    std::int64_t jobs_ = 0, slowest_ = 0;  // 0: not given
     std::unique_ptr<TestReport> report_;
     TestCounts counts_;
     std::optional<pid_t> parent_;

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <map>
+#include <algorithm>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include "bindings/command/command.h"
@@ -21,7 +23,7 @@ std::string prefixed(const std::string& prefix, std::string text)
 
 class TextReport : public TestReport {
 public:
-    explicit TextReport(bool verbose) : verbose_(verbose) {}
+    TextReport(bool verbose, std::size_t slowest) : verbose_(verbose), slowest_(slowest) {}
 
     void add(const TestResult& result) override
     {
@@ -31,15 +33,22 @@ public:
                               prefixed("  ", result.message)));
         else if (verbose_)
             print(fmt::format("{} {}\n", result.kind == SceneTestEvent::Passed ? "passed" : "skipped", name));
+        if (slowest_ > 0) durations_.emplace_back(result.seconds, fmt::format("{} ({})", name, result.file));
     }
 
     void end(const TestCounts& counts) override
     {
+        std::sort(durations_.begin(), durations_.end(), std::greater<>());
+        durations_.resize(std::min(durations_.size(), slowest_));
+        // As Catch2 prints them.
+        for (const auto& [seconds, name] : durations_) print(fmt::format("{:.3f} s: {}\n", seconds, name));
         print(fmt::format("{} passed, {} failed, {} skipped\n", counts.passed, counts.failed, counts.skipped));
     }
 
 private:
     bool verbose_;
+    std::size_t slowest_;
+    std::vector<std::pair<double, std::string>> durations_;  // of all tests, if some are to be listed
 };
 
 // Test Anything Protocol, version 13: a line for each test as it ends, messages as comments, the plan last.
@@ -158,11 +167,11 @@ void TestCounts::add(SceneTestEvent::Kind kind)
     broken += kind == SceneTestEvent::Broken;
 }
 
-std::unique_ptr<TestReport> TestReport::make(const std::string& format, bool verbose)
+std::unique_ptr<TestReport> TestReport::make(const std::string& format, bool verbose, std::size_t slowest)
 {
     if (format == "tap") return std::make_unique<TapReport>();
     if (format == "junit") return std::make_unique<JUnitReport>();
-    return std::make_unique<TextReport>(verbose);
+    return std::make_unique<TextReport>(verbose, slowest);
 }
 
 }  // namespace rapid

@@ -24,8 +24,8 @@ struct TestCounts {
 
 class TestReport {
 public:
-    // verbose: reports tests that pass, too.
-    static std::unique_ptr<TestReport> make(const std::string& format, bool verbose);
+    // verbose: reports tests that pass, too. slowest: that many tests are listed with their seconds, as text only.
+    static std::unique_ptr<TestReport> make(const std::string& format, bool verbose, std::size_t slowest = 0);
     static constexpr const char* formats[] = {"text", "tap", "junit"};
 
     virtual ~TestReport() = default;

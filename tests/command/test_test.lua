@@ -148,6 +148,71 @@ it("comes after", function() end)]],
       "4 passed, 2 failed, 0 skipped\n", result.stdout)
   end)
 
+  -- The first test ends when the one of the last file has run: so neither waits if these run at the same time.
+  local meeting = {
+    ["t/test_a.lua"] = [[
+local command = require "testing.command"
+it("waits for the last file", function() assert.equal("last\n", command.shell("timeout 60 cat meeting").stdout) end)
+it("comes second", function() end)]],
+    ["t/test_b.lua"] = 'it("ends the process", function() os.exit(7) end) ' .. failing,
+    ["t/test_c.lua"] = [[
+local command = require "testing.command"
+it("meets the first file", function()
+  assert.equal(0, command.shell("timeout 60 sh -c 'echo last >meeting'").status)
+end)]],
+  }
+
+  it("runs several files at the same time, and reports them in their order", function()
+    local folder = new_folder(meeting)
+    command.shell("mkfifo meeting", { cwd = folder.path })
+    local result = folder:test "t --jobs 3 --verbose"
+    assert.equal([[
+passed waits for the last file
+passed comes second
+FAILED ends the process
+  t/test_b.lua: the test ended the process with status 7
+FAILED two is false
+  t/test_b.lua:2: Expected objects to be the same.
+passed two is true
+passed meets the first file
+4 passed, 2 failed, 0 skipped
+]], (result.stdout:gsub("(to be the same%.\n).-\n(passed)", "%1%2")))
+    assert.equal(1, result.status)
+  end)
+
+  it("prints what files print as if they ran one after another", function()
+    local printing = [[
+print "file"
+it("one", function() print "one"; io.stderr:write "error one\n" end)
+it("two", function() os.execute "echo program; echo error of a program >&2"; error("two", 0) end)
+it("three", function() print "three"; os.exit(3) end)
+it("four", function() io.write "no newline" end)]]
+    local folder = new_folder { ["t/test_a.lua"] = printing, ["t/test_b.lua"] = failing, ["t/test_c.lua"] = printing }
+    local by_one, at_once = folder:test "t --jobs 1", folder:test "t --jobs 3"
+    assert.equal(by_one.stdout, at_once.stdout)
+    assert.equal(by_one.stderr, at_once.stderr)
+    assert.equal(1, at_once.status)
+    local lines = "file\none\nprogram\nFAILED two\n.-three\nFAILED three\n.-file\nno newline"
+    assert.truthy(at_once.stdout:find("^" .. lines .. "FAILED two is false\n.-\n" .. lines .. "5 passed"), at_once.stdout)
+  end)
+
+  it("refuses a number of jobs that is none", function()
+    local result = new_folder({ ["a.lua"] = passing }):test "a.lua --jobs 0"
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find('--jobs = "0"; it must be a whole number, at least 1', 1, true), result.stderr)
+  end)
+
+  it("lists the slowest tests with their seconds", function()
+    local folder = new_folder { ["a.lua"] = passing, ["b.lua"] = failing }
+    local result = folder:test "a.lua b.lua --slowest 2"
+    local first, second = result.stdout:match "\n(%d+%.%d%d%d) s: [^\n]+ %(%l%.lua%)\n(%d+%.%d%d%d) s: [^\n]+\n2 passed"
+    assert.truthy(first, result.stdout)
+    assert.is_true(tonumber(first) >= tonumber(second))
+    assert.equal(2, select(2, result.stdout:gsub("%d s: ", "")))
+    assert.equal("--slowest does not go with --format tap; use --format text\n",
+      folder:test("a.lua --slowest 2 --format tap").stderr)
+  end)
+
   it("leaves nothing running when it is killed", function()
     local folder = new_folder { ["t.lua"] = [[
 local command = require "testing.command"

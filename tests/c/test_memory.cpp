@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "include/rapid/rapid.h"
+#include "tests/amount.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -74,16 +75,14 @@ TEST_CASE("memory that runs out while a state of Lua is made is an error of the 
     CHECK_FALSE(passes(requests, folder / "count"));  // of no first state
 }
 
-// EMBEDDING_FAULTS=10000 has more of them.
-TEST_CASE("memory that is refused in any call is an error of that call, and the next scene runs", "[c]")
+TEST_CASE("memory that is refused in any call is an error of that call, and the next scene runs", "[c][random]")
 {
     const test::TemporaryFolder folder;
     REQUIRE(runs(folder.path(), "RAPID_FAULT=alloc:0:12 RAPID_FAULT_COUNT=count", 1));
     long requests = 0;
     std::ifstream(folder / "count") >> requests;
     REQUIRE(requests > 10000);
-    const char* const wanted = std::getenv("EMBEDDING_FAULTS");
-    const long faults = wanted ? std::atol(wanted) : 100;
+    const long faults = amount("EMBEDDING_FAULTS", 100);
     std::string list;
     for (long k = 0; k < faults; ++k) list += "alloc:" + std::to_string(1 + k * requests / faults) + ":12\n";
     folder.write("list", list);

@@ -1,5 +1,6 @@
 -- rapid run --cache: a run that goes on where it was, to the same bytes; and what refuses to.
 local command = require "testing.command"
+local amount = require "tests.amount"
 local statistics = require "tests.same_statistics"
 
 local rain = [[
@@ -301,7 +302,7 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
 
   it("comes to the same files whatever is damaged in a cache", function()
     local lehmer = require "tests.lehmer".new(11)
-    for _ = 1, tonumber(os.getenv "RAPID_DAMAGES" or 30) do
+    for _ = 1, amount.of("RAPID_DAMAGES", 5) do
       local file = "kept/" .. lehmer.pick { "snapshot.0009.rapid", "snapshot.0006.rapid", "journal" }
       local bytes = damaged:read(file)
       local at = lehmer.below(#bytes) + 1

@@ -11,6 +11,7 @@
 
 #include "runtime/files/content_hash.h"
 #include "runtime/io/state_file.h"
+#include "tests/amount.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/host/forger.h"
 #include "tests/test.h"
@@ -20,12 +21,6 @@ using namespace rapid;
 namespace {
 
 namespace fs = std::filesystem;
-
-int setting(const char* name, int usual)
-{
-    const char* text = std::getenv(name);
-    return text ? std::atoi(text) : usual;
-}
 
 constexpr const char* scene = R"(local rapid = require "rapid"
     return rapid.create { seed = 3 }
@@ -116,7 +111,7 @@ TEST_CASE("a snapshot with any header is told, or is an error that names it", "[
     CHECK(told > 0);
 }
 
-TEST_CASE("a cache that is made to do harm is refused, or the run goes on", "[crafted][long]")
+TEST_CASE("a cache that is made to do harm is refused, or the run goes on", "[crafted][random]")
 {
     const test::TemporaryFolder folder;
     folder.write("scene.lua", scene);
@@ -126,8 +121,8 @@ TEST_CASE("a cache that is made to do harm is refused, or the run goes on", "[cr
     const std::string whole_journal = test::file_text(journal);
     const StateFile whole((folder / "kept") / "snapshot.0004.rapid");
     int refused = 0;
-    const int end = setting("RAPID_CRAFTED", 40);
-    for (int k = setting("RAPID_CRAFTED_FIRST", 0); k < end; ++k) {
+    const int end = amount("RAPID_CRAFTED", 10);
+    for (int k = amount("RAPID_CRAFTED_FIRST", 0); k < end; ++k) {
         fs::remove_all(cache);
         fs::copy(folder / "kept", cache, fs::copy_options::recursive);
         fs::remove(cache / "snapshot.0006.rapid");

@@ -1,5 +1,6 @@
 -- rapid run --part, --sample, rapid merge, and what `rapid explain` says of them.
 local command = require "testing.command"
+local amount = require "tests.amount"
 local csv_rows = require "tests.csv_rows"
 local json = require "dkjson"
 local lehmer = require "tests.lehmer"
@@ -300,7 +301,7 @@ describe("every scene in graphs", function()
       command.shell("rm -f g.* gp_* gm.*", { cwd = folder.path })
       -- The scene may warn.
       assert.equal(0, rapid("run " .. scene .. " -f 1-11x5 -o 'g.####.bgeo' --quiet").status)
-      for _, count in ipairs { 2, 3, 16 } do
+      for _, count in ipairs(amount.thorough and { 2, 3, 16 } or { 3 }) do
         for k = 1, count do
           local part = ("run %s --part %d/%d -f 1-11x5 -o 'gp.####.bgeo' --quiet --threads 2"):format(scene, k, count)
           assert.equal(0, rapid(part).status, part)
@@ -329,10 +330,10 @@ describe("random scenes without couplings", function()
     local source = pick { 'rapid.shape.sphere {}, from = "volume"', "rapid.mesh.box {}", "rapid.shape.box {}",
                           "rapid.mesh.torus {}:transform(function(f) return rapid.translate(f.time, 0, 0) end)",
                           "rapid.points.grid { size = {1, 1, 1}, spacing = 0.3 }" }
-    local amount = pick { "rate = 2000", "rate = function(f) return 500 + 200 * f.number end", "count = 40",
+    local births_of = pick { "rate = 2000", "rate = function(f) return 500 + 200 * f.number end", "count = 40",
                           "impulse = { [2] = 300, [5] = 70 }" }
     return (":emit { name = 'e%d', source = %s, %s, %sbirth = '%s', velocity = {1, 2, 0}, spread = %d, attributes = { "
-      .. "heat = %s, airdrag = %s }%s }"):format(k, source, amount, life, pick { "random", "even", "begin", "end" },
+      .. "heat = %s, airdrag = %s }%s }"):format(k, source, births_of, life, pick { "random", "even", "begin", "end" },
       pick { 0, 40, 180 }, pick { "1", "{0, 1}" }, pick { "0.5", "{0.2, 2}" }, pick { "", ", group = 'some'" })
   end
   local steps = {
@@ -351,7 +352,7 @@ describe("random scenes without couplings", function()
     ":collide { shape = rapid.levelset.box { voxel = 0.1 }, radius = 0, response = 'stick' }",
   }
 
-  for k = 1, tonumber(os.getenv "PARTS_SCENES") or 12 do
+  for k = 1, amount.of("PARTS_SCENES", 5) do
     it("are their parts, number " .. k, function()
       local chain = { "local rapid = require 'rapid'", ("return rapid.create { seed = %d, subframes = %d%s }"):format(k,
         pick { 1, 1, 2 }, pick { "", ", points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.25 }" }) }

@@ -193,7 +193,8 @@ it("four", function() io.write "no newline" end)]]
     assert.equal(by_one.stderr, at_once.stderr)
     assert.equal(1, at_once.status)
     local lines = "file\none\nprogram\nFAILED two\n.-three\nFAILED three\n.-file\nno newline"
-    assert.truthy(at_once.stdout:find("^" .. lines .. "FAILED two is false\n.-\n" .. lines .. "5 passed"), at_once.stdout)
+    local pattern = "^" .. lines .. "FAILED two is false\n.-\n" .. lines .. "5 passed"
+    assert.truthy(at_once.stdout:find(pattern), at_once.stdout)
   end)
 
   it("refuses a number of jobs that is none", function()

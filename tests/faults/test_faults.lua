@@ -1,12 +1,13 @@
 -- Faults of the system in a small run: a disk that is full or breaks, short counts. Whatever fails, the run ends with a
 -- documented status and says what was wrong, and every file that is there is whole.
 --
---   RAPID_FAULTS=10000 rapid test tests/faults/test_faults.lua      as many faults (1,000)
+--   RAPID_FAULTS=10000 rapid test tests/faults/test_faults.lua      as many faults (100)
 --   RAPID_FAULT_SEED=2 rapid test tests/faults/test_faults.lua      others (1)
 local command = require "testing.command"
+local amount = require "tests.amount"
 local lehmer = require "tests.lehmer"
 
-local faults = tonumber(os.getenv "RAPID_FAULTS" or 1000)
+local faults = amount.of("RAPID_FAULTS", 100)
 
 local scene = [[
 local rapid = require "rapid"

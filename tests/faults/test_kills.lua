@@ -1,9 +1,10 @@
 -- Runs that are killed at any moment, alone and beside others: whole files stay, and no others.
 --
---   RAPID_KILLS=1000 rapid test tests/faults/test_kills.lua      as many kills (100)
+--   RAPID_KILLS=1000 rapid test tests/faults/test_kills.lua      as many kills (20)
 local command = require "testing.command"
+local amount = require "tests.amount"
 
-local kills = tonumber(os.getenv "RAPID_KILLS" or 100)
+local kills = amount.of("RAPID_KILLS", 20)
 
 local scene = [[
 local rapid = require "rapid"

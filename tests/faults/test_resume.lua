@@ -1,23 +1,30 @@
 -- Runs with --cache that are killed at any moment and picked up again, on another number of threads: in the end each
 -- scene has the files and the statistics of a run that was not interrupted.
 --
---   RAPID_RESUMES=20 rapid test tests/faults/test_resume.lua      as many kills of each scene (2)
+--   RAPID_RESUMES=20 rapid test tests/faults/test_resume.lua      as many kills of each scene (0.2: of each fifth)
 --   RAPID_RESUME_SCENES=pile,drop                                 of these scenes alone
+local amount = require "tests.amount"
 local command = require "testing.command"
 local lehmer = require "tests.lehmer"
 local statistics = require "tests.same_statistics"
 
-local kills = tonumber(os.getenv "RAPID_RESUMES" or 2)
+local kills = amount.of("RAPID_RESUMES", 0.2)
 local only = os.getenv "RAPID_RESUME_SCENES"
 local random = lehmer.new(tonumber(os.getenv "RAPID_RESUME_SEED" or 7))
 
 local frames = 16
 local root = command.binary():match "^(.*)/build/[^/]*/bin/[^/]*$"
 
-local scenes = {}
+local every = kills < 1 and math.floor(1 / kills + 0.5) or 1
+kills = math.max(kills, 1)
+
+local scenes, number = {}, 0
 for path in io.popen(("ls %s/graphs/*.lua"):format(command.quoted(root))):lines() do
   local name = path:match "([^/]*)%.lua$"
-  if not only or ("," .. only .. ","):find("," .. name .. ",", 1, true) then scenes[#scenes + 1] = { name, path } end
+  if not only or ("," .. only .. ","):find("," .. name .. ",", 1, true) then
+    if number % every == 0 then scenes[#scenes + 1] = { name, path } end
+    number = number + 1
+  end
 end
 
 local script = [[

@@ -18,6 +18,7 @@
 
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
+#include "tests/amount.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/host/forger.h"
 #include "tests/host/run.h"
@@ -28,12 +29,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-
-int setting(const char* name, int usual)
-{
-    const char* text = std::getenv(name);
-    return text ? std::atoi(text) : usual;
-}
 
 std::vector<std::pair<std::string, fs::path>> scenes(const fs::path& folder)
 {
@@ -87,7 +82,7 @@ TEST_CASE("goes on behind crafted snapshots", "[.]")
     auto* const report =
         static_cast<Report*>(::mmap(nullptr, sizeof(Report), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0));
     const SavedState whole = StateFile(folder / "whole").state();
-    const int end = setting("RAPID_TEST_END", 0), step = setting("RAPID_TEST_STEP", 1);
+    const int end = amount("RAPID_TEST_END", 0), step = amount("RAPID_TEST_STEP", 1);
     for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGILL, SIGBUS, SIGALRM, SIGPROF}) ::signal(signal, SIG_DFL);
     limit();
     for (; report->next < end; report->next += step) {
@@ -103,7 +98,7 @@ TEST_CASE("goes on behind crafted snapshots", "[.]")
     ::_exit(0);
 }
 
-TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "[crafted][long]")
+TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "[crafted][random]")
 {
     const test::TemporaryFolder folder;
     const auto all = scenes(folder.path());
@@ -120,11 +115,11 @@ TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "
         }
         go_on_behind(StateFile(folder / "whole").state(), scene);
 
-        Report report{setting("RAPID_CRAFTED_FIRST", 0) / step * step + static_cast<int>(k), 0, 0};
+        Report report{amount("RAPID_CRAFTED_FIRST", 0) / step * step + static_cast<int>(k), 0, 0};
         std::ofstream(folder / "report", std::ios::binary).write(reinterpret_cast<char*>(&report), sizeof report);
         ::setenv("RAPID_TEST_SNAPSHOT", folder.path().c_str(), 1);
         ::setenv("RAPID_TEST_SCENE", scene.c_str(), 1);
-        ::setenv("RAPID_TEST_END", std::to_string(setting("RAPID_CRAFTED", 300)).c_str(), 1);
+        ::setenv("RAPID_TEST_END", std::to_string(amount("RAPID_CRAFTED", 100)).c_str(), 1);
         ::setenv("RAPID_TEST_STEP", std::to_string(step).c_str(), 1);
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         const int status = std::system(("'" + program + "' 'goes on behind crafted snapshots' >/dev/null").c_str());

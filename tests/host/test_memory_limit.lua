@@ -1,7 +1,8 @@
 -- --script-memory, at whatever moment it is reached: in the interpreter, and in code that LuaJIT has compiled, which it
 -- may have linked to other code since it began.
 --
---   RAPID_LIMITS=100 build/test/bin/rapid test tests/host/test_memory_limit.lua   as many of each place and program (2)
+--   RAPID_LIMITS=100 build/test/bin/rapid test tests/host/test_memory_limit.lua   as many of each place and program (1)
+local amount = require "tests.amount"
 local lehmer = require "tests.lehmer".new(5)
 local places = require "tests.script_places"
 local scene = require "testing.scene"
@@ -25,7 +26,7 @@ local programs = {
 
 describe("--script-memory", function()
   it("is an error with its place, in every place and program, at any limit", function()
-    for _ = 1, tonumber(os.getenv "RAPID_LIMITS" or 2) do
+    for _ = 1, amount.of("RAPID_LIMITS", 1) do
       for where, place in pairs(places) do
         for name, program in pairs(programs) do
           local limit = 9000000 + lehmer.below(24000000)

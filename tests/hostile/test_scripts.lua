@@ -3,11 +3,12 @@
 -- HOSTILE_SCRIPTS is how many are tried, HOSTILE_STRESSED how many of them with Lua's collector at work all the time (a
 -- fifth), HOSTILE_SEED the first one's seed.
 local command = require "testing.command"
+local amount = require "tests.amount"
 local library = require "tests.faults.library"
 local judged = require "tests.hostile.judged"
 local scripts = require "tests.hostile.scripts"
 
-local count = tonumber(os.getenv "HOSTILE_SCRIPTS" or 100)
+local count = amount.of("HOSTILE_SCRIPTS", 10)
 local many_stressed = tonumber(os.getenv "HOSTILE_STRESSED" or math.ceil(count / 5))
 local first = tonumber(os.getenv "HOSTILE_SEED" or 1)
 

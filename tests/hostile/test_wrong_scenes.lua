@@ -2,10 +2,11 @@
 --
 -- WRONG_SCENES is how many are tried, WRONG_SEED the first one's seed.
 local command = require "testing.command"
+local amount = require "tests.amount"
 local judged = require "tests.hostile.judged"
 local wrong_scenes = require "tests.hostile.wrong_scenes"
 
-local count = tonumber(os.getenv "WRONG_SCENES" or 200)
+local count = amount.of("WRONG_SCENES", 20)
 local first = tonumber(os.getenv "WRONG_SEED" or 1)
 
 -- The scene's file with the line or without, a node, or a file that can't be written.

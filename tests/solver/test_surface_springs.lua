@@ -1,8 +1,9 @@
 -- :spring with a shape as its target: the energy at any stiffness, the path along curved surfaces, its order.
 local scene = require "testing.scene"
+local amount = require "tests.amount"
 local lehmer = require "tests.lehmer"
 
-local scenes, seed = tonumber(os.getenv "SPRING_SCENES") or 60, tonumber(os.getenv "SPRING_SEED") or 1
+local scenes, seed = amount.of("SPRING_SCENES", 20), tonumber(os.getenv "SPRING_SEED") or 1
 
 local function run(text, last, every)
   local frames = every and {1, last} or {last, last}

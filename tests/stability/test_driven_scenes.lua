@@ -5,13 +5,14 @@
 -- changed it by. In the suite some are run; STABILITY_SCENES=1000 STABILITY_SEED=7 rapid test tests/stability runs
 -- more, and others. Of a scene that is wrong, the simplest that still is so is shown, ready to run.
 local scene = require "testing.scene"
+local amount = require "tests.amount"
 local json = require "dkjson"
 local driven_scenes = require "tests.stability.driven_scenes"
 local passive_scenes = require "tests.verification.passive_scenes"
 local mechanical_energy = require "tests.verification.mechanical_energy"
 local simplest = require "tests.verification.simplest"
 
-local scenes = tonumber(os.getenv "STABILITY_SCENES") or 50
+local scenes = amount.of("STABILITY_SCENES", 10)
 local seed = tonumber(os.getenv "STABILITY_SEED") or 1
 local allowed = 0.01 -- of the most energy that is in motion or stored in springs
 

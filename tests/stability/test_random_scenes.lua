@@ -5,9 +5,10 @@
 -- STABILITY_SEED=7 rapid test tests/stability runs more, and others. A scene that fails is shown whole, with its number
 -- and seed.
 local scene = require "testing.scene"
+local amount = require "tests.amount"
 local random_scenes = require "tests.stability.random_scenes"
 
-local scenes = tonumber(os.getenv "STABILITY_SCENES") or 100
+local scenes = amount.of("STABILITY_SCENES", 100)
 local seed = tonumber(os.getenv "STABILITY_SEED") or 1
 -- s of all processors for one scene. The usual one takes 0.01; half of this, 4,800 points that are bound each to all
 -- others, in 16 sub-steps.

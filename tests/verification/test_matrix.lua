@@ -1,10 +1,11 @@
--- Each row of the verification matrix (matrix.lua) holds. Long rows are measured where VERIFICATION_LONG is set;
--- VERIFICATION_ONLY is a word that a row's case, feature or law must contain, VERIFICATION_TABLE a file that the table
--- is written into. tests/verification/run sets them.
+-- Each row of the verification matrix (matrix.lua) holds. tests/run --thorough measures long rows, too, and so does
+-- VERIFICATION_LONG=1. VERIFICATION_ONLY is a word that a row's case, feature or law must contain, VERIFICATION_TABLE a
+-- file that the table is written into. tests/verification/run sets them.
+local amount = require "tests.amount"
 local matrix = require "tests.verification.matrix"
 
 local only = os.getenv "VERIFICATION_ONLY" or ""
-local with_long = os.getenv "VERIFICATION_LONG"
+local with_long = os.getenv "VERIFICATION_LONG" or amount.thorough
 local measured = {}
 
 describe("verification", function()

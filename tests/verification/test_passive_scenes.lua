@@ -4,12 +4,13 @@
 -- In the suite some are run; PASSIVE_SCENES=2000 PASSIVE_SEED=7 rapid test tests/verification runs more, and others. Of
 -- a scene that gains, the simplest that still does is shown, ready to run.
 local scene = require "testing.scene"
+local amount = require "tests.amount"
 local json = require "dkjson"
 local passive_scenes = require "tests.verification.passive_scenes"
 local mechanical_energy = require "tests.verification.mechanical_energy"
 local simplest = require "tests.verification.simplest"
 
-local scenes = tonumber(os.getenv "PASSIVE_SCENES") or 50 -- of each kind
+local scenes = amount.of("PASSIVE_SCENES", 20) -- of each kind
 local seed = tonumber(os.getenv "PASSIVE_SEED") or 1
 local allowed = 0.01 -- of the most energy that is in motion or stored in springs
 

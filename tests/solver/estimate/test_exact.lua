@@ -4,11 +4,12 @@
 -- runs more, and others.
 local ffi = require "ffi"
 local scene = require "testing.scene"
+local amount = require "tests.amount"
 local lehmer = require "tests.lehmer"
 
 local draw = lehmer.new()
 local pick, chance, between, magnitude = draw.pick, draw.chance, draw.between, draw.magnitude
-local scenes = tonumber(os.getenv "EXACT_SCENES") or 60
+local scenes = amount.of("EXACT_SCENES", 20)
 local seed = tonumber(os.getenv "EXACT_SEED") or 1
 local fps, frames = 24, 12
 

@@ -14,8 +14,7 @@ import unittest
 
 sys.dont_write_bytecode = True  # in the folder of the sources
 root = pathlib.Path(__file__).resolve().parents[2]
-if "RAPID_INSTALLED" not in os.environ:
-    sys.path.insert(0, str(root / "bindings/python"))
+sys.path.insert(0, str(root / "bindings/python"))
 
 import numpy  # noqa: E402
 

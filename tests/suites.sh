@@ -68,7 +68,8 @@ catch_filter() {
     return "$status"
 }
 
-lua_tests() { build/test/bin/rapid test --slowest 30 "$@"; }
+# lua_tests BUILD FILE...
+lua_tests() { "$1/bin/rapid" test --slowest 30 "${@:2}"; }
 
 # sanitized SUITE PRESET FOLDER...: builds the Catch2 tests of these folders with a sanitizer and assertions, and runs
 # them.

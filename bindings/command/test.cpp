@@ -125,8 +125,7 @@ private:
             running.clear();
             std::vector<TestFile*> files_of_running;
             for (std::size_t i = reported; i < files.size() && running.size() < jobs; ++i) {
-                if (i == tests.size())
-                    tests.push_back(std::make_unique<TestFile>(files[i], words, files.size() > 1));
+                if (i == tests.size()) tests.push_back(std::make_unique<TestFile>(files[i], words, files.size() > 1));
                 if (tests[i]->has_ended()) continue;
                 running.push_back({tests[i]->descriptor(), POLLIN, 0});
                 files_of_running.push_back(tests[i].get());

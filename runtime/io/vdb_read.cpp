@@ -18,6 +18,7 @@
 #include "runtime/io/point_message.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_types.h"
+#include "runtime/shapes/level_set/vdb_file.h"
 
 namespace rapid {
 namespace {
@@ -27,6 +28,43 @@ using vdb::points::AttributeArray;
 using vdb::points::PointDataGrid;
 using vdb::points::PointDataTree;
 using Leaf = PointDataTree::LeafNodeType;
+
+// Whether the voxels' offsets ascend, up to the length of the arrays. A leaf without points has arrays of one value.
+bool has_valid_offsets(const Leaf& leaf)
+{
+    for (vdb::Index voxel = 1; voxel < Leaf::SIZE; ++voxel)
+        if (leaf.getValue(voxel - 1) > leaf.getValue(voxel)) return false;
+    const auto& arrays = leaf.attributeSet();
+    for (std::size_t a = 0; leaf.getLastValue() > 0 && a < arrays.size(); ++a)
+        if (arrays.getConst(a)->size() != leaf.getLastValue()) return false;
+    return true;
+}
+
+bool have_same_attributes(const Leaf& leaf, const Leaf& other)
+{
+    const auto &arrays = leaf.attributeSet(), &others = other.attributeSet();
+    if (&arrays.descriptor() != &others.descriptor() && arrays.descriptor() != others.descriptor()) return false;
+    for (std::size_t a = 0; a < arrays.size(); ++a)
+        if (arrays.getConst(a)->stride() != others.getConst(a)->stride()) return false;
+    return true;
+}
+
+// The number of points of a grid. Throws if reading them would lead out of a leaf's arrays.
+std::size_t checked_count(const PointDataGrid& grid)
+{
+    std::size_t count = 0;
+    const auto first = grid.tree().cbeginLeaf();
+    for (auto leaf = first; leaf; ++leaf) {
+        if (!has_valid_offsets(*leaf))
+            throw Error(fmt::format("can't be read: a leaf of the grid \"{}\" has more points than values of them",
+                                    grid.getName()));
+        if (!have_same_attributes(*leaf, *first))
+            throw Error(
+                fmt::format("can't be read: the leaves of the grid \"{}\" differ in their attributes", grid.getName()));
+        count += leaf->getLastValue();
+    }
+    return count;
+}
 
 // A leaf with points, and the index of its first point in the set.
 struct LeafRange {
@@ -212,20 +250,19 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
     initialize_openvdb();
     const LeftOut left_out;
     try {
-        vdb::io::File file(path.string());
-        file.open(/*delayed loading=*/false);
+        VdbFile file(path);
         std::vector<PointDataGrid::ConstPtr> grids;
         std::string others;
         std::size_t count = 0;
-        for (auto name = file.beginName(); name != file.endName(); ++name) {
-            const auto metadata = file.readGridMetadata(name.gridName());
-            if (!metadata->isType<PointDataGrid>()) {
-                LeftOut::add(fmt::format("the grid \"{}\" ({})", name.gridName(), metadata->type()));
-                others += fmt::format("{}\"{}\" ({})", others.empty() ? "" : ", ", name.gridName(), metadata->type());
+        for (const vdb::GridBase::Ptr& grid : file.grids()) {
+            if (!grid->isType<PointDataGrid>()) {
+                const std::string what = fmt::format("\"{}\" ({})", grid->getName(), grid->type());
+                LeftOut::add("the grid " + what);
+                others += (others.empty() ? "" : ", ") + what;
                 continue;
             }
-            grids.push_back(vdb::gridConstPtrCast<PointDataGrid>(file.readGrid(name.gridName())));
-            for (auto leaf = grids.back()->tree().cbeginLeaf(); leaf; ++leaf) count += leaf->getLastValue();
+            grids.push_back(vdb::gridConstPtrCast<PointDataGrid>(file.read(grid)));
+            count += checked_count(*grids.back());
         }
         if (grids.empty())
             throw Error(others.empty() ? std::string("the file holds no grids")

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointConversion.h>
@@ -195,6 +196,50 @@ TEST_CASE("a .vdb without points says which grids it has", "[io][vdb]")
 
     CHECK(error_of([&] { read_points(folder / "a.vdb"); }) ==
           (folder / "a.vdb").string() + ": the file holds no points; its grids are \"surface\" (Tree_float_5_4_3)");
+}
+
+TEST_CASE("a .vdb that is cut is an error that says so", "[io][vdb]")
+{
+    const TemporaryFolder folder;
+    write_points(folder / "whole.vdb", random_points({.size = 100}));
+    const std::string whole = file_text(folder / "whole.vdb");
+    for (const std::size_t missing : {1, 50, 100}) {
+        const auto path = folder.write("cut.vdb", whole.substr(0, whole.size() - missing));
+        CHECK(error_of([&] { read_points(path); }) ==
+              fmt::format("{}: can't be read: it is cut: its grid \"points\" ends at byte {}, the file at byte {}",
+                          path.string(), whole.size(), whole.size() - missing));
+    }
+    const auto header = folder.write("header.vdb", whole.substr(0, 40));
+    CHECK(error_of([&] { read_points(header); }) == header.string() + ": can't be read: it is cut or damaged");
+    // Bytes after the last grid are nobody's.
+    CHECK(read_points(folder.write("longer.vdb", whole + "more")).size() == 100);
+}
+
+TEST_CASE("a .vdb whose sizes contradict each other is refused before OpenVDB reads beyond its arrays", "[io][vdb]")
+{
+    constexpr std::uint32_t size = 100;
+    const TemporaryFolder folder;
+    PointSet points;
+    points.append(size);
+    points.add({"pscale", 0.02f});
+    write_points(folder / "whole.vdb", points);
+    const std::string whole = file_text(folder / "whole.vdb");
+    // The array of one float for all points: its bytes and 6, its flags, how it is stored (paged, uniform), its points.
+    std::string array("\x0a\0\0\0\0\0\0\0\x08\x0a", 10);
+    array.append(reinterpret_cast<const char*>(&size), sizeof size);
+    const std::size_t at = whole.find(array);
+    REQUIRE(at != std::string::npos);
+    const auto error = [&](std::size_t offset, char value) {
+        std::string text = whole;
+        text[at + offset] = value;
+        const auto path = folder.write("damaged.vdb", text);
+        std::string message = error_of([&] { read_points(path); });
+        return message.erase(0, std::min(message.size(), path.string().size() + 2));
+    };
+    const std::string damaged = "can't be read: it is cut or damaged";
+    CHECK(error(0, 8) == damaged);  // two bytes
+    CHECK(error(9, 8) == damaged);  // not uniform: a float for each point
+    CHECK(error(10, 99) == "can't be read: a leaf of the grid \"points\" has more points than values of them");
 }
 
 TEST_CASE("a position that is not finite can't be written to .vdb, and the error names the point", "[io][vdb]")

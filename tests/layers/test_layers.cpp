@@ -60,7 +60,7 @@ const std::map<std::string, std::set<std::string>> below = {
       "runtime/solver", "runtime/solver/collision", "runtime/solver/constraints", "runtime/solver/estimate",
       "runtime/graph", "runtime/operators/emit", "runtime/operators/goal", "runtime/operators/solve"}},
     {"runtime/picture", {"runtime", "runtime/points", "runtime/shapes/mesh"}},
-    {"runtime/io", {"runtime", "runtime/files", "runtime/points", "runtime/picture"}},
+    {"runtime/io", {"runtime", "runtime/files", "runtime/points", "runtime/shapes/level_set", "runtime/picture"}},
     {"runtime/report", {"runtime", "runtime/files", "runtime/points", "runtime/graph"}},
 };
 

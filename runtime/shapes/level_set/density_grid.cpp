@@ -1,7 +1,6 @@
 #include "runtime/shapes/level_set/density_grid.h"
 
 #include <fmt/format.h>
-#include <openvdb/io/File.h>
 
 #include <algorithm>
 #include <limits>
@@ -12,6 +11,7 @@
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/open_grids.h"
+#include "runtime/shapes/level_set/vdb_file.h"
 #include "runtime/shapes/scatter/alias_table.h"
 
 namespace rapid {
@@ -118,16 +118,15 @@ FloatGrid::Ptr read_fog(const std::filesystem::path& file_path, const std::strin
     initialize_openvdb();
     const std::string path = file_path.string();
     try {
-        openvdb::io::File file(path);
-        file.open(/*delayLoad=*/false);
-        const auto chosen = choose_fog(path, name, *file.readAllGridMetadata());
+        VdbFile file(file_path);
+        const auto chosen = choose_fog(path, name, file.grids());
         if (!is_fog(*chosen))
             throw Error(fmt::format(
                 "grid \"{}\" of \"{}\" is {}{}; it must be a fog of floats: rapid.levelset.read takes "
                 "level sets, rapid.grid.read vectors",
                 chosen->getName(), path, chosen->getGridClass() == openvdb::GRID_LEVEL_SET ? "a level set of " : "",
                 chosen->valueType()));
-        return openvdb::gridPtrCast<FloatGrid>(file.readGrid(chosen->getName()));
+        return openvdb::gridPtrCast<FloatGrid>(file.read(chosen));
     } catch (const openvdb::Exception& e) {
         throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path, e.what()));
     }

@@ -1,6 +1,5 @@
 // Level sets in .vdb files, by the names of their grids.
 #include <fmt/format.h>
-#include <openvdb/io/File.h>
 
 #include <algorithm>
 
@@ -9,6 +8,7 @@
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/vdb_archive.h"
+#include "runtime/shapes/level_set/vdb_file.h"
 
 namespace rapid {
 namespace {
@@ -41,10 +41,8 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
     initialize_openvdb();
     const std::string path = file_path.string();
     try {
-        openvdb::io::File file(path);
-        file.open(/*delayLoad=*/false);
-        const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
-        const auto chosen = choose_level_set(path, name, *grids);
+        VdbFile file(file_path);
+        const auto chosen = choose_level_set(path, name, file.grids());
         if (!is_level_set(*chosen))
             throw Error(fmt::format("grid \"{}\" of \"{}\" is {} of class \"{}\"; it must be a float level set",
                                     chosen->getName(), path, chosen->valueType(),
@@ -55,7 +53,7 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
                 fmt::format("the map of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample it "
                             "to cubic voxels along the axes",
                             chosen->getName(), path));
-        const auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid(chosen->getName()));
+        const auto grid = openvdb::gridPtrCast<FloatGrid>(file.read(chosen));
         if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles(/*threaded=*/false);
         return grid;
     } catch (const openvdb::Exception& e) {

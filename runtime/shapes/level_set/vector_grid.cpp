@@ -1,13 +1,13 @@
 #include "runtime/shapes/level_set/vector_grid.h"
 
 #include <fmt/format.h>
-#include <openvdb/io/File.h>
 
 #include "runtime/error.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/open_grids.h"
+#include "runtime/shapes/level_set/vdb_file.h"
 
 namespace rapid {
 namespace {
@@ -34,15 +34,14 @@ Vec3SGrid::Ptr read_vectors(const std::filesystem::path& file_path, const std::s
     initialize_openvdb();
     const std::string path = file_path.string();
     try {
-        openvdb::io::File file(path);
-        file.open(/*delayLoad=*/false);
-        const auto chosen = choose_vectors(path, name, *file.readAllGridMetadata());
+        VdbFile file(file_path);
+        const auto chosen = choose_vectors(path, name, file.grids());
         if (!chosen->isType<Vec3SGrid>())
             throw Error(
                 fmt::format("grid \"{}\" of \"{}\" is {}; it must be of vectors (vec3s): three grids of floats are "
                             "merged into one where they are made",
                             chosen->getName(), path, chosen->valueType()));
-        return openvdb::gridPtrCast<Vec3SGrid>(file.readGrid(chosen->getName()));
+        return openvdb::gridPtrCast<Vec3SGrid>(file.read(chosen));
     } catch (const openvdb::Exception& e) {
         throw Error(fmt::format("cannot read \"{}\": {}; it must be an OpenVDB file", path, e.what()));
     }

@@ -1,4 +1,6 @@
+#include <fmt/format.h>
 #include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
@@ -95,6 +97,36 @@ TEST_CASE("a file's other grids are left alone, and a grid is found by its name"
     CHECK_THAT(
         folder.message_of([&] { read_level_set(file, "density"); }),
         Equals("grid \"density\" of \"both.vdb\" is float of class \"fog volume\"; it must be a float level set"));
+}
+
+TEST_CASE("level sets that share their values, and files without offsets, are read", "[level set][file]")
+{
+    const Folder folder;
+    const auto first = sphere_grid("first"), other = sphere_grid("other");
+    const auto second = first->copy();  // of the same tree
+    second->setName("second");
+    folder.write_grids("shared.vdb", {first, second, other});
+    std::ofstream stream(folder / "stream.vdb", std::ios::binary);
+    openvdb::io::Stream(stream).write(openvdb::GridCPtrVec{first, second, other});
+    stream.close();
+    for (const char* file : {"shared.vdb", "stream.vdb"}) {
+        const auto expected = distances(*read_level_set(folder / file, "other"));
+        CHECK(distances(*read_level_set(folder / file, "first")) == expected);
+        CHECK(distances(*read_level_set(folder / file, "second")) == expected);
+    }
+}
+
+TEST_CASE("a level set that is cut is an error that says so", "[level set][file]")
+{
+    const Folder folder;
+    folder.write_grids("whole.vdb", {sphere_grid("surface")});
+    const std::string whole = test::file_text(folder / "whole.vdb");
+    folder.write("cut.vdb", whole.substr(0, whole.size() - 100));
+    CHECK_THAT(folder.message_of([&] { read_level_set(folder / "cut.vdb", ""); }),
+               Equals(fmt::format(
+                   "cannot read \"cut.vdb\": can't be read: it is cut: its grid \"surface\" ends at byte {}, the file "
+                   "at byte {}",
+                   whole.size(), whole.size() - 100)));
 }
 
 TEST_CASE("files without a level set are refused by name", "[level set][file]")

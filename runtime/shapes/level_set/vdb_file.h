@@ -1,0 +1,33 @@
+// Reads .vdb files with OpenVDB, from memory.
+//
+// OpenVDB ignores the state of the stream that it reads from: the values that a cut file lacks would be those of memory
+// that was never written. The stream therefore throws, and sizes are checked before OpenVDB relies on them
+// (vdb_layout.h).
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <filesystem>
+#include <memory>
+
+namespace rapid {
+
+class VdbFile {
+public:
+    // Reads everything but the values of the grids. Throws Error if the file is cut or damaged, and openvdb::Exception
+    // if OpenVDB does not know what it holds.
+    explicit VdbFile(const std::filesystem::path& path);
+    ~VdbFile();
+
+    // The grids without their values, sorted by name.
+    const openvdb::GridPtrVec& grids() const;
+
+    // One of grids() with its values. Throws like the constructor.
+    openvdb::GridBase::Ptr read(const openvdb::GridBase::Ptr& grid);
+
+private:
+    class Archive;
+    std::unique_ptr<Archive> archive_;
+};
+
+}  // namespace rapid

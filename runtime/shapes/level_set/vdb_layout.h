@@ -1,0 +1,80 @@
+// Checks the sizes in a .vdb file that OpenVDB takes for granted.
+//
+// OpenVDB passes compressed data to Blosc, which reads as far as the data's own header says, and fills arrays as far as
+// the file says. A damaged size would therefore yield values from memory that was never written. These functions walk
+// over a grid without unpacking it and compare every size with the data it describes.
+//
+// Format versions 223 and 224. Older files know neither Blosc nor points; a checked stream (vdb_file.h) is enough for
+// them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/error.h"
+
+namespace rapid {
+
+// The file ends too early or contradicts itself.
+inline Error damaged_vdb() { return Error("can't be read: it is cut or damaged"); }
+
+// A position in the file. Every function throws Error if the file ends before.
+class VdbCursor {
+public:
+    VdbCursor(std::span<const unsigned char> file, std::size_t at) : file_(file), at_(at) {}
+
+    std::size_t at() const { return at_; }
+    std::span<const unsigned char> bytes(std::uint64_t count)
+    {
+        if (at_ > file_.size() || count > file_.size() - at_) throw damaged_vdb();
+        at_ += count;
+        return file_.subspan(at_ - count, count);
+    }
+    void skip(std::uint64_t count) { bytes(count); }
+    template <class T>
+    T take()
+    {
+        T value;
+        std::memcpy(&value, bytes(sizeof value).data(), sizeof value);
+        return value;
+    }
+    // A string after its length.
+    std::string text()
+    {
+        const auto taken = bytes(take<std::uint32_t>());
+        return {taken.begin(), taken.end()};
+    }
+
+private:
+    std::span<const unsigned char> file_;
+    std::size_t at_;
+};
+
+// How the values of a grid are stored.
+struct VdbValues {
+    std::size_t bytes = 0;          // of a value in memory
+    std::size_t stored_bytes = 0;   // of a value in the file: half of it in 16-bit grids
+    std::uint32_t compression = 0;  // OpenVDB's flags (openvdb/io/Compression.h)
+};
+
+// A chunk packed by Blosc, of the unpacked size. Point grids pad what is shorter than 128 bytes.
+enum class Padding { None, To128 };
+void check_packed(std::span<const unsigned char> chunk, std::uint64_t unpacked, Padding padding);
+
+// A list of metadata, up to its end.
+void check_metadata(VdbCursor& cursor);
+
+// The nodes of a tree, up to their end. Returns the number of active voxels of each leaf, in OpenVDB's order.
+std::vector<std::uint16_t> check_topology(VdbCursor& cursor, const VdbValues& values);
+
+// The voxels of the leaves of a grid that is not one of points, up to their end.
+void check_voxels(VdbCursor& cursor, const VdbValues& values, std::span<const std::uint16_t> active);
+
+// The voxels and attributes of a grid of points, up to their end.
+void check_points(VdbCursor& cursor, std::size_t leaves);
+
+}  // namespace rapid

@@ -204,6 +204,10 @@ void PlyFile::read_lists(const PlyElement& element, std::size_t wanted,
                 throw Error(fmt::format("{} {} of {}: a list of {} numbers is longer than the file", element.name, i,
                                         element.count, count));
             if (p == wanted) list.clear();
+            if (property.list && p != wanted && encoding_ != Encoding::Ascii) {
+                at_ += static_cast<std::size_t>(count) * scalar_bytes(property.type);
+                continue;
+            }
             for (auto left = static_cast<std::size_t>(count); left > 0; --left) {
                 const double number = take_number(element, i, property, property.type);
                 numbers_[p] = number;

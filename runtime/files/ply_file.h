@@ -46,7 +46,7 @@ public:
 
     const std::vector<PlyElement>& elements() const { return elements_; }
 
-    // The elements are read, or passed over, in their order.
+    // The elements are read, or passed over, in their order, and all of them: a file may be cut in its last one.
     PlyRecords read_records(const PlyElement& element);
     void read_lists(const PlyElement& element, std::size_t property,
                     const std::function<void(std::span<const std::int64_t> list)>& row);

@@ -471,6 +471,8 @@ PointSet read_bgeo(const std::filesystem::path& path)
     reader.take(stride_of_unread(reader, of_the_whole));
     reader.enter("groups");
     for (std::uint32_t g = 0; g < groups; ++g) read_group(reader, lines.points);
+    reader.enter("extra section");  // the shortest one, which all writers of the format end with
+    reader.take(end_section.size());
     if (lines.points.find_group(trail_places_group)) return without_trail_places(std::move(lines.points));
     return in_order_of_lines(lines);
 }

@@ -206,7 +206,8 @@ struct CsvColumn {
 
 Error csv_error(std::size_t line, const std::string& what) { return Error(fmt::format("line {}: {}", line, what)); }
 
-// A text at a place, in quotes or up to the next comma or the end of the line; where it ends.
+// Parses a string, which is in quotes or reaches up to the next comma or the end of the line. Returns where it ends, or
+// null if there is no closing quote.
 const char* parse_text(const char* at, const char* stop, std::string& text)
 {
     text.clear();
@@ -218,7 +219,7 @@ const char* parse_text(const char* at, const char* stop, std::string& text)
         if (*at == '"' && (++at == stop || *at != '"')) return at;
         text += *at;
     }
-    return stop;
+    return nullptr;
 }
 
 // Whether a value is no number.
@@ -238,6 +239,7 @@ void find_texts(std::string_view line, const std::vector<bool>& may_be_text, std
     for (std::size_t c = 0; c < columns.size() && at != stop; ++c) {
         columns[c].is_text = may_be_text[c] && is_text(at, stop);
         at = parse_text(at, stop, text);
+        if (!at) return;
         if (at != stop && *at == ',') ++at;
     }
 }
@@ -275,6 +277,9 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
                 }
                 if (columns[c].is_text) {
                     at = parse_text(at, stop, word);
+                    if (!at)
+                        throw csv_error(
+                            i + 2, fmt::format("{} has no closing quote; the file ends early or is damaged", names[c]));
                     columns[c].texts[i] = token_of_word(word);
                     continue;
                 }

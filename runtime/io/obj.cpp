@@ -120,7 +120,7 @@ PointSet read_obj(const std::filesystem::path& path)
         text.remove_prefix(std::min(text.size(), line.size() + 1));
         Words words(line);
         const std::string_view kind = words.next();
-        if (text.empty() && !ends && (kind == "v" || kind == "l"))
+        if (text.empty() && !ends && !kind.empty() && !kind.starts_with('#'))
             throw Error(
                 fmt::format("line {}: there is no newline at its end, so that its last number may be cut short; if the "
                             "file is whole, append a newline (echo >> FILE)",

@@ -156,8 +156,7 @@ PointSet read_ply(const std::filesystem::path& path)
     PlyFile file(input.text());
     std::optional<PointSet> points;
     for (const PlyElement& element : file.elements()) {
-        if (points) break;
-        if (element.name == "vertex")
+        if (element.name == "vertex" && !points)
             points = read_vertices(file, element);
         else
             file.pass_over(element);

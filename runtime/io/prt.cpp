@@ -275,7 +275,9 @@ PointSet read_prt(const std::filesystem::path& path)
         throw beyond_memory(fmt::format("{} points, decompressed,", n), both, "write fewer points to the file");
     const std::unique_ptr<unsigned char[]> records(new unsigned char[bytes]);
     uLongf found = bytes;
-    const int result = n == 0 ? Z_OK : ::uncompress(records.get(), &found, reader.rest().data(), reader.rest().size());
+    const bool is_empty = n == 0 && reader.rest().empty();  // nothing was compressed
+    const int result =
+        is_empty ? Z_OK : ::uncompress(records.get(), &found, reader.rest().data(), reader.rest().size());
     if (result == Z_MEM_ERROR) throw std::bad_alloc();
     if (found < bytes)
         throw Error(fmt::format("the file ends early or is damaged: its header promises {} points, it holds {}", n,

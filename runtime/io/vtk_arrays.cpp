@@ -80,7 +80,9 @@ VtkFile::VtkFile(std::string_view text, std::string_view type)
     if (appended != std::string_view::npos) {
         const std::size_t tag_end = text.find('>', appended);
         const std::size_t begin = tag_end == std::string_view::npos ? tag_end : text.find('_', tag_end);
-        if (begin == std::string_view::npos) throw Error("the file ends within its AppendedData");
+        const std::size_t last = text.find_last_not_of(xml_space);
+        if (begin == std::string_view::npos || !text.substr(0, last + 1).ends_with("</VTKFile>"))
+            throw Error("the file ends within its AppendedData");
         appended_base64_ = text.substr(appended, tag_end - appended).find("base64") != std::string_view::npos;
         appended_ = text.substr(begin + 1);
         xml += "</VTKFile>";

@@ -105,6 +105,7 @@ TEST_CASE("a .bgeo of another program is read: texts by their table, odd sizes b
     name("wood");
     for (const float number : {1.0f, 2.0f, 3.0f, 1.0f, 0.25f, 0.75f}) put(std::bit_cast<std::uint32_t>(number), 4);
     put(1, 4);
+    put(0x00ff, 2);
     std::ofstream(folder / "a.bgeo", std::ios::binary) << text;
 
     const PointSet points = read_points(folder / "a.bgeo");

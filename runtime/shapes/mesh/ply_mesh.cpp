@@ -259,21 +259,20 @@ MeshFile read_ply_mesh(const std::filesystem::path& path)
     const InputFile input(path);
     PlyFile file(input.text());
     MeshFile mesh;
-    bool placed = false;
+    bool has_vertices = false, has_faces = false;
     for (const PlyElement& element : file.elements()) {
-        if (element.name == "vertex" && !placed) {
+        if (element.name == "vertex" && !has_vertices) {
             read_vertices(file, element, mesh);
-            placed = true;
-        } else if (element.name == "face" && placed) {
+            has_vertices = true;
+        } else if (element.name == "face" && !has_faces) {
+            if (!has_vertices) throw Error("the faces are before the vertices");
             read_faces(file, element, mesh);
-            leave_out_others(file.elements(), mesh);
-            return mesh;
-        } else if (element.name == "face") {
-            throw Error("the faces are before the vertices");
+            has_faces = true;
         } else {
             file.pass_over(element);
         }
     }
+    if (has_faces) leave_out_others(file.elements(), mesh);
     return mesh;
 }
 

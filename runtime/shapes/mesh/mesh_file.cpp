@@ -20,6 +20,7 @@
 #include "runtime/files/left_out.h"
 #include "runtime/shapes/mesh/gltf_attributes.h"
 #include "runtime/shapes/mesh/mesh_file.h"
+#include "runtime/shapes/mesh/text_end.h"
 
 namespace rapid {
 namespace {
@@ -195,6 +196,7 @@ PartValues further_values(const std::filesystem::path& path, const aiScene& scen
 
 MeshFile import(const std::filesystem::path& path)
 {
+    check_text_end(path);
     Assimp::Importer importer;
     importer.SetIOHandler(new RegularFiles);  // the importer's from here on
     const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);

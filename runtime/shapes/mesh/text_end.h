@@ -1,0 +1,11 @@
+// The end of mesh files that are text. Assimp takes a cut one for a whole one.
+#pragma once
+
+#include <filesystem>
+
+namespace rapid {
+
+// Throws Error if an .stl that is text does not end with "endsolid", or an .obj within a line. Other files pass.
+void check_text_end(const std::filesystem::path& path);
+
+}  // namespace rapid

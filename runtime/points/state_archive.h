@@ -20,6 +20,8 @@
 #include <cereal/types/vector.hpp>
 #include <cstdint>
 #include <type_traits>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "runtime/points/point_set.h"
@@ -120,6 +122,20 @@ inline void load(StateReader& from, bool& value)
     std::uint8_t byte = 0;
     load(from, byte);
     value = byte != 0;
+}
+
+// As cereal saves it. Its own function throws an exception that is no Error if the index is out of range.
+template <class First, class... Rest>
+void load(StateReader& from, std::variant<First, Rest...>& value)
+{
+    std::int32_t index = 0;
+    from(index);
+    StateReader::expect(0 <= index && index <= static_cast<std::int32_t>(sizeof...(Rest)));
+    const auto load_if = [&]<std::size_t k>(std::integral_constant<std::size_t, k>) {
+        if (static_cast<std::size_t>(index) == k) from(value.template emplace<k>());
+    };
+    [&]<std::size_t... k>(std::index_sequence<k...>) { (load_if(std::integral_constant<std::size_t, k>()), ...); }
+    (std::make_index_sequence<sizeof...(Rest) + 1>());
 }
 
 template <class T>

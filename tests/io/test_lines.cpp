@@ -7,27 +7,13 @@
 #include "runtime/io/format.h"
 #include "runtime/points/point_lines.h"
 #include "runtime/points/trail.h"
-#include "tests/io/random_points.h"
+#include "tests/io/points_with_trails.h"
 #include "tests/test.h"
 
 using namespace rapid;
 using namespace rapid::test;
 
 namespace {
-
-// Point i has been i % 4 places long.
-PointSet with_trails(std::size_t size)
-{
-    PointSet points = random_points({.size = size, .wide = false, .texts = false});
-    for (const AttributeSpec& column : trail_columns(3)) points.add(column);
-    const std::span<std::int32_t> count = points.column<std::int32_t>(trail_count_name).write();
-    for (std::size_t i = 0; i < size; ++i) count[i] = static_cast<std::int32_t>(i % 4);
-    for (int place = 1; place <= 3; ++place) {
-        const std::span<Vec3f> P = points.column<Vec3f>(trail_name(place)).write();
-        for (std::size_t i = 0; i < size; ++i) P[i] = points.P()[i] + Vec3f(0, static_cast<float>(place), 0);
-    }
-    return points;
-}
 
 // 0 0 0 -1 2 2 -1: two lines, of three points and of two.
 PointSet with_curves()
@@ -57,7 +43,7 @@ private:
 
 TEST_CASE("the lines of trails go from each point backwards, and the set comes back from them", "[io][lines]")
 {
-    const PointSet points = with_trails(9);
+    const PointSet points = points_with_trails(9);
     const PointLines lines = with_lines(points);
     CHECK(lines.sizes == std::vector<std::uint32_t>{2, 3, 4, 2, 3, 4});
     REQUIRE(lines.points.size() == 9 + 1 + 2 + 3 + 1 + 2 + 3);
@@ -76,7 +62,7 @@ TEST_CASE("points with trails come back from .bgeo and .ply with the same bits",
     const std::string extension = GENERATE(".bgeo", ".ply");
     CAPTURE(size, extension);
     const TemporaryFolder folder;
-    const PointSet points = with_trails(size);
+    const PointSet points = points_with_trails(size);
     const LeftOut left_out;
     write_points(folder / ("a" + extension), points);
     CHECK(differing_columns(points, read_points(folder / ("a" + extension))) == "");
@@ -184,6 +170,6 @@ TEST_CASE("an .obj has a line through each curve, and the other points", "[io][l
     const TemporaryFolder folder;
     write_points(folder / "a.obj", with_curves());
     CHECK_THAT(file_text(folder / "a.obj"), Catch::EndsWith("\np 4\np 7\nl 1 2 3\nl 5 6\n"));
-    write_points(folder / "b.obj", with_trails(3));
+    write_points(folder / "b.obj", points_with_trails(3));
     CHECK_THAT(file_text(folder / "b.obj"), Catch::EndsWith("\np 1\nl 2 4\nl 3 5 6\n"));
 }

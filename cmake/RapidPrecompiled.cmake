@@ -16,5 +16,6 @@ set(rapid_common_headers <algorithm> <array> <cmath> <cstdint> <filesystem> <fun
   <variant> <vector> <Eigen/Core> <Eigen/Geometry> <fmt/format.h> <tbb/parallel_for.h>)
 
 rapid_precompile(rapid_precompiled ${rapid_common_headers})
-rapid_precompile(rapid_precompiled_openvdb ${rapid_common_headers} <openvdb/openvdb.h>)
+rapid_precompile(rapid_precompiled_openvdb ${rapid_common_headers}
+  ${PROJECT_SOURCE_DIR}/runtime/openvdb_grids.h)
 target_link_libraries(rapid_precompiled_openvdb PRIVATE OpenVDB::openvdb)

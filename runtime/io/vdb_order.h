@@ -3,11 +3,10 @@
 // (column_files.h) are sorted there, a few leaves at a time.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstdint>
 #include <vector>
 
+#include "runtime/openvdb_grids.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {

@@ -1,9 +1,7 @@
 // Reads .vdb (vdb.h).
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
-#include <openvdb/points/PointDataGrid.h>
 #include <openvdb/points/PointGroup.h>
 #include <tbb/parallel_for.h>
 
@@ -17,6 +15,7 @@
 #include "runtime/io/id_order.h"
 #include "runtime/io/point_message.h"
 #include "runtime/io/vdb.h"
+#include "runtime/io/vdb_points.h"
 #include "runtime/io/vdb_types.h"
 #include "runtime/shapes/level_set/vdb_file.h"
 

@@ -1,10 +1,9 @@
 // Rapid's attribute types and OpenVDB's.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <type_traits>
 
+#include "runtime/openvdb_grids.h"
 #include "runtime/points/token.h"
 #include "runtime/vec.h"
 

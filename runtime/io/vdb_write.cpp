@@ -2,10 +2,8 @@
 // written here, page by page, as OpenVDB's own leaves would. So no grid is held in memory, values are packed once, not
 // twice, and by all threads.
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
-#include <openvdb/points/PointDataGrid.h>
 #include <openvdb/points/PointGroup.h>
 #include <openvdb/points/StreamCompression.h>
 #include <tbb/parallel_for.h>
@@ -23,6 +21,7 @@
 #include "runtime/io/text_table.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_order.h"
+#include "runtime/io/vdb_points.h"
 #include "runtime/io/vdb_types.h"
 #include "runtime/io/vdb_voxel.h"
 #include "runtime/points/column_files.h"

@@ -3,7 +3,6 @@
 // count.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/points/PointDataGrid.h>
 #include <openvdb/tools/PointIndexGrid.h>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "runtime/io/format.h"
+#include "runtime/openvdb_grids.h"
 #include "runtime/picture/picture.h"
 
 namespace {

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/points/PointCount.h>
@@ -7,6 +6,7 @@
 #include <tbb/global_control.h>
 
 #include "runtime/io/format.h"
+#include "runtime/openvdb_grids.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
 

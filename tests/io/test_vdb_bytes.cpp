@@ -1,6 +1,5 @@
 // What Rapid writes of a grid by itself, against a grid that OpenVDB makes and writes as a whole.
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointConversion.h>
@@ -16,6 +15,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/vdb_types.h"
 #include "runtime/io/vdb_voxel.h"
+#include "runtime/openvdb_grids.h"
 #include "runtime/points/column_files.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"

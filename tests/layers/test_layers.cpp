@@ -186,7 +186,9 @@ TEST_CASE("a command is a program like others", "[layers]")
 TEST_CASE("only shapes and formats know OpenVDB", "[layers]")
 {
     for (const Include& include : includes_below("runtime")) {
-        if (include.included.rfind("openvdb/", 0) != 0) continue;
+        const std::string grids = "runtime/openvdb_grids.h";  // what both know of it
+        if (include.file == grids || (include.included.rfind("openvdb/", 0) != 0 && include.included != grids))
+            continue;
         CAPTURE(include.file, include.included);
         CHECK((include.folder.rfind("runtime/shapes/", 0) == 0 || include.folder == "runtime/io"));
     }

@@ -1,7 +1,6 @@
 #include "tests/mutants/whole_files.h"
 
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 #include <xxhash.h>
 
 #include <array>
@@ -13,6 +12,7 @@
 #include "runtime/files/output_file.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
+#include "runtime/openvdb_grids.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/io/points_with_trails.h"

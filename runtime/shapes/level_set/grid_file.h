@@ -1,9 +1,9 @@
 // For readers of .vdb files: how the grids in a file are named and chosen.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <string>
+
+#include "runtime/openvdb_grids.h"
 
 namespace rapid {
 

@@ -4,12 +4,12 @@
 #pragma once
 
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"
+#include "runtime/openvdb_grids.h"
 
 namespace rapid {
 

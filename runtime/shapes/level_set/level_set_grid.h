@@ -1,11 +1,10 @@
 // OpenVDB's grid of a level set, and the functions that build it. Includes OpenVDB; level_set.h is enough for queries.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <functional>
 #include <memory>
 
+#include "runtime/openvdb_grids.h"
 #include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/level_set/voxel_blocks.h"
 

@@ -9,6 +9,7 @@
 #include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
+#include "runtime/shapes/level_set/openvdb_meshes.h"
 #include "runtime/shapes/level_set/placed.h"
 
 namespace rapid {

@@ -4,7 +4,6 @@
 // too many triangles about them to ask each: there the distance is OpenVDB's, whose triangle may be the wrong one
 // beyond two voxels (by up to 0.7 of a voxel), corrected to a thousandth of a voxel. The sign is that of the winding
 // number. A mesh without one has OpenVDB's distances and signs.
-#include <openvdb/tools/MeshToVolume.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "runtime/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/mesh_blocks.h"
+#include "runtime/shapes/level_set/openvdb_meshes.h"
 #include "runtime/shapes/level_set/prism.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/mesh/ray_crossings.h"

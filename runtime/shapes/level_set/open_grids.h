@@ -1,11 +1,11 @@
 // Vector grids and fogs on OpenVDB grids. Includes OpenVDB; vector_grid.h and density_grid.h are enough for queries.
 #pragma once
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
 #include <cmath>
 
+#include "runtime/openvdb_grids.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 

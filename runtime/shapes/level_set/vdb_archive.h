@@ -1,10 +1,10 @@
 // Grids to .vdb files that get their names only when they are complete.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <filesystem>
 #include <string>
+
+#include "runtime/openvdb_grids.h"
 
 namespace rapid {
 

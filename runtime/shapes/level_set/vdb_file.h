@@ -5,10 +5,10 @@
 // (vdb_layout.h).
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <filesystem>
 #include <memory>
+
+#include "runtime/openvdb_grids.h"
 
 namespace rapid {
 

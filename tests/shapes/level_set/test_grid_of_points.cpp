@@ -1,3 +1,4 @@
+#include "runtime/openvdb_grids.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
 
 #include <openvdb/io/File.h>

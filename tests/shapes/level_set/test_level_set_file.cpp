@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <filesystem>
@@ -9,6 +8,7 @@
 #include <random>
 
 #include "runtime/error.h"
+#include "runtime/openvdb_grids.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/files/other_circumstances.h"
 #include "tests/files/temporary_folder.h"

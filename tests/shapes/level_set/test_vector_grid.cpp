@@ -1,7 +1,7 @@
+#include "runtime/openvdb_grids.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 
 #include <filesystem>
 

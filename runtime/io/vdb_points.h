@@ -1,0 +1,11 @@
+// OpenVDB's grids of points, as runtime/openvdb_grids.h has those of values.
+#pragma once
+
+#include <openvdb/points/PointDataGrid.h>
+
+#include "runtime/openvdb_grids.h"
+
+#ifdef __OPTIMIZE__
+extern template class openvdb::tree::Tree<openvdb::points::PointDataTree::RootNodeType>;
+extern template class openvdb::Grid<openvdb::points::PointDataTree>;
+#endif
